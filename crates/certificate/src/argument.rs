@@ -1,47 +1,51 @@
-//! The argument of a certificate as it is written.
+//! The argument (optimality proof) of a certificate: its JSON format.
 
 use crate::integer::Integer;
 use serde::{Deserialize, Serialize};
 
-/// The format of an argument.
+/// Value of [`Argument::format`].
 pub const ARGUMENT_FORMAT: &str = "metaplan-argument/1";
 
-/// Why no plan is cheaper. All costs and numbers are in the units of the task.
+/// A proof that no plan is cheaper than the claim. All costs and numbers are in the integer units
+/// of the task.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Argument {
     /// [`ARGUMENT_FORMAT`].
     pub format: String,
-    /// Lower bounds on what is still to be paid.
+    /// Lower bounds on the remaining cost (admissible heuristics).
     pub potentials: Vec<Potential>,
-    /// Lower bounds on what must be left of numbers.
+    /// Lower bounds on the resources that a state needs to reach the goal.
     pub needs: Vec<Need>,
-    /// The states that a cheaper plan would have to pass; none of them is a goal state that is cheaper than claimed.
+    /// States that cover the reachable states with a cost below the claim. None of them is a goal
+    /// state with a smaller cost than claimed.
     pub labels: Vec<Label>,
 }
 
-/// A lower bound on what is still to be paid, by the values of a few variables.
+/// A lower bound on the remaining cost, as a function of a few variables (a pattern).
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Potential {
     /// The variables, by position in the task.
     pub pattern: Vec<u32>,
-    /// For each combination of values, the last variable varying fastest; null where no goal state is within reach.
+    /// For each combination of values, the last variable varying fastest, the bound in cost
+    /// units; `null` if no goal state is reachable.
     pub values: Vec<Option<Integer>>,
 }
 
-/// A lower bound on what must be left of a number, by the values of a few variables.
+/// A lower bound on the required value of a numeric variable, as a function of a few variables.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Need {
-    /// The number, by position in the task.
+    /// The numeric variable, by position in the task.
     pub number: u32,
-    /// As in [`Potential::pattern`].
+    /// The variables of the pattern, as in [`Potential::pattern`].
     pub pattern: Vec<u32>,
-    /// As in [`Potential::values`].
+    /// For each combination of values the bound, as in [`Potential::values`].
     pub values: Vec<Option<Integer>>,
 }
 
-/// A state, derived variables left out, and what was paid on the way to it: values, numbers, costs.
+/// A reached state without its derived variables, and the cost of reaching it: (values, numbers,
+/// cost).
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Label(pub Vec<u32>, pub Vec<Integer>, pub Integer);

@@ -1,4 +1,5 @@
-//! Checks the argument of a certificate against the written task, by arithmetic alone.
+//! Checks an optimality proof against the ground task, by induction over the labels and with
+//! integer arithmetic only.
 
 use std::rc::Rc;
 
@@ -15,56 +16,57 @@ use crate::references;
 use crate::semantics::{State, holds_without_numbers};
 use crate::table::{Table, check_need, check_potential};
 
-/// Combinations of designs that matter, of all operators together, are not more than this.
+/// Upper limit on the number of non-dominated design combinations, summed over all operators.
 const CHOICE_LIMIT: usize = 1 << 20;
-/// Upper limit on the comparisons of two combinations of designs, of all operators together: about a second.
+/// Upper limit on the number of pairwise comparisons of design combinations, summed over all
+/// operators (about 1 s).
 const COMPARISON_LIMIT: usize = 1 << 25;
-/// Going through a combination counts as this many comparisons.
+/// Work of visiting one combination, in comparisons.
 const COMBINATION_COST: usize = 2;
 
-/// What was checked.
+/// Sizes of the checked proof.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Checked {
-    /// States that the induction goes through.
+    /// Number of states in the induction.
     pub labels: usize,
-    /// Tables of lower bounds on cost.
+    /// Number of tables of lower bounds on cost.
     pub potentials: usize,
-    /// Tables of lower bounds on resources.
+    /// Number of tables of lower bounds on resources.
     pub needs: usize,
 }
 
-/// Why a certificate is not accepted: the first thing that is wrong.
+/// The first reason for which a certificate is rejected.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Fault {
-    /// A document does not have its form.
+    /// A document is not well-formed.
     #[error("{document}: {reason}")]
     Form {
-        /// Which one.
+        /// Name of the document.
         document: &'static str,
-        /// What is wrong with it.
+        /// Description of the error.
         reason: String,
     },
-    /// The claimed cost is none that the task can have.
+    /// No plan of the task can have the claimed cost.
     #[error("no plan of the task can cost {0}")]
     Cost(String),
-    /// A table of lower bounds is wrong.
+    /// A table does not contain lower bounds.
     #[error("{table} {position} is not a lower bound: {reason}")]
     Bound {
-        /// `potential` or `need`.
+        /// Kind of the table: `potential` or `need`.
         table: &'static str,
-        /// Counted from 0.
+        /// Position of the table, from 0.
         position: usize,
-        /// Where it fails.
+        /// Entry or operator that violates the bound.
         reason: String,
     },
-    /// The initial state is not covered.
+    /// No label covers the initial state.
     #[error("no label covers the initial state")]
     Initial,
-    /// A label is a goal state that costs less than the claim.
+    /// A label is a goal state with a smaller cost than claimed.
     #[error("label {0} is a goal state, and cheaper than claimed")]
     Goal(usize),
-    /// A successor of a label is neither covered nor cut off.
+    /// A successor of a label is neither covered by a label nor pruned by a bound.
     #[error("label {label}, operator {operator}: nothing covers the state that follows")]
     Successor {
         /// Position of the label, from 0.
@@ -74,10 +76,11 @@ pub enum Fault {
     },
 }
 
-/// Checks that no plan of the task has a better metric than `claim`, or that it has no plan at all if there is no claim.
+/// Checks that no plan of the task has a better metric value than `claim`. Without a claim,
+/// checks that the task has no plan.
 ///
 /// # Errors
-/// The first thing that is wrong.
+/// The first fault that is found.
 pub fn check(task: &str, argument: &str, claim: Option<&BigRational>) -> Result<Checked, Fault> {
     let (model, argument, cost) = parse(task, argument, claim)?;
     let mut potentials = Vec::new();
@@ -122,7 +125,8 @@ pub fn check(task: &str, argument: &str, claim: Option<&BigRational>) -> Result<
     })
 }
 
-/// The documents, with what they refer to in place, and the sum of operator costs that is claimed.
+/// Parses both documents and checks their references. Also returns the claimed sum of operator
+/// costs.
 pub(super) fn parse(
     task: &str,
     argument: &str,
@@ -130,11 +134,11 @@ pub(super) fn parse(
 ) -> Result<(Model, Argument, Option<Integer>), Fault> {
     let model: Model = read("the task", task)?;
     let argument: Argument = read("the argument", argument)?;
-    for (document, found, expected) in
+    for (document, format, expected) in
         [("the task", &model.format, TASK_FORMAT), ("the argument", &argument.format, ARGUMENT_FORMAT)]
     {
-        if found != expected {
-            return Err(form(document, format!("format `{found}`, where `{expected}` is expected")));
+        if format != expected {
+            return Err(form(document, format!("format `{format}`, where `{expected}` is expected")));
         }
     }
     references::task(&model).map_err(|reason| form("the task", reason))?;
@@ -151,7 +155,7 @@ fn read<T: DeserializeOwned>(document: &'static str, text: &str) -> Result<T, Fa
     serde_json::from_str(text).map_err(|error| form(document, error.to_string()))
 }
 
-/// The sum of operator costs that a metric stands for.
+/// Converts a metric value to the sum of operator costs in units of the task.
 fn cost(model: &Model, metric: &BigRational) -> Result<Integer, Fault> {
     let scaled = metric * model.objective.scale.to_rational();
     let scaled = if model.objective.maximize { -scaled } else { scaled };
@@ -159,7 +163,7 @@ fn cost(model: &Model, metric: &BigRational) -> Result<Integer, Fault> {
     cost.ok_or_else(|| Fault::Cost(metric.to_string()))
 }
 
-/// A combination of designs with what it costs.
+/// A combination of designs and its cost.
 type Choice = (Vec<u32>, Integer);
 
 struct Checker<'c> {
@@ -169,7 +173,7 @@ struct Checker<'c> {
     needs: Vec<(usize, Table<'c>)>,
     labels: FxHashMap<&'c [u32], Vec<(&'c [Integer], &'c Integer)>>,
     monotone: bool,
-    /// For each operator.
+    /// The non-dominated combinations of each operator.
     choices: Vec<Rc<[Choice]>>,
 }
 
@@ -212,9 +216,10 @@ impl Checker<'_> {
         })
     }
 
-    /// Whether every plan that goes on from a state costs at least as much as is claimed, by a label or by a bound.
+    /// Returns `true` if every continuation of a state costs at least the claim, by a label or by
+    /// a bound.
     fn is_covered(&self, state: &State, paid: &Integer) -> bool {
-        let hopeless = self.potentials.iter().any(|potential| match (potential.at(state), &self.cost) {
+        let too_expensive = self.potentials.iter().any(|potential| match (potential.at(state), &self.cost) {
             (None, _) => true,
             (Some(more), Some(cost)) => paid + more >= *cost,
             (Some(_), None) => false,
@@ -222,11 +227,11 @@ impl Checker<'_> {
         let exhausted = |(number, need): &(usize, Table<'_>)| {
             need.at(state).is_none_or(|need| !need.is_zero() && *need > state.numbers[*number])
         };
-        if hopeless || self.needs.iter().any(exhausted) {
+        if too_expensive || self.needs.iter().any(exhausted) {
             return true;
         }
-        let known = self.labels.get(&state.values[..self.model.basic]);
-        known.into_iter().flatten().any(|(numbers, cost)| {
+        let labels = self.labels.get(&state.values[..self.model.basic]);
+        labels.into_iter().flatten().any(|(numbers, cost)| {
             let mut pairs = numbers.iter().zip(&state.numbers);
             *cost <= paid
                 && if self.monotone { pairs.all(|(a, b)| a >= b) } else { pairs.all(|(a, b)| a == b) }
@@ -234,35 +239,38 @@ impl Checker<'_> {
     }
 }
 
-/// For each operator the combinations that no other one makes superfluous: one that costs no more, and with which every condition
-/// holds as soon and every number ends as high (exactly so where more may hurt). What covers the successor by the
-/// latter covers the successor by the former.
+/// Returns the non-dominated combinations of each operator. A combination dominates another one
+/// if it costs no more, satisfies every condition that the other one satisfies, and leaves every
+/// number at least as high (equal, if larger numbers may hurt). A label that covers the successor
+/// by the dominating combination then also covers the successor by the dominated one.
 fn choices(model: &Model, monotone: bool) -> Result<Vec<Rc<[Choice]>>, Fault> {
-    let mut known: FxHashMap<_, Rc<[Choice]>> = FxHashMap::default();
+    let mut fronts: FxHashMap<_, Rc<[Choice]>> = FxHashMap::default();
     let mut count = 0_usize;
     let mut comparisons = 0;
-    let mut all = Vec::new();
+    let mut choices = Vec::new();
     for operator in &model.operators {
         let quantities: Vec<_> = quantities(operator).collect();
+        // Operators with equal tables share one Pareto front.
         let key = (operator.uses, operator.exclusions, &operator.cost, quantities.clone());
-        let own = if let Some(own) = known.get(&key) {
-            Rc::clone(own)
+        let front = if let Some(known) = fronts.get(&key) {
+            Rc::clone(known)
         } else {
-            let own = front(model, operator, &quantities, monotone, &mut comparisons)?;
-            count = count.saturating_add(own.len());
+            let front = front(model, operator, &quantities, monotone, &mut comparisons)?;
+            count = count.saturating_add(front.len());
             if count > CHOICE_LIMIT {
                 let reason = format!("more than {CHOICE_LIMIT} combinations of designs matter");
                 return Err(form("the task", reason));
             }
-            known.insert(key, Rc::clone(&own));
-            own
+            fronts.insert(key, Rc::clone(&front));
+            front
         };
-        all.push(own);
+        choices.push(front);
     }
-    Ok(all)
+    Ok(choices)
 }
 
-/// The combinations of an operator as [`choices`] has them; counts the comparisons.
+/// Computes the non-dominated combinations of one operator, see [`choices`]. Adds its work to
+/// `comparisons`.
 fn front(
     model: &Model,
     operator: &Operator,
@@ -276,9 +284,9 @@ fn front(
         let mut pairs = a.1.iter().zip(&b.1);
         a.0.1 <= b.0.1 && if monotone { pairs.all(|(a, b)| a >= b) } else { pairs.all(|(a, b)| a == b) }
     };
-    let all = model.choices(operator);
-    let combinations = all.len();
-    for choice in all {
+    let candidates = model.choices(operator);
+    let combinations = candidates.len();
+    for choice in candidates {
         *comparisons = comparisons.saturating_add(front.len()).saturating_add(COMBINATION_COST);
         if *comparisons > COMPARISON_LIMIT {
             let reason = format!(
@@ -298,13 +306,13 @@ fn front(
     Ok(front.into_iter().map(|(choice, _)| choice).collect())
 }
 
-/// What depends on designs in the conditions and changes of an operator.
+/// The design-dependent expressions in the conditions and changes of an operator.
 fn quantities(operator: &Operator) -> impl Iterator<Item = &Quantity> {
     let changes = operator.changes.iter().map(|(_, value)| value);
     operator.condition.comparisons.iter().chain(changes).map(|linear| &linear.quantity)
 }
 
-/// Operators by a fact that they require.
+/// Operators, indexed by one of their required facts.
 struct Index {
     by_fact: FxHashMap<(u32, u32), Vec<usize>>,
     always: Vec<usize>,
@@ -314,6 +322,7 @@ impl Index {
     fn new(model: &Model) -> Self {
         let mut index = Self { by_fact: FxHashMap::default(), always: Vec::new() };
         for (operator, position) in model.operators.iter().zip(0..) {
+            // A fact of the variable with the largest domain is the most selective key.
             let widest =
                 operator.condition.facts.iter().max_by_key(|fact| model.variables[fact.0 as usize].len());
             match widest {

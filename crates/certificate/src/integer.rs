@@ -1,5 +1,6 @@
-//! Integers of any size: 128 bits where that is enough, more where it is not. Nothing wraps or saturates. A document has no
-//! numbers of more than [`MAX_DIGITS`] digits, because the time to read one is quadratic.
+//! Integers of any size: 128 bits if sufficient, else arbitrary precision. No operation wraps or
+//! saturates. Numbers of documents have at most [`MAX_DIGITS`] digits, because parsing takes
+//! quadratic time.
 
 use std::cmp::Ordering;
 use std::iter::Sum;
@@ -13,14 +14,15 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::Number;
 
-/// Upper limit on the digits of a number in a document. A number of a PDDL file has at most 400.
+/// Upper limit on the digits of a number in a document. A number of a PDDL file has at most 400
+/// digits.
 pub const MAX_DIGITS: usize = 10_000;
 
-/// An integer. A document has none of more than [`MAX_DIGITS`] digits.
+/// An arbitrary-precision integer with at most [`MAX_DIGITS`] digits in documents.
 #[derive(Clone, PartialEq, Eq, Hash)]
 pub struct Integer(Repr);
 
-/// It is `Small` whenever it fits, so that equal integers are equal representations.
+/// Canonical representation: `Small` whenever the value fits, so that equality is structural.
 #[derive(Clone, PartialEq, Eq, Hash)]
 enum Repr {
     Small(i128),
@@ -39,7 +41,7 @@ impl Integer {
         }
     }
 
-    /// The same number as a fraction.
+    /// Converts the integer to a fraction.
     #[must_use]
     pub fn to_rational(&self) -> BigRational {
         BigRational::from_integer(self.to_big())
@@ -76,7 +78,7 @@ impl Integer {
         }
     }
 
-    /// How many bits two's complement needs, the sign included.
+    /// Number of bits in two's complement, including the sign.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "at most 128 leading zeros, and bits that are held in memory"
@@ -86,7 +88,7 @@ impl Integer {
             Small(small) => {
                 (129 - if *small < 0 { (!small).leading_zeros() } else { small.leading_zeros() }) as usize
             }
-            // One more than the magnitude has is enough for either sign.
+            // One bit more than the magnitude suffices for either sign.
             Big(big) => usize::try_from(big.bits()).unwrap_or(usize::MAX - 1) + 1,
         }
     }
@@ -177,7 +179,7 @@ impl Ord for Integer {
     }
 }
 
-/// In decimals.
+/// Formats the integer in decimal.
 impl std::fmt::Display for Integer {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match &self.0 {
@@ -193,7 +195,7 @@ impl std::fmt::Debug for Integer {
     }
 }
 
-/// As a JSON number with all its digits.
+/// Serializes a JSON number with all its digits.
 impl Serialize for Integer {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match &self.0 {
@@ -226,7 +228,7 @@ mod tests {
 
     use super::*;
 
-    /// Integers of every size, those at the borders of the small ones among them.
+    /// Integers of every size, including the bounds of the small representation.
     fn integer() -> impl Strategy<Value = BigInt> {
         prop_oneof![
             (-20_i128..20).prop_map(BigInt::from),
@@ -254,7 +256,7 @@ mod tests {
                 prop_assert_eq!(x.div_floor(&y).to_big(), a.div_floor(&b));
             }
             prop_assert_eq!(x.bit(position), a.bit(position as u64));
-            // From the last bit on all are the sign.
+            // All bits above the width equal the sign.
             let width = x.width();
             prop_assert!((width - 1..width + 3).all(|position| x.bit(position) == x.is_negative()));
             let written = serde_json::to_string(&x).expect("JSON");
@@ -264,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_of_very_many_digits_are_refused_at_once() {
+    fn numbers_with_too_many_digits_are_rejected_without_parsing() {
         let longest = "9".repeat(MAX_DIGITS);
         assert_eq!(serde_json::from_str::<Integer>(&longest).expect("an integer").to_string(), longest);
         let error = serde_json::from_str::<Integer>(&"9".repeat(10_000_000)).expect_err("too long");
@@ -272,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_integer_is_refused() {
+    fn text_that_is_not_an_integer_is_rejected() {
         for text in ["1.5", "1e3", "\"7\"", "null", "1e400", "-", "+1"] {
             assert!(serde_json::from_str::<Integer>(text).is_err(), "{text}");
         }

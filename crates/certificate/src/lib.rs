@@ -1,20 +1,23 @@
-//! The checker of certificates: why no plan is cheaper, in a form that is checked by arithmetic.
+//! Checks optimality certificates of plans by integer arithmetic.
 //!
-//! The argument is a closed set of labels \[1\]. A label is a state with what was paid on the way to it. It *covers* a
-//! state with the same values that cost no less and has no more of any number (exactly the same numbers where more may
-//! hurt). *Potentials* bound from below what is still to be paid, as tables over a few variables; *needs* bound what must be left of
-//! a resource. If the initial state is covered or cut off, no label is a goal state cheaper than the claim, and each
-//! successor of a label is covered or cut off again, then no plan of any length is cheaper than the claim: by
-//! induction over its steps. A claim without a cost is that there is no plan.
+//! The optimality proof is a closed set of labels \[1\]. A label is a state with the cost of
+//! reaching it. It *covers* a state with the same values if that state costs no less and has no
+//! larger numbers (equal numbers, if larger numbers may hurt). *Potentials* are lower bounds on
+//! the remaining cost, as tables over a few variables; *needs* are lower bounds on a required
+//! resource. If the initial state is covered or pruned, no label is a goal state cheaper than the
+//! claim, and each successor of a label is covered or pruned, then no plan of any length is
+//! cheaper than the claim, by induction over its steps. A claim without a cost states that the
+//! task has no plan.
 //!
-//! [`faithful()`] compares a written task with its files, without grounding them. [`check_refutation`] checks a second argument for
-//! small tasks: a formula, its refutation, and a bound on the number of steps. [`verification_conditions`] writes the first one for
-//! an SMT solver.
+//! [`faithful()`] checks that a ground task refines its files, without grounding them.
+//! [`check_refutation`] checks a second proof for small tasks: a formula, its refutation, and a
+//! bound on the number of steps. [`verification_conditions`] exports the first proof to SMT
+//! solvers.
 //!
-//! What is absent: whatever plans. No grounder, no search and no SAT solver is linked.
+//! What is absent: planner code. The crate links no grounder, no search and no SAT solver.
 //!
-//! \[1\] S. Eriksson, G. Röger, M. Helmert: Unsolvability certificates for classical planning, ICAPS 2017 (inductive sets);
-//! labels as in M. Desrochers, F. Soumis, INFOR 26(3), 1988.
+//! \[1\] S. Eriksson, G. Röger, M. Helmert: Unsolvability certificates for classical planning,
+//! ICAPS 2017 (inductive sets); labels as in M. Desrochers, F. Soumis, INFOR 26(3), 1988.
 
 #![warn(
     clippy::cast_possible_truncation,
@@ -43,7 +46,7 @@ mod semantics;
 mod smt;
 mod table;
 
-/// The documents of a certificate as they are written.
+/// The document types of a certificate.
 pub mod format {
     pub use crate::argument::{ARGUMENT_FORMAT, Argument, Label, Need, Potential};
     pub use crate::integer::{Integer, MAX_DIGITS};

@@ -1,57 +1,59 @@
-//! A ground task as a certificate writes it: plain lists of numbers.
+//! The JSON format of a ground task in a certificate: plain lists of numbers.
 
 use crate::integer::Integer;
 use serde::{Deserialize, Serialize};
 
-/// The format of a task.
+/// Value of [`Model::format`].
 pub const TASK_FORMAT: &str = "metaplan-task/1";
 
 /// A variable, counted from 0, and one of its values.
 pub type Fact = (u32, u32);
 
-/// A ground task. What many operators have in common is listed once.
+/// A ground task. Parts that many operators share are listed once.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Model {
-    /// [`TASK_FORMAT`].
+    /// The constant [`TASK_FORMAT`].
     pub format: String,
     /// The objects of the problem; other parts refer to them by position.
     pub objects: Vec<String>,
     /// The names of the actions.
     pub schemas: Vec<String>,
-    /// The values of each finite-domain variable; the last value of a variable holds where none of its atoms does.
+    /// The values of each finite-domain variable; the last value means that no atom of the
+    /// variable holds.
     pub variables: Vec<Vec<String>>,
-    /// The variables from here on are derived.
+    /// Number of basic variables; all later variables are derived.
     pub basic: usize,
-    /// The value of each variable at first.
+    /// The initial value of each variable.
     pub values: Vec<u32>,
-    /// What each number is at first.
+    /// The initial value of each number.
     pub numbers: Vec<Integer>,
-    /// The numeric fluents that they are, and how many times their values.
+    /// The numeric fluent of each number.
     pub fluents: Vec<String>,
-    /// So many times the values of the files are numbers.
+    /// Numbers are this many times the values of the files.
     pub number_scale: Integer,
     /// The designs that may fill each slot, as objects.
     pub slots: Vec<Vec<u32>>,
-    /// Lists of slots that operators fill, each with the designs that suit.
+    /// Lists of slots that operators fill, each with its suitable designs.
     pub uses: Vec<Vec<(u32, Vec<u32>)>>,
-    /// Lists of combinations of designs that operators do not admit.
+    /// Lists of excluded combinations of designs.
     pub exclusions: Vec<Vec<Exclusion>>,
     /// Values by designs; quantities refer to them.
     pub tables: Vec<Vec<Integer>>,
-    /// Everything that a step of a plan can do.
+    /// All operators.
     pub operators: Vec<Operator>,
-    /// In the order of evaluation.
+    /// The axiom layers in the order of evaluation.
     pub axioms: Vec<Layer>,
-    /// What holds in the end.
+    /// The goal condition.
     pub goal: Condition,
-    /// What costs are in terms of the metric.
+    /// The relation of costs to the metric.
     pub objective: Objective,
     /// Durations are this many times the values of the files.
     pub time_scale: Integer,
 }
 
-/// Combinations of designs (positions in lists of suitable designs) that are not admitted for some slots of an operator.
+/// Combinations of designs (positions in lists of suitable designs) that are excluded for some
+/// slots of an operator.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Exclusion {
@@ -61,33 +63,33 @@ pub struct Exclusion {
     pub combinations: Vec<Vec<u32>>,
 }
 
-/// A step that a plan can have, whatever the designs that it runs with.
+/// A ground operator, parameterised by the designs in its slots.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Operator {
-    /// Position in [`Model::schemas`]; one after the last is a wait.
+    /// Position in [`Model::schemas`]; the position after the last one is a wait.
     pub schema: u32,
-    /// One for each parameter of the action.
+    /// One argument for each parameter of the action.
     pub arguments: Vec<Argument>,
-    /// Positions in `Model::uses` and `Model::exclusions`.
+    /// Position in [`Model::uses`].
     pub uses: u32,
     /// Position in [`Model::exclusions`].
     pub exclusions: u32,
-    /// What has to hold before.
+    /// The precondition.
     pub condition: Condition,
-    /// What holds after, later ones prevailing.
+    /// The unconditional effects; later effects override earlier ones.
     pub effects: Vec<Fact>,
-    /// What holds after, if something holds before.
+    /// The conditional effects.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub conditional: Vec<Conditional>,
-    /// What numbers become, in terms of the numbers before.
+    /// New values of numbers, in terms of the numbers before.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub changes: Vec<(u32, Linear)>,
-    /// What is paid.
+    /// The cost.
     pub cost: Quantity,
-    /// How long it takes.
+    /// The duration, scaled by [`Model::time_scale`].
     pub duration: Quantity,
-    /// If it is a wait: until when, from the start of the plan.
+    /// For a wait, the time at which it ends, from the start of the plan.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub wait: Option<Integer>,
 }
@@ -102,52 +104,53 @@ pub enum Argument {
     Slot(u32),
 }
 
-/// All facts, one literal of every clause, and every comparison ≥ 0.
+/// A conjunction of facts, clauses, and comparisons with 0.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Condition {
-    /// All of them hold.
+    /// The facts; all must hold.
     pub facts: Vec<Fact>,
-    /// Of each, one holds.
+    /// The clauses; of each, one literal must hold.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub clauses: Vec<Vec<Literal>>,
-    /// Each is at least 0.
+    /// Linear expressions that must be at least 0.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub comparisons: Vec<Linear>,
 }
 
-/// A fact, and whether it or its negation is meant.
+/// A fact and its required truth value.
 pub type Literal = (Fact, bool);
 
-/// Effects under a condition; later ones prevail over earlier ones.
+/// Effects under a condition; later effects override earlier ones.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Conditional {
-    /// All of them hold before.
+    /// The literals that must hold before.
     pub condition: Vec<Literal>,
-    /// What holds after, later ones prevailing.
+    /// The effects, later ones overriding earlier ones.
     pub effects: Vec<Fact>,
 }
 
-/// A constant plus tables over slots of the operator, by position in `Model::tables`, the last slot varying fastest.
+/// A constant plus tables over slots of the operator, by position in [`Model::tables`], the last
+/// slot varying fastest.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Quantity {
-    /// What does not depend on designs.
+    /// The part that does not depend on designs.
     pub constant: Integer,
     /// Slots, by position, and the table over them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tables: Vec<(Vec<u32>, u32)>,
 }
 
-/// Numbers times factors, plus a quantity.
+/// A linear expression over numbers, plus a quantity.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Linear {
     /// Numbers, by position, and their factors.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub factors: Vec<(u32, Integer)>,
-    /// What is added.
+    /// The added quantity.
     pub quantity: Quantity,
 }
 
@@ -155,20 +158,20 @@ pub struct Linear {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Layer {
-    /// The fact that holds where the body does.
+    /// The rules: head and body.
     pub rules: Vec<(Fact, Condition)>,
-    /// Whether the rules of the layer may depend on each other.
+    /// `true` if the rules of the layer may depend on each other.
     pub recursive: bool,
 }
 
-/// How costs relate to the metric of the files.
+/// The relation of costs to the metric of the files.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Objective {
-    /// Costs are this many times the metric,
+    /// Costs are this many times the metric.
     pub scale: Integer,
-    /// which has this added (in costs),
+    /// The constant part of the metric, in costs.
     pub offset: Integer,
-    /// and the opposite sign if it is maximized.
+    /// `true` if the metric is maximised; costs then have the opposite sign.
     pub maximize: bool,
 }

@@ -1,4 +1,4 @@
-//! Whether the parts of a certificate that refer to each other exist: after this, no index is out of range.
+//! Checks that a certificate is well-formed: after this check no index is out of range.
 
 use crate::argument::Argument;
 use crate::integer::Integer;
@@ -6,9 +6,9 @@ use crate::model::{self, Condition, Exclusion, Fact, Linear, Literal, Model, Ope
 
 type Found = Result<(), String>;
 
-/// An operator with more combinations of designs is refused rather than gone through.
+/// Upper limit on the design combinations of an operator.
 const CHOICE_LIMIT: usize = 1 << 20;
-/// A table with more entries is refused.
+/// Upper limit on the entries of a table.
 const TABLE_LIMIT: usize = 1 << 22;
 
 fn require(holds: bool, message: impl FnOnce() -> String) -> Found {
@@ -16,14 +16,14 @@ fn require(holds: bool, message: impl FnOnce() -> String) -> Found {
 }
 
 fn are_distinct(numbers: impl Iterator<Item = u32>) -> bool {
-    let mut all: Vec<u32> = numbers.collect();
-    let count = all.len();
-    all.sort_unstable();
-    all.dedup();
-    all.len() == count
+    let mut sorted: Vec<u32> = numbers.collect();
+    let count = sorted.len();
+    sorted.sort_unstable();
+    sorted.dedup();
+    sorted.len() == count
 }
 
-/// Checks a task.
+/// Checks the references of a task.
 pub(super) fn task(model: &Model) -> Found {
     let count = model.variables.len();
     require(model.basic <= count, || "more basic variables than variables".into())?;
@@ -58,7 +58,7 @@ pub(super) fn task(model: &Model) -> Found {
     model.check_condition(&model.goal, &[])
 }
 
-/// Checks an argument about a task.
+/// Checks the references of an argument to its task.
 pub(super) fn argument(model: &Model, argument: &Argument) -> Found {
     let potentials = argument.potentials.iter().map(|potential| (&potential.pattern, &potential.values));
     let needs = argument.needs.iter().map(|need| (&need.pattern, &need.values));
@@ -150,8 +150,8 @@ impl Model {
     fn check_quantity(&self, quantity: &Quantity, sizes: &[usize]) -> Found {
         for (slots, table) in &quantity.tables {
             let table = self.tables.get(*table as usize).ok_or("no such table")?;
-            let own = slots.iter().map(|slot| sizes.get(*slot as usize).copied());
-            let size = own.into_iter().try_fold(1_usize, |product, size| product.checked_mul(size?));
+            let slot_sizes = slots.iter().map(|slot| sizes.get(*slot as usize).copied());
+            let size = slot_sizes.into_iter().try_fold(1_usize, |product, size| product.checked_mul(size?));
             require(size == Some(table.len()), || "a table of the wrong size".into())?;
         }
         Ok(())

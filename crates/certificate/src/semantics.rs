@@ -1,4 +1,5 @@
-//! What a written task means: states, operators and what they cost. Slow and plain; all arithmetic is exact.
+//! Semantics of a ground task: states, operators and costs. The implementation favours simplicity
+//! over speed; all arithmetic is exact.
 
 use std::ops::Range;
 
@@ -13,19 +14,19 @@ pub(super) struct State {
 }
 
 impl Model {
-    /// The variables that are not derived.
+    /// The basic (not derived) variables.
     #[expect(clippy::cast_possible_truncation, reason = "fewer than 2^32 of each kind, see `references`")]
     pub(super) fn basic_variables(&self) -> Range<u32> {
         0..self.basic as u32
     }
 
-    /// The variables that are derived.
+    /// The derived variables.
     #[expect(clippy::cast_possible_truncation, reason = "fewer than 2^32 of each kind, see `references`")]
     pub(super) fn derived_variables(&self) -> Range<u32> {
         self.basic as u32..self.variables.len() as u32
     }
 
-    /// The value of a variable that holds where none of its atoms does.
+    /// The value that means that no atom of a variable holds.
     #[expect(
         clippy::cast_possible_truncation,
         clippy::arithmetic_side_effects,
@@ -35,7 +36,7 @@ impl Model {
         self.variables[variable as usize].len() as u32 - 1
     }
 
-    /// A state with these basic values; the derived ones follow.
+    /// Creates a state with these basic values and evaluates the axioms.
     pub(super) fn state(&self, basic: &[u32], numbers: &[Integer]) -> State {
         let mut values = basic.to_vec();
         values.resize(self.variables.len(), 0);
@@ -48,7 +49,7 @@ impl Model {
         self.state(&self.values[..self.basic], &self.numbers)
     }
 
-    /// Gives derived variables their values: the least fixpoint of the rules, layer by layer.
+    /// Evaluates the axioms: the least fixpoint of the rules, layer by layer.
     fn derive(&self, state: &mut State) {
         for variable in self.derived_variables() {
             state.values[variable as usize] = self.none(variable);
@@ -69,29 +70,29 @@ impl Model {
         }
     }
 
-    /// How many designs suit each slot of an operator.
+    /// Number of suitable designs for each slot of an operator.
     pub(super) fn sizes(&self, operator: &Operator) -> Vec<usize> {
         self.uses[operator.uses as usize].iter().map(|(_, designs)| designs.len()).collect()
     }
 
-    /// All combinations of designs that an operator admits.
+    /// All design combinations that an operator admits.
     #[expect(clippy::cast_possible_truncation, reason = "a slot has fewer designs, see `references`")]
     pub(super) fn choices(&self, operator: &Operator) -> Vec<Vec<u32>> {
-        let mut all: Vec<Vec<u32>> = vec![Vec::new()];
+        let mut choices: Vec<Vec<u32>> = vec![Vec::new()];
         for size in self.sizes(operator) {
             let longer = |choice: Vec<u32>| {
                 (0..size as u32).map(move |design| choice.iter().copied().chain([design]).collect())
             };
-            all = all.into_iter().flat_map(longer).collect();
+            choices = choices.into_iter().flat_map(longer).collect();
         }
         let exclusions = &self.exclusions[operator.exclusions as usize];
-        all.retain(|choice| {
+        choices.retain(|choice| {
             !exclusions.iter().any(|exclusion| {
                 let chosen: Vec<u32> = exclusion.slots.iter().map(|slot| choice[*slot as usize]).collect();
                 exclusion.combinations.contains(&chosen)
             })
         });
-        all
+        choices
     }
 
     /// The value of a quantity for a combination of designs.
@@ -102,6 +103,7 @@ impl Model {
     pub(super) fn quantity(&self, quantity: &Quantity, choice: &[u32], sizes: &[usize]) -> Integer {
         let mut sum = quantity.constant.clone();
         for (slots, table) in &quantity.tables {
+            // The row number is the mixed-radix number of the chosen designs.
             let mut row = 0;
             for slot in slots {
                 row = row * sizes[*slot as usize] + choice[*slot as usize] as usize;
@@ -111,14 +113,14 @@ impl Model {
         sum
     }
 
-    /// A lower bound on a quantity for all combinations of designs.
+    /// Lower bound on a quantity over all combinations of designs.
     pub(super) fn least(&self, quantity: &Quantity) -> Integer {
         let tables =
             quantity.tables.iter().filter_map(|(_, table)| self.tables[*table as usize].iter().min());
         tables.chain([&quantity.constant]).sum()
     }
 
-    /// An upper bound, as `least` is a lower one.
+    /// Upper bound on a quantity over all combinations of designs.
     pub(super) fn most(&self, quantity: &Quantity) -> Integer {
         let tables =
             quantity.tables.iter().filter_map(|(_, table)| self.tables[*table as usize].iter().max());
@@ -131,7 +133,7 @@ impl Model {
         numbers.fold(quantity, |sum, (number, factor)| &sum + &(&state.numbers[*number as usize] * factor))
     }
 
-    /// Whether a condition holds; its finite-domain part does not depend on designs.
+    /// Returns `true` if a condition holds. Its finite-domain part does not depend on designs.
     pub(super) fn holds(
         &self,
         condition: &Condition,
@@ -158,6 +160,7 @@ impl Model {
         for (variable, value) in &operator.effects {
             next.values[*variable as usize] = *value;
         }
+        // Conditions of conditional effects refer to the state before the operator.
         for conditional in &operator.conditional {
             if conditional.condition.iter().all(|literal| literal_holds(literal, state)) {
                 for (variable, value) in &conditional.effects {
@@ -172,8 +175,8 @@ impl Model {
         next
     }
 
-    /// Whether more of any number never hurts: no factor in any condition or change is negative, and no derived variable
-    /// depends on numbers.
+    /// Returns `true` if larger numbers never hurt: no factor in any condition or change is
+    /// negative, and no derived variable depends on numbers.
     pub(super) fn more_never_hurts(&self) -> bool {
         let rules = self.axioms.iter().flat_map(|layer| &layer.rules);
         let conditions = self.operators.iter().map(|operator| &operator.condition).chain([&self.goal]);

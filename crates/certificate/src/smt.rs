@@ -1,8 +1,10 @@
-//! The argument of a certificate as verification conditions in SMT-LIB 2, for checkers that are not ours.
+//! Writes the optimality proof of a certificate as verification conditions in SMT-LIB 2, for
+//! independent checkers.
 //!
-//! With the claimed cost C, the invariant says of a state and of what was paid on the way to it: it is covered by a label, or
-//! cut off by a potential or a need. The conditions ask for a counterexample: to the invariant in the initial state, to its
-//! excluding goal states cheaper than C, and to its being kept by each operator. An SMT solver has to answer `unsat` to each.
+//! With the claimed cost C, the invariant of a state and the accumulated cost is: a label covers
+//! it, or a potential or a need prunes it. The conditions ask for counterexamples: the initial
+//! state violates the invariant, a goal state in the invariant is cheaper than C, or an operator
+//! leaves the invariant. An SMT solver must answer `unsat` to each.
 
 use std::fmt::Write as _;
 
@@ -13,8 +15,9 @@ use crate::check::{Fault, parse};
 use crate::integer::Integer;
 use crate::model::{Condition, Fact, Linear, Literal, Model, Operator, Quantity};
 
-/// The verification conditions for a claim, as `check` takes it. None for tasks with derived variables, whose least
-/// fixpoints have no short form.
+/// Returns the verification conditions for a claim, which is interpreted as in [`crate::check`].
+/// Returns `None` for tasks with derived variables, whose least fixpoints have no compact
+/// encoding.
 ///
 /// # Errors
 /// The documents are not well-formed.
@@ -38,7 +41,7 @@ struct Writer<'w> {
     monotone: bool,
 }
 
-/// The parts under an operation; without any, its neutral element.
+/// Joins parts by an operation. Returns the neutral element if there are no parts.
 fn join(operation: &str, neutral: &str, parts: impl IntoIterator<Item = String>) -> String {
     let parts: Vec<String> = parts.into_iter().collect();
     match &parts[..] {
@@ -68,7 +71,7 @@ fn literal((own, positive): &Literal) -> String {
     if *positive { fact(*own) } else { format!("(not {})", fact(*own)) }
 }
 
-/// Asks for a state that satisfies all assertions.
+/// Writes a query for a state that satisfies all assertions.
 fn question(text: &mut String, about: &str, declarations: &str, assertions: &[String]) {
     let _ = write!(text, "; {about}\n(push)\n{declarations}");
     for assertion in assertions {
@@ -112,21 +115,22 @@ impl Writer<'_> {
         format!("(invariant {})", self.names().join(" "))
     }
 
-    /// The invariant as a function of the variables and of what was paid.
+    /// The invariant as a function of the variables and the accumulated cost.
     fn invariant(&self) -> String {
         let parameters: Vec<String> = self.names().iter().map(|name| format!("({name} Int)")).collect();
         let potentials = self.argument.potentials.iter().map(|potential| self.cut_off(potential));
         let needs = self.argument.needs.iter().map(|need| self.exhausted(need));
         let labels = self.argument.labels.iter().map(|label| self.covers(label));
         let mut parts = any(potentials.chain(needs).chain(labels));
-        // An empty clause: grounding has found that the goal never holds, and nothing more has to be known.
+        // An empty clause means that grounding found the goal unreachable; the invariant is then
+        // trivial.
         if self.model.goal.clauses.iter().any(Vec::is_empty) {
             "true".clone_into(&mut parts);
         }
         format!("(define-fun invariant ({}) Bool {parts})", parameters.join(" "))
     }
 
-    /// One part for each entry of a table for which there is something to say.
+    /// The disjunction over all entries of a table that yield a formula.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "a row and its parts are below the size of a table, see `references`"
@@ -138,13 +142,13 @@ impl Writer<'_> {
         entry: impl Fn(Option<&Integer>) -> Option<String>,
     ) -> String {
         any(values.iter().enumerate().filter_map(|(row, value)| {
-            let said = entry(value.as_ref())?;
-            let mut rest = row;
-            let mut parts = vec![said];
+            let formula = entry(value.as_ref())?;
+            let mut remaining_row = row;
+            let mut parts = vec![formula];
             for variable in pattern.iter().rev() {
                 let size = self.model.variables[*variable as usize].len();
-                parts.push(format!("(= v{variable} {})", rest % size));
-                rest /= size;
+                parts.push(format!("(= v{variable} {})", remaining_row % size));
+                remaining_row /= size;
             }
             Some(all(parts))
         }))
@@ -185,7 +189,8 @@ impl Writer<'_> {
         join("+", "0", factors.chain([self.quantity(&linear.quantity, sizes)]))
     }
 
-    /// Tables become cases of the choices `c0`, `c1`, … for the slots of the operator at hand.
+    /// Encodes a quantity. Tables become case distinctions over the choices `c0`, `c1`, … of the
+    /// operator's slots.
     fn quantity(&self, quantity: &Quantity, sizes: &[usize]) -> String {
         let tables = quantity.tables.iter().map(|(slots, table)| {
             let rows = &self.model.tables[*table as usize];
@@ -196,8 +201,9 @@ impl Writer<'_> {
             };
             let key = row(slots);
             let last = rows.last().map_or_else(|| "0".to_owned(), number);
-            let rest = rows.iter().enumerate().rev().skip(1);
-            rest.fold(last, |rest, (row, value)| format!("(ite (= {key} {row}) {} {rest})", number(value)))
+            let earlier_rows = rows.iter().enumerate().rev().skip(1);
+            earlier_rows
+                .fold(last, |cases, (row, value)| format!("(ite (= {key} {row}) {} {cases})", number(value)))
         });
         join("+", "0", std::iter::once(number(&quantity.constant)).chain(tables))
     }
@@ -232,14 +238,14 @@ impl Writer<'_> {
     }
 }
 
-/// A condition whose comparisons have been written already.
+/// Writes a condition whose comparisons are already written.
 fn condition_with(condition: &Condition, comparisons: impl Iterator<Item = String>) -> String {
     let facts = condition.facts.iter().copied().map(fact);
     let clauses = condition.clauses.iter().map(|clause| any(clause.iter().map(literal)));
     all(facts.chain(clauses).chain(comparisons.map(|sum| format!("(>= {sum} 0)"))))
 }
 
-/// The value of a variable after an operator; what comes later prevails.
+/// The value of a variable after an operator; later effects override earlier ones.
 fn value_after(operator: &Operator, variable: u32) -> String {
     let of = |effects: &[Fact]| effects.iter().rev().find(|fact| fact.0 == variable).map(|fact| fact.1);
     let plain = of(&operator.effects).map_or_else(|| format!("v{variable}"), |value| value.to_string());

@@ -1,18 +1,20 @@
-//! Tables of lower bounds by the values of a few variables, and why they are bounds.
+//! Tables of lower bounds over the values of a few variables (abstract heuristics), and the check
+//! that they are bounds.
 //!
-//! A potential is a lower bound on the cost to the goal if it is at most 0 wherever the goal can hold, and no operator lowers it by
-//! more than it costs. A need is a lower bound on what must be left of a number if no operator makes up for it
-//! otherwise: one that uses the number requires that it stays at least 0, and whatever else changes it may only stand where
-//! nothing is needed. What it requires may be stronger: `battery >= 5` is enough where 4 are used.
+//! A potential is a lower bound on the remaining cost if it is at most 0 wherever the goal can
+//! hold and no operator decreases it by more than its cost. A need is a lower bound on the
+//! required value of a number if every operator that decreases the number requires that it stays
+//! at least 0, and every other change of the number occurs only where the need is 0. The
+//! requirement may be stronger: `battery >= 5` suffices for a use of 4.
 
 use crate::integer::Integer;
 use crate::model::{Conditional, Fact, Linear, Literal, Model, Operator, Quantity};
 use crate::semantics::State;
 
-/// A bound; none is infinity.
+/// A bound; `None` is infinity.
 type Bound<'b> = Option<&'b Integer>;
 
-/// A value (none for infinity) for each combination of values of the pattern.
+/// A bound for each combination of values of the pattern.
 pub(super) struct Table<'t> {
     pattern: &'t [u32],
     sizes: Vec<usize>,
@@ -33,7 +35,7 @@ impl<'t> Table<'t> {
         self.at_row(self.row(values))
     }
 
-    /// The position of a combination of values.
+    /// The row of a combination of values.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "a row is below the size of its table, see `references`"
@@ -42,13 +44,13 @@ impl<'t> Table<'t> {
         self.sizes.iter().zip(values).fold(0, |row, (size, value)| row * size + *value as usize)
     }
 
-    /// The position of a state's values.
+    /// The row of the values of a state.
     pub(super) fn row_of(&self, state: &State) -> usize {
         let values: Vec<u32> = self.pattern.iter().map(|variable| state.values[*variable as usize]).collect();
         self.row(&values)
     }
 
-    /// How many combinations of values there are.
+    /// Number of combinations of values.
     pub(super) fn rows(&self) -> usize {
         self.values.len()
     }
@@ -57,23 +59,23 @@ impl<'t> Table<'t> {
         self.values[row].as_ref()
     }
 
-    /// Every combination that agrees with some facts.
+    /// All combinations that agree with some facts.
     #[expect(
         clippy::arithmetic_side_effects,
         clippy::cast_possible_truncation,
         reason = "a row is below the size of its table, see `references`"
     )]
     pub(super) fn matching(&self, facts: &[Fact]) -> Vec<Vec<u32>> {
-        let mut all = vec![Vec::new()];
+        let mut combinations = vec![Vec::new()];
         for (variable, size) in self.pattern.iter().zip(&self.sizes) {
             let fixed = facts.iter().find(|fact| fact.0 == *variable).map(|fact| fact.1);
             let range = fixed.map_or(0..*size as u32, |value| value..value + 1);
             let longer = |values: Vec<u32>| {
                 range.clone().map(move |value| values.iter().copied().chain([value]).collect())
             };
-            all = all.into_iter().flat_map(longer).collect();
+            combinations = combinations.into_iter().flat_map(longer).collect();
         }
-        all
+        combinations
     }
 
     fn after(&self, values: &[u32], effects: &[Fact]) -> Vec<u32> {
@@ -87,7 +89,8 @@ impl<'t> Table<'t> {
         facts.any(|fact| self.pattern.contains(&fact.0))
     }
 
-    /// Where an operator may lead from some values: what a conditional effect asks for beyond the pattern may hold or not.
+    /// The combinations that an operator may reach. A conditional effect whose condition mentions
+    /// variables outside of the pattern may apply or not.
     pub(super) fn targets(&self, operator: &Operator, values: &[u32]) -> Vec<Vec<u32>> {
         let truth = |((variable, value), positive): &Literal| {
             let position = self.pattern.iter().position(|own| own == variable)?;
@@ -110,7 +113,9 @@ impl<'t> Table<'t> {
         targets
     }
 
-    /// Calls `check` with the values before and after, for every operator that touches the pattern. `false` is an error.
+    /// Calls `check` with the bounds before and after each abstract transition of each operator.
+    /// An operator that does not touch the pattern is checked once. Returns an error if `check`
+    /// returns `false`.
     fn each_transition(
         &self,
         model: &Model,
@@ -118,7 +123,8 @@ impl<'t> Table<'t> {
     ) -> Result<(), String> {
         for (operator, position) in model.operators.iter().zip(0..) {
             if !self.touches(operator) {
-                // It leads from each combination to itself; any finite value stands for all.
+                // The operator maps each combination to itself, so one finite value represents
+                // all.
                 let finite = self.values.iter().flatten().max();
                 if finite.is_some() && !check(operator, finite, finite) {
                     return Err(format!("operator {position}, which changes nothing that the table knows"));
@@ -137,12 +143,12 @@ impl<'t> Table<'t> {
     }
 }
 
-/// Whether `left ≤ right + step`, where none is infinite.
+/// Returns `true` if `left ≤ right + step`, where `None` is infinity.
 fn at_most(left: Bound<'_>, right: Bound<'_>, step: &Integer) -> bool {
     right.is_none_or(|right| left.is_some_and(|left| *left <= right + step))
 }
 
-/// Checks that a table bounds the cost to the goal from below.
+/// Checks that a table is a lower bound on the remaining cost.
 pub(super) fn check_potential(model: &Model, table: &Table<'_>) -> Result<(), String> {
     for values in table.matching(&model.goal.facts) {
         if !at_most(table.value(&values), Some(&Integer::ZERO), &Integer::ZERO) {
@@ -154,29 +160,30 @@ pub(super) fn check_potential(model: &Model, table: &Table<'_>) -> Result<(), St
     })
 }
 
-/// What an operator does to a number.
+/// The effect of an operator on a number.
 enum Use {
-    /// It lowers it by at least so much (≥ 0), and requires that at least 0 is left then.
+    /// Decreases the number by at least this amount (≥ 0), and requires that the result is at
+    /// least 0.
     Lowers(Integer),
-    /// Anything else.
+    /// Any other effect.
     Other,
 }
 
 fn use_of(model: &Model, operator: &Operator, number: u32) -> Use {
     let mut changes = operator.changes.iter().filter(|(own, _)| *own == number);
     let Some((_, value)) = changes.next() else { return Use::Lowers(Integer::ZERO) };
-    let most = model.most(&value.quantity);
-    let guarded = most.is_zero() && value.quantity.tables.is_empty()
+    let greatest = model.most(&value.quantity);
+    let guarded = greatest.is_zero() && value.quantity.tables.is_empty()
         || operator.condition.comparisons.iter().any(|guard| implies(model, guard, value));
-    if changes.next().is_none() && is_alone(value, number) && !most.is_positive() && guarded {
-        Use::Lowers(-&most)
+    if changes.next().is_none() && is_alone(value, number) && !greatest.is_positive() && guarded {
+        Use::Lowers(-&greatest)
     } else {
         Use::Other
     }
 }
 
-/// Returns `true` if one expression is at most another one in all states and with all designs, so that the latter is at
-/// least 0 if the former is. `false` says nothing.
+/// Returns `true` if `guard` is at most `wanted` in all states and with all designs, so that
+/// `wanted` is at least 0 if `guard` is. `false` means undecided.
 fn implies(model: &Model, guard: &Linear, wanted: &Linear) -> bool {
     let same_designs = guard.quantity.tables == wanted.quantity.tables
         && guard.quantity.constant <= wanted.quantity.constant;
@@ -184,12 +191,12 @@ fn implies(model: &Model, guard: &Linear, wanted: &Linear) -> bool {
         && (same_designs || model.most(&guard.quantity) <= model.least(&wanted.quantity))
 }
 
-/// Checks that a table bounds from below what must be left of a number, where it is not 0.
+/// Checks that a table is a lower bound on the required value of a number.
 pub(super) fn check_need(model: &Model, number: u32, table: &Table<'_>) -> Result<(), String> {
     if table.values.iter().flatten().any(Integer::is_negative) {
         return Err("it is negative".into());
     }
-    let left = model
+    let required = model
         .goal
         .comparisons
         .iter()
@@ -198,7 +205,7 @@ pub(super) fn check_need(model: &Model, number: u32, table: &Table<'_>) -> Resul
         .unwrap_or_default()
         .max(Integer::ZERO);
     for values in table.matching(&model.goal.facts) {
-        if !at_most(table.value(&values), Some(&left), &Integer::ZERO) {
+        if !at_most(table.value(&values), Some(&required), &Integer::ZERO) {
             return Err(format!("the goal may hold at {values:?}"));
         }
     }
@@ -208,13 +215,13 @@ pub(super) fn check_need(model: &Model, number: u32, table: &Table<'_>) -> Resul
     })
 }
 
-/// The value that a number must have for a comparison to hold, if it is about that number alone.
+/// The lower bound on a number that a comparison implies, if it mentions no other number.
 fn lower_end(linear: &Linear, number: u32) -> Option<Integer> {
     let Quantity { constant, tables } = &linear.quantity;
     (is_alone(linear, number) && tables.is_empty()).then(|| -constant)
 }
 
-/// Whether a linear expression is a number plus a quantity.
+/// Returns `true` if a linear expression is one number plus a quantity.
 pub(super) fn is_alone(linear: &Linear, number: u32) -> bool {
     linear.factors == [(number, Integer::from(1))]
 }

@@ -1,5 +1,5 @@
-//! Documents that ask for much: they are checked in polynomial time, or refused early with a message that names the size. All
-//! of this runs in the threads of tests, which have a stack of 2 MB, without optimisation.
+//! Adversarial documents are checked in polynomial time or rejected early with a message that
+//! names the size. The tests run in threads with a stack of 2 MB, without optimisation.
 
 use std::fmt::Write as _;
 
@@ -14,7 +14,8 @@ fn read(domain: &str, problem: &str) -> (Domain, Problem) {
     (domain, problem)
 }
 
-/// A task with variables of one atom each. An operator has a name, arguments, at most one variable that it requires, and one that it sets.
+/// A task with variables of one atom each. An operator is given by its name, its arguments, the
+/// variable that it requires, if any, and the variable that it sets.
 fn task(objects: &str, atoms: &[&str], operators: &[(&str, &str, Option<usize>, usize)]) -> String {
     let variables: Vec<String> = atoms.iter().map(|atom| format!(r#"["{atom}", "none of these"]"#)).collect();
     let values: Vec<&str> = atoms.iter().map(|_| "1").collect();
@@ -42,7 +43,8 @@ fn task(objects: &str, atoms: &[&str], operators: &[(&str, &str, Option<usize>, 
     )
 }
 
-/// Reaching `(b)` in two steps, with further declarations, rules and actions, objects and facts that change nothing.
+/// Compares a task that reaches `(b)` in two steps with files that have additional declarations,
+/// rules, objects and facts.
 fn compare(declarations: &str, more: &str, objects: &str, facts: &str) -> Faithful {
     let domain = format!(
         "(define (domain d) (:predicates (a) (b) {declarations}) {more}
@@ -58,7 +60,7 @@ fn compare(declarations: &str, more: &str, objects: &str, facts: &str) -> Faithf
     }
 }
 
-/// Names with a prefix and numbers from 0.
+/// Numbered names with a prefix, from 0.
 fn names(prefix: &str, count: usize) -> String {
     (0..count).fold(String::new(), |mut text, number| {
         let _ = write!(text, " {prefix}{number}");
@@ -66,7 +68,7 @@ fn names(prefix: &str, count: usize) -> String {
     })
 }
 
-/// `(next o0 o1)`, and so on, and the end.
+/// Facts `(next o0 o1)` and so on, and `(end oN)`.
 fn chain(length: usize) -> String {
     let mut facts = format!("(end o{length})");
     for number in 0..length {
@@ -76,7 +78,7 @@ fn chain(length: usize) -> String {
 }
 
 #[test]
-fn derived_atoms_in_a_long_row_are_replaced_by_their_rules() {
+fn long_chains_of_derived_atoms_are_unfolded() {
     let length = 5_000;
     let declarations = "(next ?x ?y) (end ?x) (p ?x)";
     let more = "(:derived (p ?x) (or (and (end ?x) (a)) (exists (?y) (and (next ?x ?y) (p ?y)))))
@@ -85,9 +87,9 @@ fn derived_atoms_in_a_long_row_are_replaced_by_their_rules() {
     assert!(matches!(found, Faithful::Yes { instances: 3, .. }), "{found:?}");
 }
 
-/// The nesting of conditions is limited, also if each atom adds only one level.
+/// The nesting of unfolded conditions is limited even if each atom adds only one level.
 #[test]
-fn conditions_that_nest_too_deep_are_refused() {
+fn conditions_that_nest_too_deeply_are_rejected() {
     let length = 5_000;
     let declarations = "(next ?x ?y) (end ?x) (p ?x) (q ?x)";
     let more = "(:derived (p ?x) (or (and (end ?x) (a)) (exists (?y) (and (next ?x ?y) (or (a) (and (q ?x) (p ?y)))))))
@@ -101,7 +103,7 @@ fn conditions_that_nest_too_deep_are_refused() {
 }
 
 #[test]
-fn many_names_in_one_place_are_refused_or_compared() {
+fn long_lists_of_names_are_rejected_or_compared() {
     let many = names("?x", 60_000);
     let quantified =
         |word: &str| format!("(:action zz :parameters () :precondition ({word} ({many}) (a)) :effect (a))");
@@ -118,14 +120,14 @@ fn many_names_in_one_place_are_refused_or_compared() {
     let more = format!("(:action zz :parameters ({many}) :precondition (a) :effect (a))");
     let found = compare("", &more, "o", "");
     assert!(matches!(found, Faithful::Yes { instances: 3, .. }), "{found:?}");
-    // With two objects there are too many instances, and nothing is multiplied out.
+    // Two objects give too many instances; the check must reject them without enumeration.
     let found = compare("", &more, "o o2", "");
     assert!(matches!(found, Faithful::Undecided(Cause::TooMany { .. })), "{found:?}");
 }
 
-/// Also the widest rules that are compared take little time.
+/// The largest accepted chain of rules is compared quickly.
 #[test]
-fn many_derived_predicates_in_a_row_take_little_time() {
+fn long_chains_of_derived_predicates_are_compared_quickly() {
     let count = 3_000;
     let mut declarations = String::new();
     let mut more = String::new();
@@ -138,9 +140,10 @@ fn many_derived_predicates_in_a_row_take_little_time() {
     assert!(matches!(found, Faithful::Yes { .. }), "{found:?}");
 }
 
-/// Each of the combinations costs less than those with a higher number, and allows less.
+/// No combination dominates another one: each costs less than the combinations with a higher
+/// number, and allows less.
 #[test]
-fn many_combinations_of_designs_with_advantages_are_refused() {
+fn many_non_dominated_design_combinations_are_rejected() {
     let slots = 19;
     let task = task("\"x\", \"y\"", &["(a)", "(b)"], &[("go", "", Some(0), 1), ("on", "", None, 0)]);
     let mut task: serde_json::Value = serde_json::from_str(&task).expect("JSON");
@@ -163,7 +166,8 @@ fn many_combinations_of_designs_with_advantages_are_refused() {
     assert!(reason.starts_with("an operator with 524288 combinations of designs"), "{reason}");
 }
 
-/// Walking `steps` times with a battery: each step uses 4 and requires that `required` are there.
+/// Checks a need of two walking steps with a battery of 7: each step uses 4 and requires at least
+/// `required`.
 fn walk(required: i32) -> Result<(), Fault> {
     let task = format!(
         r#"{{"format": "metaplan-task/1", "objects": [], "schemas": ["walk"],
@@ -174,7 +178,7 @@ fn walk(required: i32) -> Result<(), Fault> {
         step(0, required),
         step(1, required)
     );
-    // From `(s)` two steps are needed, which use 8.
+    // Two steps are required from `(s)`, which use 8.
     let argument = r#"{"format": "metaplan-argument/1", "potentials": [],
       "needs": [{"number": 0, "pattern": [0], "values": [8, 4, 0, null]}], "labels": []}"#;
     check(&task, argument, None).map(|_| ())
@@ -191,9 +195,10 @@ fn step(from: u32, required: i32) -> String {
     )
 }
 
-/// A charge of 7 does not suffice for two steps, whatever a step requires beyond its use. If it requires less, the charge may fall below 0.
+/// A charge of 7 does not suffice for two steps if each step requires at least its use. If it
+/// requires less, the charge may fall below 0.
 #[test]
-fn needs_rest_on_requirements_that_are_at_least_the_use() {
+fn needs_are_proved_only_if_each_step_requires_at_least_its_use() {
     for required in [4, 5, 100] {
         assert_eq!(walk(required), Ok(()), "{required}");
     }
@@ -228,7 +233,7 @@ fn stages() -> String {
 }
 
 #[test]
-fn a_group_shows_that_its_parts_are_exclusive() {
+fn a_mutex_group_proves_its_subsets_exclusive() {
     let problem = "(define (problem p) (:domain d) (:init (idle)) (:goal (done)))";
     let (domain, problem) = read(STAGES, problem);
     let made = witness(&domain, &problem, &stages(), &|| false).expect("a witness");
@@ -236,11 +241,11 @@ fn a_group_shows_that_its_parts_are_exclusive() {
     assert!(made.contains(group), "{made}");
     let compared = |witness: &str| faithful(&domain, &problem, &stages(), witness, &|| false);
     assert_eq!(compared(&made), Faithful::Yes { instances: 3, idle: 0, timed: false });
-    // Without the group, the comparison cannot tell, and does not name a difference.
+    // Without the group the check is undecided and reports no difference.
     let found = compared(&made.replace(group, ""));
     let Faithful::Undecided(cause @ Cause::Exclusion { .. }) = &found else { panic!("{found:?}") };
     assert!(cause.to_string().starts_with("cannot tell whether the ground task"), "{cause}");
-    // Groups that are not exclusive are refused, also together with one that is.
+    // Groups that are not exclusive are rejected, even in addition to a valid group.
     for wrong in [r#""(idle)","(done)""#, r#""(loading)","(done)""#] {
         let found = compared(
             &made.replace(group, &format!(r#","exclusive":[["(idle)","(loading)","(loaded)"],[{wrong}]]"#)),
@@ -250,7 +255,7 @@ fn a_group_shows_that_its_parts_are_exclusive() {
 }
 
 #[test]
-fn a_group_that_does_not_hold_at_first_is_refused() {
+fn a_group_violated_by_the_initial_state_is_rejected() {
     let problem = "(define (problem p) (:domain d) (:init (idle) (done)) (:goal (done)))";
     let (domain, problem) = read(STAGES, problem);
     let made = witness(&domain, &problem, &stages(), &|| false).expect("a witness");
@@ -265,7 +270,7 @@ fn a_group_that_does_not_hold_at_first_is_refused() {
 }
 
 #[test]
-fn numbers_of_very_many_digits_are_refused() {
+fn numbers_with_too_many_digits_are_rejected() {
     let task = task("", &["(a)", "(b)"], &[("go", "", Some(0), 1)]);
     let task = task.replace(r#""time_scale": 1"#, &format!(r#""time_scale": {}"#, "9".repeat(10_000_000)));
     let argument = r#"{"format": "metaplan-argument/1", "potentials": [], "needs": [], "labels": []}"#;

@@ -1,4 +1,4 @@
-//! Checks certificates, and says of each part whether it holds.
+//! Verifies certificates and prints the result of each part.
 //!
 //! `cargo run -p metaplan-verify --example directory -- CERTIFICATE…`
 #![expect(clippy::print_stdout, reason = "an example prints")]
@@ -12,7 +12,7 @@ use metaplan_verify::{Claim, Verifier};
 fn main() -> ExitCode {
     let directories: Vec<PathBuf> =
         std::env::args().skip(1).filter(|word| !word.starts_with('-')).map(PathBuf::from).collect();
-    let mut all = true;
+    let mut are_verified = true;
     for directory in &directories {
         let verification = Verifier::new(directory).time_limit(Duration::from_secs(600)).verify();
         let claim = match &verification.claim {
@@ -27,8 +27,8 @@ fn main() -> ExitCode {
                 Err(reason) => println!("  {}: FAILS: {reason}", part.part),
             }
         }
-        all &= verification.verified();
+        are_verified &= verification.verified();
     }
-    println!("{}", if all { "all verified" } else { "not all verified" });
+    println!("{}", if are_verified { "all verified" } else { "not all verified" });
     ExitCode::from(u8::from(!all))
 }

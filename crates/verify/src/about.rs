@@ -1,4 +1,4 @@
-//! Whether a certificate is about a mission, as its files and the situation are now.
+//! Checks that a certificate matches the present files and situation of a mission.
 
 use mission::Mission;
 use mission::knowledge::rule_text;
@@ -7,20 +7,20 @@ use pddl::{print_domain, print_problem};
 
 use crate::knowledge::{KnowledgeFiles, ORIGIN, Origin, said_first};
 
-/// Whether a certificate is about a mission, as its files and the situation are now.
+/// Checks that a certificate matches the present files and situation of a mission.
 pub(crate) fn about(
     written: Option<&KnowledgeFiles<'_>>,
     (domain, problem): (&str, &str),
     mission: &Mission,
 ) -> Result<String, String> {
-    let said = format!("it is about `{}` as it is now", mission.name);
+    let confirmation = format!("it is about `{}` as it is now", mission.name);
     let other = |what: &str| Err(format!("it is not about `{}` as it is now: {what}", mission.name));
     let (written, base) = match (written, mission.knowledge()) {
         (Some(written), Some(base)) => (written, base),
         (None, None) => {
             let (filled, _) = mission.filled().map_err(|messages| said_first(&messages))?;
-            let same = print_domain(mission.domain()) == domain && print_problem(&filled) == problem;
-            return if same { Ok(said) } else { other("domain or problem differ") };
+            let equal = print_domain(mission.domain()) == domain && print_problem(&filled) == problem;
+            return if equal { Ok(confirmation) } else { other("domain or problem differ") };
         }
         _ => return other("one has a knowledge base, and the other has none"),
     };
@@ -47,5 +47,5 @@ pub(crate) fn about(
     if print_problem(mission.problem()) != origin.problem || base.statements() != origin.changes {
         return other("the problem or the situation (`--scenario`, `--set`, `--fail`) differs");
     }
-    Ok(said)
+    Ok(confirmation)
 }

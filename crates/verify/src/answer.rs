@@ -1,4 +1,4 @@
-//! What came of a verification, for people and programs.
+//! The result of a verification, as text and as JSON.
 
 use std::fmt::{self, Write as _};
 
@@ -94,8 +94,8 @@ fn extent(subject: &Subject) -> String {
         Unchecked::Knowledge => "knowledge base",
         Unchecked::Mission => "mission",
     };
-    let others: Vec<&str> = subject.not_checked.iter().map(word).collect();
-    if others.is_empty() { checked } else { format!("{checked}; not checked: {}", others.join(", ")) }
+    let unchecked: Vec<&str> = subject.not_checked.iter().map(word).collect();
+    if unchecked.is_empty() { checked } else { format!("{checked}; not checked: {}", unchecked.join(", ")) }
 }
 
 /// For programs: a [`VerificationAnswer`].

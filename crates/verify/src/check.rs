@@ -1,4 +1,4 @@
-//! What a certificate claims, checked part by part.
+//! Verifies a certificate part by part.
 
 use std::fmt;
 use std::fs;
@@ -40,30 +40,32 @@ pub struct Verifier<'a> {
 }
 
 impl<'a> Verifier<'a> {
-    /// There is no limit, and the certificate may be about any mission.
+    /// Creates a verifier without limits and without a mission to compare with.
     pub fn new(directory: &'a Path) -> Self {
         Self { directory, mission: None, until: None, stop: Box::new(|| false) }
     }
 
-    /// Also checks that the certificate is about a mission in its present situation.
+    /// Also checks that the certificate matches a mission in its present situation.
     #[must_use]
     pub fn mission(self, mission: impl Into<Option<&'a Mission>>) -> Self {
         Self { mission: mission.into(), ..self }
     }
 
-    /// The comparison of the task with the files, which can take long, fails after this long, counted from now.
+    /// Limits the time of the grounding check, which may take long, counted from this call. The
+    /// check then fails.
     #[must_use]
     pub fn time_limit(self, time: Duration) -> Self {
         Self { until: Instant::now().checked_add(time), ..self }
     }
 
-    /// That comparison also fails when this says so.
+    /// Lets the grounding check fail when `stop` returns `true`.
     #[must_use]
     pub fn stop(self, stop: impl Fn() -> bool + 'a) -> Self {
         Self { stop: Box::new(stop), ..self }
     }
 
-    /// Checks part by part. What is wrong with the certificate is a part that fails, and no error.
+    /// Verifies all parts. A defect of the certificate is reported as a failed part, not as an
+    /// error.
     pub fn verify(&self) -> Verification {
         let mut report = Verification { claim: None, subject: None, parts: Vec::new() };
         match read(self.directory) {
@@ -88,10 +90,12 @@ impl<'a> Verifier<'a> {
         report
     }
 
-    /// The argument of the certificate as verification conditions in SMT-LIB 2; it is not checked here.
+    /// Returns the argument of the certificate as verification conditions in SMT-LIB 2, without
+    /// checking it.
     ///
     /// # Errors
-    /// M121: the certificate cannot be read, or its task has derived variables, for which there are no such conditions.
+    /// M121: the certificate cannot be read, or its task has derived variables, for which there
+    /// are no such conditions.
     pub fn conditions(&self) -> Result<String, Errors> {
         conditions(self.directory, &|| self.is_over()).map_err(Errors::from)
     }
@@ -143,12 +147,12 @@ fn parts(
         parts.push(VerifiedPart { part: "derivations", result: derivations });
         parts.push(VerifiedPart { part: "knowledge", result: filled });
     }
-    let (same, timed) = match same_task(&domain, &problem, (text(TASK), text(WITNESS)), stop) {
+    let (task_result, timed) = match same_task(&domain, &problem, (text(TASK), text(WITNESS)), stop) {
         Ok((said, timed)) => (Ok(said), timed),
-        // Whatever it is, it is not verified.
+        // The value is not used: the part has failed.
         Err(reason) => (Err(reason), false),
     };
-    parts.push(VerifiedPart { part: "task", result: same });
+    parts.push(VerifiedPart { part: "task", result: task_result });
     let metric = match claim {
         Claim::Unsolvable => None,
         Claim::Optimal { metric } => {
@@ -180,7 +184,7 @@ fn parts(
     parts
 }
 
-/// What a certificate says about knowledge, if it does.
+/// The knowledge files of a certificate, if it has any.
 fn written(contents: &[(String, String)]) -> Option<knowledge::KnowledgeFiles<'_>> {
     contents.iter().any(|(name, _)| name == knowledge::ORIGIN).then(|| knowledge::KnowledgeFiles {
         document: text(contents, knowledge::DOCUMENT),

@@ -1,25 +1,25 @@
-//! Everything that follows from a mission's knowledge, with why, as a file: to be replayed by `rules::replay`, which shares no
-//! code with the engine's evaluation.
+//! The JSON file of all inferred facts of a mission's knowledge with their derivations.
+//! `rules::replay` checks it without code of the inference engine.
 
 use rules::{Derivation, DerivationStep, Fact, Literal, Reason, RuleIdentity, Symbol, Symbols};
 use serde::{Deserialize, Serialize};
 
-/// The file.
+/// Name of the file.
 pub const DERIVATIONS: &str = "derivations.json";
-/// The version of its format.
+/// Version of the format.
 pub const FORMAT: &str = "metaplan-derivations/1";
 
-/// The document: steps, each after what it rests on.
+/// The document. Each step follows the steps that support it.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Document {
     /// [`FORMAT`].
     pub format: String,
-    /// Names and literals; everything else refers to them by position.
+    /// Names and literals; other parts refer to them by position.
     pub terms: Vec<Term>,
-    /// The rules that steps name.
+    /// The rules that the steps refer to.
     pub rules: Vec<Rule>,
-    /// What follows, and why.
+    /// The derivation steps.
     pub steps: Vec<Step>,
 }
 
@@ -29,45 +29,46 @@ pub struct Document {
 pub enum Term {
     /// An IRI.
     Name(String),
-    /// Lexical form, datatype.
+    /// A typed literal: lexical form, datatype.
     Literal(String, String),
-    /// Text, `rdf:langString`, language.
+    /// A language-tagged string: text, `rdf:langString`, language.
     Text(String, String, String),
 }
 
-/// A rule by where it stands.
+/// A rule, identified by its position in its source.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Rule {
-    /// The file.
+    /// Name of the file.
     pub source: String,
-    /// Which one of the file's.
+    /// Position of the rule in the file.
     pub position: u32,
-    /// Its name, if it has one.
+    /// Name of the rule, if it has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub label: Option<String>,
-    /// Those that have a value in each step.
+    /// The variables that have a value in each step.
     pub variables: Vec<String>,
 }
 
-/// A fact; stated unless more is said.
+/// A fact. It is asserted if neither `rule` nor `supports` is present.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Step {
     /// Predicate and arguments.
     pub fact: Vec<u32>,
-    /// The rule that says so.
+    /// The rule that derives the fact.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rule: Option<u32>,
     /// The values of the rule's variables.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub bindings: Vec<u32>,
-    /// The steps of the facts that the relation atoms of the rule's body found, in order; or what an equality rests on.
+    /// The steps of the facts that match the relation atoms of the rule's body, in order, or the
+    /// steps that support an equality.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub supports: Option<Vec<u32>>,
 }
 
-/// Reads derivations; names and values are interned in `symbols`.
+/// Parses derivations and interns their names and values in `symbols`.
 pub(crate) fn read(text: &str, symbols: &mut Symbols) -> Result<Derivation, String> {
     let wrong = |reason: &str| format!("{DERIVATIONS}: {reason}");
     let document: Document = serde_json::from_str(text).map_err(|error| wrong(&error.to_string()))?;

@@ -1,4 +1,4 @@
-//! SHA-256 of files and texts, in hexadecimal digits.
+//! SHA-256 digests of files and texts, in hexadecimal.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -6,7 +6,7 @@ use std::path::Path;
 
 use sha2::{Digest as _, Sha256};
 
-/// The size of a file and its SHA-256, read piece by piece.
+/// Returns the size and the SHA-256 of a file, reading it in blocks.
 ///
 /// # Errors
 /// The file cannot be read.
@@ -16,7 +16,7 @@ pub fn digest_of(path: &Path) -> std::io::Result<(u64, String)> {
     Ok((bytes, hexadecimal(&hasher.finalize())))
 }
 
-/// The SHA-256 of a text.
+/// The SHA-256 of a byte string.
 pub fn digest(bytes: &[u8]) -> String {
     hexadecimal(&Sha256::digest(bytes))
 }

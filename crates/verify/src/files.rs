@@ -1,4 +1,4 @@
-//! The files of a certificate: read as the manifest has them, and none that it does not have.
+//! Reads the files of a certificate. They must be exactly the files that the manifest lists.
 
 use std::fs;
 use std::io::Read as _;
@@ -11,12 +11,13 @@ use crate::manifest::{
 };
 use crate::{derivations, knowledge};
 
-/// The text of a file among several.
+/// Returns the text of a named file, or the empty string.
 pub fn text<'t, N: AsRef<str>>(files: &'t [(N, String)], name: &str) -> &'t str {
-    files.iter().find(|(own, _)| own.as_ref() == name).map_or("", |(_, text)| text.as_str())
+    files.iter().find(|(file_name, _)| file_name.as_ref() == name).map_or("", |(_, text)| text.as_str())
 }
 
-/// The manifest, and the contents of the files, each as the manifest says.
+/// Reads the manifest and the files, and checks their sizes and digests. Streamed files are
+/// checked but not returned.
 pub(crate) fn read(directory: &Path) -> Result<(Manifest, Vec<(String, String)>), String> {
     let manifest = read_file(directory, "manifest.json", 1 << 20)?;
     let manifest: Manifest =
@@ -38,7 +39,7 @@ pub(crate) fn read(directory: &Path) -> Result<(Manifest, Vec<(String, String)>)
     let mut names: Vec<&str> = manifest.files.iter().map(|file| file.name.as_str()).collect();
     names.sort_unstable();
     if names != expected {
-        // However many there are, the first show what is wrong.
+        // The list may be long; the first names suffice to show the error.
         names.truncate(expected.len() + 1);
         return Err(format!(
             "manifest.json: lists {}, where {} are expected",
@@ -69,25 +70,25 @@ pub(crate) fn read(directory: &Path) -> Result<(Manifest, Vec<(String, String)>)
                 file.bytes
             ));
         }
-        let found = digest(text.as_bytes());
-        if found != file.sha256 {
-            return Err(format!("{}: SHA-256 is {found}, where {} is expected", file.name, file.sha256));
+        let sha256 = digest(text.as_bytes());
+        if sha256 != file.sha256 {
+            return Err(format!("{}: SHA-256 is {sha256}, where {} is expected", file.name, file.sha256));
         }
         contents.push((file.name.clone(), text));
     }
     Ok((manifest, contents))
 }
 
-/// A file whose contents are looked at later.
+/// Checks the size and the SHA-256 of a file that is not kept in memory.
 fn check_streamed(directory: &Path, file: &File) -> Result<(), String> {
     let File { name, bytes, sha256 } = file;
     let wrong = |what: String| format!("{name}: {what}");
-    let most = if [PROOF, HINTS].contains(&name.as_str()) { PROOF_LIMIT.min(*bytes) } else { *bytes };
-    let path = plain_file(directory, name, most)?;
-    let (found, digest) =
+    let limit = if [PROOF, HINTS].contains(&name.as_str()) { PROOF_LIMIT.min(*bytes) } else { *bytes };
+    let path = plain_file(directory, name, limit)?;
+    let (size, digest) =
         digest_of(&path).map_err(|error| wrong(format!("cannot be read: {}", error.kind())))?;
-    if found != *bytes {
-        return Err(wrong(format!("has {found} bytes, where {bytes} are expected")));
+    if size != *bytes {
+        return Err(wrong(format!("has {size} bytes, where {bytes} are expected")));
     }
     if digest != *sha256 {
         return Err(wrong(format!("SHA-256 is {digest}, where {sha256} is expected")));
@@ -95,7 +96,7 @@ fn check_streamed(directory: &Path, file: &File) -> Result<(), String> {
     Ok(())
 }
 
-/// The path of a plain file of at most so many bytes.
+/// Returns the path of a regular file of at most `most` bytes.
 fn plain_file(directory: &Path, name: &str, most: u64) -> Result<PathBuf, String> {
     let path = directory.join(name);
     let wrong = |what: String| format!("{name}: {what}");
@@ -110,7 +111,7 @@ fn plain_file(directory: &Path, name: &str, most: u64) -> Result<PathBuf, String
     Ok(path)
 }
 
-/// The contents of a plain file of at most so many bytes.
+/// Reads a regular file of at most `most` bytes.
 fn read_file(directory: &Path, name: &str, most: u64) -> Result<String, String> {
     let path = plain_file(directory, name, most)?;
     let wrong = |what: String| format!("{name}: {what}");

@@ -1,4 +1,5 @@
-//! Where a mission's problem comes from: its knowledge base, what has changed since, and why what follows from them does.
+//! The origin of a mission's problem: its knowledge base, later changes, and the derivations of
+//! the inferred facts.
 
 use std::collections::BTreeMap;
 
@@ -14,41 +15,42 @@ use mission::knowledge::{COADAPTATION, Knowledge, Sources, Stated, Statements, T
 use mission::message::Message;
 use mission::{Bindings, Mission, Names};
 
-/// The knowledge base with all that it imports, as N-Triples.
+/// Name of the file with the knowledge base and its imports, as N-Triples.
 pub const DOCUMENT: &str = "knowledge.nt";
-/// Everything else.
+/// Name of the file with all other inputs.
 pub const ORIGIN: &str = "origin.json";
 
-/// What joins a knowledge base with PDDL, and what has changed since it was read.
+/// The connection between a knowledge base and PDDL, and the changes since the knowledge base was
+/// read.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Origin {
-    /// The domain as its file has it.
+    /// Text of the domain file.
     pub domain: String,
-    /// The problem without what the knowledge base contributes.
+    /// The problem without the parts that the knowledge base contributes.
     pub problem: String,
-    /// PDDL symbol to query, beyond the defaults.
+    /// Query of each PDDL symbol, beyond the defaults.
     pub bindings: BTreeMap<String, String>,
-    /// Names of individuals to names of objects, where they differ.
+    /// Object names of individuals, where they differ.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub names: BTreeMap<String, String>,
-    /// Names and texts of rule files.
+    /// Names and texts of the rule files.
     pub rules: Vec<(String, String)>,
-    /// The SHA-256 of those that the program ships, by name.
+    /// SHA-256 of the rule files that the program ships, by name.
     pub shipped: BTreeMap<String, String>,
-    /// What has changed since the documents were read.
+    /// Changes since the documents were read.
     pub changes: Statements,
 }
 
-/// What a certificate says about knowledge: the documents, what has changed since, and what follows.
+/// The texts of the knowledge files of a certificate.
 pub(crate) struct KnowledgeFiles<'w> {
     pub(crate) document: &'w str,
     pub(crate) origin: &'w str,
     pub(crate) derivations: &'w str,
 }
 
-/// Replays the derivations, and fills the problem with what they say. It must be the problem that was planned, but for its
-/// metric.
+/// Replays the derivations and fills the problem with the inferred facts. The result must equal
+/// the certificate's problem except for the metric.
 pub(crate) fn check(
     written: &KnowledgeFiles<'_>,
     domain: &Domain,
@@ -61,14 +63,14 @@ pub(crate) fn check(
     [Ok(said), filled(knowledge, &origin, domain, problem)]
 }
 
-/// Whether a rule file is the shipped one of that name.
+/// Returns `true` if a rule file is the shipped file of that name.
 pub fn is_shipped(name: &str, text: &str) -> bool {
     [(COADAPTATION, rules::COADAPTATION_RULES), (TOMASYS, rules::TOMASYS_RULES)].contains(&(name, text))
 }
 
-/// Which rules are ours, and which are not whatever they are called.
+/// Reports for each rule file whether it is the shipped one, and checks the recorded digests.
 fn provenance(origin: &Origin) -> Result<String, String> {
-    let mut said = Vec::new();
+    let mut descriptions = Vec::new();
     for (name, text) in &origin.rules {
         let sum = digest(text.as_bytes());
         let short = &sum[..12];
@@ -77,7 +79,7 @@ fn provenance(origin: &Origin) -> Result<String, String> {
         {
             return Err(format!("the rules `{name}` have the SHA-256 {sum}, where {claimed} is named"));
         }
-        said.push(if is_shipped(name, text) {
+        descriptions.push(if is_shipped(name, text) {
             format!("`{name}` (shipped)")
         } else if [COADAPTATION, TOMASYS].contains(&name.as_str()) {
             format!("`{name}` (NOT the shipped rules of this version, SHA-256 {short}…)")
@@ -85,11 +87,12 @@ fn provenance(origin: &Origin) -> Result<String, String> {
             format!("`{}` (not shipped, SHA-256 {short}…)", name.rsplit('/').next().unwrap_or(name))
         });
     }
-    let other = origin.shipped.keys().find(|name| !origin.rules.iter().any(|(own, _)| own == *name));
-    match other {
+    let missing =
+        origin.shipped.keys().find(|name| !origin.rules.iter().any(|(rule_name, _)| rule_name == *name));
+    match missing {
         Some(name) => Err(format!("the rules `{name}` are named and not there")),
-        None if said.is_empty() => Ok("no rule files".to_owned()),
-        None => Ok(format!("rules: {}", said.join(", "))),
+        None if descriptions.is_empty() => Ok("no rule files".to_owned()),
+        None => Ok(format!("rules: {}", descriptions.join(", "))),
     }
 }
 
@@ -98,10 +101,10 @@ pub(crate) fn said_first(messages: &[Message]) -> String {
     error.map_or_else(String::new, |found| found.message.clone())
 }
 
-/// What the documents say, with what has changed since.
+/// Reads the documents and applies the later changes.
 ///
 /// # Errors
-/// What is wrong with them, as a sentence.
+/// A description of the error.
 pub fn stated(document: &str, origin: &Origin) -> Result<Stated, String> {
     let directory = tempfile::tempdir().map_err(|error| format!("no temporary directory: {error}"))?;
     let write = |name: &str, text: &str| {
@@ -114,7 +117,7 @@ pub fn stated(document: &str, origin: &Origin) -> Result<Stated, String> {
     let rules = rules
         .map(|((_, text), number)| Ok(write(&format!("rules-{number}.swrl"), text)?.display().to_string()));
     let rules = rules.collect::<Result<Vec<_>, String>>()?;
-    // What the document imports would lie outside of the certificate.
+    // Imports would refer to documents outside of the certificate, so they are not followed.
     let options = ReadOptions { closed: true, ..ReadOptions::default() };
     let sources = Sources { documents, rules, options, ..Sources::default() };
     let mut stated = Stated::read_for(&sources, &origin.domain).map_err(|messages| said_first(&messages))?;
@@ -128,7 +131,7 @@ pub fn stated(document: &str, origin: &Origin) -> Result<Stated, String> {
     Ok(stated)
 }
 
-/// What follows, by its derivations alone.
+/// Derives the inferred knowledge from the derivations alone.
 fn replayed(written: &KnowledgeFiles<'_>) -> Result<(Knowledge, String, Origin), String> {
     let origin: Origin =
         serde_json::from_str(written.origin).map_err(|error| format!("{ORIGIN}: {error}"))?;
@@ -137,7 +140,7 @@ fn replayed(written: &KnowledgeFiles<'_>) -> Result<(Knowledge, String, Origin),
     let Replayed { facts, derived, matches } =
         replay(&stated.program, &mut stated.symbols, &stated.facts, &derivation)
             .map_err(|fault| format!("{DERIVATIONS}: {fault}"))?;
-    let said = format!(
+    let summary = format!(
         "{facts} facts hold, {derived} of them by rules, and nothing else follows: {} rules and axioms, {matches} matches",
         stated.program.rules.len()
     );
@@ -145,11 +148,11 @@ fn replayed(written: &KnowledgeFiles<'_>) -> Result<(Knowledge, String, Origin),
     let Stated { symbols, program, facts: told, terms, .. } = stated;
     let knowledge = Knowledge::closed(symbols, facts, program.equality);
     let knowledge = knowledge.map_err(|messages| said_first(&messages))?.with_terms(terms, &told);
-    let said = format!("{said}; {}", provenance(&origin)?);
-    Ok((knowledge, said, origin))
+    let summary = format!("{summary}; {}", provenance(&origin)?);
+    Ok((knowledge, summary, origin))
 }
 
-/// The code that joins knowledge and PDDL, which the planner runs, too.
+/// The code that connects knowledge and PDDL, which verifier and planner share.
 fn shared(mission: &Mission) -> &'static str {
     match (mission.adaptation(), mission.completed_predicates()) {
         (Some(_), _) => "the bindings, and the explicit form of the plain domain",
@@ -170,7 +173,7 @@ fn filled(
     let mission = Mission::new("", Some(Ok(knowledge)), bindings, own_domain, own_problem);
     let mission = mission.map_err(|messages| said_first(&messages))?;
     let (mut filled, _) = mission.filled().map_err(|messages| said_first(&messages))?;
-    let own = print_problem(&filled);
+    let unchanged_metric = print_problem(&filled);
     filled.metric.clone_from(&problem.metric);
     if print_domain(mission.domain()) != print_domain(domain) {
         return Err("the mission's domain is another one".to_owned());
@@ -184,7 +187,7 @@ fn filled(
     if found != expected {
         return Err("the knowledge says more or less than the problem".to_owned());
     }
-    // The metric is the only thing that a user chooses with each plan.
-    let metric = if own == expected { "" } else { ", with another metric than the mission's" };
+    // The metric is the only part that a user chooses for each plan.
+    let metric = if unchanged_metric == expected { "" } else { ", with another metric than the mission's" };
     Ok(format!("the problem is what follows{metric}; on trust: {}", shared(&mission)))
 }

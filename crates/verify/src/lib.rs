@@ -1,6 +1,7 @@
-//! Whether a certificate proves what it claims: from the knowledge base to the refutation of a formula.
+//! Verifies optimality certificates, from the knowledge base to the refutation of a formula.
 //!
-//! A certificate is a directory with all that is needed to check that a plan is optimal, or that there is none:
+//! A certificate is a directory with everything that is required to check that a plan is optimal
+//! or that no plan exists:
 //!
 //! | file | holds |
 //! |---|---|
@@ -14,7 +15,7 @@
 //! | `formula.cnf`, `legend.txt`, `proof.drat`, `hints.txt` | for small tasks: "a cheaper plan has at most so many steps" in DIMACS, what its variables mean, its refutation, what each line of that follows from |
 //! | `argument.json` | why no plan is cheaper: labels, potentials, needs (see `metaplan-certificate`) |
 //!
-//! Nothing here plans, and nothing that plans is linked.
+//! What is absent: the crate links no planner code.
 //!
 #![doc = include_str!("../README.md")]
 

@@ -1,4 +1,4 @@
-//! `metaplan-verify DIR`: whether a certificate proves what it claims.
+//! `metaplan-verify DIR`: verifies a certificate.
 
 use std::io::{ErrorKind, Write as _};
 use std::path::PathBuf;
@@ -11,7 +11,7 @@ use mission::file;
 use mission::message::{ErrorAnswer, Errors, Message};
 use mission::visible::{pretty, visible, visible_json};
 
-/// The statuses of `metaplan verify`.
+/// Exit statuses, equal to those of `metaplan verify`.
 const VERIFIED: u8 = 0;
 const BAD_INPUT: u8 = 3;
 const INVALID: u8 = 30;
@@ -44,7 +44,7 @@ enum Format {
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    // The default hook would print a stack trace at users; what matters is printed below.
+    // The default hook would print a stack trace; the message is printed below instead.
     std::panic::set_hook(Box::new(|_| {}));
     let outcome = std::panic::catch_unwind(|| run(&arguments));
     ExitCode::from(match outcome {
@@ -60,7 +60,7 @@ fn main() -> ExitCode {
     })
 }
 
-/// Checks the certificate.
+/// Verifies the certificate under the limits.
 fn run(arguments: &Arguments) -> Result<Verification, Errors> {
     let Arguments { directory, format, smt, time_limit } = arguments.clone();
     let watch = Watch::start(time_limit, move |report| std::process::exit(show(report, format).into()));
@@ -71,7 +71,7 @@ fn run(arguments: &Arguments) -> Result<Verification, Errors> {
     Ok(watch.end(verifier.verify()))
 }
 
-/// Writes what came of it; returns the status.
+/// Prints the verification and returns the exit status.
 fn show(report: &Verification, format: Format) -> u8 {
     let written = document(&match format {
         Format::Text => report.to_string(),
@@ -84,7 +84,7 @@ fn show(report: &Verification, format: Format) -> u8 {
     }
 }
 
-/// Writes an error: text on standard error, or a JSON object as the answer.
+/// Prints an error: text on standard error, or a JSON object as the answer.
 fn fail(messages: &[Message], format: Format) {
     match format {
         Format::Text => {
@@ -98,7 +98,8 @@ fn fail(messages: &[Message], format: Format) {
     }
 }
 
-/// Writes to standard output; false if that is not possible. A reader that has gone away is not a fault, a full disk is.
+/// Writes to standard output. Returns `false` on failure. A closed pipe is not an error, unlike a
+/// full disk.
 fn document(text: &str) -> bool {
     let mut stdout = std::io::stdout().lock();
     match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {

@@ -1,4 +1,4 @@
-//! What a certificate consists of and claims, and what came of checking it.
+//! The manifest of a certificate, its claim, and the result of a verification.
 
 use std::fmt::Write as _;
 
@@ -6,58 +6,59 @@ use serde::{Deserialize, Serialize};
 
 use crate::digest::digest;
 
-/// The version of the format.
+/// Version of the format.
 pub const FORMAT: &str = "metaplan-certificate/3";
-/// All files that are never in memory as a whole are together at most this large, in bytes.
+/// Upper limit on the total size of the streamed files, in bytes.
 pub const SIZE_LIMIT: u64 = 1 << 30;
-/// All files that are in memory as a whole are together at most this large, in bytes.
+/// Upper limit on the total size of the files that are read into memory, in bytes.
 pub const TEXT_LIMIT: u64 = 1 << 28;
-/// The PDDL domain as it was planned with.
+/// Name of the file with the planned PDDL domain.
 pub const DOMAIN: &str = "domain.pddl";
-/// The problem as it was planned with: availability and values filled in.
+/// Name of the file with the planned problem, with availability and values filled in.
 pub const PROBLEM: &str = "problem.pddl";
-/// The plan; missing if there is none.
+/// Name of the file with the plan; absent if there is no plan.
 pub const PLAN: &str = "plan.txt";
-/// The ground task.
+/// Name of the file with the ground task.
 pub const TASK: &str = "task.json";
-/// The atoms that may ever hold, and the values that numbers may have.
+/// Name of the file with the possible atoms and the ranges of numbers.
 pub const WITNESS: &str = "witness.json";
-/// Why no plan is cheaper.
+/// Name of the file with the optimality proof.
 pub const ARGUMENT: &str = "argument.json";
-/// For small tasks: "a cheaper plan has at most so many steps", in DIMACS.
+/// Name of the file with the formula "a cheaper plan has at most T steps" of a small task, in
+/// DIMACS.
 pub const FORMULA: &str = "formula.cnf";
-/// What the variables of the formula mean.
+/// Name of the file with the meaning of the formula's variables.
 pub const LEGEND: &str = "legend.txt";
-/// The refutation of the formula.
+/// Name of the file with the refutation of the formula.
 pub const PROOF: &str = "proof.drat";
-/// What each line of the refutation follows from.
+/// Name of the file with the antecedents of each line of the refutation.
 pub const HINTS: &str = "hints.txt";
-/// These may be large, and are never in memory as a whole.
+/// Names of the files that may be large and are never read into memory as a whole.
 pub const STREAMED: [&str; 4] = [FORMULA, LEGEND, PROOF, HINTS];
-/// A proof and its hints are at most this large each, in bytes.
+/// Upper limit on the size of the proof and of its hints, each in bytes.
 pub const PROOF_LIMIT: u64 = 1 << 28;
 
-/// What a certificate claims, and of which files it consists.
+/// The claim and the files of a certificate.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
-    /// [`FORMAT`].
+    /// The constant [`FORMAT`].
     pub format: String,
-    /// What is claimed.
+    /// The claim.
     pub claim: Claim,
-    /// Whether there is a formula.
+    /// The refutation, if there is one.
     pub refutation: Refutation,
-    /// All files but the manifest.
+    /// All files except the manifest.
     pub files: Vec<File>,
 }
 
-/// Whether there is a formula with a proof besides the argument.
+/// The second proof of the claim, by a formula and its refutation.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Refutation {
-    /// For plans of at most so many steps; longer ones are not cheaper.
+    /// A formula for plans of at most this number of steps; longer plans are not cheaper.
     Steps(usize),
-    /// Why not.
+    /// No formula, and the reason.
     None(String),
 }
 
@@ -79,15 +80,15 @@ pub enum Claim {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct File {
-    /// Its name in the directory.
+    /// Name of the file in the directory.
     pub name: String,
-    /// Its size.
+    /// Size in bytes.
     pub bytes: u64,
-    /// Its SHA-256 in hexadecimal digits.
+    /// SHA-256 in hexadecimal digits.
     pub sha256: String,
 }
 
-/// The files that say what a certificate is about, of which [`Subject::digest`] is made.
+/// Names of the files that [`Subject::digest`] covers.
 pub const SUBJECT: [&str; 4] = [DOMAIN, PROBLEM, crate::knowledge::DOCUMENT, crate::knowledge::ORIGIN];
 
 /// The files or the mission that a claim was checked for.
@@ -149,30 +150,32 @@ impl Subject {
     }
 }
 
-/// What came of one part of a verification.
+/// The result of one part of a verification.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct VerifiedPart {
-    /// `files`, `derivations`, `knowledge`, `plan`, `task`, `argument`, `formula`, `proof`, `steps` or `mission`; or
-    /// `limits`, where time or memory was up.
+    /// Name of the part: `files`, `derivations`, `knowledge`, `plan`, `task`, `argument`,
+    /// `formula`, `proof`, `steps` or `mission`; or `limits` if the time or memory limit was
+    /// reached.
     pub part: &'static str,
-    /// What was checked; or why it fails, with the first thing that is wrong.
+    /// A summary of the check, or the first defect.
     pub result: Result<String, String>,
 }
 
-/// What came of a verification.
+/// The result of a verification.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Verification {
-    /// The claim; none if the manifest does not say.
+    /// The claim; `None` if the manifest cannot be read.
     pub claim: Option<Claim>,
-    /// The files or the mission that the claim was checked for; none if the files cannot be read.
+    /// The files or the mission that the claim was checked for; `None` if the files cannot be
+    /// read.
     pub subject: Option<Subject>,
-    /// In order; what rests on a part that fails is left out.
+    /// The parts in order. Parts that depend on a failed part may be absent.
     pub parts: Vec<VerifiedPart>,
 }
 
 impl Verification {
-    /// Whether the claim is proved.
+    /// Returns `true` if the claim is proved.
     pub fn verified(&self) -> bool {
         self.claim.is_some() && self.parts.iter().all(|part| part.result.is_ok())
     }

@@ -1,14 +1,15 @@
-//! The limit on memory: what the process occupies, to a flag that stops it.
+//! The memory limit: a thread measures the process and sets a flag.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// How often the memory is measured. So long the process may go on taking more.
+/// Interval between two measurements. The process may exceed the limit for this time.
 const INTERVAL: Duration = Duration::from_millis(5);
 
-/// Sets the flag as soon as the process occupies more than so many megabytes (of 2^20 bytes) of main memory. Programs that
-/// it starts do not count. False if the platform does not tell how much memory a process occupies: there is no limit then.
+/// Starts a thread that sets the flag as soon as the process occupies more than `megabytes` of
+/// main memory (units of 2^20 bytes). Child processes do not count. Returns `false`, and sets no
+/// limit, if the platform does not report the memory of a process.
 #[must_use]
 pub fn watch(megabytes: u64, interrupt: Arc<AtomicBool>) -> bool {
     let occupied = || memory_stats::memory_stats().map(|stats| stats.physical_mem as u64);

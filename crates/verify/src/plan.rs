@@ -1,4 +1,4 @@
-//! The plan of a certificate, executed by the validator.
+//! Validates the plan of a certificate.
 
 use num_rational::BigRational;
 use num_traits::Zero;
@@ -9,10 +9,12 @@ use pddl::{Source, to_decimal};
 use crate::manifest::PLAN;
 use crate::measure::measure;
 
-/// Has the validator execute the plan, unless `stop` returns `true` before the end. The metric is what the validator says.
+/// Executes the plan in the validator until `stop` returns `true`. Returns a summary and the
+/// metric value.
 ///
 /// # Errors
-/// The plan is none, cannot be executed, or has another metric than claimed; or it was not executed to the end.
+/// The plan is malformed, cannot be executed, or has another metric than claimed; or the
+/// validation was stopped.
 pub fn plan(
     domain: &Domain,
     problem: &Problem,
@@ -26,9 +28,10 @@ pub fn plan(
     if plan.steps.iter().all(|step| step.start.is_some()) {
         plan.steps.sort_by(|left, right| left.start.cmp(&right.start));
     }
-    // One step after the other, each as long as the files say, unless they leave a choice: what is written may be rounded. Where
-    // nothing happens by itself, each starts when the one before it has ended; otherwise when it is written, or a little
-    // later for that reason.
+    // The steps are executed in sequence, each with the duration of the files unless the files
+    // leave a choice, because written times may be rounded. Without timed events, each step
+    // starts when the previous one has ended. With timed events, it starts at its written time or
+    // within the tolerance after it.
     let is_timed = problem.init.iter().any(|element| matches!(element, InitialElement::Timed(..)));
     for step in &mut plan.steps {
         step.start = step.start.take().filter(|_| is_timed);
@@ -43,7 +46,7 @@ pub fn plan(
     }
     let steps = plan.steps.len();
     let value = measure(problem, &verdict, steps, timed).ok_or("the metric has no value after the plan")?;
-    // As a decimal where there is one, or as a fraction.
+    // The claim is a decimal if the value has one, or else a fraction.
     if value.to_string() != claimed && to_decimal(&value).is_none_or(|decimal| decimal != claimed) {
         return Err(format!("its metric is {value}, where {claimed} is claimed"));
     }
@@ -51,7 +54,7 @@ pub fn plan(
     Ok((format!("{steps} step{ending}, valid, metric {claimed}"), value))
 }
 
-/// Whether an action of this name has a duration that is not fixed.
+/// Returns `true` if an action of this name has a duration that is not fixed.
 fn is_chosen(domain: &Domain, name: &Name) -> bool {
     let mut bodies =
         domain.actions.iter().filter(|action| action.identifier.name == *name).map(|action| &action.body);

@@ -1,4 +1,4 @@
-//! The files of a certificate, and whether its ground task stands for them.
+//! Reads the PDDL files of a certificate and checks the grounding of its task.
 
 use certificate::{Faithful, faithful};
 use pddl::Source;
@@ -6,10 +6,10 @@ use pddl::ast::{Domain, Problem};
 
 use crate::manifest::{DOMAIN, PROBLEM};
 
-/// The domain and the problem, from their texts.
+/// Parses the domain and the problem.
 ///
 /// # Errors
-/// The first thing that is wrong with them.
+/// The first error in the texts.
 pub fn read_pddl(domain: &str, problem: &str) -> Result<(Domain, Problem), String> {
     let read = pddl::read(&Source::new(DOMAIN, domain), &Source::new(PROBLEM, problem));
     let first =
@@ -17,11 +17,11 @@ pub fn read_pddl(domain: &str, problem: &str) -> Result<(Domain, Problem), Strin
     read.map(|(domain, problem, _)| (domain, problem)).map_err(first)
 }
 
-/// Whether the task stands for the files, and whether plans are measured by time where there is no metric. The comparison ends
-/// when `stop` says so.
+/// Checks that the task refines the files. Also returns `true` if plans are measured by time
+/// because there is no metric. The check ends when `stop` returns `true`.
 ///
 /// # Errors
-/// The first difference, or why it is not known.
+/// The first difference, or the reason why the check is undecided.
 pub fn same_task(
     domain: &Domain,
     problem: &Problem,
@@ -30,11 +30,11 @@ pub fn same_task(
 ) -> Result<(String, bool), String> {
     match faithful(domain, problem, task, witness, stop) {
         Faithful::Yes { instances, idle, timed } => {
-            let said = format!(
+            let summary = format!(
                 "it stands for the files: {instances} instances of actions can be executed, {idle} of which change nothing \
                  that it knows"
             );
-            Ok((said, timed))
+            Ok((summary, timed))
         }
         Faithful::No(difference) => Err(difference.to_string()),
         Faithful::Undecided(cause) => Err(cause.to_string()),

@@ -1,4 +1,5 @@
-//! When a verification has to stop: a certificate may come from anybody, and ask for more than there is.
+//! The time and memory limits of a verification. A certificate is untrusted and may require
+//! unlimited resources.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -7,14 +8,15 @@ use std::time::{Duration, Instant};
 use crate::manifest::{Verification, VerifiedPart};
 use crate::memory;
 
-/// The process may take so much, in megabytes of 2^20 bytes.
+/// Upper limit on the memory of the process, in megabytes of 2^20 bytes.
 const MEMORY_LIMIT: u64 = 4096;
-/// Time after a limit, besides a tenth of the time limit, until a verification that does not stop by itself is given up.
+/// Time after a limit, in addition to a tenth of the time limit, until a verification that has
+/// not stopped is aborted.
 const GRACE: Duration = Duration::from_millis(100);
 const LATE: &str = "it takes longer than `--time-limit` allows";
 const INTERVAL: Duration = Duration::from_millis(50);
 
-/// The limits of a verification that is under way. Clones are about the same one.
+/// The limits of a running verification. Clones share the same limits.
 #[derive(Debug, Clone)]
 pub struct Watch {
     started: Instant,
@@ -24,21 +26,21 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// Begins to measure time and memory. Not all that is done asks whether to stop, so that a thread of its own waits for the
-    /// end: some time after a limit has been reached it calls `give_up` with what there is to say then. That should end the
-    /// program.
+    /// Starts measuring time and memory. Not every computation polls the limits, so a separate
+    /// thread calls `give_up` some time after a limit was reached if the verification has not
+    /// ended. `give_up` should end the program.
     pub fn start(time: Duration, give_up: impl FnOnce(&Verification) + Send + 'static) -> Self {
         let (interrupt, answered) = (Arc::default(), Arc::default());
         let watch = Self { started: Instant::now(), time, interrupt, answered };
-        // Where the platform does not tell how much memory is taken, there is no limit on it.
+        // Without a measurement of the platform, memory is unlimited.
         let _ = memory::watch(MEMORY_LIMIT, Arc::clone(&watch.interrupt));
-        let own = watch.clone();
+        let watcher = watch.clone();
         std::thread::spawn(move || {
-            while !own.reached() {
+            while !watcher.reached() {
                 std::thread::sleep(INTERVAL);
             }
-            std::thread::sleep(own.time / 10 + GRACE);
-            if !own.answered.swap(true, Ordering::Relaxed) {
+            std::thread::sleep(watcher.time / 10 + GRACE);
+            if !watcher.answered.swap(true, Ordering::Relaxed) {
                 let reason = format!("{LATE}, or more than {MEMORY_LIMIT} MB");
                 let parts = vec![VerifiedPart { part: "limits", result: Err(reason) }];
                 give_up(&Verification { claim: None, subject: None, parts });
@@ -47,18 +49,19 @@ impl Watch {
         watch
     }
 
-    /// Whether a limit is reached.
+    /// Returns `true` if a limit is reached.
     pub fn reached(&self) -> bool {
         self.interrupt.load(Ordering::Relaxed) || self.started.elapsed() >= self.time
     }
 
-    /// What came of the verification; it fails if it took too long. Nobody gives up from now on.
+    /// Ends the verification and returns its report, which fails if the time limit is exceeded.
+    /// `give_up` is not called afterwards.
     #[must_use]
     pub fn end(&self, mut report: Verification) -> Verification {
         if self.started.elapsed() > self.time {
             report.parts.push(VerifiedPart { part: "limits", result: Err(LATE.to_owned()) });
         }
-        // The other thread has begun to say that time is up, and ends the program.
+        // The watching thread is already reporting the limit and ends the program.
         while self.answered.swap(true, Ordering::Relaxed) {
             std::thread::park();
         }
@@ -66,10 +69,10 @@ impl Watch {
     }
 }
 
-/// A time from a number of seconds, as an option has it.
+/// Parses a duration in seconds, for command-line options.
 ///
 /// # Errors
-/// It is not a number of seconds, or negative.
+/// The text is not a number of seconds, or the number is negative.
 pub fn seconds(text: &str) -> Result<Duration, String> {
     let seconds: f64 = text.parse().map_err(|_| format!("`{text}` is not a number of seconds"))?;
     Duration::try_from_secs_f64(seconds).map_err(|error| error.to_string())

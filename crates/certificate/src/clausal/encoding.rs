@@ -1,4 +1,4 @@
-//! A task to the formula "there is a plan of at most T steps that costs less than the claim".
+//! Encodes a task as the formula "a plan of at most T steps costs less than the claim".
 
 use crate::clausal::formula::Formula;
 use crate::clausal::sums::Sums;
@@ -6,7 +6,7 @@ use crate::clausal::timeline::Timeline;
 use crate::integer::Integer;
 use crate::model::Model;
 
-/// The formula of a task; an error says what it does not cover.
+/// Encodes a task. Returns the reason if the task has a construct that is not supported.
 pub(super) fn encode(model: &Model, cost: &Integer, steps: usize, limit: usize) -> Result<Formula, String> {
     if !model.axioms.is_empty() {
         return Err("derived predicates are not covered".into());

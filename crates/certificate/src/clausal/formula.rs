@@ -1,4 +1,5 @@
-//! Clauses with names for their variables, as they are written and compared.
+//! Propositional formulas in clausal form, with names for their variables; written in DIMACS and
+//! compared with written files.
 
 use std::fmt::Write as _;
 use std::io::{BufRead, Read, Write};
@@ -6,20 +7,21 @@ use std::io::{BufRead, Read, Write};
 use crate::clausal::lines;
 use crate::clausal::literal::Literal;
 
-/// Clauses, and what their variables mean.
+/// A CNF formula with named variables.
 pub struct Formula {
-    /// Of all clauses, one after the other.
+    /// Literals of all clauses, concatenated.
     literals: Vec<Literal>,
-    /// Where each clause ends.
+    /// End of each clause in `literals`.
     ends: Vec<usize>,
     names: Vec<String>,
     limit: usize,
-    /// How many bits the longest of its numbers has.
+    /// Number of bits of the widest number.
     widest: usize,
 }
 
 impl Formula {
-    /// The formula that is true, which does not grow much beyond so many literals.
+    /// Creates a formula with one variable that is true. At most about `limit` literals are
+    /// stored.
     pub(super) fn new(limit: usize) -> Self {
         let mut formula =
             Self { literals: Vec::new(), ends: Vec::new(), names: Vec::new(), limit, widest: 0 };
@@ -28,12 +30,12 @@ impl Formula {
         formula
     }
 
-    /// Notes that one of its numbers has so many bits.
+    /// Records a number of `bits` bits.
     pub(super) fn has_number(&mut self, bits: usize) {
         self.widest = self.widest.max(bits);
     }
 
-    /// An error if it has grown beyond the limit.
+    /// Returns an error if the formula exceeds its limit.
     pub(super) fn within_limit(&self) -> Result<(), String> {
         if self.literals.len() > self.limit || self.names.len() >= self.limit {
             return Err(format!("the formula has more than {} literals", self.limit));
@@ -41,30 +43,33 @@ impl Formula {
         Ok(())
     }
 
-    /// A new variable.
+    /// Adds a variable.
     pub(super) fn variable(&mut self, name: impl FnOnce() -> String) -> Literal {
-        // What is beyond the limit is refused in any case.
+        // Variables beyond the limit need no name: `within_limit` rejects the formula.
         if self.names.len() < self.limit {
             self.names.push(name());
         }
         Literal::of_variable(self.names.len()).unwrap_or(Literal::FIRST)
     }
 
-    /// The variable that is true.
+    /// The literal that is always true.
     #[allow(clippy::unused_self, reason = "part of the formula")]
     pub(super) fn truth(&self) -> Literal {
         Literal::FIRST
     }
 
     pub(super) fn clause(&mut self, clause: &[Literal]) {
-        // What is beyond the limit is refused in any case.
+        // Clauses beyond the limit are not stored: `within_limit` rejects the formula.
         if self.literals.len() <= self.limit {
             self.literals.extend(clause);
             self.ends.push(self.literals.len());
         }
     }
 
-    /// At most one of some variables: with "one of the first so many" where there are many.
+    /// Encodes that at most one variable is true: pairwise for up to 5 variables, else by the
+    /// sequential counter encoding [1].
+    ///
+    /// [1] Sinz, "Towards an optimal CNF encoding of Boolean cardinality constraints", CP 2005.
     #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     pub(super) fn at_most_one(&mut self, variables: &[Literal], name: &str) {
         if variables.len() <= 5 {
@@ -87,18 +92,18 @@ impl Formula {
         }
     }
 
-    /// How many variables it has.
+    /// Number of variables.
     pub fn variables(&self) -> usize {
         self.names.len()
     }
 
-    /// Its clauses.
+    /// Iterates over the clauses.
     pub fn clauses(&self) -> impl Iterator<Item = &[Literal]> {
         let begins = std::iter::once(0).chain(self.ends.iter().copied());
         begins.zip(&self.ends).map(|(begin, end)| &self.literals[begin..*end])
     }
 
-    /// How many bits the longest of its numbers has.
+    /// Number of bits of the widest number.
     pub fn widest(&self) -> usize {
         self.widest
     }
@@ -107,19 +112,19 @@ impl Formula {
         self.ends.len()
     }
 
-    /// Writes it in DIMACS.
+    /// Writes the formula in DIMACS.
     ///
     /// # Errors
-    /// The output fails.
+    /// Errors of the output.
     pub fn write_dimacs(&self, output: &mut dyn Write) -> std::io::Result<()> {
         self.dimacs(&mut |line| output.write_all(line))?;
         output.flush()
     }
 
-    /// Writes a line for each variable: its number and what it stands for.
+    /// Writes one line for each variable: its number and its meaning.
     ///
     /// # Errors
-    /// The output fails.
+    /// Errors of the output.
     pub fn write_legend(&self, output: &mut dyn Write) -> std::io::Result<()> {
         self.legend(&mut |line| output.write_all(line))?;
         output.flush()
@@ -145,32 +150,32 @@ impl Formula {
         })
     }
 
-    /// Whether a written formula and its legend are these: every clause, by the names of its variables.
+    /// Checks that a written formula and its legend equal this formula, line by line.
     pub(super) fn compare(&self, formula: &mut dyn BufRead, legend: &mut dyn BufRead) -> Result<(), String> {
-        let mut legend = Written { what: "legend", text: legend, line: Vec::new(), number: 0 };
+        let mut legend = LineComparer { what: "legend", text: legend, line: Vec::new(), number: 0 };
         self.legend(&mut |line| legend.compare(line))?;
         legend.end()?;
-        let mut formula = Written { what: "formula", text: formula, line: Vec::new(), number: 0 };
+        let mut formula = LineComparer { what: "formula", text: formula, line: Vec::new(), number: 0 };
         self.dimacs(&mut |line| formula.compare(line))?;
         formula.end()
     }
 }
 
-/// A text that is compared line by line with what is expected.
-struct Written<'w> {
+/// Compares a text line by line with the expected lines.
+struct LineComparer<'w> {
     what: &'static str,
     text: &'w mut dyn BufRead,
     line: Vec<u8>,
-    /// Lines so far.
+    /// Number of lines read.
     number: usize,
 }
 
-impl Written<'_> {
+impl LineComparer<'_> {
     #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     fn compare(&mut self, expected: &[u8]) -> Result<(), String> {
         self.number += 1;
         self.line.clear();
-        // A line that is longer than expected is wrong, however long it is.
+        // Reading at most the expected length bounds memory; a longer line differs in any case.
         let mut line = Read::take(&mut *self.text, expected.len() as u64);
         line.read_until(b'\n', &mut self.line)
             .map_err(|error| format!("the {} cannot be read: {error}", self.what))?;

@@ -1,23 +1,24 @@
-//! Lines of numbers, each ended by 0, as DIMACS and DRAT have them; read one at a time.
+//! Reads and writes lines of integers that end with 0, the syntax of DIMACS and DRAT.
 
 use std::io::{BufRead, Read};
 
 use crate::clausal::literal::Literal;
 
-/// A line is not longer than this, in bytes.
+/// Upper limit on the length of a line, in bytes.
 const LINE_LIMIT: u64 = 1 << 22;
 
-/// Reads a line, without its end; none at the end of the text.
+/// Reads a line without its terminator. Returns `None` at the end of the input.
 ///
 /// # Errors
-/// The input fails.
+/// Errors of the input.
 pub fn read<'l>(input: &mut dyn BufRead, line: &'l mut Vec<u8>) -> std::io::Result<Option<&'l [u8]>> {
     line.clear();
     Read::take(&mut *input, LINE_LIMIT).read_until(b'\n', line)?;
     Ok((!line.is_empty()).then(|| line.trim_ascii_end()))
 }
 
-/// The literals of a line, over so many variables; none if something else is there.
+/// Parses the literals of a line. Returns `None` if the line is malformed or has a variable above
+/// `variables`.
 pub fn literals(line: &[u8], variables: usize, literals: &mut Vec<Literal>) -> Option<()> {
     literals.clear();
     numbers(line, variables, &mut |negative, variable| {
@@ -27,7 +28,8 @@ pub fn literals(line: &[u8], variables: usize, literals: &mut Vec<Literal>) -> O
     })
 }
 
-/// The places in a list of so many clauses that a line names by numbers from 1; none if something else is there.
+/// Parses clause numbers from 1 to `clauses` and converts them to positions from 0. Returns
+/// `None` if the line is malformed.
 pub(crate) fn places(line: &[u8], clauses: usize, places: &mut Vec<usize>) -> Option<()> {
     places.clear();
     numbers(line, clauses, &mut |negative, number| {
@@ -36,12 +38,13 @@ pub(crate) fn places(line: &[u8], clauses: usize, places: &mut Vec<usize>) -> Op
     })
 }
 
-/// Visits the numbers of a line without the 0 that ends it; none if there are other words, or numbers beyond the limit.
+/// Visits the numbers of a line except the final 0. Returns `None` if the line is malformed or a
+/// number exceeds the limit.
 fn numbers(line: &[u8], limit: usize, visit: &mut dyn FnMut(bool, usize) -> Option<()>) -> Option<()> {
     let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
     loop {
         let word = words.next()?;
-        let (digits, negative) = word.strip_prefix(b"-").map_or((word, false), |rest| (rest, true));
+        let (digits, negative) = word.strip_prefix(b"-").map_or((word, false), |digits| (digits, true));
         let digit = |number: usize, digit: &u8| {
             let digit = char::from(*digit).to_digit(10)?;
             let number = number.checked_mul(10)?.checked_add(digit as usize)?;
@@ -58,7 +61,7 @@ fn numbers(line: &[u8], limit: usize, visit: &mut dyn FnMut(bool, usize) -> Opti
     }
 }
 
-/// Makes a line of numbers, with its end.
+/// Formats a line of numbers with the final 0 and a line feed.
 pub fn format(line: &mut Vec<u8>, numbers: impl Iterator<Item = i32>) {
     line.clear();
     let mut digits = itoa::Buffer::new();

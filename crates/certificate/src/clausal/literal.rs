@@ -1,42 +1,44 @@
-//! Variables of a formula and their negations, numbered as in DIMACS.
+//! Literals of a CNF formula, numbered as in DIMACS.
 
 use std::ops::Neg;
 
-/// A variable, numbered from 1, or its negation. The least number of 32 bits is none, so that each can be negated.
+/// A variable, numbered from 1, or its negation. `i32::MIN` is excluded so that every literal can
+/// be negated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Literal(i32);
 
 impl Literal {
-    /// The first variable.
+    /// The literal of the first variable.
     pub(crate) const FIRST: Self = Self(1);
 
-    /// None if the number is that of no literal.
+    /// Returns `None` if the number is 0 or `i32::MIN`.
     pub(crate) fn new(number: i32) -> Option<Self> {
         (number != 0 && number != i32::MIN).then_some(Self(number))
     }
 
-    /// The variable of a number; none if there are not so many.
+    /// The positive literal of a variable. Returns `None` if the number is 0 or does not fit 31
+    /// bits.
     pub(crate) fn of_variable(number: usize) -> Option<Self> {
         i32::try_from(number).ok().and_then(Self::new)
     }
 
-    /// As in DIMACS.
+    /// The literal as a DIMACS number.
     pub fn number(self) -> i32 {
         self.0
     }
 
-    /// The number of its variable, from 1.
+    /// Number of the variable, from 1.
     pub fn variable(self) -> usize {
         self.0.unsigned_abs() as usize
     }
 
-    /// The place of a literal in lists over all of them, whose length is [`Self::places`].
+    /// Index of the literal in an array of [`Self::places`] entries.
     #[expect(clippy::arithmetic_side_effects, reason = "twice a number below 2^31 in 64 bits")]
     pub fn index(self) -> usize {
         2 * self.variable() + usize::from(self.0 < 0)
     }
 
-    /// How long lists over all literals of so many variables are.
+    /// Length of an array that is indexed by the literals of `variables` variables.
     #[expect(clippy::arithmetic_side_effects, reason = "variables have names that are held in memory")]
     pub fn places(variables: usize) -> usize {
         2 * variables + 2

@@ -1,12 +1,16 @@
-//! A second way to the same claim, for small tasks: a formula that says "there is a cheaper plan of at most T steps", its
-//! refutation, and why no longer plan is cheaper.
+//! A second proof of the same claim, for small tasks: a formula "a cheaper plan has at most T
+//! steps", its refutation, and a proof that no longer plan is cheaper.
 //!
-//! [`encoding`] is plain: one operator at each step, all states written out, sums in binary. It knows no windows, no reduced
-//! costs and no symmetries, and shares nothing with the planner's encoding. It is this formula that a SAT solver refutes for the
-//! certificate, not the one that the plan was found with. [`proof`] checks the refutation, clause by clause, by going through notes
-//! of what each follows from; it is not a solver. [`steps`] bounds the number of steps by arithmetic on a potential.
+//! [`encoding`] is deliberately simple: one operator per step, explicit states, sums in binary.
+//! It has no time windows, no reduced costs and no symmetry breaking, and shares no code with the
+//! planner's encoding. A SAT solver refutes this formula for the certificate, not the formula
+//! that found the plan. [`proof`] checks the refutation clause by clause along its hints (linear
+//! RUP, as in LRAT [1]); it does not search. [`steps`] bounds the number of steps by arithmetic
+//! on a potential.
 //!
-//! The formula of a task is made again to check it, and compared with the written one.
+//! The check encodes the task again and compares the result with the written formula.
+//!
+//! [1] Cruz-Filipe et al., "Efficient certified RAT verification", CADE 2017.
 
 mod binary;
 mod encoding;
@@ -30,25 +34,27 @@ pub use formula::Formula;
 pub use literal::Literal;
 pub use steps::StepBound;
 
-/// A formula with more literals than this is not written.
+/// Upper limit on the number of literals of a formula.
 const LITERAL_LIMIT: usize = 4_000_000;
-/// Where the parts of a refutation come from.
+/// Input streams of a refutation.
 pub struct Inputs<'i> {
-    /// In DIMACS.
+    /// The formula in DIMACS.
     pub formula: &'i mut dyn BufRead,
-    /// A line for each variable: its number and what it stands for.
+    /// One line for each variable: its number and its meaning.
     pub legend: &'i mut dyn BufRead,
-    /// In DRAT: clauses that follow by unit propagation, and no deletions.
+    /// The proof in DRAT without deletions; each clause follows by unit propagation.
     pub proof: &'i mut dyn BufRead,
-    /// For each line of the proof the numbers of the clauses that it follows from: the formula's from 1, then the proof's.
+    /// For each line of the proof, the numbers of its antecedents: the clauses of the formula
+    /// from 1, then those of the proof.
     pub hints: &'i mut dyn BufRead,
 }
 
-/// The formula "a plan that is cheaper than the claim has at most so many steps", with that number. The claim is as for
-/// [`crate::check`].
+/// Encodes "a plan that is cheaper than the claim has at most T steps" and returns the formula
+/// with T. The claim is interpreted as in [`crate::check`].
 ///
 /// # Errors
-/// Why there is none: a construct that the formula does not cover, no bound on the number of steps, a limit.
+/// A construct that the encoding does not support, no bound on the number of steps, or an
+/// exceeded limit.
 pub fn formula(
     (task, argument): (&str, &str),
     claim: Option<&BigRational>,
@@ -60,8 +66,9 @@ pub fn formula(
     Ok((encoding::encode(&model, &cost, steps, LITERAL_LIMIT)?, steps))
 }
 
-/// Checks a refutation: that the formula is the one of the task, that the proof refutes it, and that no plan of more steps is
-/// cheaper. Each comes with what was checked, or with why it fails.
+/// Checks a refutation in three parts: the formula encodes the task, the proof refutes the
+/// formula, and no plan of more steps is cheaper. Returns a summary or the reason of failure for
+/// each part.
 pub fn check_refutation(
     (task, argument): (&str, &str),
     claim: Option<&BigRational>,

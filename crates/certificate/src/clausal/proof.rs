@@ -1,9 +1,10 @@
-//! A checker of clausal proofs with hints: each clause that a proof adds has to follow from the clauses so far by unit
-//! propagation (RUP) through the clauses that its hints name, in their order, and the last one is empty.
+//! Checks clausal proofs with hints: each added clause must follow by reverse unit propagation
+//! (RUP) through the clauses that its hints name, in their order. The last clause is empty.
 //!
-//! A clause follows if its negation leads to a contradiction. Each hint names a clause of which at most one literal is not false
-//! by then: that literal is settled, or there is the contradiction. So nothing is searched for, and each hint is looked at
-//! once. The formula's clauses are numbered from 1, those of the proof go on from there.
+//! A clause follows if its negation leads to a contradiction. Each hint names a clause with at
+//! most one literal that is not false: that literal becomes true, or the clause is the
+//! contradiction. The check does not search and visits each hint once. The clauses of the formula
+//! are numbered from 1, followed by those of the proof.
 
 use std::io::BufRead;
 use std::ops::Range;
@@ -11,13 +12,14 @@ use std::ops::Range;
 use crate::clausal::lines;
 use crate::clausal::literal::Literal;
 
-/// All clauses together have at most so many literals.
+/// Upper limit on the number of literals of all clauses.
 const LITERAL_LIMIT: usize = 1 << 26;
 
-/// Checks that a proof refutes clauses over variables numbered from 1; returns how many clauses it adds.
+/// Checks that a proof refutes clauses over variables numbered from 1. Returns the number of
+/// added clauses.
 ///
 /// # Errors
-/// The first line that does not follow, or that the proof ends too early.
+/// The first line that does not follow, or a missing empty clause.
 pub(super) fn check<'c>(
     clauses: impl Iterator<Item = &'c [Literal]>,
     variables: usize,
@@ -57,13 +59,13 @@ pub(super) fn check<'c>(
 }
 
 struct Checker {
-    /// Of all clauses, one after the other.
+    /// Literals of all clauses, concatenated.
     literals: Vec<Literal>,
-    /// Where each clause stands.
+    /// Range of each clause in `literals`.
     places: Vec<Range<usize>>,
-    /// Whether a literal is true.
+    /// For each literal, whether it is true.
     is_true: Vec<bool>,
-    /// Literals that are true.
+    /// The true literals, for resetting `is_true`.
     settled: Vec<Literal>,
 }
 
@@ -79,7 +81,7 @@ impl Checker {
         self.settled.push(literal);
     }
 
-    /// Whether the hints lead from the negation of a clause to a contradiction.
+    /// Returns `true` if the hints derive a contradiction from the negation of a clause.
     fn follows(&mut self, clause: &[Literal], hints: &[usize]) -> bool {
         for literal in clause {
             self.settle(-*literal);
@@ -98,8 +100,8 @@ impl Checker {
             let mut open = clause.iter().filter(|literal| !self.is_true[(-**literal).index()]);
             match open.next().copied() {
                 None => return true,
-                // A literal may stand in a clause twice.
-                Some(literal) if open.all(|other| *other == literal) => self.settle(literal),
+                // A clause may contain the same literal twice.
+                Some(literal) if open.all(|repeated| *repeated == literal) => self.settle(literal),
                 Some(_) => return false,
             }
         }
@@ -113,7 +115,7 @@ mod tests {
     use crate::clausal::lines;
     use crate::clausal::literal::Literal;
 
-    /// Numbers, the same in every run.
+    /// A deterministic pseudo-random generator.
     struct Random(u64);
 
     impl Random {
@@ -134,22 +136,22 @@ mod tests {
     fn has_a_model(clauses: &[Vec<Literal>]) -> bool {
         let holds =
             |model: u32, literal: &Literal| (model >> literal.variable() & 1 == 1) == (literal.number() > 0);
-        (0..32).any(|model| clauses.iter().all(|clause| clause.iter().any(|own| holds(model, own))))
+        (0..32).any(|model| clauses.iter().all(|clause| clause.iter().any(|literal| holds(model, literal))))
     }
 
-    fn text(all: &[Vec<i32>]) -> Vec<u8> {
+    fn text(lines_of_numbers: &[Vec<i32>]) -> Vec<u8> {
         let mut text = Vec::new();
         let mut line = Vec::new();
-        for numbers in all {
+        for numbers in lines_of_numbers {
             lines::format(&mut line, numbers.iter().copied());
             text.extend(&line);
         }
         text
     }
 
-    /// A clause is a set, however often a literal is written.
+    /// A clause is a set: repeated literals have no effect.
     #[test]
-    fn a_literal_may_stand_in_a_clause_twice() {
+    fn a_clause_may_repeat_a_literal() {
         let literal = |number: &i32| Literal::new(*number).expect("a literal");
         let clauses = [&[1, 1][..], &[-1, 2, -1, 2], &[-2, -2]];
         let clauses = clauses.map(|clause| clause.iter().map(literal).collect::<Vec<_>>());
@@ -158,9 +160,9 @@ mod tests {
         assert_eq!(check(borrowed, 2, &mut proof.as_slice(), &mut hints.as_slice()), Ok(1));
     }
 
-    /// Whatever proofs and hints say, clauses that have a model are not refuted; some of the others are.
+    /// No random proof refutes satisfiable clauses; some random proofs refute unsatisfiable ones.
     #[test]
-    fn only_what_has_no_model_is_refuted() {
+    fn satisfiable_clauses_are_never_refuted() {
         let mut refuted = 0;
         for seed in 0..20_000 {
             let mut random = Random(seed);
@@ -177,12 +179,12 @@ mod tests {
             let hints: Vec<Vec<i32>> = (0..=length).map(|line| hints(line, &mut random)).collect();
             let (proof, hints) = (text(&proof), text(&hints));
             let borrowed = clauses.iter().map(Vec::as_slice);
-            let found = check(borrowed, 4, &mut proof.as_slice(), &mut hints.as_slice());
+            let result = check(borrowed, 4, &mut proof.as_slice(), &mut hints.as_slice());
             assert!(
-                found.is_err() || !has_a_model(&clauses),
+                result.is_err() || !has_a_model(&clauses),
                 "seed {seed}: {clauses:?}\n{proof:?}\n{hints:?}"
             );
-            refuted += u32::from(found.is_ok());
+            refuted += u32::from(result.is_ok());
         }
         assert!(refuted > 100, "{refuted}");
     }

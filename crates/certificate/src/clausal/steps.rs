@@ -1,29 +1,30 @@
-//! A bound on the number of steps of a cheaper plan, by arithmetic on a potential.
+//! Bounds the number of steps of a cheaper plan by arithmetic on a potential.
 //!
-//! Whatever a plan does, its first T + 1 steps lead to some values of the potential's variables, and cost at least what the
-//! cheapest T + 1 operators cost that lead there; the rest costs at least the potential, or at least nothing. If the sum is never
-//! below the claim, a cheaper plan has at most T steps.
+//! The first T + 1 steps of a plan lead to some values of the potential's variables and cost at
+//! least as much as the cheapest T + 1 operators that lead there. The remaining steps cost at
+//! least the potential (or, for [`StepBound::Spent`], at least 0). If the sum is at least the
+//! claim for all values, a cheaper plan has at most T steps.
 
 use crate::argument::Argument;
 use crate::integer::Integer;
 use crate::model::Model;
 use crate::table::Table;
 
-/// By what a cheaper plan has only so many steps.
+/// The argument that bounds the number of steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StepBound {
-    /// By what the steps cost: the formula alone then says that no plan is cheaper.
+    /// The cost of the steps alone. The formula alone then implies that no plan is cheaper.
     Spent,
-    /// By what they cost and what a potential says is still to be paid: fewer steps, and a smaller formula.
+    /// The cost of the steps plus the potential: fewer steps and a smaller formula.
     Potential,
 }
 
-/// No formula has more steps.
+/// Upper limit on the number of steps of a formula.
 const STEP_LIMIT: usize = 64;
-/// A potential between whose rows operators lead in more ways bounds nothing.
+/// Upper limit on the number of edges of the abstract transition graph.
 const EDGE_LIMIT: usize = 1 << 22;
 
-/// The least bound that a potential gives.
+/// Returns the smallest bound that a potential proves.
 pub(super) fn bound(
     model: &Model,
     argument: &Argument,
@@ -42,7 +43,8 @@ pub(super) fn bound(
     bounds.min().ok_or_else(|| format!("a cheaper plan may have more than {STEP_LIMIT} steps"))
 }
 
-/// Whether no plan of more steps is cheaper, by the potential whose position is returned.
+/// Checks that no plan of more than `steps` steps is cheaper. Returns the position of the
+/// potential that proves it.
 pub(super) fn check(
     model: &Model,
     argument: &Argument,
@@ -58,14 +60,14 @@ pub(super) fn check(
         (0..=steps).for_each(|_| layers.advance());
         layers.least().is_none_or(|least| least >= *cost).then_some(position)
     };
-    let found = argument.potentials.iter().enumerate().find_map(serves);
-    found.ok_or_else(|| format!("a cheaper plan may have more than {steps} steps"))
+    let position = argument.potentials.iter().enumerate().find_map(serves);
+    position.ok_or_else(|| format!("a cheaper plan may have more than {steps} steps"))
 }
 
-/// What it costs at least to come to each combination of values in a number of steps.
+/// Minimal cost of reaching each combination of values in exactly k steps (Bellman-Ford layers).
 struct Layers<'l> {
     table: &'l Table<'l>,
-    /// From, to, least cost.
+    /// Abstract transitions: (source row, target row, minimal cost).
     edges: Vec<(usize, usize, Integer)>,
     costs: Vec<Option<Integer>>,
 }
@@ -76,8 +78,9 @@ impl<'l> Layers<'l> {
         let mut idle: Option<Integer> = None;
         for operator in &model.operators {
             let cost = model.least(&operator.cost);
+            // Operators that leave the pattern unchanged are self-loops of every row.
             if !table.touches(operator) {
-                idle = Some(idle.map_or(cost.clone(), |known| known.min(cost)));
+                idle = Some(idle.map_or(cost.clone(), |cheapest| cheapest.min(cost)));
                 continue;
             }
             for values in table.matching(&operator.condition.facts) {
@@ -92,7 +95,7 @@ impl<'l> Layers<'l> {
         let rows = table.rows();
         edges.extend((0..rows).filter_map(|row| Some((row, row, idle.clone()?))));
         edges.sort_unstable();
-        // Sorted by cost last: the first of each pair is the cheapest.
+        // The cost is the last sort key, so the first edge of each pair is the cheapest.
         edges.dedup_by_key(|edge| (edge.0, edge.1));
         let mut costs = vec![None; rows];
         costs[table.row_of(&model.initial())] = Some(Integer::ZERO);
@@ -104,7 +107,7 @@ impl<'l> Layers<'l> {
         for (from, to, cost) in &self.edges {
             if let Some(before) = &self.costs[*from] {
                 let after = before + cost;
-                if next[*to].as_ref().is_none_or(|known| after < *known) {
+                if next[*to].as_ref().is_none_or(|best| after < *best) {
                     next[*to] = Some(after);
                 }
             }
@@ -112,12 +115,12 @@ impl<'l> Layers<'l> {
         self.costs = next;
     }
 
-    /// The least that was spent.
+    /// Minimal cost of the steps so far.
     fn spent(&self) -> Option<Integer> {
         self.costs.iter().flatten().min().cloned()
     }
 
-    /// The least that a plan costs that is still under way.
+    /// Minimal cost of a plan that has not reached the goal yet: steps so far plus potential.
     fn least(&self) -> Option<Integer> {
         let rows = self.costs.iter().enumerate();
         rows.filter_map(|(row, cost)| Some(cost.as_ref()? + self.table.at_row(row)?)).min()

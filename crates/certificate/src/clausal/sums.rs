@@ -1,8 +1,9 @@
-//! What is spent and what is left after each step, in binary.
+//! Encodes the accumulated cost and the numeric variables after each step, in binary.
 //!
-//! An operator adds a constant and entries of tables over its slots, all in two's complement; the bits of a summand are what
-//! the chosen operator and designs make them. Nothing overflows: what is spent never exceeds the limit, and numbers
-//! are as wide as they can get in so many steps.
+//! An operator adds a constant and entries of tables over its slots, all in two's complement. The
+//! operator and the designs of the step determine the bits of each summand. No sum overflows: the
+//! accumulated cost is limited after each step, and numbers are as wide as their range after T
+//! steps requires.
 
 use std::collections::BTreeMap;
 
@@ -14,25 +15,25 @@ use crate::integer::Integer;
 use crate::model::{Linear, Model, Operator, Quantity};
 use crate::table::is_alone;
 
-/// Numbers of more bits make no formula.
+/// Upper limit on the number of bits of a number.
 const WIDTH_LIMIT: usize = 4_096;
 
 /// The sums after the latest step.
 pub(super) struct Sums {
     spent: Bits,
-    /// What may be spent at most.
+    /// Upper limit on the accumulated cost.
     limit: Integer,
     numbers: Vec<Bits>,
 }
 
-/// What an operator does to a number.
+/// The effect of an operator on a number.
 enum Change<'c> {
     Add(&'c Quantity),
     Assign(&'c Quantity),
 }
 
 fn change(operator: &Operator, number: u32) -> Result<Option<Change<'_>>, String> {
-    let mut changes = operator.changes.iter().filter(|(own, _)| *own == number);
+    let mut changes = operator.changes.iter().filter(|(changed, _)| *changed == number);
     let Some((_, value)) = changes.next() else { return Ok(None) };
     match &value.factors[..] {
         _ if changes.next().is_some() => Err("an operator that changes a number twice is not covered".into()),
@@ -42,22 +43,22 @@ fn change(operator: &Operator, number: u32) -> Result<Option<Change<'_>>, String
     }
 }
 
-/// All comparisons of a task.
+/// Iterates over all comparisons of a task.
 fn comparisons(model: &Model) -> impl Iterator<Item = &Linear> {
     let conditions = model.operators.iter().map(|operator| &operator.condition).chain([&model.goal]);
     conditions.flat_map(|condition| &condition.comparisons)
 }
 
-/// How many bits a number needs for so many steps, and to be compared.
+/// Number of bits that a number needs for `steps` steps and for its comparisons.
 fn number_width(model: &Model, number: u32, steps: usize) -> Result<usize, String> {
     let initial = &model.numbers[number as usize];
-    let (mut least, mut most) = (initial.clone(), initial.clone());
+    let (mut least, mut greatest) = (initial.clone(), initial.clone());
     let (mut falls, mut rises) = (Integer::ZERO, Integer::ZERO);
     for operator in &model.operators {
         match change(operator, number)? {
             Some(Change::Assign(value)) => {
                 least = least.min(model.least(value));
-                most = most.max(model.most(value));
+                greatest = greatest.max(model.most(value));
             }
             Some(Change::Add(value)) => {
                 falls = falls.min(model.least(value));
@@ -68,14 +69,15 @@ fn number_width(model: &Model, number: u32, steps: usize) -> Result<usize, Strin
     }
     let steps = Integer::from(steps as i128);
     least = &least + &(&falls * &steps);
-    most = &most + &(&rises * &steps);
-    let own = comparisons(model).filter(|linear| linear.factors.iter().any(|(own, _)| *own == number));
-    let sizes = own.map(|linear| {
+    greatest = &greatest + &(&rises * &steps);
+    let compared =
+        comparisons(model).filter(|linear| linear.factors.iter().any(|(factor, _)| *factor == number));
+    let sizes = compared.map(|linear| {
         let quantity = &linear.quantity;
         &(-&model.least(quantity)).max(model.most(quantity)) + &Integer::from(1)
     });
-    let beside = sizes.max().unwrap_or_default();
-    Ok(width(&(&least - &beside), &(&most + &beside)))
+    let margin = sizes.max().unwrap_or_default();
+    Ok(width(&(&least - &margin), &(&greatest + &margin)))
 }
 
 impl Sums {
@@ -90,8 +92,8 @@ impl Sums {
         if model.operators.iter().any(|operator| model.least(&operator.cost).is_negative()) {
             return Err("operators that cost less than nothing are not covered".into());
         }
-        let most = &limit + &dearest.unwrap_or_default();
-        let spent = formula.constant(&Integer::ZERO, width(&Integer::ZERO, &most));
+        let highest = &limit + &dearest.unwrap_or_default();
+        let spent = formula.constant(&Integer::ZERO, width(&Integer::ZERO, &highest));
         let mut numbers = Vec::new();
         for (number, initial) in (0..).zip(&model.numbers) {
             numbers.push(formula.constant(initial, number_width(model, number, steps)?));
@@ -103,7 +105,7 @@ impl Sums {
         Ok(sums)
     }
 
-    /// How many bits the longest number has.
+    /// Number of bits of the widest number.
     pub(super) fn widest(&self) -> usize {
         self.numbers.iter().chain([&self.spent]).map(Vec::len).max().unwrap_or(0)
     }
@@ -127,17 +129,19 @@ impl Sums {
         for (number, bits) in (0..).zip(&mut self.numbers) {
             *bits = adder.change(formula, bits, number)?;
         }
-        for (operator, own) in model.operators.iter().zip(&timeline.operators) {
+        for (operator, literal) in model.operators.iter().zip(&timeline.operators) {
             for linear in &operator.condition.comparisons {
                 let [(number, factor)] = &linear.factors[..] else {
                     return Err("a comparison of several numbers, or of none, is not covered".into());
                 };
-                if operator.changes.iter().any(|(own, value)| own == number && value == linear) {
+                if operator.changes.iter().any(|(changed, value)| changed == number && value == linear) {
+                    // The condition says that the number after the step is not negative, so its
+                    // sign bit is the test.
                     let after = &self.numbers[*number as usize];
-                    formula.clause(&[-*own, -sign(after)]);
+                    formula.clause(&[-*literal, -sign(after)]);
                 } else if linear.quantity.tables.is_empty() {
-                    let own = (&[*own][..], &before[*number as usize]);
-                    compare(formula, own, factor, &linear.quantity.constant);
+                    let guarded = (&[*literal][..], &before[*number as usize]);
+                    compare(formula, guarded, factor, &linear.quantity.constant);
                 } else if !is_alone(linear, *number) {
                     return Err("a comparison of a multiple with designs is not covered".into());
                 }
@@ -151,8 +155,8 @@ impl Sums {
         for linear in &model.goal.comparisons {
             match &linear.factors[..] {
                 [(number, factor)] if linear.quantity.tables.is_empty() => {
-                    let own = (&[][..], &self.numbers[*number as usize]);
-                    compare(formula, own, factor, &linear.quantity.constant);
+                    let unguarded = (&[][..], &self.numbers[*number as usize]);
+                    compare(formula, unguarded, factor, &linear.quantity.constant);
                 }
                 _ => return Err("a goal about several numbers is not covered".into()),
             }
@@ -161,7 +165,7 @@ impl Sums {
     }
 }
 
-/// Where a condition holds, a multiple of a number plus a constant is at least 0.
+/// Encodes that `factor` times the number plus `constant` is at least 0, under a condition.
 fn compare(
     formula: &mut Formula,
     (condition, number): (&[Literal], &Bits),
@@ -177,7 +181,7 @@ fn compare(
     }
 }
 
-/// What an operator fills, the slots that a table is over, and the table.
+/// Key of equal tables: the uses of the operator, the slots of the table, the table.
 type Kind<'k> = (u32, &'k [u32], u32);
 
 struct Adder<'a> {
@@ -187,7 +191,7 @@ struct Adder<'a> {
 }
 
 impl Adder<'_> {
-    /// A number after the step.
+    /// Returns the number after the step.
     fn change(&mut self, formula: &mut Formula, before: &Bits, number: u32) -> Result<Bits, String> {
         let changes: Vec<Option<Change<'_>>> =
             self.model.operators.iter().map(|operator| change(operator, number)).collect::<Result<_, _>>()?;
@@ -195,14 +199,15 @@ impl Adder<'_> {
         let mut base = before.clone();
         if changes.iter().flatten().any(|change| matches!(change, Change::Assign(_))) {
             let assigned = formula.variable(|| format!("{name} is assigned at step {}", self.step));
-            for (own, change) in self.timeline.operators.iter().zip(&changes) {
+            for (operator, change) in self.timeline.operators.iter().zip(&changes) {
                 let assigns = matches!(change, Some(Change::Assign(_)));
-                formula.clause(&[-*own, if assigns { assigned } else { -assigned }]);
+                formula.clause(&[-*operator, if assigns { assigned } else { -assigned }]);
             }
             if let Some(idle) = self.timeline.idle {
                 formula.clause(&[-idle, -assigned]);
             }
             base = formula.bits(before.len(), &format!("what is kept of {name} at step {}", self.step));
+            // An assignment adds its value to 0, any other change to the previous value.
             for (kept, bit) in base.iter().zip(before) {
                 formula.clause(&[-assigned, -*kept]);
                 formula.clause(&[assigned, -*kept, *bit]);
@@ -219,64 +224,66 @@ impl Adder<'_> {
         Ok(self.sum(formula, &base, &parts, &name))
     }
 
-    /// Comparisons with tables: sums of their own, which may not be negative.
+    /// Encodes comparisons with tables as separate sums that must not be negative.
     fn tests(&mut self, formula: &mut Formula, before: &[Bits]) {
-        let asked = |operator: &Operator, number: u32| -> Vec<Linear> {
-            let own = operator.condition.comparisons.iter().filter(|linear| {
+        let table_comparisons = |operator: &Operator, number: u32| -> Vec<Linear> {
+            let linear_conditions = operator.condition.comparisons.iter().filter(|linear| {
                 is_alone(linear, number)
                     && !linear.quantity.tables.is_empty()
-                    && !operator.changes.iter().any(|(own, value)| *own == number && value == *linear)
+                    && !operator.changes.iter().any(|(changed, value)| *changed == number && value == *linear)
             });
-            own.cloned().collect()
+            linear_conditions.cloned().collect()
         };
         for (number, bits) in (0..).zip(before) {
-            let all: Vec<Vec<Linear>> =
-                self.model.operators.iter().map(|operator| asked(operator, number)).collect();
-            let most = all.iter().map(Vec::len).max().unwrap_or(0);
-            for place in 0..most {
+            let comparisons: Vec<Vec<Linear>> =
+                self.model.operators.iter().map(|operator| table_comparisons(operator, number)).collect();
+            let count = comparisons.iter().map(Vec::len).max().unwrap_or(0);
+            for place in 0..count {
                 let parts: Vec<Option<&Quantity>> =
-                    all.iter().map(|own| own.get(place).map(|linear| &linear.quantity)).collect();
+                    comparisons.iter().map(|list| list.get(place).map(|linear| &linear.quantity)).collect();
                 let sum = self.sum(formula, bits, &parts, &format!("comparison {place} of number {number}"));
-                for (own, _) in self.timeline.operators.iter().zip(&parts).filter(|(_, part)| part.is_some())
+                for (operator, _) in
+                    self.timeline.operators.iter().zip(&parts).filter(|(_, part)| part.is_some())
                 {
-                    formula.clause(&[-*own, -sign(&sum)]);
+                    formula.clause(&[-*operator, -sign(&sum)]);
                 }
             }
         }
     }
 
-    /// A number plus what each operator adds to it.
+    /// Encodes `base` plus the quantity that the operator of this step adds.
     fn sum(&mut self, formula: &mut Formula, base: &Bits, parts: &[Option<&Quantity>], name: &str) -> Bits {
         let step = self.step;
         let constants = parts.iter().map(|part| part.map_or(&Integer::ZERO, |quantity| &quantity.constant));
         let mut kinds: BTreeMap<&Integer, Vec<Literal>> = BTreeMap::new();
-        for (own, constant) in self.timeline.operators.iter().zip(constants) {
-            kinds.entry(constant).or_default().push(*own);
+        for (literal, constant) in self.timeline.operators.iter().zip(constants) {
+            kinds.entry(constant).or_default().push(*literal);
         }
         let mut sum = base.clone();
+        // A sum of zero constants needs no adder.
         if kinds.keys().any(|constant| !constant.is_zero()) {
             kinds.entry(&Integer::ZERO).or_default().extend(self.timeline.idle);
             let added = formula.bits(base.len(), &format!("the constant added to {name} at step {step}"));
             for (constant, operators) in kinds {
                 let kind = formula.variable(|| format!("{constant} is added to {name} at step {step}"));
-                for own in operators {
-                    formula.clause(&[-own, kind]);
+                for operator in operators {
+                    formula.clause(&[-operator, kind]);
                 }
-                for (position, own) in added.iter().enumerate() {
-                    formula.clause(&[-kind, if constant.bit(position) { *own } else { -*own }]);
+                for (position, bit) in added.iter().enumerate() {
+                    formula.clause(&[-kind, if constant.bit(position) { *bit } else { -*bit }]);
                 }
             }
             sum = formula.add(&sum, &added, &format!("{name} with the constant of step {step}"));
         }
-        let most = parts.iter().flatten().map(|quantity| quantity.tables.len()).max().unwrap_or(0);
-        for place in 0..most {
+        let tables = parts.iter().flatten().map(|quantity| quantity.tables.len()).max().unwrap_or(0);
+        for place in 0..tables {
             let added = self.table(formula, parts, place, (base.len(), name));
             sum = formula.add(&sum, &added, &format!("{name} with table {place} of step {step}"));
         }
         sum
     }
 
-    /// The entry of one of the operator's tables.
+    /// Encodes the table entry that the operator of this step adds.
     #[expect(
         clippy::arithmetic_side_effects,
         clippy::cast_possible_truncation,
@@ -292,36 +299,40 @@ impl Adder<'_> {
         let step = self.step;
         let added = formula.bits(width, &format!("table {place} added to {name} at step {step}"));
         let mut kinds: BTreeMap<Option<Kind<'_>>, Vec<Literal>> = BTreeMap::new();
-        for ((operator, own), part) in self.model.operators.iter().zip(&self.timeline.operators).zip(parts) {
+        for ((operator, literal), part) in
+            self.model.operators.iter().zip(&self.timeline.operators).zip(parts)
+        {
             let table = part.and_then(|quantity| quantity.tables.get(place));
             let kind = table.map(|(slots, table)| (operator.uses, slots.as_slice(), *table));
-            kinds.entry(kind).or_default().push(*own);
+            kinds.entry(kind).or_default().push(*literal);
         }
         kinds.entry(None).or_default().extend(self.timeline.idle);
         for (kind, operators) in kinds {
             let Some((uses, slots, table)) = kind else {
-                for own in operators {
+                for operator in operators {
                     for bit in &added {
-                        formula.clause(&[-own, -*bit]);
+                        formula.clause(&[-operator, -*bit]);
                     }
                 }
                 continue;
             };
             let chosen = formula.variable(|| format!("table {table} is added to {name} at step {step}"));
-            for own in operators {
-                formula.clause(&[-own, chosen]);
+            for operator in operators {
+                formula.clause(&[-operator, chosen]);
             }
             let uses = &self.model.uses[uses as usize];
             for (row, value) in self.model.tables[table as usize].iter().enumerate() {
-                let mut rest = row;
+                // The row number is the mixed-radix number of the designs, the last slot being
+                // the lowest digit.
+                let mut remaining_row = row;
                 let mut condition = vec![-chosen];
                 for slot in slots.iter().rev() {
                     let size = uses[*slot as usize].1.len();
-                    condition.push(-self.timeline.design(uses, *slot, (rest % size) as u32));
-                    rest /= size;
+                    condition.push(-self.timeline.design(uses, *slot, (remaining_row % size) as u32));
+                    remaining_row /= size;
                 }
-                for (position, own) in added.iter().enumerate() {
-                    let literal = if value.bit(position) { *own } else { -*own };
+                for (position, bit) in added.iter().enumerate() {
+                    let literal = if value.bit(position) { *bit } else { -*bit };
                     formula.clause(&[&condition[..], &[literal]].concat());
                 }
             }

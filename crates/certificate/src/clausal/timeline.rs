@@ -1,7 +1,8 @@
-//! After each step, every variable has exactly one value; at each step stands exactly one operator, or none for good.
+//! Encodes states and steps: after each step every variable has exactly one value; each step has
+//! exactly one operator or is idle, and all steps after an idle step are idle.
 //!
-//! An operator requires its conditions, makes its effects true, and fills its slots with designs that suit; a value that was not
-//! there before was made by an operator.
+//! An operator implies its conditions, its effects, and a suitable design in each of its slots.
+//! Frame axioms: a value that did not hold before the step is an effect of the step's operator.
 
 use std::collections::BTreeMap;
 
@@ -9,14 +10,14 @@ use crate::clausal::formula::Formula;
 use crate::clausal::literal::Literal;
 use crate::model::{self, Argument, Fact, Model, Operator};
 
-/// States and what leads from one to the next.
+/// The state after the latest step and the choices of that step.
 pub(super) struct Timeline {
-    /// For each variable and value, after the latest step.
+    /// For each variable and value, its literal after the latest step.
     values: Vec<Vec<Literal>>,
-    /// At the latest step.
+    /// For each operator, its literal at the latest step.
     pub(super) operators: Vec<Literal>,
     pub(super) idle: Option<Literal>,
-    /// For each slot and design.
+    /// For each slot and design, its literal at the latest step.
     pub(super) chosen: Vec<Vec<Literal>>,
 }
 
@@ -30,14 +31,15 @@ impl Timeline {
     }
 
     fn state(model: &Model, formula: &mut Formula, time: usize) -> Vec<Vec<Literal>> {
-        let all = model.variables.iter().enumerate().map(|(variable, values)| {
+        let variables = model.variables.iter().enumerate().map(|(variable, values)| {
             let name = |value: &String| format!("{value} (variable {variable}) after step {time}");
-            let own: Vec<Literal> = values.iter().map(|value| formula.variable(|| name(value))).collect();
-            formula.clause(&own);
-            formula.at_most_one(&own, &format!("the values of variable {variable} after step {time}"));
-            own
+            let literals: Vec<Literal> =
+                values.iter().map(|value| formula.variable(|| name(value))).collect();
+            formula.clause(&literals);
+            formula.at_most_one(&literals, &format!("the values of variable {variable} after step {time}"));
+            literals
         });
-        all.collect()
+        variables.collect()
     }
 
     fn fact(values: &[Vec<Literal>], (variable, value): Fact) -> Literal {
@@ -54,28 +56,29 @@ impl Timeline {
         if let Some(before) = self.idle.replace(idle) {
             formula.clause(&[-before, idle]);
         }
-        let one = [&operators[..], &[idle]].concat();
-        formula.clause(&one);
-        formula.at_most_one(&one, &format!("the operators at step {number}"));
+        let choices = [&operators[..], &[idle]].concat();
+        formula.clause(&choices);
+        formula.at_most_one(&choices, &format!("the operators at step {number}"));
         self.operators = operators;
         self.choose(model, formula, number);
         let next = Self::state(model, formula, number);
         let mut makers: BTreeMap<Fact, Vec<Literal>> = BTreeMap::new();
-        for (operator, own) in model.operators.iter().zip(&self.operators) {
+        for (operator, literal) in model.operators.iter().zip(&self.operators) {
             for fact in &operator.condition.facts {
-                formula.clause(&[-*own, Self::fact(&self.values, *fact)]);
+                formula.clause(&[-*literal, Self::fact(&self.values, *fact)]);
             }
             for clause in &operator.condition.clauses {
                 let literals = clause.iter().map(|literal| Self::literal(&self.values, literal));
-                formula.clause(&std::iter::once(-*own).chain(literals).collect::<Vec<_>>());
+                formula.clause(&std::iter::once(-*literal).chain(literals).collect::<Vec<_>>());
             }
-            // Later effects prevail.
+            // Later effects override earlier ones.
             let last: BTreeMap<u32, u32> = operator.effects.iter().copied().collect();
             for fact in last {
-                formula.clause(&[-*own, Self::fact(&next, fact)]);
-                makers.entry(fact).or_default().push(*own);
+                formula.clause(&[-*literal, Self::fact(&next, fact)]);
+                makers.entry(fact).or_default().push(*literal);
             }
         }
+        // Frame axioms: a value persists or has an operator that makes it true.
         for (variable, values) in (0..).zip(&next) {
             for (value, after) in (0..).zip(values) {
                 let before = Self::fact(&self.values, (variable, value));
@@ -87,22 +90,26 @@ impl Timeline {
     }
 
     fn literal(values: &[Vec<Literal>], (fact, positive): &model::Literal) -> Literal {
-        let own = Self::fact(values, *fact);
-        if *positive { own } else { -own }
+        let literal = Self::fact(values, *fact);
+        if *positive { literal } else { -literal }
     }
 
-    /// Every operator fills its slots with designs that suit, and with no combination that is excluded.
+    /// Encodes that every operator fills its slots with suitable designs and without excluded
+    /// combinations.
     fn choose(&mut self, model: &Model, formula: &mut Formula, number: usize) {
         self.chosen = Vec::new();
         for (slot, designs) in model.slots.iter().enumerate() {
             let name = |design: &u32| format!("{} in slot {slot} at step {number}", object(model, *design));
-            let own: Vec<Literal> = designs.iter().map(|design| formula.variable(|| name(design))).collect();
-            formula.at_most_one(&own, &format!("the designs of slot {slot} at step {number}"));
-            self.chosen.push(own);
+            let literals: Vec<Literal> =
+                designs.iter().map(|design| formula.variable(|| name(design))).collect();
+            formula.at_most_one(&literals, &format!("the designs of slot {slot} at step {number}"));
+            self.chosen.push(literals);
         }
+        // Operators with equal slots and exclusions share one variable, which keeps the clauses
+        // few.
         let mut kinds: BTreeMap<(u32, u32), Vec<Literal>> = BTreeMap::new();
-        for (operator, own) in model.operators.iter().zip(&self.operators) {
-            kinds.entry((operator.uses, operator.exclusions)).or_default().push(*own);
+        for (operator, literal) in model.operators.iter().zip(&self.operators) {
+            kinds.entry((operator.uses, operator.exclusions)).or_default().push(*literal);
         }
         for ((uses, exclusions), operators) in kinds {
             let kind =
@@ -125,7 +132,8 @@ impl Timeline {
         }
     }
 
-    /// A design by its position among those that suit a slot of an operator.
+    /// The literal of a design, given by its position among the suitable designs of a slot of an
+    /// operator.
     pub(super) fn design(&self, uses: &[(u32, Vec<u32>)], slot: u32, design: u32) -> Literal {
         let (slot, suited) = &uses[slot as usize];
         self.chosen[*slot as usize][suited[design as usize] as usize]
@@ -143,10 +151,10 @@ impl Timeline {
     }
 }
 
-/// An operator as it is called in PDDL; slots are `?` and a number.
+/// The name of an operator in PDDL; a slot is written as `?` and its number.
 fn show(model: &Model, operator: &Operator) -> String {
     let argument = |argument: &Argument| match argument {
-        Argument::Object(own) => format!(" {}", object(model, *own)),
+        Argument::Object(number) => format!(" {}", object(model, *number)),
         Argument::Slot(slot) => format!(" ?{slot}"),
     };
     let arguments: String = operator.arguments.iter().map(argument).collect();

@@ -1,6 +1,7 @@
-//! What an instance of an action requires and does, case by case, in terms of the state before it. A durative action is one step:
-//! its start effects take place before the conditions of its middle and end are looked at, and before its end effects. One without
-//! duration is one happening. Where there are events, there are cases for each passage.
+//! Computes the conditions and effects of an action instance as a list of cases over the state
+//! before it. A durative action is one step: its start effects precede the evaluation of its
+//! over-all and at-end conditions and its end effects. An instantaneous action is one happening.
+//! With timed events there are separate cases for each passage of time.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -23,10 +24,10 @@ use pddl::ast::{
     Expression,
 };
 
-/// What happens when nothing is done until the next event, for each event.
+/// The cases of waiting until the next event, one per event.
 #[expect(clippy::arithmetic_side_effects, reason = "the place of an event that is held in memory")]
 pub(super) fn waits(timeline: &Timeline, structure: &Structure) -> Result<Vec<Case>, Cause> {
-    let mut all = Vec::new();
+    let mut cases = Vec::new();
     for (before, event) in timeline.events.iter().enumerate().skip(timeline.begun) {
         let passage = Passage::wait(before + 1, &event.time);
         let mut truths = event.truths.clone();
@@ -34,7 +35,7 @@ pub(super) fn waits(timeline: &Timeline, structure: &Structure) -> Result<Vec<Ca
         truths.extend([(timeline::phase(before), false), (timeline::waited(), true)]);
         for known in Known::default().assume(structure, &Formula::Atom(timeline::phase(before), true))? {
             let (truths, passage) = (truths.clone(), passage.clone());
-            all.push(Case {
+            cases.push(Case {
                 known,
                 truths,
                 effects: Vec::new(),
@@ -44,13 +45,14 @@ pub(super) fn waits(timeline: &Timeline, structure: &Structure) -> Result<Vec<Ca
             });
         }
     }
-    Ok(all)
+    Ok(cases)
 }
 
-/// What fluents become.
+/// New values of fluents.
 type Changes = BTreeMap<Key, Linear>;
 
-/// The cases in which an instance can be executed; the reader has its arguments.
+/// Returns the cases in which an instance can be executed. The reader has the binding of its
+/// parameters.
 pub(super) fn cases<'r>(
     mut reader: Reader<'r>,
     structure: &Structure,
@@ -59,9 +61,9 @@ pub(super) fn cases<'r>(
     match &action.body {
         ActionBody::Instantaneous { precondition, effect } => {
             let condition = reader.formula(precondition, true)?;
-            let mut all = Vec::new();
+            let mut cases = Vec::new();
             if condition.is(false) {
-                return Ok(all);
+                return Ok(cases);
             }
             let moment = reader.moment([effect])?;
             let timeline = &reader.world.timeline;
@@ -71,13 +73,14 @@ pub(super) fn cases<'r>(
                 if event.is_some_and(|event| reads().event(event)) {
                     continue;
                 }
-                let own = all_of(&condition, [passage.condition(timeline), moment.leaves(event)]);
+                let condition_at_start =
+                    all_of(&condition, [passage.condition(timeline), moment.leaves(event)]);
                 let applied = Applied { truths: passage.truths(timeline), ..Applied::default() };
-                for known in Known::default().assume(structure, &own)? {
-                    all.extend(moment.last(structure, known, &applied, (&passage, None))?);
+                for known in Known::default().assume(structure, &condition_at_start)? {
+                    cases.extend(moment.last(structure, known, &applied, (&passage, None))?);
                 }
             }
-            Ok(all)
+            Ok(cases)
         }
         ActionBody::Durative { duration, conditions, effects } => {
             let Some(length) = reader.lengths(duration)? else { return Ok(Vec::new()) };
@@ -89,12 +92,13 @@ pub(super) fn cases<'r>(
     }
 }
 
-/// A condition, and others, most of which say nothing.
-fn all_of(condition: &Formula, others: [Formula; 2]) -> Cow<'_, Formula> {
-    if others.iter().all(|other| other.is(true)) {
+/// Conjoins a condition with two others. Borrows the condition if both others are true, the most
+/// frequent case.
+fn all_of(condition: &Formula, additional: [Formula; 2]) -> Cow<'_, Formula> {
+    if additional.iter().all(|extra| extra.is(true)) {
         return Cow::Borrowed(condition);
     }
-    Cow::Owned(Formula::junction(std::iter::once(condition.clone()).chain(others), true))
+    Cow::Owned(Formula::junction(std::iter::once(condition.clone()).chain(additional), true))
 }
 
 struct Durative<'r> {
@@ -105,16 +109,17 @@ struct Durative<'r> {
 
 impl<'r> Durative<'r> {
     fn condition(&self, reader: &mut Reader<'r>, times: &[ConditionTime]) -> Result<Formula, Cause> {
-        let own = self.conditions.iter().filter(|(time, _)| times.contains(time));
-        let own: Result<Vec<_>, _> = own.map(|(_, condition)| reader.formula(condition, true)).collect();
-        Ok(Formula::junction(own?, true))
+        let timed = self.conditions.iter().filter(|(time, _)| times.contains(time));
+        let conditions: Result<Vec<_>, _> =
+            timed.map(|(_, condition)| reader.formula(condition, true)).collect();
+        Ok(Formula::junction(conditions?, true))
     }
 
     fn effects(&self, wanted: EffectTime) -> impl Iterator<Item = &'r Effect> {
         self.effects.iter().filter(move |(time, _)| *time == wanted).map(|(_, effect)| effect)
     }
 
-    /// What the start or the end reads.
+    /// The atoms and fluents that the start or the end reads.
     fn reads(&self, reader: &Reader<'r>, wanted: EffectTime) -> Reads<'r> {
         let time = match wanted {
             EffectTime::AtStart => ConditionTime::AtStart,
@@ -129,7 +134,8 @@ impl<'r> Durative<'r> {
         )
     }
 
-    /// Without duration, start and end are one happening, and nothing lies between them.
+    /// The cases for duration 0: start and end are one happening, and over-all conditions apply
+    /// to no state.
     fn at_once(&self, mut reader: Reader<'r>, structure: &Structure) -> Result<Vec<Case>, Cause> {
         let mut ends = Vec::new();
         for (condition, effect) in
@@ -144,32 +150,38 @@ impl<'r> Durative<'r> {
         let [(condition, start), (at_end, end)] = &ends[..] else { return Ok(Vec::new()) };
         let reads = [EffectTime::AtStart, EffectTime::AtEnd].map(|half| self.reads(&reader, half));
         let apart = happening::apart((&reads[0], start), (&reads[1], end));
-        let both = Moment {
+        let happening = Moment {
             atoms: [&start.atoms[..], &end.atoms[..]].concat(),
             numbers: [&start.numbers[..], &end.numbers[..]].concat(),
         };
-        let mut all = Vec::new();
+        let mut cases = Vec::new();
         let timeline = &reader.world.timeline;
         for passage in timeline.passages(&BigRational::zero()) {
             let event = passage.at_start(timeline);
             if event.is_some_and(|event| reads.iter().any(|half| half.event(event))) {
                 continue;
             }
-            let own = [condition, at_end, &apart, &passage.condition(timeline), &both.leaves(event)];
+            let conditions =
+                [condition, at_end, &apart, &passage.condition(timeline), &happening.leaves(event)];
             let applied = Applied { truths: passage.truths(timeline), ..Applied::default() };
-            let own = Formula::junction(own.into_iter().cloned(), true);
-            for known in Known::default().assume(structure, &own)? {
-                all.extend(both.last(structure, known, &applied, (&passage, reader.length.as_ref()))?);
+            let conditions = Formula::junction(conditions.into_iter().cloned(), true);
+            for known in Known::default().assume(structure, &conditions)? {
+                cases.extend(happening.last(
+                    structure,
+                    known,
+                    &applied,
+                    (&passage, reader.length.as_ref()),
+                )?);
             }
         }
-        Ok(all)
+        Ok(cases)
     }
 
     fn cases(&self, mut reader: Reader<'r>, structure: &Structure) -> Result<Vec<Case>, Cause> {
         let condition = self.condition(&mut reader, &[ConditionTime::AtStart])?;
-        let mut all = Vec::new();
+        let mut cases = Vec::new();
         if condition.is(false) {
-            return Ok(all);
+            return Ok(cases);
         }
         let start = reader.moment(self.effects(EffectTime::AtStart))?;
         let timeline = &reader.world.timeline;
@@ -179,24 +191,25 @@ impl<'r> Durative<'r> {
             if event.is_some_and(|event| self.reads(&reader, EffectTime::AtStart).event(event)) {
                 continue;
             }
-            let own = all_of(&condition, [passage.condition(timeline), start.leaves(event)]);
-            for known in Known::default().assume(structure, &own)? {
+            let condition_at_start = all_of(&condition, [passage.condition(timeline), start.leaves(event)]);
+            for known in Known::default().assume(structure, &condition_at_start)? {
                 let guards = start.atoms.iter().map(|(guard, ..)| guard);
                 let guards = guards.chain(start.numbers.iter().map(|(guard, ..)| guard));
                 for known in known.split(structure, guards)? {
                     let truths = start.truths(structure, &known);
                     for (known, changes) in start.numbers(structure, &known, &Applied::default())? {
                         reader.applied = Applied { truths: truths.clone(), changes };
-                        all.extend(self.after_start(&mut reader, structure, &known, &passage)?);
+                        cases.extend(self.after_start(&mut reader, structure, &known, &passage)?);
                     }
                     reader.applied = Applied::default();
                 }
             }
         }
-        Ok(all)
+        Ok(cases)
     }
 
-    /// The cases once the start has taken place: the events in between, what holds over all, and the end.
+    /// The cases after the start effects: events during the action, over-all conditions, and the
+    /// end.
     fn after_start(
         &self,
         reader: &mut Reader<'r>,
@@ -210,14 +223,15 @@ impl<'r> Durative<'r> {
             return Ok(Vec::new());
         }
         let mut later = vec![self.condition(reader, &[ConditionTime::OverAll])?];
+        // Over-all conditions must hold again after each event during the action.
         for event in passage.between(timeline) {
             reader.applied.truths.extend(event.truths.clone());
             later.push(self.condition(reader, &[ConditionTime::OverAll])?);
         }
         later.push(self.condition(reader, &[ConditionTime::AtEnd])?);
-        let mut all = Vec::new();
+        let mut cases = Vec::new();
         if later.iter().any(|condition| condition.is(false)) {
-            return Ok(all);
+            return Ok(cases);
         }
         let end = reader.moment(self.effects(EffectTime::AtEnd))?;
         later.push(end.leaves(event));
@@ -225,14 +239,14 @@ impl<'r> Durative<'r> {
         applied.truths.extend(event.into_iter().flat_map(|event| event.truths.clone()));
         applied.truths.extend(passage.truths(timeline));
         for known in known.assume(structure, &Formula::junction(later, true))? {
-            all.extend(end.last(structure, known, &applied, (passage, reader.length.as_ref()))?);
+            cases.extend(end.last(structure, known, &applied, (passage, reader.length.as_ref()))?);
         }
-        Ok(all)
+        Ok(cases)
     }
 }
 
 impl<'r> Reader<'r> {
-    /// What a happening with these conditions and effects reads.
+    /// The atoms and fluents that a happening with these conditions and effects reads.
     fn reads(
         &self,
         conditions: Vec<&'r Condition>,
@@ -280,27 +294,28 @@ impl<'r> Reader<'r> {
 }
 
 impl Moment {
-    /// That no effect sets an atom to another value than an event of the same time.
+    /// The condition that no effect contradicts an event of the same time.
     fn leaves(&self, event: Option<&Event>) -> Formula {
         let Some(event) = event else { return Formula::truth(true) };
         let opposite = self.atoms.iter().filter(|(_, key, holds)| event.truths.get(key) == Some(&!holds));
         Formula::junction(opposite.map(|(guard, ..)| guard.negated()), true)
     }
 
-    /// What becomes of atoms where all conditions are decided.
+    /// Truth values of the affected atoms when all guards are decided.
     fn truths(&self, structure: &Structure, known: &Known) -> BTreeMap<Key, bool> {
         let active = |guard: &Formula| known.decide(structure, guard) == Some(true);
         let mut truths = BTreeMap::new();
         for (guard, key, holds) in &self.atoms {
             if active(guard) {
-                let own = truths.entry(key.clone()).or_insert(*holds);
-                *own |= *holds;
+                let value = truths.entry(key.clone()).or_insert(*holds);
+                // An atom that is both added and deleted holds.
+                *value |= *holds;
             }
         }
         truths
     }
 
-    /// The cases of the end of an instance, after what its start has made.
+    /// The cases of the end of an instance, after its start effects.
     fn last(
         &self,
         structure: &Structure,
@@ -308,21 +323,21 @@ impl Moment {
         applied: &Applied,
         (passage, length): (&Passage, Option<&Length>),
     ) -> Result<Vec<Case>, Cause> {
-        let mut all = Vec::new();
+        let mut cases = Vec::new();
         for known in known.split(structure, self.numbers.iter().map(|(guard, ..)| guard))? {
-            for (known, own) in self.numbers(structure, &known, applied)? {
+            for (known, number_changes) in self.numbers(structure, &known, applied)? {
                 let mut changes = applied.changes.clone();
-                changes.extend(own);
+                changes.extend(number_changes);
                 let (truths, effects) = (applied.truths.clone(), self.atoms.clone());
                 let (passage, length) = (passage.clone(), length.cloned());
-                all.push(Case { known, truths, effects, changes, length, passage });
+                cases.push(Case { known, truths, effects, changes, length, passage });
             }
         }
-        Ok(all)
+        Ok(cases)
     }
 
-    /// What numbers become where the conditions of all their effects are decided; nothing where active effects contradict each
-    /// other or have no value.
+    /// The new values of numbers when all guards are decided. Empty if active effects contradict
+    /// each other or are undefined.
     fn numbers(
         &self,
         structure: &Structure,
@@ -350,8 +365,8 @@ impl Moment {
     }
 }
 
-/// What effects at one time make of a number; none if they contradict each other. Different values that are assigned to it have to
-/// be equal.
+/// Combines simultaneous effects on one number. Returns `None` if they contradict each other.
+/// Values that are assigned twice yield equations.
 fn together(
     before: Linear,
     effects: &[(Assignment, &Linear)],

@@ -1,5 +1,6 @@
-//! An upper bound of the derived atoms that may hold in states of the witness: the least fixpoint of the rules in which everything but a
-//! positive atom is possible. It is computed by semi-naive evaluation: each new atom is used once in each place that reads it.
+//! Computes an upper bound on the derived atoms that may hold in states of the witness: the least
+//! fixpoint of the rules, in which every condition except positive derived atoms is relaxed.
+//! Semi-naive evaluation: each new atom is used once in each rule position that reads it.
 
 use std::rc::Rc;
 
@@ -13,25 +14,25 @@ use crate::faithful::verdict::Cause;
 use crate::faithful::world::World;
 use pddl::ast::{Atom, Condition, Derived, Name, Term, TypedName};
 
-/// With more derived atoms, nothing is checked.
+/// Upper limit on the number of derived atoms.
 const ATOM_LIMIT: usize = 50_000;
 
 /// Upper limit on the conjuncts around an atom that give candidates.
 const CONJUNCT_LIMIT: usize = 64;
 
-/// A place where a rule reads a derived atom that has to hold.
+/// A positive occurrence of a derived atom in a rule.
 struct Occurrence<'w> {
     rule: &'w Derived,
     atom: &'w Atom,
     /// The variables of the existential quantifiers around it.
     variables: Rc<[&'w TypedName]>,
-    /// Conditions that have to hold, too.
+    /// Conjuncts around the atom, which give candidates for variables.
     others: Rc<[&'w Condition]>,
-    /// `false` if a variable has the name of another one, so that a name does not tell which of them it is.
+    /// `false` if a variable shadows another one, so that a name is ambiguous.
     has_distinct_names: bool,
 }
 
-/// Adds the bound to what is known of derived atoms.
+/// Computes the bound and stores it in `axioms`.
 pub(super) fn add(
     world: &World<'_>,
     invariant: &Invariant,
@@ -79,45 +80,45 @@ fn too_many() -> Cause {
     Cause::TooMany { what: "derived atoms".into(), limit: ATOM_LIMIT }
 }
 
-/// Collects the places where a condition reads derived atoms that have to hold.
+/// Collects the positive occurrences of derived atoms in a condition.
 fn collect<'w>(
     world: &World<'w>,
     rule: &'w Derived,
     condition: &'w Condition,
     (variables, others): (&Rc<[&'w TypedName]>, &Rc<[&'w Condition]>),
-    found: &mut FxHashMap<u32, Vec<Occurrence<'w>>>,
+    occurrences: &mut FxHashMap<u32, Vec<Occurrence<'w>>>,
 ) -> Result<(), Cause> {
     match condition {
         Condition::And(parts) => {
             let others = others.iter().copied().chain(parts).take(CONJUNCT_LIMIT).collect();
-            parts.iter().try_for_each(|part| collect(world, rule, part, (variables, &others), found))
+            parts.iter().try_for_each(|part| collect(world, rule, part, (variables, &others), occurrences))
         }
         Condition::Or(parts) => {
-            parts.iter().try_for_each(|part| collect(world, rule, part, (variables, others), found))
+            parts.iter().try_for_each(|part| collect(world, rule, part, (variables, others), occurrences))
         }
         Condition::Exists(bound, inner) => {
             let variables = variables.iter().copied().chain(bound).collect();
-            collect(world, rule, inner, (&variables, others), found)
+            collect(world, rule, inner, (&variables, others), occurrences)
         }
         Condition::Atom(atom) if world.is_derived(atom) => {
             let (variables, others) = (Rc::clone(variables), Rc::clone(others));
             let has_distinct_names = has_distinct_names(rule, &variables);
             let occurrence = Occurrence { rule, atom, variables, others, has_distinct_names };
-            found.entry(world.symbol(&atom.predicate.name)?).or_default().push(occurrence);
+            occurrences.entry(world.symbol(&atom.predicate.name)?).or_default().push(occurrence);
             Ok(())
         }
         _ => Ok(()),
     }
 }
 
-/// Returns `true` if no parameter of a rule and no variable around an atom has the name of another.
+/// Returns `true` if no variable around an atom shadows another one or a parameter of the rule.
 fn has_distinct_names(rule: &Derived, variables: &[&TypedName]) -> bool {
-    let all = rule.head.parameters.iter().chain(variables.iter().copied());
+    let variables_in_scope = rule.head.parameters.iter().chain(variables.iter().copied());
     let mut names = FxHashSet::default();
-    all.into_iter().all(|own| names.insert(&own.identifier.name))
+    variables_in_scope.into_iter().all(|variable| names.insert(&variable.identifier.name))
 }
 
-/// The heads of a rule that are new, by all its instances.
+/// Returns the new heads of all instances of a rule.
 fn all_heads(
     world: &World<'_>,
     invariant: &Invariant,
@@ -128,10 +129,10 @@ fn all_heads(
     let mut heads = Vec::new();
     let mut reader = Reader::new(world, invariant, axioms);
     let parameters = &rule.head.parameters;
-    reader.each(parameters, Some(&rule.condition), &mut |own| {
-        let objects = parameters.iter().map(|parameter| own.binding[&parameter.identifier.name]).collect();
+    reader.each(parameters, Some(&rule.condition), &mut |reader| {
+        let objects = parameters.iter().map(|parameter| reader.binding[&parameter.identifier.name]).collect();
         let key = (symbol, objects);
-        if !own.axioms.bound.contains(&key) && own.is_possible(&rule.condition)? {
+        if !reader.axioms.bound.contains(&key) && reader.is_possible(&rule.condition)? {
             heads.push(key);
         }
         Ok(true)
@@ -140,7 +141,7 @@ fn all_heads(
 }
 
 impl Occurrence<'_> {
-    /// The heads that are new and that the rule concludes from an atom in this place.
+    /// Returns the new heads that follow from the atom `key` at this occurrence.
     fn heads(
         &self,
         world: &World<'_>,
@@ -154,12 +155,14 @@ impl Occurrence<'_> {
         if !self.unify(&mut reader, key) {
             return Ok(Vec::new());
         }
-        // All bindings of the other parameters, one parameter after the other.
+        // Extends each row by the candidates of one unbound parameter at a time.
         let mut rows: Vec<Vec<(&Name, u32)>> = vec![Vec::new()];
-        let open = parameters.iter().filter(|own| !reader.binding.contains_key(&own.identifier.name));
+        let open =
+            parameters.iter().filter(|parameter| !reader.binding.contains_key(&parameter.identifier.name));
         for parameter in open.collect::<Vec<_>>() {
             let mut longer = Vec::new();
             for row in rows {
+                // Earlier parameters of the row restrict the candidates of later ones.
                 let before = reader.binding.clone();
                 reader.binding.extend(row.iter().copied());
                 for object in reader.candidates_where(parameter, &self.others) {
@@ -174,13 +177,14 @@ impl Occurrence<'_> {
             }
             rows = longer;
         }
-        for own in self.variables.iter() {
-            reader.binding.remove(&own.identifier.name);
+        for variable in self.variables.iter() {
+            reader.binding.remove(&variable.identifier.name);
         }
         let mut heads = Vec::new();
         for row in rows {
             reader.binding.extend(row);
-            let objects = parameters.iter().map(|own| reader.binding[&own.identifier.name]).collect();
+            let objects =
+                parameters.iter().map(|parameter| reader.binding[&parameter.identifier.name]).collect();
             let key = (symbol, objects);
             if !axioms.bound.contains(&key) && reader.is_possible(&self.rule.condition)? {
                 heads.push(key);
@@ -189,16 +193,17 @@ impl Occurrence<'_> {
         Ok(heads)
     }
 
-    /// Binds the variables of the atom so that it is the given one; returns `false` if it cannot be.
+    /// Binds the variables of the atom to the objects of `key`. Returns `false` if they do not
+    /// match.
     fn unify<'r>(&'r self, reader: &mut Reader<'r>, key: &Key) -> bool {
         let typed = || self.rule.head.parameters.iter().chain(self.variables.iter().copied());
         self.atom.arguments.len() == key.1.len()
             && self.atom.arguments.iter().zip(&key.1).all(|(term, object)| {
-                if let Term::Variable(own) = term
-                    && !reader.binding.contains_key(&own.name)
+                if let Term::Variable(variable) = term
+                    && !reader.binding.contains_key(&variable.name)
                 {
-                    let declared = typed().find(|typed| typed.identifier.name == own.name);
-                    reader.binding.insert(&own.name, *object);
+                    let declared = typed().find(|typed| typed.identifier.name == variable.name);
+                    reader.binding.insert(&variable.name, *object);
                     return declared.is_some_and(|typed| reader.world.is_of(*object, &typed.r#type));
                 }
                 reader.world.bound(term, &reader.binding) == Some(*object)
@@ -207,8 +212,8 @@ impl Occurrence<'_> {
 }
 
 impl<'r> Reader<'r> {
-    /// Returns `false` if a condition holds in no state of the witness: negations, implications and comparisons that change are
-    /// taken to be possible.
+    /// Returns `false` if a condition holds in no state of the witness. Negations, implications
+    /// and comparisons that may change are assumed to be possible.
     fn is_possible(&mut self, condition: &'r Condition) -> Result<bool, Cause> {
         self.count()?;
         match condition {
@@ -230,8 +235,8 @@ impl<'r> Reader<'r> {
             }
             Condition::Exists(bound, inner) => {
                 let mut possible = false;
-                self.each(bound, Some(inner), &mut |own| {
-                    possible = own.is_possible(inner)?;
+                self.each(bound, Some(inner), &mut |reader| {
+                    possible = reader.is_possible(inner)?;
                     Ok(!possible)
                 })?;
                 Ok(possible)

@@ -1,4 +1,4 @@
-//! What comes of an instance, and what takes place at once.
+//! Outcomes of an action instance under a condition, and simultaneous effects.
 
 use std::collections::BTreeMap;
 
@@ -9,26 +9,28 @@ use crate::faithful::linear::Linear;
 use crate::faithful::timeline::Passage;
 use pddl::ast::Assignment;
 
-/// One way in which the conditions of an instance can turn out. Cases may overlap; together they are all.
+/// One outcome of the conditions of an instance. Cases may overlap; together they cover all
+/// executions.
 #[derive(Debug)]
 pub(super) struct Case {
-    /// What holds before.
+    /// Facts that hold before.
     pub(super) known: Known,
-    /// What has become of atoms at the start.
+    /// Truth values of atoms after the start effects.
     pub(super) truths: BTreeMap<Key, bool>,
-    /// What becomes of atoms at the end, each under a condition; what is both added and deleted holds.
+    /// Conditional effects on atoms at the end: (condition, atom, added). An atom that is both
+    /// added and deleted holds.
     pub(super) effects: Vec<(Formula, Key, bool)>,
-    /// Fluents that have these values afterwards.
+    /// Values of the changed fluents afterwards.
     pub(super) changes: BTreeMap<Key, Linear>,
-    /// None for an instantaneous action, and for a wait.
+    /// The duration; `None` for instantaneous actions and waits.
     pub(super) length: Option<Length>,
     pub(super) passage: Passage,
 }
 
-/// Effects that take place at once, each under a condition.
+/// Simultaneous conditional effects.
 #[derive(Default)]
 pub(super) struct Moment {
     pub(super) atoms: Vec<(Formula, Key, bool)>,
-    /// A value is missing where it is undefined.
+    /// Effects on fluents; the value is `None` if it is undefined.
     pub(super) numbers: Vec<(Formula, Assignment, Key, Option<Linear>)>,
 }

@@ -1,5 +1,5 @@
-//! What the files say against what the task says: initial states, goals, rules, and each case of each instance of an action
-//! against the operator that stands for it.
+//! Compares the PDDL files with the ground task: initial state, goal, rules of derived
+//! predicates, and each case of each action instance with the operator that represents it.
 
 use std::collections::BTreeSet;
 
@@ -22,41 +22,42 @@ use pddl::ast::{Action, Direction};
 
 type Result<T> = std::result::Result<T, Obstacle>;
 
-/// A condition is looked at in at most so many cases beyond those of the files.
+/// Upper limit on the case splits of one condition.
 const SPLIT_LIMIT: usize = 256;
 
-/// By name and arguments; none for a slot.
+/// Operators by action name and arguments; an argument is `None` for a slot.
 type Calls = FxHashMap<(String, Vec<Option<u32>>), Vec<usize>>;
 
 pub(super) struct Comparison<'c> {
     pub(super) task: &'c Translation<'c>,
     objects: FxHashMap<String, u32>,
     operators: Calls,
-    /// Those that wait for the next event.
+    /// Operators that wait for the next event.
     waits: Vec<usize>,
-    /// Which arguments of an action are slots.
+    /// For each action, the sets of arguments that are slots.
     masks: FxHashMap<String, BTreeSet<Vec<bool>>>,
-    /// What is to be as little as possible; none if plans are measured by time or length.
+    /// The metric to be minimised; `None` if plans are measured by time or length.
     metric: Option<Linear>,
     timed: bool,
-    /// Times of events and durations are multiples of this.
+    /// Times of events and durations are multiples of this unit.
     unit: BigRational,
 }
 
-/// An instance as messages name it, and what it adds to the metric.
+/// The name of an instance for messages, and the cost that it adds to the metric.
 struct Instance<'i> {
     name: &'i dyn Fn() -> String,
     cost: BigRational,
 }
 
 impl<'c> Comparison<'c> {
-    /// `timed` says what plans are measured by where there is no metric; times of events and durations are multiples of `unit`.
+    /// `timed` selects time instead of length as the measure without a metric. Times of events
+    /// and durations are multiples of `unit`.
     pub(super) fn new(task: &'c Translation<'c>, timed: bool, unit: BigRational) -> Result<Self> {
         let model = task.model;
         let folded = |name: &String| name.to_ascii_lowercase();
         let mut objects = FxHashMap::default();
-        for (own, name) in (0..).zip(&model.objects) {
-            if objects.insert(folded(name), own).is_some() {
+        for (number, name) in (0..).zip(&model.objects) {
+            if objects.insert(folded(name), number).is_some() {
                 return Err(Difference::Form { reason: format!("{name} is two objects") }.into());
             }
         }
@@ -112,7 +113,7 @@ impl<'c> Comparison<'c> {
     pub(super) fn initial(&self) -> Result<()> {
         let (model, names) = (self.task.model, self.task.names);
         for variable in model.basic_variables() {
-            let own = &model.variables[variable as usize];
+            let atoms = &model.variables[variable as usize];
             let holding: Vec<u32> = names
                 .atoms(variable)
                 .filter(|(_, key)| self.task.world.holds_initially(key))
@@ -124,7 +125,7 @@ impl<'c> Comparison<'c> {
                 _ => u32::MAX,
             };
             if model.values[variable as usize] != expected {
-                return Err(Difference::Initial { what: own.join(" or ") }.into());
+                return Err(Difference::Initial { what: atoms.join(" or ") }.into());
             }
         }
         for (key, number) in names.fluents.iter().zip(&model.numbers) {
@@ -145,25 +146,25 @@ impl<'c> Comparison<'c> {
         Ok(())
     }
 
-    /// The goal of the files implies that of the task.
+    /// Checks that the goal of the files implies the goal of the task.
     pub(super) fn goal(&self) -> Result<()> {
         let mut reader = Reader::new(self.task.world, self.task.invariant, self.task.axioms);
         let goal = reader.formula(&self.task.world.problem.goal, true)?;
-        let wanted = self.task.condition(&self.task.model.goal, &[], &[]);
+        let task_goal = self.task.condition(&self.task.model.goal, &[], &[]);
         // No plan ends with a wait.
-        let rest = Formula::Atom(timeline::waited(), false);
-        for known in
-            Known::default().assume(&self.task.names.structure, &Formula::junction([goal, rest], true))?
+        let not_waited = Formula::Atom(timeline::waited(), false);
+        for known in Known::default()
+            .assume(&self.task.names.structure, &Formula::junction([goal, not_waited], true))?
         {
-            if !self.follows(known, &wanted, &|_| true) {
+            if !self.follows(known, &task_goal, &|_| true) {
                 return Err(Difference::Goal.into());
             }
         }
         Ok(())
     }
 
-    /// The rules of the task give each derived atom that both know the same value as those of the files: what holds by the ones
-    /// holds by the others.
+    /// Checks that the rules of the task and the rules of the files are equivalent for each
+    /// derived atom that is a variable of the task.
     pub(super) fn rules(&self) -> Result<()> {
         let task = self.task;
         let mut linked: Vec<&Key> = task.axioms.linked.iter().collect();
@@ -171,13 +172,14 @@ impl<'c> Comparison<'c> {
         for key in linked {
             let Some((variable, _)) = task.names.fact(key) else { continue };
             let files = Reader::new(task.world, task.invariant, task.axioms).unfold(key)?;
-            let own = task.rules(variable);
-            // A derivation must not rest on what is derived later, so that derived atoms are not looked at by cases.
+            let rules = task.rules(variable);
+            // A derivation must not depend on atoms that are derived later, so case splits on
+            // derived atoms are excluded.
             let admits = |leaf: &Formula| match leaf {
                 Formula::Atom(key, _) => task.world.rules(key.0).is_none(),
                 _ => true,
             };
-            for (left, right) in [(&files, &own), (&own, &files)] {
+            for (left, right) in [(&files, &rules), (&rules, &files)] {
                 for known in Known::default().assume(&task.names.structure, left)? {
                     if !self.follows(known, right, &admits) {
                         return Err(Difference::WrongRules { atom: task.world.show(key) }.into());
@@ -188,7 +190,7 @@ impl<'c> Comparison<'c> {
         Ok(())
     }
 
-    /// Whether a condition holds wherever this is known, if need be by cases.
+    /// Returns `true` if `known` implies a condition, by case splits if necessary.
     fn follows(&self, known: Known, wanted: &Formula, admits: &dyn Fn(&Formula) -> bool) -> bool {
         let structure = &self.task.names.structure;
         let mut open = vec![known];
@@ -207,8 +209,8 @@ impl<'c> Comparison<'c> {
         open.is_empty()
     }
 
-    /// Looks for operators that do what a case of an instance does; `false` if none is needed because it changes nothing that
-    /// the task knows.
+    /// Checks that an operator simulates a case of an instance. Returns `false` if none is
+    /// needed, because the case does not change the task state.
     pub(super) fn case(&self, action: &Action, arguments: &[u32], case: &Case) -> Result<bool> {
         let name = || {
             let words = arguments.iter().map(|object| self.task.world.name(*object));
@@ -224,7 +226,7 @@ impl<'c> Comparison<'c> {
         self.find(&self.candidates(action, arguments), case, &instance).map(|()| true)
     }
 
-    /// Looks for the wait that leads to an event.
+    /// Checks that a wait operator simulates a wait until an event.
     pub(super) fn wait(&self, case: &Case) -> Result<()> {
         let name = || {
             let phases = case.truths.iter().filter(|(key, holds)| key.0 == PHASE && **holds);
@@ -243,7 +245,8 @@ impl<'c> Comparison<'c> {
         self.find(&waits, case, &instance)
     }
 
-    /// Looks among operators for those that do what a case does, wherever it can be executed.
+    /// Checks that one of the operators simulates a case, in every state in which the case can be
+    /// executed.
     fn find(&self, candidates: &[(&Operator, Vec<u32>)], case: &Case, instance: &Instance<'_>) -> Result<()> {
         let structure = &self.task.names.structure;
         let conditions: Vec<Formula> = candidates
@@ -258,17 +261,17 @@ impl<'c> Comparison<'c> {
             let mut reason = Obstacle::from(Difference::NoOperatorFor { instance: String::new() });
             let mut done = false;
             for ((operator, choice), condition) in candidates.iter().zip(&conditions) {
-                let found = match known.decide(structure, condition) {
+                let result = match known.decide(structure, condition) {
                     Some(true) => self.simulates((operator, choice), case, &known, instance),
                     _ => Err(Difference::WrongCondition { instance: String::new() }.into()),
                 };
-                match found {
+                match result {
                     Ok(()) => {
                         done = true;
                         break;
                     }
-                    // The reason against the operator that is nearest is reported.
-                    Err(other) if rank(&other) >= rank(&reason) => reason = other,
+                    // The error about the best matching operator is reported.
+                    Err(next) if rank(&next) >= rank(&reason) => reason = next,
                     Err(_) => {}
                 }
             }
@@ -292,9 +295,9 @@ impl<'c> Comparison<'c> {
         known: &Known,
         instance: &Instance<'_>,
     ) -> Result<()> {
-        let made = Made { operator, choice };
+        let resolved = Made { operator, choice };
         let wrong_effect = |what| Difference::WrongEffect { instance: (instance.name)(), what };
-        effects::compare(self.task, case, known, Some(made)).map_err(|mismatch| match mismatch {
+        effects::compare(self.task, case, known, Some(resolved)).map_err(|mismatch| match mismatch {
             Mismatch::Differs(what) => Obstacle::from(wrong_effect(what)),
             Mismatch::Unknown(atoms) => Cause::Exclusion { instance: (instance.name)(), atoms }.into(),
         })?;
@@ -302,19 +305,22 @@ impl<'c> Comparison<'c> {
             return Err(wrong_effect(self.task.world.show(&timeline::clock())).into());
         }
         let model = self.task.model;
-        let own = model.quantity(&operator.cost, choice, &model.sizes(operator));
-        if own.to_rational() > &instance.cost * model.objective.scale.to_rational() {
+        let cost = model.quantity(&operator.cost, choice, &model.sizes(operator));
+        if cost.to_rational() > &instance.cost * model.objective.scale.to_rational() {
             let cost = instance.cost.to_string();
             return Err(Difference::WrongCost { instance: (instance.name)(), cost }.into());
         }
         Ok(())
     }
 
-    /// Whether the clock stands for the time at the end of a case if it stands for the time at its start.
+    /// Returns `true` if the clock of the task, given that it represents the start time,
+    /// represents the end time after the case.
     fn keeps_time(&self, (operator, choice): (&Operator, &[u32]), case: &Case) -> bool {
         let Some(number) = self.task.names.numbers.get(&timeline::clock()) else { return true };
-        // Time does not go back, so that the clock may stand still.
-        let Some((_, value)) = operator.changes.iter().find(|(own, _)| own == number) else { return true };
+        // Time never decreases, so a clock that stands still is a lower bound.
+        let Some((_, value)) = operator.changes.iter().find(|(changed, _)| changed == number) else {
+            return true;
+        };
         let value = self.task.value(value, choice, &self.task.model.sizes(operator));
         let passed = value.clone().minus(&Linear::fluent(timeline::clock()));
         match (passed.value(), value.value()) {
@@ -327,7 +333,7 @@ impl<'c> Comparison<'c> {
         }
     }
 
-    /// The least that a case adds to the metric.
+    /// Minimal increase of the metric by a case.
     fn cost(&self, case: &Case) -> Result<BigRational> {
         let one = BigRational::one();
         let time = |factor: &BigRational| match &case.length {
@@ -352,7 +358,7 @@ impl<'c> Comparison<'c> {
         }
     }
 
-    /// Operators with a choice of designs that have these arguments.
+    /// Returns operators with the choice of designs that yields these arguments.
     fn candidates(&self, action: &Action, arguments: &[u32]) -> Vec<(&'c Operator, Vec<u32>)> {
         let name = action.identifier.name.as_str().to_ascii_lowercase();
         let world = self.task.world;
@@ -360,18 +366,19 @@ impl<'c> Comparison<'c> {
         let Some(objects) = arguments.iter().map(object).collect::<Option<Vec<u32>>>() else {
             return Vec::new();
         };
-        let mut found = Vec::new();
+        let mut candidates = Vec::new();
         for mask in self.masks.get(&name).into_iter().flatten().filter(|mask| mask.len() == objects.len()) {
             let pattern = objects.iter().zip(mask).map(|(object, open)| (!open).then_some(*object)).collect();
             for position in self.operators.get(&(name.clone(), pattern)).into_iter().flatten() {
                 let operator = &self.task.model.operators[*position];
-                found.extend(self.choice(operator, &objects).map(|choice| (operator, choice)));
+                candidates.extend(self.choice(operator, &objects).map(|choice| (operator, choice)));
             }
         }
-        found
+        candidates
     }
 
-    /// The choice of designs that gives an operator its arguments, if it admits that.
+    /// Returns the choice of designs for which an operator has these arguments, if it is not
+    /// excluded.
     fn choice(&self, operator: &Operator, objects: &[u32]) -> Option<Vec<u32>> {
         let model = self.task.model;
         let uses = &model.uses[operator.uses as usize];
@@ -379,14 +386,14 @@ impl<'c> Comparison<'c> {
         for (argument, object) in operator.arguments.iter().zip(objects) {
             let Argument::Slot(place) = argument else { continue };
             let (slot, designs) = uses.get(*place as usize)?;
-            let all = &model.slots[*slot as usize];
-            let position = designs.iter().position(|design| all[*design as usize] == *object)?;
+            let objects_of_slot = &model.slots[*slot as usize];
+            let position = designs.iter().position(|design| objects_of_slot[*design as usize] == *object)?;
             let position = u32::try_from(position).ok()?;
-            let own = &mut choice[*place as usize];
-            if own.is_some_and(|other| other != position) {
+            let entry = &mut choice[*place as usize];
+            if entry.is_some_and(|earlier| earlier != position) {
                 return None;
             }
-            *own = Some(position);
+            *entry = Some(position);
         }
         let choice: Vec<u32> = choice.into_iter().collect::<Option<_>>()?;
         let excluded = model.exclusions[operator.exclusions as usize].iter().any(|exclusion| {
@@ -397,7 +404,7 @@ impl<'c> Comparison<'c> {
     }
 }
 
-/// Rank of the reason for which an operator is refused: the greater, the more of the operator fits.
+/// Rank of the reason for which an operator is rejected: higher if more of the operator matches.
 fn rank(reason: &Obstacle) -> u8 {
     match reason {
         Obstacle::Differs(Difference::NoOperatorFor { .. }) => 0,
@@ -407,7 +414,7 @@ fn rank(reason: &Obstacle) -> u8 {
     }
 }
 
-/// A reason with the name of the instance.
+/// Adds the name of the instance to a reason.
 fn named(reason: Obstacle, instance: &str) -> Obstacle {
     let instance = instance.to_owned();
     match reason {
@@ -415,6 +422,6 @@ fn named(reason: Obstacle, instance: &str) -> Obstacle {
         Obstacle::Differs(Difference::WrongCondition { .. }) => {
             Difference::WrongCondition { instance }.into()
         }
-        other => other,
+        reason => reason,
     }
 }

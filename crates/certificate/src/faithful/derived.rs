@@ -1,4 +1,5 @@
-//! Derived atoms: which of them always or never hold, and which the task knows.
+//! Analyses derived atoms: which of them hold always or never, and which are variables of the
+//! task.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -12,7 +13,7 @@ use crate::faithful::verdict::Cause;
 use crate::faithful::world::World;
 use pddl::ast::{Condition, Expression};
 
-/// What the witness says of derived atoms.
+/// Computes the facts about derived atoms that the witness implies.
 pub(super) fn axioms(
     world: &World<'_>,
     invariant: &Invariant,
@@ -25,10 +26,11 @@ pub(super) fn axioms(
     }
     bound::add(world, invariant, &mut axioms, stop)?;
     let bodies = bodies(world, invariant, &axioms)?;
-    // Each set is sound if the other one is, and each gets better with the other one.
+    // Both sets are sound at any time; each iteration may sharpen either by the other.
     loop {
-        let may = fixpoint(&bodies, |formula, own| possible(world, formula, own, &axioms.must));
-        let must = fixpoint(&bodies, |formula, own| certain(world, formula, own, &may));
+        let may =
+            fixpoint(&bodies, |formula, atoms_so_far| possible(world, formula, atoms_so_far, &axioms.must));
+        let must = fixpoint(&bodies, |formula, atoms_so_far| certain(world, formula, atoms_so_far, &may));
         let settled = may == axioms.may && must == axioms.must;
         (axioms.may, axioms.must) = (may, must);
         if settled {
@@ -41,20 +43,20 @@ pub(super) fn axioms(
     Ok(axioms)
 }
 
-/// The derived atoms on cycles of dependencies, and those on paths between such cycles: what remains after repeated removal of atoms that depend on no
-/// remaining atom, or on which none depends.
+/// Returns the derived atoms on dependency cycles and on paths between cycles, by repeated
+/// removal of atoms without a remaining predecessor or successor.
 fn circular<'b>(axioms: &Axioms, bodies: &'b [(Key, Formula)]) -> FxHashSet<&'b Key> {
     let mut below: FxHashMap<&Key, FxHashSet<&Key>> = FxHashMap::default();
     for (key, body) in bodies.iter().filter(|(key, _)| axioms.known(key).is_none()) {
         atoms(body, below.entry(key).or_default());
     }
     let mut remaining: FxHashSet<&Key> = below.keys().copied().collect();
-    for own in below.values_mut() {
-        own.retain(|key| remaining.contains(key));
+    for links in below.values_mut() {
+        links.retain(|key| remaining.contains(key));
     }
     let mut above: FxHashMap<&Key, FxHashSet<&Key>> = FxHashMap::default();
-    for (key, own) in &below {
-        for lower in own {
+    for (key, links) in &below {
+        for lower in links {
             above.entry(*lower).or_default().insert(*key);
         }
     }
@@ -64,7 +66,7 @@ fn circular<'b>(axioms: &Axioms, bodies: &'b [(Key, Formula)]) -> FxHashSet<&'b 
     remaining
 }
 
-/// Takes away the atoms without a link to one that remains, again and again.
+/// Removes atoms without links to remaining atoms until a fixpoint is reached.
 #[expect(clippy::arithmetic_side_effects, reason = "a link is taken away once")]
 fn take_ends_away<'b>(
     remaining: &mut FxHashSet<&'b Key>,
@@ -72,25 +74,26 @@ fn take_ends_away<'b>(
     opposite: &FxHashMap<&'b Key, FxHashSet<&'b Key>>,
 ) {
     let count = |key: &'b Key| {
-        let own = links.get(key).into_iter().flatten();
-        (key, own.filter(|other| remaining.contains(*other)).count())
+        let targets = links.get(key).into_iter().flatten();
+        (key, targets.filter(|target| remaining.contains(*target)).count())
     };
     let mut counts: FxHashMap<&Key, usize> = remaining.iter().copied().map(count).collect();
     let mut open: Vec<&Key> = counts.iter().filter(|(_, count)| **count == 0).map(|(key, _)| *key).collect();
     while let Some(key) = open.pop() {
         remaining.remove(key);
-        for other in opposite.get(key).into_iter().flatten() {
-            if let Some(count) = counts.get_mut(other) {
+        for target in opposite.get(key).into_iter().flatten() {
+            if let Some(count) = counts.get_mut(target) {
                 *count -= 1;
                 if *count == 0 {
-                    open.push(*other);
+                    open.push(*target);
                 }
             }
         }
     }
 }
 
-/// Derived atoms with the conditions under which they hold, in terms of atoms of both kinds.
+/// Returns the derived atoms with the formulas under which they hold, over basic and derived
+/// atoms.
 fn bodies(world: &World<'_>, invariant: &Invariant, axioms: &Axioms) -> Result<Vec<(Key, Formula)>, Cause> {
     let mut heads: Vec<Key> = axioms.bound.atoms().cloned().collect();
     heads.sort_unstable();
@@ -103,19 +106,19 @@ fn bodies(world: &World<'_>, invariant: &Invariant, axioms: &Axioms) -> Result<V
     heads.into_iter().map(body).collect()
 }
 
-/// All atoms in a formula.
-fn atoms<'f>(formula: &'f Formula, found: &mut FxHashSet<&'f Key>) {
+/// Collects all atoms of a formula.
+fn atoms<'f>(formula: &'f Formula, keys: &mut FxHashSet<&'f Key>) {
     match formula {
-        Formula::All(parts) | Formula::Any(parts) => parts.iter().for_each(|part| atoms(part, found)),
+        Formula::All(parts) | Formula::Any(parts) => parts.iter().for_each(|part| atoms(part, keys)),
         Formula::Atom(key, _) => {
-            found.insert(key);
+            keys.insert(key);
         }
         Formula::Compare(..) => {}
     }
 }
 
-/// The least set of atoms whose bodies hold by the set. A body that holds by a set holds by every larger one, so that it is read
-/// again only when an atom in it has joined.
+/// Computes the least set of atoms whose bodies hold by the set. Bodies are monotone, so a body
+/// is evaluated again only when one of its atoms is added.
 fn fixpoint(bodies: &[(Key, Formula)], holds: impl Fn(&Formula, &FxHashSet<Key>) -> bool) -> FxHashSet<Key> {
     let mut readers: FxHashMap<&Key, Vec<usize>> = FxHashMap::default();
     for (place, (_, body)) in bodies.iter().enumerate() {
@@ -125,19 +128,20 @@ fn fixpoint(bodies: &[(Key, Formula)], holds: impl Fn(&Formula, &FxHashSet<Key>)
             readers.entry(key).or_default().push(place);
         }
     }
-    let mut own: FxHashSet<Key> = FxHashSet::default();
+    let mut fixpoint: FxHashSet<Key> = FxHashSet::default();
     let mut open: Vec<usize> = (0..bodies.len()).rev().collect();
     while let Some(place) = open.pop() {
         let (key, body) = &bodies[place];
-        if !own.contains(key) && holds(body, &own) {
-            own.insert(key.clone());
+        if !fixpoint.contains(key) && holds(body, &fixpoint) {
+            fixpoint.insert(key.clone());
             open.extend(readers.get(key).into_iter().flatten());
         }
     }
-    own
+    fixpoint
 }
 
-/// Whether a body may hold where derived atoms hold only if they are in one set, and surely if they are in the other one.
+/// Returns `true` if a body may hold when at most the derived atoms of `may` and at least those
+/// of `must` hold.
 fn possible(world: &World<'_>, formula: &Formula, may: &FxHashSet<Key>, must: &FxHashSet<Key>) -> bool {
     match formula {
         Formula::All(parts) => parts.iter().all(|part| possible(world, part, may, must)),
@@ -148,7 +152,8 @@ fn possible(world: &World<'_>, formula: &Formula, may: &FxHashSet<Key>, must: &F
     }
 }
 
-/// Whether a body holds in any case.
+/// Returns `true` if a body holds whenever at least the derived atoms of `must` and at most those
+/// of `may` hold.
 fn certain(world: &World<'_>, formula: &Formula, must: &FxHashSet<Key>, may: &FxHashSet<Key>) -> bool {
     match formula {
         Formula::All(parts) => parts.iter().all(|part| certain(world, part, must, may)),
@@ -159,38 +164,38 @@ fn certain(world: &World<'_>, formula: &Formula, must: &FxHashSet<Key>, may: &Fx
     }
 }
 
-/// The predicates and functions that the rules of each derived predicate mention.
+/// Collects the predicates and functions that the rules of each derived predicate mention.
 fn reads(world: &World<'_>) -> Result<FxHashMap<u32, FxHashSet<u32>>, Cause> {
     let mut reads: FxHashMap<u32, FxHashSet<u32>> = FxHashMap::default();
     for (symbol, rules) in world.derived() {
-        let own = reads.entry(symbol).or_default();
+        let symbols = reads.entry(symbol).or_default();
         for rule in rules {
-            in_condition(world, &rule.condition, own)?;
+            in_condition(world, &rule.condition, symbols)?;
         }
     }
     Ok(reads)
 }
 
-fn in_condition(world: &World<'_>, condition: &Condition, found: &mut FxHashSet<u32>) -> Result<(), Cause> {
+fn in_condition(world: &World<'_>, condition: &Condition, symbols: &mut FxHashSet<u32>) -> Result<(), Cause> {
     match condition {
         Condition::And(parts) | Condition::Or(parts) => {
-            parts.iter().try_for_each(|part| in_condition(world, part, found))
+            parts.iter().try_for_each(|part| in_condition(world, part, symbols))
         }
         Condition::Not(inner) | Condition::Exists(_, inner) | Condition::ForAll(_, inner) => {
-            in_condition(world, inner, found)
+            in_condition(world, inner, symbols)
         }
         Condition::Imply(left, right) => {
-            in_condition(world, left, found)?;
-            in_condition(world, right, found)
+            in_condition(world, left, symbols)?;
+            in_condition(world, right, symbols)
         }
         Condition::Atom(atom) => {
-            found.insert(world.symbol(&atom.predicate.name)?);
+            symbols.insert(world.symbol(&atom.predicate.name)?);
             Ok(())
         }
         Condition::Equal(..) => Ok(()),
         Condition::Compare(_, left, right, _) => {
-            in_expression(world, left, found)?;
-            in_expression(world, right, found)
+            in_expression(world, left, symbols)?;
+            in_expression(world, right, symbols)
         }
     }
 }
@@ -198,15 +203,15 @@ fn in_condition(world: &World<'_>, condition: &Condition, found: &mut FxHashSet<
 fn in_expression(
     world: &World<'_>,
     expression: &Expression,
-    found: &mut FxHashSet<u32>,
+    symbols: &mut FxHashSet<u32>,
 ) -> Result<(), Cause> {
     match expression {
         Expression::Fluent(atom) => {
-            found.insert(world.symbol(&atom.predicate.name)?);
+            symbols.insert(world.symbol(&atom.predicate.name)?);
             Ok(())
         }
         Expression::Operation(_, parts, _) => {
-            parts.iter().try_for_each(|part| in_expression(world, part, found))
+            parts.iter().try_for_each(|part| in_expression(world, part, symbols))
         }
         Expression::Number(..) | Expression::Duration(_) | Expression::TotalTime(_) => Ok(()),
     }

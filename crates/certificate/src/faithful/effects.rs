@@ -1,4 +1,5 @@
-//! What a case of an instance makes of the variables and numbers of the task, against what an operator makes of them.
+//! Compares the effects of a case of an instance on the variables and numbers of the task with
+//! the effects of an operator.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,7 +10,7 @@ use crate::faithful::linear::Linear;
 use crate::faithful::translation::Translation;
 use crate::model::Operator;
 
-/// A variable is looked at in at most so many cases.
+/// Upper limit on the case splits for one variable.
 const SPLIT_LIMIT: usize = 1_024;
 
 /// An operator with a choice of designs.
@@ -19,33 +20,35 @@ pub(super) struct Made<'m> {
     pub(super) choice: &'m [u32],
 }
 
-/// The first variable or number that is not shown to become the same.
+/// The first variable or number whose values are not proved equal.
 pub(super) enum Mismatch {
-    /// A variable or number becomes something else.
+    /// The values of a variable or number differ.
     Differs(String),
-    /// It does not follow that at most one of the atoms of a variable holds afterwards, or there are too many cases.
+    /// The atoms of a variable are not proved exclusive after the case, or there are too many
+    /// cases.
     Unknown(String),
 }
 
-/// Compares a case with an operator, or with nothing that happens.
+/// Compares the effects of a case with those of an operator, or with no effects if there is no
+/// operator.
 pub(super) fn compare(
     task: &Translation<'_>,
     case: &Case,
     known: &Known,
-    made: Option<Made<'_>>,
+    operator: Option<Made<'_>>,
 ) -> Result<(), Mismatch> {
-    numbers(task, case, made)?;
+    numbers(task, case, operator)?;
     let touched = case.truths.keys().chain(case.effects.iter().map(|(_, key, _)| key));
     let touched = touched.filter_map(|key| Some(task.names.fact(key)?.0));
     let mut variables: BTreeSet<u32> = touched.collect();
-    if let Some(Made { operator, .. }) = made {
+    if let Some(Made { operator, .. }) = operator {
         let conditional = operator.conditional.iter().flat_map(|conditional| &conditional.effects);
         variables.extend(operator.effects.iter().chain(conditional).map(|fact| fact.0));
     }
     for variable in variables {
-        let own = Variable::new(task, case, made.map(|made| made.operator), variable);
+        let comparison = Variable::new(task, case, operator.map(|operator| operator.operator), variable);
         let words = || task.model.variables[variable as usize].join(" or ");
-        match own.agrees(known) {
+        match comparison.agrees(known) {
             Some(true) => {}
             Some(false) => return Err(Mismatch::Differs(words())),
             None => return Err(Mismatch::Unknown(words())),
@@ -54,49 +57,49 @@ pub(super) fn compare(
     Ok(())
 }
 
-fn numbers(task: &Translation<'_>, case: &Case, made: Option<Made<'_>>) -> Result<(), Mismatch> {
+fn numbers(task: &Translation<'_>, case: &Case, operator: Option<Made<'_>>) -> Result<(), Mismatch> {
     let fluents = (0..).zip(&task.names.fluents);
-    // What becomes of the clock is a matter of the passage.
+    // The clock is compared by the passage of time, not by its value.
     for (number, key) in fluents.filter(|(_, key)| key.0 != CLOCK) {
-        let same = || task.invariant.settled(&Linear::fluent(key.clone()));
-        let expected = case.changes.get(key).map_or_else(same, |after| task.invariant.settled(after));
-        let found = made.and_then(|Made { operator, choice }| {
-            let (_, value) = operator.changes.iter().find(|(own, _)| *own == number)?;
+        let unchanged = || task.invariant.settled(&Linear::fluent(key.clone()));
+        let expected = case.changes.get(key).map_or_else(unchanged, |after| task.invariant.settled(after));
+        let actual = operator.and_then(|Made { operator, choice }| {
+            let (_, value) = operator.changes.iter().find(|(changed, _)| *changed == number)?;
             Some(task.value(value, choice, &task.model.sizes(operator)))
         });
-        if found.unwrap_or_else(same) != expected {
+        if actual.unwrap_or_else(unchanged) != expected {
             return Err(Mismatch::Differs(task.world.show(key)));
         }
     }
     Ok(())
 }
 
-/// What becomes of one variable.
+/// Compares the values of one variable.
 struct Variable<'v> {
     task: &'v Translation<'v>,
     own: u32,
     case: &'v Case,
-    /// What the end of the case does to its atoms.
+    /// End effects of the case on the atoms of the variable.
     effects: Vec<&'v (Formula, Key, bool)>,
-    /// Its atoms that the case may change.
+    /// Atoms of the variable that the case may change.
     touched: BTreeMap<u32, &'v Key>,
-    /// What the operator makes of it, and under which conditions, in order.
+    /// The unconditional effect of the operator on the variable.
     certain: Option<u32>,
     conditional: Vec<(Formula, u32)>,
 }
 
-/// What is found where not everything is decided.
+/// Result of a comparison under partial knowledge.
 enum Outcome<'o> {
     Same,
     Other,
-    /// Nothing shows that its atoms stay exclusive.
+    /// The atoms of the variable are not proved exclusive.
     Unknown,
-    /// It depends on this.
+    /// The result depends on this formula.
     Open(Formula),
     OpenPart(&'o Formula),
 }
 
-/// What a variable becomes; none if it stays what it is.
+/// A value of a variable; `None` if it is unchanged.
 type Value = Option<u32>;
 
 impl<'v> Variable<'v> {
@@ -105,17 +108,18 @@ impl<'v> Variable<'v> {
         let effects: Vec<_> = case.effects.iter().filter(|(_, key, _)| value(key).is_some()).collect();
         let touched = case.truths.keys().chain(effects.iter().map(|(_, key, _)| key));
         let touched = touched.filter_map(|key| Some((value(key)?, key))).collect();
-        let own =
+        let assigned =
             |facts: &[(u32, u32)]| facts.iter().rev().find(|fact| fact.0 == variable).map(|fact| fact.1);
         let conditional = operator.into_iter().flat_map(|operator| &operator.conditional);
         let conditional = conditional
-            .filter_map(|effect| Some((task.literals(&effect.condition, true), own(&effect.effects)?)))
+            .filter_map(|effect| Some((task.literals(&effect.condition, true), assigned(&effect.effects)?)))
             .collect();
-        let certain = operator.and_then(|operator| own(&operator.effects));
+        let certain = operator.and_then(|operator| assigned(&operator.effects));
         Self { task, own: variable, case, effects, touched, certain, conditional }
     }
 
-    /// Whether both make the same of it wherever this is known; `None` if the comparison cannot tell.
+    /// Returns whether the case and the operator agree wherever `known` holds; `None` if
+    /// undecided.
     fn agrees(&self, known: &Known) -> Option<bool> {
         let structure = &self.task.names.structure;
         let mut open = vec![known.clone()];
@@ -144,18 +148,18 @@ impl<'v> Variable<'v> {
         }
         let holds = |guard: &Formula| known.decide(structure, guard) == Some(true);
         let last = self.conditional.iter().rev().find(|(guard, _)| holds(guard)).map(|(_, value)| *value);
-        let found: Value = last.or(self.certain);
+        let actual: Value = last.or(self.certain);
         let current = self.current(known);
         let expected = match self.expected(known, current) {
             Ok(expected) => expected,
             Err(outcome) => return outcome,
         };
-        if expected == found {
+        if expected == actual {
             return Outcome::Same;
         }
         if let Some(current) = current {
-            let same = expected.unwrap_or(current) == found.unwrap_or(current);
-            return if same { Outcome::Same } else { Outcome::Other };
+            let equal = expected.unwrap_or(current) == actual.unwrap_or(current);
+            return if equal { Outcome::Same } else { Outcome::Other };
         }
         let mut possible = self.possible(known);
         possible.next().map_or(Outcome::Unknown, |(_, key)| Outcome::Open(Formula::Atom(key.clone(), true)))
@@ -165,16 +169,16 @@ impl<'v> Variable<'v> {
         self.task.invariant.may_hold(key) && known.atom(&self.task.names.structure, key) != Some(false)
     }
 
-    /// Its atoms that may hold before.
+    /// The atoms of the variable that may hold before.
     fn possible(&self, known: &'v Known) -> impl Iterator<Item = (u32, &'v Key)> {
-        // Where one is known to hold, the others are known not to.
+        // If one atom holds, the other atoms of the variable do not.
         let holding = known.holding(self.own);
-        let own = holding.and_then(|key| Some((self.task.names.fact(key)?.1, key)));
-        let all = if holding.is_some() { None } else { Some(self.task.possible(self.own)) };
-        all.into_iter().flatten().chain(own).filter(|(_, key)| self.may_hold(known, key))
+        let held_atom = holding.and_then(|key| Some((self.task.names.fact(key)?.1, key)));
+        let possible_atoms = if holding.is_some() { None } else { Some(self.task.possible(self.own)) };
+        possible_atoms.into_iter().flatten().chain(held_atom).filter(|(_, key)| self.may_hold(known, key))
     }
 
-    /// The value before, if it is known.
+    /// The value before the case, if it is known.
     fn current(&self, known: &Known) -> Value {
         let structure = &self.task.names.structure;
         match self.possible(known).next() {
@@ -184,19 +188,20 @@ impl<'v> Variable<'v> {
         }
     }
 
-    /// What the files make of it; of its atoms at most one may hold then.
+    /// The value after the case according to the files. At most one atom of the variable may then
+    /// hold.
     fn expected(&self, known: &Known, current: Value) -> Result<Value, Outcome<'_>> {
         let structure = &self.task.names.structure;
         let after = |key: &Key| {
-            let own = self.effects.iter().filter(|(_, own, _)| own == key);
+            let effects = self.effects.iter().filter(|(_, atom, _)| atom == key);
             let mut active =
-                own.filter(|(guard, ..)| known.decide(structure, guard) == Some(true)).peekable();
+                effects.filter(|(guard, ..)| known.decide(structure, guard) == Some(true)).peekable();
             match active.peek() {
                 Some(_) => Some(active.any(|(_, _, holds)| *holds)),
                 None => self.case.truths.get(key).copied(),
             }
         };
-        let none = self.task.model.none(self.own);
+        let no_atom = self.task.model.none(self.own);
         let (mut added, mut deleted) = (Vec::new(), None);
         let mut remains = self.possible(known).any(|(value, _)| !self.touched.contains_key(&value));
         for (value, key) in &self.touched {
@@ -208,11 +213,11 @@ impl<'v> Variable<'v> {
             }
         }
         match (&added[..], remains) {
-            ([], false) => Ok(Some(none)),
+            ([], false) => Ok(Some(no_atom)),
             ([], true) if deleted.is_none() => Ok(None),
             ([], true) => match (current, deleted) {
                 (None, Some(key)) => Err(Outcome::Open(Formula::Atom(key.clone(), true))),
-                // It is one that is not deleted.
+                // Another atom holds, which is not deleted.
                 _ => Ok(None),
             },
             ([value], false) => Ok(Some(*value)),

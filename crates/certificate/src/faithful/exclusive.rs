@@ -1,12 +1,16 @@
-//! Groups of atoms of which at most one holds, in addition to the variables of the task: the witness lists them, and each is kept
-//! by every instance if all variables and groups are exclusive before it.
+//! Mutex groups (atoms of which at most one holds) in addition to the variables of the task. The
+//! witness lists them; each is preserved by every instance if all variables and groups are
+//! exclusive before it.
 //!
-//! They are needed where the variables of the task share one invariant. Of `{idle, loading, loaded}` the task may keep `{loading,
-//! loaded}` as a variable, because another variable has `idle`. That loading begins only in `idle` then says nothing of `loaded`,
-//! unless the whole group is known. [`search`] finds it as invariant synthesis does [1]: a group that an instance breaks gets an
-//! atom that this instance requires and deletes.
+//! They are required where the variables of the task share one invariant. Of `{idle, loading,
+//! loaded}` the task may keep `{loading, loaded}` as a variable, because another variable
+//! contains `idle`. The fact that loading starts only in `idle` then implies nothing about
+//! `loaded` without the whole group. [`search`] finds the group by invariant synthesis [1]: a
+//! group that an instance violates is extended by an atom that this instance requires and
+//! deletes.
 //!
-//! [1] M. Helmert: Concise finite-domain representations for PDDL planning tasks, Artificial Intelligence 173, 2009, section 5.
+//! [1] M. Helmert: Concise finite-domain representations for PDDL planning tasks, Artificial
+//! Intelligence 173, 2009, section 5.
 
 use std::collections::BTreeSet;
 
@@ -17,23 +21,25 @@ use crate::faithful::formula::Structure;
 use crate::faithful::key::Key;
 use crate::faithful::world::World;
 
-/// Upper limit on the cases in which an instance is compared with a group.
+/// Upper limit on the case splits for one instance and group.
 const SPLIT_LIMIT: usize = 1_024;
-/// Upper limit on the checks of a group against what an instance does, while groups are searched for.
+/// Upper limit on the checks of a group against a case during the search.
 const SEARCH_LIMIT: usize = 20_000_000;
-/// Upper limit on the groups that are tried for one variable.
+/// Upper limit on the groups tried for one variable.
 const GROUP_LIMIT: usize = 300;
 
 /// Atoms of which at most one holds.
 pub(super) type Group = BTreeSet<Key>;
 
-/// Returns `true` if actions change all atoms of a group, and at most one holds at first.
+/// Returns `true` if only actions change the atoms of a group and at most one atom holds
+/// initially.
 pub(super) fn holds_initially(world: &World<'_>, group: &Group) -> bool {
     let is_basic = |key: &Key| world.changes(key.0) && world.rules(key.0).is_none();
     group.iter().all(is_basic) && group.iter().filter(|key| world.holds_initially(key)).count() <= 1
 }
 
-/// Returns `true` if at most one atom of a group holds after a case, given that this is so before.
+/// Returns `true` if at most one atom of a group holds after a case, given that at most one holds
+/// before.
 pub(super) fn keeps(
     structure: &Structure,
     may_hold: &dyn Fn(&Key) -> bool,
@@ -52,22 +58,22 @@ pub(super) fn keeps(
         }
         // An atom that is both added and deleted holds.
         let after = |key: &Key| {
-            let own = effects.iter().filter(|(_, own, _)| own == key);
-            let active = own.filter(|(guard, ..)| known.decide(structure, guard) == Some(true));
+            let atom_effects = effects.iter().filter(|(_, atom, _)| atom == key);
+            let active = atom_effects.filter(|(guard, ..)| known.decide(structure, guard) == Some(true));
             let last = active.map(|(_, _, holds)| *holds).reduce(|left, right| left || right);
             last.or_else(|| case.truths.get(key).copied())
         };
-        let (added, others): (Vec<&Key>, Vec<&Key>) = group.iter().partition(|key| after(key) == Some(true));
+        let (added, unadded): (Vec<&Key>, Vec<&Key>) = group.iter().partition(|key| after(key) == Some(true));
         let may_remain =
             |key: &Key| after(key).is_none() && may_hold(key) && known.atom(structure, key) != Some(false);
-        if added.len() > 1 || added.len() == 1 && others.into_iter().any(may_remain) {
+        if added.len() > 1 || added.len() == 1 && unadded.into_iter().any(may_remain) {
             return false;
         }
     }
     open.is_empty()
 }
 
-/// The effect of a case of an instance on groups.
+/// The effect of a case on groups.
 pub(super) struct Move {
     /// Atoms that hold before.
     holding: Vec<Key>,
@@ -78,7 +84,7 @@ pub(super) struct Move {
 }
 
 impl Move {
-    /// The effect of a case that may add these atoms.
+    /// Computes the effect of a case that may add the atoms `adds`.
     pub(super) fn new(structure: &Structure, case: &Case, adds: BTreeSet<Key>) -> Self {
         let at_end = case
             .effects
@@ -94,10 +100,12 @@ impl Move {
         !self.adds.is_empty()
     }
 
-    /// Returns `Ok` if at most one atom of a group holds afterwards, given that this is so before.
+    /// Checks that at most one atom of a group holds afterwards, given that at most one holds
+    /// before.
     ///
     /// # Errors
-    /// The atoms of which each would prove it if it were a member of the group; empty if there is no such atom.
+    /// The atoms each of which would repair the group if it were a member; empty if there is no
+    /// such atom.
     pub(super) fn keeps(&self, group: &Group, may_hold: &dyn Fn(&Key) -> bool) -> Result<(), Vec<Key>> {
         let mut added = self.adds.iter().filter(|key| group.contains(*key));
         let Some(key) = added.next() else { return Ok(()) };
@@ -107,14 +115,14 @@ impl Move {
         if let Some(before) = self.holding.iter().find(|key| group.contains(*key)) {
             return if before == key || self.deletes.contains(before) { Ok(()) } else { Err(Vec::new()) };
         }
-        if group.iter().all(|other| other == key || self.deletes.contains(other) || !may_hold(other)) {
+        if group.iter().all(|atom| atom == key || self.deletes.contains(atom) || !may_hold(atom)) {
             return Ok(());
         }
         Err(self.holding.iter().filter(|key| self.deletes.contains(*key)).cloned().collect())
     }
 }
 
-/// The groups that keep those of some variables exclusive that are not so by themselves.
+/// Finds groups that prove the exclusiveness of variables that are not inductive by themselves.
 #[expect(clippy::arithmetic_side_effects, reason = "no more than the limit")]
 pub(super) fn search(
     world: &World<'_>,
@@ -124,37 +132,37 @@ pub(super) fn search(
     stop: &dyn Fn() -> bool,
 ) -> Vec<Group> {
     let mut adding: FxHashMap<&Key, Vec<&Move>> = FxHashMap::default();
-    for own in moves {
-        for key in &own.adds {
-            adding.entry(key).or_default().push(own);
+    for candidate in moves {
+        for key in &candidate.adds {
+            adding.entry(key).or_default().push(candidate);
         }
     }
-    let mut found: Vec<Group> = Vec::new();
+    let mut groups: Vec<Group> = Vec::new();
     let mut checks = 0;
     'variables: for variable in variables {
-        if found.iter().any(|group| variable.is_subset(group)) {
+        if groups.iter().any(|group| variable.is_subset(group)) {
             continue;
         }
         let mut open = vec![variable.clone()];
-        let mut seen: FxHashSet<Group> = FxHashSet::default();
+        let mut visited: FxHashSet<Group> = FxHashSet::default();
         while let Some(group) = open.pop() {
-            if seen.len() >= GROUP_LIMIT || stop() {
+            if visited.len() >= GROUP_LIMIT || stop() {
                 continue 'variables;
             }
-            if !seen.insert(group.clone()) || !holds_initially(world, &group) {
+            if !visited.insert(group.clone()) || !holds_initially(world, &group) {
                 continue;
             }
             let mut concerned = group.iter().filter_map(|key| adding.get(key)).flatten();
-            let broken = concerned.find_map(|own| {
+            let broken = concerned.find_map(|candidate| {
                 checks += 1;
-                own.keeps(&group, may_hold).err()
+                candidate.keeps(&group, may_hold).err()
             });
             if checks > SEARCH_LIMIT {
-                return found;
+                return groups;
             }
             let Some(repairs) = broken else {
                 if group != variable {
-                    found.push(group);
+                    groups.push(group);
                 }
                 continue 'variables;
             };
@@ -165,15 +173,15 @@ pub(super) fn search(
             }));
         }
     }
-    found
+    groups
 }
 
-/// Groups of a witness by number; the variables of the task come first.
+/// Numbers the groups of a witness, after the variables of the task.
 pub(super) fn numbered(variables: usize, groups: &[Group]) -> impl Iterator<Item = (u32, &Group)> {
     (u32::try_from(variables).unwrap_or(u32::MAX)..).zip(groups)
 }
 
-/// The groups that a case adds an atom of.
+/// Returns the groups to which a case adds an atom.
 pub(super) fn concerned<'g>(case: &Case, groups: &'g [Group]) -> impl Iterator<Item = &'g Group> {
     let at_end = case.effects.iter().filter(|(_, _, holds)| *holds).map(|(_, key, _)| key);
     let added: FxHashSet<&Key> =

@@ -1,4 +1,4 @@
-//! Conditions of an instance over the state before it, and what follows from what is known of that state.
+//! Conditions of an instance over the state before it, and partial states that decide them.
 
 use std::collections::BTreeMap;
 
@@ -11,11 +11,11 @@ use crate::faithful::key::Key;
 use crate::faithful::linear::Linear;
 use crate::faithful::verdict::Cause;
 
-/// A condition falls apart into at most so many cases.
+/// Upper limit on the number of cases of a condition.
 const CASE_LIMIT: usize = 4_096;
 
-/// Upper limit on the nesting of a condition once derived atoms are replaced by their rules. Functions on formulas recurse as
-/// deep as a formula nests.
+/// Upper limit on the nesting of a condition after derived atoms are replaced by their rules.
+/// Functions on formulas recurse to this depth.
 pub(super) const DEPTH_LIMIT: usize = 300;
 
 /// A condition in negation normal form.
@@ -23,7 +23,7 @@ pub(super) const DEPTH_LIMIT: usize = 300;
 pub(super) enum Formula {
     All(Vec<Formula>),
     Any(Vec<Formula>),
-    /// An atom, and whether it holds.
+    /// An atom and its required truth value.
     Atom(Key, bool),
     /// The expression is at least 0, or more than 0 if strict.
     Compare(Linear, bool),
@@ -42,7 +42,7 @@ impl Formula {
         }
     }
 
-    /// A conjunction (or disjunction) of parts, simplified.
+    /// Creates a simplified conjunction (or disjunction).
     pub(super) fn junction(parts: impl IntoIterator<Item = Self>, all: bool) -> Self {
         let mut kept = Vec::new();
         for part in parts {
@@ -61,7 +61,7 @@ impl Formula {
         }
     }
 
-    /// How many atoms and comparisons it has.
+    /// Number of atoms and comparisons.
     pub(super) fn size(&self) -> usize {
         match self {
             Self::All(parts) | Self::Any(parts) => parts.iter().map(Self::size).sum(),
@@ -89,30 +89,30 @@ impl Formula {
     }
 }
 
-/// What the task says of atoms and fluents: of which atoms at most one holds, and which fluents are integers once they are
-/// multiplied.
+/// Knowledge of the task about atoms and fluents: the mutex groups of each atom, and the factors
+/// that make fluents integers.
 #[derive(Debug, Default)]
 pub(super) struct Structure {
     pub(super) groups: FxHashMap<Key, SmallVec<[u32; 1]>>,
     pub(super) integers: FxHashMap<Key, BigRational>,
 }
 
-/// What is known of a state.
+/// A partial state.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Known {
     atoms: BTreeMap<Key, bool>,
-    /// The atom that holds of a group.
+    /// For each group, the atom that holds.
     holding: BTreeMap<u32, Key>,
     pub(super) comparisons: Vec<(Linear, bool)>,
 }
 
 impl Known {
-    /// The atom that is known to hold of a group.
+    /// The atom of a group that is known to hold.
     pub(super) fn holding(&self, group: u32) -> Option<&Key> {
         self.holding.get(&group)
     }
 
-    /// The atoms that are known to hold.
+    /// Iterates over the atoms that are known to hold.
     pub(super) fn holding_atoms(&self) -> impl Iterator<Item = &Key> {
         self.atoms.iter().filter(|(_, holds)| **holds).map(|(key, _)| key)
     }
@@ -125,7 +125,7 @@ impl Known {
         groups.iter().any(|group| self.holding.contains_key(group)).then_some(false)
     }
 
-    /// Whether a condition holds, if that follows.
+    /// Returns the truth value of a condition if the partial state implies it.
     pub(super) fn decide(&self, structure: &Structure, formula: &Formula) -> Option<bool> {
         match formula {
             Formula::All(parts) => self.junction(structure, parts, true),
@@ -158,7 +158,7 @@ impl Known {
         (!open).then_some(all)
     }
 
-    /// A part of a condition, an atom or a comparison, on which it depends whether it holds.
+    /// Returns an undecided leaf (atom or comparison) of an undecided condition.
     pub(super) fn open<'f>(
         &self,
         structure: &Structure,
@@ -176,62 +176,62 @@ impl Known {
         }
     }
 
-    /// What is known in each case in which a condition holds; together they are all.
+    /// Returns the partial states that cover all states in which a condition holds.
     pub(super) fn assume(&self, structure: &Structure, formula: &Formula) -> Result<Vec<Self>, Cause> {
         match self.decide(structure, formula) {
             Some(true) => return Ok(vec![self.clone()]),
             Some(false) => return Ok(Vec::new()),
             None => {}
         }
-        let mut known = self.clone();
+        let mut extended = self.clone();
         match formula {
             Formula::Atom(key, holds) => {
-                known.atoms.insert(key.clone(), *holds);
+                extended.atoms.insert(key.clone(), *holds);
                 for group in structure.groups.get(key).into_iter().flatten().filter(|_| *holds) {
-                    known.holding.insert(*group, key.clone());
+                    extended.holding.insert(*group, key.clone());
                 }
-                Ok(vec![known])
+                Ok(vec![extended])
             }
             Formula::Compare(linear, strict) => {
-                known.comparisons.push((linear.clone(), *strict));
-                Ok(vec![known])
+                extended.comparisons.push((linear.clone(), *strict));
+                Ok(vec![extended])
             }
             Formula::Any(parts) => {
-                let mut all = Vec::new();
+                let mut cases = Vec::new();
                 for part in parts {
-                    all.extend(self.assume(structure, part)?);
-                    limited(all.len())?;
+                    cases.extend(self.assume(structure, part)?);
+                    limited(cases.len())?;
                 }
-                Ok(all)
+                Ok(cases)
             }
             Formula::All(parts) => {
-                let mut all = vec![known];
-                // What leaves no choice comes first, and narrows the choices.
+                let mut cases = vec![extended];
+                // Leaves come first: they do not split and may decide the remaining parts.
                 let is_leaf = |part: &&Formula| matches!(part, Formula::Atom(..) | Formula::Compare(..));
                 let (leaves, others): (Vec<_>, Vec<_>) = parts.iter().partition(is_leaf);
                 for part in leaves.into_iter().chain(others) {
                     let mut longer = Vec::new();
-                    for known in &all {
+                    for known in &cases {
                         longer.extend(known.assume(structure, part)?);
                         limited(longer.len())?;
                     }
-                    all = longer;
+                    cases = longer;
                 }
-                Ok(all)
+                Ok(cases)
             }
         }
     }
 
-    /// The cases in which each of some conditions is decided.
+    /// Returns cases in which each of the formulas is decided.
     pub(super) fn split<'f>(
         self,
         structure: &Structure,
         formulas: impl Iterator<Item = &'f Formula>,
     ) -> Result<Vec<Self>, Cause> {
-        let mut all = vec![self];
+        let mut cases = vec![self];
         for formula in formulas {
             let mut longer = Vec::new();
-            for known in all {
+            for known in cases {
                 if known.decide(structure, formula).is_some() {
                     longer.push(known);
                 } else {
@@ -240,9 +240,9 @@ impl Known {
                 }
                 limited(longer.len())?;
             }
-            all = longer;
+            cases = longer;
         }
-        Ok(all)
+        Ok(cases)
     }
 }
 
@@ -253,42 +253,43 @@ fn limited(cases: usize) -> Result<(), Cause> {
     Err(Cause::TooMany { what: "cases of one instance of an action".into(), limit: CASE_LIMIT })
 }
 
-/// Whether a comparison that holds implies that an expression is at least 0, or more.
+/// Returns `true` if the comparison `known` implies that `wanted` is at least 0, or more than 0
+/// if strict.
 fn implies(structure: &Structure, known: &(Linear, bool), wanted: &Linear, strict: bool) -> bool {
     let Some(ratio) = wanted.ratio_to(&known.0).filter(Signed::is_positive) else { return false };
-    // The fluents' part of what is wanted is at least this, or more.
+    // Lower bound on the fluent part of `wanted`.
     let mut least = -(&known.0.constant * ratio);
-    let mut more = known.1;
+    let mut is_strict = known.1;
     if let Some(unit) = unit(structure, wanted) {
-        // It is a multiple of the unit.
+        // The fluent part is a multiple of the unit, so the bound can be rounded up.
         let multiple = &least / &unit;
-        let rounded = if more { multiple.floor() + BigRational::one() } else { multiple.ceil() };
-        (least, more) = (rounded * unit, false);
+        let rounded = if is_strict { multiple.floor() + BigRational::one() } else { multiple.ceil() };
+        (least, is_strict) = (rounded * unit, false);
     }
     let least = least + &wanted.constant;
-    least.is_positive() || least.is_zero() && (more || !strict)
+    least.is_positive() || least.is_zero() && (is_strict || !strict)
 }
 
-/// What a sum of fluents times factors is a multiple of, whatever the state.
+/// A number of which the fluent part of an expression is a multiple in every state.
 fn unit(structure: &Structure, linear: &Linear) -> Option<BigRational> {
     let mut unit: Option<BigRational> = None;
     for (key, factor) in &linear.factors {
         // The fluent is a multiple of 1 / scale.
-        let own = (factor / structure.integers.get(key)?).abs();
+        let step = (factor / structure.integers.get(key)?).abs();
         unit = Some(match unit {
-            None => own,
-            Some(unit) => common(&unit, &own),
+            None => step,
+            Some(unit) => common(&unit, &step),
         });
     }
     unit
 }
 
-/// The greatest common divisor of two positive fractions.
+/// The greatest common divisor of two positive fractions, by Euclid's algorithm.
 fn common(left: &BigRational, right: &BigRational) -> BigRational {
     let (mut left, mut right) = (left.clone(), right.clone());
     while !right.is_zero() {
-        let rest = &left - (&left / &right).floor() * &right;
-        (left, right) = (right, rest);
+        let remainder = &left - (&left / &right).floor() * &right;
+        (left, right) = (right, remainder);
     }
     left
 }

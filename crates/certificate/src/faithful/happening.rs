@@ -1,4 +1,5 @@
-//! Start and end of an action that takes no time are one happening: where they interfere, the action cannot be executed [1].
+//! Interference of the start and the end of an action with duration 0, which are one happening:
+//! if they interfere, the action cannot be executed [1].
 //!
 //! [1] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, sections 7 and 8 (no moving targets).
 
@@ -7,10 +8,10 @@ use crate::faithful::formula::Formula;
 use crate::faithful::reads::Reads;
 use pddl::ast::Assignment;
 
-/// Start or end of an action: what it reads, and what it does.
+/// The reads and the effects of the start or the end of an action.
 type Half<'h> = (&'h Reads<'h>, &'h Moment);
 
-/// That two halves of an action do not interfere.
+/// Returns the condition that two halves of an action do not interfere.
 pub(super) fn apart(left: Half<'_>, right: Half<'_>) -> Formula {
     let mut clashes = Vec::new();
     one_way(left.1, right, &mut clashes);
@@ -19,7 +20,8 @@ pub(super) fn apart(left: Half<'_>, right: Half<'_>) -> Formula {
     Formula::junction(clashes.iter().map(Formula::negated), true)
 }
 
-/// When one changes what the other reads, or adds what the other deletes.
+/// Collects the conditions under which one half changes a read of the other half, or adds an atom
+/// that the other half deletes.
 fn one_way(changing: &Moment, (reads, other): Half<'_>, clashes: &mut Vec<Formula>) {
     for (guard, key, holds) in &changing.atoms {
         if reads.atom(key) {
@@ -32,7 +34,8 @@ fn one_way(changing: &Moment, (reads, other): Half<'_>, clashes: &mut Vec<Formul
     clashes.extend(numbers.map(|(guard, ..)| guard.clone()));
 }
 
-/// When both change a number otherwise than by adding to it, or by scaling it.
+/// Collects the conditions under which both halves change a number, unless both increase or both
+/// scale it.
 fn same_number(left: &Moment, right: &Moment, clashes: &mut Vec<Formula>) {
     let way = |kind: Assignment| match kind {
         Assignment::Assign => None,
@@ -40,10 +43,10 @@ fn same_number(left: &Moment, right: &Moment, clashes: &mut Vec<Formula>) {
         Assignment::ScaleUp | Assignment::ScaleDown => Some(false),
     };
     for (guard, kind, key, _) in &left.numbers {
-        let others = right
+        let conflicts = right
             .numbers
             .iter()
             .filter(|(_, other, own, _)| own == key && (way(*kind).is_none() || way(*kind) != way(*other)));
-        clashes.extend(others.map(|(own, ..)| Formula::junction([guard.clone(), own.clone()], true)));
+        clashes.extend(conflicts.map(|(own, ..)| Formula::junction([guard.clone(), own.clone()], true)));
     }
 }

@@ -1,5 +1,5 @@
-//! The instances of an action whose conditions on what never changes hold: a join over these, atom by atom, then the objects
-//! of the types of parameters that are left.
+//! Enumerates the action instances whose static conditions hold: a join over static atoms, then
+//! the objects of the types of the remaining parameters.
 
 use rustc_hash::FxHashMap;
 
@@ -7,17 +7,17 @@ use crate::faithful::verdict::Cause;
 use crate::faithful::world::World;
 use pddl::ast::{Action, ActionBody, Atom, Condition, Name, Term};
 
-/// With more instances, nothing is checked.
+/// Upper limit on the number of instances.
 pub(super) const INSTANCE_LIMIT: usize = 400_000;
-/// Upper limit on the number of arguments of all instances together; they take 256 MB then.
+/// Upper limit on the total number of arguments of all instances; they then take 256 MB.
 pub(super) const ARGUMENT_LIMIT: usize = 1 << 26;
-/// The caller's limits are polled once for this many instances.
+/// Number of instances between two polls of the caller's limits.
 const POLL_INTERVAL: usize = 1 << 10;
 
-/// Values of parameters so far.
+/// A partial binding of the parameters.
 type Binding<'b> = FxHashMap<&'b Name, u32>;
 
-/// The arguments of all instances.
+/// Returns the arguments of all instances.
 pub(super) fn of(
     world: &World<'_>,
     action: &Action,
@@ -39,7 +39,8 @@ pub(super) fn of(
     let mut open: Vec<&Atom> = atoms.into_iter().filter(is_static).collect();
     let mut partial: Vec<Binding<'_>> = vec![Binding::default()];
     while !open.is_empty() {
-        // One with the fewest unknown parameters, so that the join does not become a product.
+        // The atom with the fewest unbound parameters comes next, so that the join does not
+        // become a Cartesian product.
         let known = |atom: &Atom| {
             let names = partial.first();
             let unknown = |term: &&Term| match term {
@@ -66,7 +67,7 @@ pub(super) fn of(
         partial = longer;
     }
     let mut instances = Vec::new();
-    // The join gives the same parameters a value in each binding.
+    // All bindings of the join bind the same parameters.
     let mut typed = Vec::new();
     for parameter in &action.parameters {
         let is_bound = partial.first().is_none_or(|own| own.contains_key(&parameter.identifier.name));
@@ -91,7 +92,7 @@ pub(super) fn conjuncts<'c>(condition: &'c Condition, atoms: &mut Vec<&'c Atom>)
     }
 }
 
-/// Says that there are too many instances of what is named.
+/// The error about too many instances of an action.
 pub(super) fn too_many(name: &str) -> Cause {
     Cause::TooMany { what: format!("instances of {name}"), limit: INSTANCE_LIMIT }
 }
@@ -124,7 +125,8 @@ fn extend<'b>(
     Ok(())
 }
 
-/// Adds the instances with all objects that fit the parameters without a value; `typed` has those objects by parameter.
+/// Adds the instances that extend a binding by objects for its unbound parameters. `typed` has
+/// those objects by parameter.
 #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
 fn complete(
     world: &World<'_>,
@@ -144,7 +146,7 @@ fn complete(
     if choices.iter().any(|own| own.is_empty()) {
         return Ok(());
     }
-    // Counts through all combinations, the last parameter fastest.
+    // Enumerates all combinations like an odometer, the last parameter fastest.
     let mut places = vec![0; choices.len()];
     loop {
         if are_too_many(instances.len(), action) {
@@ -162,7 +164,7 @@ fn complete(
     }
 }
 
-/// Returns `true` if an action has more instances than are checked.
+/// Returns `true` if an action has more instances than the limits admit.
 fn are_too_many(instances: usize, action: &Action) -> bool {
     instances > INSTANCE_LIMIT || instances.saturating_mul(action.parameters.len()) > ARGUMENT_LIMIT
 }

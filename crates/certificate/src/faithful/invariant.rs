@@ -1,13 +1,17 @@
-//! The witness of what can become of a state: atoms that may hold, and intervals of numbers. It holds at first, and no instance
-//! leaves it, even if nothing is ever deleted [1], [2].
+//! The witness: an inductive over-approximation of the reachable states, with the atoms that may
+//! hold and an interval for each number. It contains the initial state and is closed under all
+//! instances, under the delete relaxation [1], [2].
 //!
-//! It may also have groups of atoms of which at most one holds (`exclusive`).
+//! It may contain mutex groups (`exclusive`).
 //!
-//! It is made as a least fixpoint, whose intervals are widened after a while. Who checks it goes through all instances once,
-//! and does not rely on how it was made.
+//! The witness is computed as a least fixpoint with widening of intervals [3]. The check visits
+//! all instances once and does not depend on the way the witness was computed.
 //!
-//! [1] J. Hoffmann: The Metric-FF planning system, JAIR 20, 2003 (relaxed reachability with intervals).
-//! [2] S. Eriksson, G. Röger, M. Helmert: Unsolvability certificates for classical planning, ICAPS 2017 (inductive sets).
+//! [1] J. Hoffmann: The Metric-FF planning system, JAIR 20, 2003 (relaxed reachability with
+//! intervals).
+//! [2] S. Eriksson, G. Röger, M. Helmert: Unsolvability certificates for classical planning,
+//! ICAPS 2017 (inductive sets).
+//! [3] P. Cousot, R. Cousot: Abstract interpretation, POPL 1977.
 
 use num_rational::BigRational;
 use num_traits::{Signed, Zero};
@@ -26,18 +30,18 @@ use crate::integer::MAX_DIGITS;
 
 pub(super) const WITNESS_FORMAT: &str = "metaplan-witness/1";
 
-/// An end of an interval moves so often before it is taken to be unbounded.
-const MOVES: u32 = 8;
+/// Widening threshold: after this many moves an end of an interval becomes unbounded.
+const WIDENING_THRESHOLD: u32 = 8;
 
-/// A witness as it is written.
+/// The JSON format of a witness.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Written {
+struct WitnessFile {
     format: String,
-    /// All atoms that may ever hold, of predicates that actions change.
+    /// All atoms that may hold, of predicates that actions change.
     atoms: Vec<String>,
-    /// Fluents that actions change, each with the least and the greatest value that it can have; null where there is none.
-    /// What is not listed has no bounds.
+    /// Fluents that actions change, each with its least and greatest value; `null` for no bound.
+    /// Fluents that are not listed are unbounded.
     numbers: Vec<(String, Option<String>, Option<String>)>,
     /// Groups of atoms of which at most one holds, in addition to the variables of the task.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -47,17 +51,17 @@ struct Written {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Invariant {
     atoms: Relation,
-    /// Those of fluents that never change are points.
+    /// Intervals of fluents; static fluents have a single value.
     numbers: FxHashMap<Key, Interval>,
-    /// Of each at most one atom holds.
+    /// Groups of atoms of which at most one holds.
     pub(super) exclusive: Vec<Group>,
 }
 
 impl Invariant {
-    /// What holds at first.
+    /// The initial state.
     pub(super) fn initial(world: &World<'_>) -> Self {
         let atoms = world.initial_atoms().filter(|key| world.changes(key.0)).collect();
-        // Nothing is known of the clock.
+        // The clock is unbounded.
         let values = world.initial_values().filter(|(key, _)| key.0 != CLOCK);
         let numbers = values.map(|(key, value)| (key.clone(), Interval::point(value))).collect();
         Self { atoms, numbers, exclusive: Vec::new() }
@@ -65,7 +69,7 @@ impl Invariant {
 
     pub(super) fn read(world: &World<'_>, text: &str) -> Result<Self, Difference> {
         let form = |reason: String| Difference::WitnessForm { reason };
-        let written: Written = serde_json::from_str(text).map_err(|error| form(error.to_string()))?;
+        let written: WitnessFile = serde_json::from_str(text).map_err(|error| form(error.to_string()))?;
         if written.format != WITNESS_FORMAT {
             return Err(form(format!("format `{}`, where `{WITNESS_FORMAT}` is expected", written.format)));
         }
@@ -132,7 +136,7 @@ impl Invariant {
         numbers.sort_unstable();
         let group = |group: &Group| group.iter().map(|key| world.show(key)).collect();
         let exclusive = self.exclusive.iter().map(group).collect();
-        let written = Written { format: WITNESS_FORMAT.to_owned(), atoms, numbers, exclusive };
+        let written = WitnessFile { format: WITNESS_FORMAT.to_owned(), atoms, numbers, exclusive };
         serde_json::to_string(&written).unwrap_or_default()
     }
 
@@ -140,17 +144,17 @@ impl Invariant {
         self.atoms.contains(key)
     }
 
-    /// The atoms of a predicate that may hold, or those with an object at a place.
+    /// The possible atoms of a predicate, optionally with an object at a position.
     pub(super) fn rows(&self, predicate: u32, place: Option<(usize, u32)>) -> impl Iterator<Item = &Key> {
         self.atoms.rows(predicate, place)
     }
 
-    /// The number of [`Invariant::rows`].
+    /// Number of atoms of [`Invariant::rows`].
     pub(super) fn count(&self, predicate: u32, place: Option<(usize, u32)>) -> usize {
         self.atoms.count(predicate, place)
     }
 
-    /// A fluent, or the only value that it can have.
+    /// The fluent as an expression, or its value if it has only one.
     pub(super) fn fluent(&self, key: Key) -> Linear {
         match self.numbers.get(&key).and_then(Interval::value) {
             Some(value) => Linear::constant(value.clone()),
@@ -158,7 +162,7 @@ impl Invariant {
         }
     }
 
-    /// An expression with the only values that fluents can have.
+    /// Replaces fluents that have only one value.
     pub(super) fn settled(&self, linear: &Linear) -> Linear {
         let mut sum = Linear::constant(linear.constant.clone());
         for (key, factor) in &linear.factors {
@@ -167,7 +171,8 @@ impl Invariant {
         sum
     }
 
-    /// That an expression is at least 0, or more than 0 if strict; decided where intervals decide it.
+    /// The condition that an expression is at least 0, or more than 0 if strict; decided if the
+    /// intervals decide it.
     pub(super) fn compare(&self, linear: &Linear, strict: bool) -> Formula {
         let linear = self.settled(linear);
         let range = linear.range(|key| self.numbers.get(key));
@@ -181,7 +186,7 @@ impl Invariant {
         }
     }
 
-    /// The values of an expression where something is known of the state.
+    /// The interval of an expression under partial knowledge of the state.
     fn range(&self, linear: &Linear, known: &Known) -> Interval {
         let mut range = linear.range(|key| self.numbers.get(key));
         for (own, _) in &known.comparisons {
@@ -198,7 +203,7 @@ impl Invariant {
         range
     }
 
-    /// The atoms that an instance may make true.
+    /// The atoms that a case may make true.
     pub(super) fn added<'c>(structure: &'c Structure, case: &'c Case) -> impl Iterator<Item = &'c Key> {
         let at_end = case
             .effects
@@ -210,7 +215,7 @@ impl Invariant {
         at_end.map(|(_, key, _)| key).chain(at_start.map(|(key, _)| key))
     }
 
-    /// Checks that a case of an instance leads to nothing else.
+    /// Checks that the successors of a case are contained in the witness.
     pub(super) fn admits(
         &self,
         world: &World<'_>,
@@ -239,10 +244,10 @@ impl Invariant {
     }
 }
 
-/// A witness in the making.
+/// Computes a witness by iteration with widening.
 pub(super) struct Widening {
     pub(super) invariant: Invariant,
-    /// How often an end of an interval has moved.
+    /// Number of moves of each end of an interval.
     moves: FxHashMap<(Key, bool), u32>,
 }
 
@@ -251,7 +256,7 @@ impl Widening {
         Self { invariant: Invariant::initial(world), moves: FxHashMap::default() }
     }
 
-    /// Takes in what a case of an instance leads to; `true` if that is new.
+    /// Extends the invariant by the successors of a case. Returns `true` if it has changed.
     #[expect(clippy::arithmetic_side_effects, reason = "fewer moves than passes over the task")]
     pub(super) fn include(&mut self, structure: &Structure, case: &Case) -> bool {
         let mut news = false;
@@ -270,7 +275,7 @@ impl Widening {
                 if outside {
                     let count = self.moves.entry((key.clone(), upper)).or_default();
                     *count += 1;
-                    *own = other.filter(|_| *count < MOVES);
+                    *own = other.filter(|_| *count < WIDENING_THRESHOLD);
                     news = true;
                 }
             };
@@ -281,7 +286,7 @@ impl Widening {
     }
 }
 
-/// Says that a fixpoint took too long.
+/// The error about too many rounds.
 pub(super) fn too_many_rounds(limit: usize) -> Cause {
     Cause::TooMany { what: "rounds in search of a witness".into(), limit }
 }

@@ -1,11 +1,11 @@
-//! How long an instance may take.
+//! The range of durations of an instance.
 
 use num_rational::BigRational;
 use num_traits::Signed;
 
 use crate::faithful::verdict::Cause;
 
-/// The lengths that an instance may take: all between two, of which it need not reach either. Without end if there is no greatest.
+/// An interval of durations; either end may be excluded. Unbounded if `most` is `None`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Length {
     pub(super) least: BigRational,
@@ -13,18 +13,18 @@ pub(super) struct Length {
 }
 
 impl Length {
-    /// The only length, if there is one.
+    /// The only duration of the interval, if there is one.
     pub(super) fn fixed(&self) -> Option<&BigRational> {
         self.most.as_ref().filter(|most| **most == self.least)
     }
 
-    /// The least that an instance adds to a sum that counts each unit of time so often.
+    /// Minimal value of the duration times `factor`.
     pub(super) fn least_times(&self, factor: &BigRational) -> Result<BigRational, Cause> {
         if !factor.is_negative() {
             return Ok(&self.least * factor);
         }
-        let most =
+        let greatest =
             self.most.as_ref().ok_or_else(|| Cause::unsupported("a metric that rewards time without end"))?;
-        Ok(most * factor)
+        Ok(greatest * factor)
     }
 }

@@ -1,4 +1,4 @@
-//! The lengths that duration constraints admit.
+//! Evaluates duration constraints.
 
 use num_rational::BigRational;
 use num_traits::Zero;
@@ -8,13 +8,14 @@ use crate::faithful::reader::Reader;
 use crate::faithful::verdict::Cause;
 use pddl::ast::{Comparison, DurationConstraint};
 
-/// The least or the greatest length, and whether it is left out.
+/// An end of an interval of durations, and `true` if it is excluded.
 type End = (BigRational, bool);
 
 impl<'r> Reader<'r> {
-    /// The lengths that all constraints admit; none if there is none, or if one of them has no value.
+    /// Returns the durations that satisfy all constraints; `None` if there are none or if a bound
+    /// is undefined.
     pub(super) fn lengths(&mut self, constraints: &'r [DurationConstraint]) -> Result<Option<Length>, Cause> {
-        // No action takes less than 0.
+        // Durations are not negative.
         let mut low: End = (BigRational::zero(), false);
         let mut high: Option<End> = None;
         for constraint in constraints {

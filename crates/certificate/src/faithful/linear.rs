@@ -7,14 +7,14 @@ use num_traits::{One, Signed, Zero};
 
 use crate::faithful::key::Key;
 
-/// Fluents times factors (none of them 0), plus a constant.
+/// A linear expression: nonzero factors of fluents plus a constant.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Linear {
     pub(super) factors: BTreeMap<Key, BigRational>,
     pub(super) constant: BigRational,
 }
 
-/// A range of numbers; an end that is missing is unbounded.
+/// An interval; a missing end is unbounded.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub(super) struct Interval {
     pub(super) low: Option<BigRational>,
@@ -26,7 +26,7 @@ impl Interval {
         Self { low: Some(value.clone()), high: Some(value.clone()) }
     }
 
-    /// The only number in it.
+    /// The only number of the interval, if there is one.
     pub(super) fn value(&self) -> Option<&BigRational> {
         self.low.as_ref().filter(|low| Some(*low) == self.high.as_ref())
     }
@@ -47,7 +47,7 @@ impl Linear {
         Self { factors: BTreeMap::from([(key, BigRational::one())]), constant: BigRational::zero() }
     }
 
-    /// This plus another one times a factor.
+    /// Returns `self + factor * other`.
     pub(super) fn plus(mut self, other: &Self, factor: &BigRational) -> Self {
         self.constant += &other.constant * factor;
         for (key, own) in &other.factors {
@@ -71,29 +71,33 @@ impl Linear {
         self.times(&-BigRational::one())
     }
 
-    /// The number that it is, if it depends on no fluent.
+    /// The value of the expression if it contains no fluent.
     pub(super) fn value(&self) -> Option<&BigRational> {
         self.factors.is_empty().then_some(&self.constant)
     }
 
-    /// The factor by which the fluents of this one are those of another one.
+    /// Returns the factor r such that the fluent part of this expression is r times the one of
+    /// `other`.
     pub(super) fn ratio_to(&self, other: &Self) -> Option<BigRational> {
         let (key, own) = self.factors.first_key_value()?;
         let ratio = own / other.factors.get(key)?;
-        let same = self.factors.len() == other.factors.len()
+        let is_multiple = self.factors.len() == other.factors.len()
             && self
                 .factors
                 .iter()
                 .all(|(key, own)| other.factors.get(key).is_some_and(|factor| factor * &ratio == *own));
-        same.then_some(ratio)
+        is_multiple.then_some(ratio)
     }
 
-    /// Its values where fluents have theirs in intervals.
+    /// The interval of the expression when each fluent is in its interval.
     pub(super) fn range<'i>(&self, interval: impl Fn(&Key) -> Option<&'i Interval>) -> Interval {
         let mut range = Interval::point(&self.constant);
         for (key, factor) in &self.factors {
-            let own = interval(key);
-            let (low, high) = (own.and_then(|own| own.low.as_ref()), own.and_then(|own| own.high.as_ref()));
+            let bounds = interval(key);
+            let (low, high) = (
+                bounds.and_then(|bounds| bounds.low.as_ref()),
+                bounds.and_then(|bounds| bounds.high.as_ref()),
+            );
             let (low, high) = if factor.is_negative() { (high, low) } else { (low, high) };
             let add = |sum: Option<BigRational>, end: Option<&BigRational>| Some(sum? + end? * factor);
             range = Interval { low: add(range.low, low), high: add(range.high, high) };

@@ -1,21 +1,26 @@
-//! Whether a written task stands for its PDDL files, checked without grounding them again.
+//! Checks that a ground task refines its PDDL files (translation validation), without grounding
+//! them again.
 //!
-//! What is needed is a simulation [1]: the initial state of the files is that of the task, and whatever an action does
-//! in a state of the files, an operator with some choice of designs does in the task's, for no more cost; the goal of the files
-//! implies that of the task. Then no plan of the files is cheaper than what the argument says of plans of the task. The
-//! task may allow more than the files, and leave out what does not matter to it.
+//! The proof is a simulation [1]: the initial states correspond; each effect of an action in a
+//! state of the files is matched by an operator with some choice of designs in the task, at no
+//! more cost; the goal of the files implies the goal of the task. Then the optimality proof about
+//! the task also holds for plans of the files. The task may allow more than the files and omit
+//! irrelevant parts.
 //!
-//! All instances of all actions are gone through: `instances` enumerates them by joins over what never changes, `reader` and
-//! `action` say what each requires and does, case by case, and `compare` looks for the operator, `effects` at what it does.
-//! `translation` reads the task in terms of the files. A variable of the task stands for
-//! atoms of which at most one holds: that is true at first, and every instance keeps it so. An instance needs no operator if it
-//! changes nothing that the task knows, or if it can never be executed: its conditions contradict what never changes, each other,
-//! the variables, or the witness. The witness (`invariant`) says which atoms may ever hold and which values numbers may have;
-//! that no instance leaves it is checked together with the rest.
+//! The check visits all instances of all actions: `instances` enumerates them by joins over
+//! static atoms, `reader` and `action` compute their conditions and effects case by case,
+//! `compare` searches the operator, and `effects` compares its effects. `translation` expresses
+//! the task in terms of the files. A variable of the task represents atoms of which at most one
+//! holds: this is checked initially and for every instance. An instance needs no operator if it
+//! does not change the task state, or if its conditions contradict static facts, each other, the
+//! variables or the witness. The witness (`invariant`) over-approximates the possible atoms and
+//! the ranges of numbers; the check proves that no instance leaves it.
 //!
-//! Covered are conditions of all kinds; conditional and universal effects; linear numbers; derived predicates, also recursive ones
-//! that are variables of the task with the same rules; actions with and without duration, one after another; timed initial
-//! literals (`timeline`); metrics of both directions. Of everything else this says that it is not covered. Shared with grounding is the syntax tree and nothing else.
+//! Supported: all kinds of conditions; conditional and universal effects; linear numbers; derived
+//! predicates, including recursive ones that are variables of the task with equivalent rules;
+//! instantaneous and durative actions, executed one after another; timed initial literals
+//! (`timeline`); metrics of both directions. Any other construct yields [`Cause::Unsupported`].
+//! The check shares only the syntax tree with the grounder.
 //!
 //! [1] R. Milner: An algebraic definition of simulation between programs, IJCAI 1971.
 
@@ -65,12 +70,12 @@ use verdict::Obstacle;
 pub use verdict::{Cause, Difference, Faithful};
 use world::World;
 
-/// A witness is looked for in at most so many rounds.
+/// Upper limit on the iterations of the witness computation.
 const ROUND_LIMIT: usize = 10_000;
 
 type Result<T> = std::result::Result<T, Obstacle>;
 
-/// Compares a written task with the files. The witness says what can become of their states.
+/// Checks that a task refines its files. The witness over-approximates their reachable states.
 pub fn faithful(
     domain: &Domain,
     problem: &Problem,
@@ -78,28 +83,29 @@ pub fn faithful(
     witness: &str,
     stop: &dyn Fn() -> bool,
 ) -> Faithful {
-    let compared = read(task).and_then(|model| {
+    let outcome = read(task).and_then(|model| {
         let files = Files::new(domain, problem, &model, stop)?;
         files.compare(witness)
     });
-    match compared {
+    match outcome {
         Ok(verdict) => verdict,
         Err(obstacle) => verdict(obstacle),
     }
 }
 
-/// Makes the witness for a written task.
+/// Computes the witness for a ground task.
 ///
 /// # Errors
-/// What [`faithful`] would say: that the task is none, or that something is not covered.
+/// The verdict that [`faithful`] would return: the task is malformed, or a construct is not
+/// supported.
 pub fn witness(
     domain: &Domain,
     problem: &Problem,
     task: &str,
     stop: &dyn Fn() -> bool,
 ) -> std::result::Result<String, Faithful> {
-    let made = read(task).and_then(|model| Files::new(domain, problem, &model, stop)?.witness());
-    made.map_err(verdict)
+    let witness = read(task).and_then(|model| Files::new(domain, problem, &model, stop)?.witness());
+    witness.map_err(verdict)
 }
 
 fn verdict(obstacle: Obstacle) -> Faithful {
@@ -119,15 +125,15 @@ fn read(task: &str) -> Result<Model> {
     Ok(model)
 }
 
-/// An instance: the action, and its arguments as objects.
+/// An action with the objects of its arguments.
 struct Instance {
     action: usize,
     arguments: Vec<u32>,
-    /// Atoms without which it cannot be executed.
+    /// Atoms that its condition requires.
     requires: Vec<Key>,
 }
 
-/// The files, with the names that the task has for what is in them.
+/// The files, with the correspondence of their atoms and fluents to the task.
 struct Files<'f> {
     domain: &'f Domain,
     world: World<'f>,
@@ -146,19 +152,19 @@ impl<'f> Files<'f> {
     ) -> Result<Self> {
         let world = World::new(domain, problem)?;
         let names = Names::new(&world, model)?;
-        let mut all = Vec::new();
+        let mut instances = Vec::new();
         let mut size = 0_usize;
         for (action, schema) in domain.actions.iter().enumerate() {
             for arguments in instances::of(&world, schema, stop)? {
                 size = size.saturating_add(arguments.len());
                 let requires = requires(&world, schema, &arguments)?;
-                all.push(Instance { action, arguments, requires });
+                instances.push(Instance { action, arguments, requires });
             }
-            if all.len() > instances::INSTANCE_LIMIT || size > instances::ARGUMENT_LIMIT {
+            if instances.len() > instances::INSTANCE_LIMIT || size > instances::ARGUMENT_LIMIT {
                 return Err(instances::too_many("actions").into());
             }
         }
-        Ok(Self { domain, world, model, names, instances: all, stop })
+        Ok(Self { domain, world, model, names, instances: instances, stop })
     }
 
     fn stopped(&self) -> std::result::Result<(), Cause> {
@@ -183,11 +189,13 @@ impl<'f> Files<'f> {
         let untimed = self.world.timeline.is_empty();
         let plain: Vec<bool> = self.domain.actions.iter().map(|action| untimed && is_plain(action)).collect();
         let waits = action::waits(&self.world.timeline, &self.names.structure)?;
-        // An instance that always does the same need not be looked at again.
+        // An instance of a plain action has constant effects and is visited until it is reachable
+        // once.
         let mut open: Vec<&Instance> = self.instances.iter().collect();
         for _ in 0..ROUND_LIMIT {
             let axioms = derived::axioms(&self.world, &widening.invariant, &self.names.linked, self.stop)?;
-            // What is known of derived atoms is about the invariant as it is now.
+            // The facts about derived atoms hold for the invariant at the start of the round
+            // only.
             let frozen = (self.world.derived().next().is_some()).then(|| widening.invariant.clone());
             let (mut news, mut next) = (false, Vec::new());
             for case in &waits {
@@ -213,7 +221,7 @@ impl<'f> Files<'f> {
         Err(invariant::too_many_rounds(ROUND_LIMIT).into())
     }
 
-    /// Groups of which at most one atom holds, for the variables that are not exclusive by themselves.
+    /// Computes mutex groups for the variables that are not exclusive by themselves.
     fn exclusive(&self, invariant: &Invariant, axioms: &Axioms) -> Result<Vec<Group>> {
         let atoms = |variable| self.names.atoms(variable).map(|(_, key)| key.clone()).collect();
         let variables: Vec<Group> = self.model.basic_variables().map(atoms).collect();
@@ -235,7 +243,7 @@ impl<'f> Files<'f> {
         Ok(exclusive::search(&self.world, &may_hold, broken, &moves, self.stop))
     }
 
-    /// Visits what each case of each instance does.
+    /// Visits the effects of each case of each instance on groups.
     fn each_move(&self, invariant: &Invariant, axioms: &Axioms, visit: &mut dyn FnMut(Move)) -> Result<()> {
         let structure = &self.names.structure;
         let waits = action::waits(&self.world.timeline, structure)?;
@@ -284,7 +292,7 @@ impl<'f> Files<'f> {
         Ok(Faithful::Yes { instances, idle, timed })
     }
 
-    /// What the times of events and all durations are multiples of.
+    /// A number of which the times of events and all durations are multiples.
     fn unit(&self, invariant: &Invariant, axioms: &Axioms) -> Result<BigRational> {
         let mut durations = BTreeSet::new();
         if !self.world.timeline.is_empty() {
@@ -297,7 +305,7 @@ impl<'f> Files<'f> {
         Ok(self.world.timeline.unit(durations.iter()))
     }
 
-    /// Whether an instance that can be executed has a duration other than 0.
+    /// Returns `true` if an executable instance has a duration other than 0.
     fn takes_time(&self, invariant: &Invariant, axioms: &Axioms) -> Result<bool> {
         for instance in &self.instances {
             if matches!(self.domain.actions[instance.action].body, ActionBody::Durative { .. }) {
@@ -312,7 +320,7 @@ impl<'f> Files<'f> {
     }
 }
 
-/// Whether an action does the same wherever it can be executed.
+/// Returns `true` if the effects of an action are unconditional and do not change numbers.
 fn is_plain(action: &Action) -> bool {
     fn plain(effect: &Effect) -> bool {
         match effect {
@@ -328,7 +336,7 @@ fn is_plain(action: &Action) -> bool {
     }
 }
 
-/// The atoms among the conjuncts of what an instance requires at first, as far as actions change them.
+/// The atoms of changing predicates in the top-level conjunction of an instance's condition.
 fn requires(world: &World<'_>, action: &Action, arguments: &[u32]) -> std::result::Result<Vec<Key>, Cause> {
     let mut atoms = Vec::new();
     match &action.body {

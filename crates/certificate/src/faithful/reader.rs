@@ -1,5 +1,5 @@
-//! Conditions and expressions of the files for one instance, once everything static and everything that the witness rules out is
-//! decided.
+//! Evaluates conditions and expressions of the files for one instance, simplified by static facts
+//! and by the witness.
 
 use std::collections::BTreeMap;
 
@@ -18,27 +18,29 @@ use crate::faithful::verdict::Cause;
 use crate::faithful::world::World;
 use pddl::ast::{Arithmetic, Atom, Comparison, Condition, Expression, Name, Term, TypedName};
 
-/// The conditions of one instance have at most so many parts.
+/// Upper limit on the parts of the conditions of one instance.
 const SIZE_LIMIT: usize = 200_000;
-/// Upper limit on the parts that are read for one instance, those among them that are read again (see [`Reader::unfold`]).
+/// Upper limit on the parts that are evaluated for one instance, counting repeated evaluation
+/// (see [`Reader::unfold`]).
 const WORK_LIMIT: usize = 16 * SIZE_LIMIT;
-/// Upper limit on the variables of one quantifier, or of the head of a rule.
+/// Upper limit on the variables of one quantifier or of the head of a rule.
 const VARIABLE_LIMIT: usize = 10_000;
-/// Upper limit on the nesting of conditions while derived atoms are replaced by their rules. It bounds the stack; atoms
-/// below are replaced one by one.
+/// Upper limit on the nesting of conditions while derived atoms are replaced by their rules. It
+/// bounds the stack; atoms below are replaced one by one.
 const UNFOLDING_LIMIT: usize = 100;
 
-/// Stands for `total-time` in metrics.
+/// The key of `total-time` in metrics.
 pub(super) const TOTAL_TIME: Key = (u32::MAX, SmallVec::new_const());
 
-/// What the start of an action has made of the state before it.
+/// The start effects of a durative action.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Applied {
     pub(super) truths: BTreeMap<Key, bool>,
     pub(super) changes: BTreeMap<Key, Linear>,
 }
 
-/// The bound variables of a quantifier: for each its remaining candidates, and the object of an outer variable of the same name.
+/// The bound variables of a quantifier: for each its remaining candidates, and the object of a
+/// shadowed outer variable.
 type Levels = Vec<(std::vec::IntoIter<u32>, Option<u32>)>;
 
 pub(super) struct Reader<'r> {
@@ -47,15 +49,15 @@ pub(super) struct Reader<'r> {
     pub(super) axioms: &'r Axioms,
     pub(super) binding: FxHashMap<&'r Name, u32>,
     pub(super) applied: Applied,
-    /// How long the instance takes.
+    /// The duration of the instance.
     pub(super) length: Option<Length>,
     pub(super) is_metric: bool,
-    /// Inside `when`, a comparison without a value has no agreed meaning.
+    /// `true` inside `when`, where an undefined comparison has no agreed meaning.
     pub(super) in_when: bool,
-    /// Derived atoms stay as they are.
+    /// `true` if derived atoms are not replaced by their rules.
     pub(super) opaque: bool,
     unfolding: Unfolding,
-    /// The nesting of the condition that is read.
+    /// The nesting of the current condition.
     depth: usize,
     size: usize,
     work: usize,
@@ -64,13 +66,14 @@ pub(super) struct Reader<'r> {
 /// Derived atoms that are being replaced by their rules.
 #[derive(Default)]
 struct Unfolding {
-    /// Derived atoms whose rules are being read, outermost first.
+    /// The derived atoms whose rules are being evaluated, outermost first.
     path: Vec<Key>,
-    /// The nesting at which the first of them is read.
+    /// The nesting at which the outermost derived atom is evaluated.
     base: usize,
-    /// An atom below [`UNFOLDING_LIMIT`], to be read by itself before the others are read again.
+    /// An atom below [`UNFOLDING_LIMIT`], to be evaluated on its own before the evaluation is
+    /// repeated.
     pending: Option<Key>,
-    /// The conditions of such atoms.
+    /// The conditions of pending atoms that are finished.
     known: FxHashMap<Key, Formula>,
 }
 
@@ -93,7 +96,8 @@ impl<'r> Reader<'r> {
         }
     }
 
-    /// A condition (or its negation) on the state after what is applied, in terms of the state before.
+    /// Returns a condition (or its negation) after the start effects, in terms of the state
+    /// before them.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "conditions nest no deeper than what is read recursively"
@@ -121,10 +125,10 @@ impl<'r> Reader<'r> {
             }
             Condition::Equal(left, right, _) => Ok(Formula::truth(self.equal(left, right)? == holds)),
             Condition::Compare(operator, left, right, _) => {
-                let compared = self.compare(*operator, left, right)?;
-                Ok(match compared {
-                    Some(compared) if holds => compared,
-                    Some(compared) => compared.negated(),
+                let comparison = self.compare(*operator, left, right)?;
+                Ok(match comparison {
+                    Some(comparison) if holds => comparison,
+                    Some(comparison) => comparison.negated(),
                     None => Formula::truth(false),
                 })
             }
@@ -150,7 +154,8 @@ impl<'r> Reader<'r> {
         all: bool,
     ) -> Result<Formula, Cause> {
         let mut kept = Vec::new();
-        // What is decided without unfolding derived atoms comes first.
+        // Parts without derived atoms come first: they may decide the junction without any
+        // unfolding.
         let (later, sooner): (Vec<_>, Vec<_>) = parts.partition(|(part, _)| self.is_derived(part));
         for (part, holds) in sooner.into_iter().chain(later) {
             let part = self.formula(part, holds)?;
@@ -162,7 +167,7 @@ impl<'r> Reader<'r> {
         Ok(Formula::junction(kept, all))
     }
 
-    /// Whether a condition mentions a derived predicate.
+    /// Returns `true` if a condition mentions a derived predicate.
     fn is_derived(&self, condition: &Condition) -> bool {
         match condition {
             Condition::And(parts) | Condition::Or(parts) => parts.iter().any(|part| self.is_derived(part)),
@@ -192,7 +197,8 @@ impl<'r> Reader<'r> {
         Ok(Formula::junction(kept, all))
     }
 
-    /// Calls `visit` with every binding of some variables, until it says `false`; with none that makes a given condition false.
+    /// Calls `visit` with every binding of the variables `bound` until it returns `false`.
+    /// Bindings that make `within` false may be skipped.
     pub(super) fn each(
         &mut self,
         bound: &'r [TypedName],
@@ -221,7 +227,8 @@ impl<'r> Reader<'r> {
         }
     }
 
-    /// Binds the innermost variable that has another candidate to it; returns `false` if no variable has one.
+    /// Advances the innermost variable that has another candidate. Returns `false` if no variable
+    /// has one.
     #[expect(clippy::arithmetic_side_effects, reason = "an entry for each of the first variables")]
     fn next_binding(&mut self, bound: &'r [TypedName], open: &mut Levels) -> bool {
         while !open.is_empty() {
@@ -278,16 +285,18 @@ impl<'r> Reader<'r> {
         Ok(if holds { formula } else { formula.negated() })
     }
 
-    /// Returns `true` if a derived predicate depends on what the start of the action has changed, so that the witness says nothing of it.
+    /// Returns `true` if a derived predicate depends on start effects, so that the witness does
+    /// not apply to it.
     pub(super) fn is_touched(&self, symbol: u32) -> bool {
         let touched = self.applied.truths.keys().chain(self.applied.changes.keys());
         self.axioms.depends(symbol, touched.map(|key| key.0))
     }
 
-    /// The condition under which a derived atom holds.
+    /// Returns the condition under which a derived atom holds.
     ///
-    /// The rules of the derived atoms that it rests on are read recursively up to a limit on the nesting. An atom below the limit
-    /// interrupts the reading; its own condition is read first, and then the reading begins again.
+    /// Rules are unfolded recursively up to a limit on the nesting. An atom below the limit
+    /// aborts the evaluation; its own condition is computed first, and then the evaluation is
+    /// repeated.
     pub(super) fn unfold(&mut self, key: &Key) -> Result<Formula, Cause> {
         if let Some(known) = self.unfolding.known.get(key).cloned() {
             self.count_parts(known.size())?;
@@ -301,7 +310,7 @@ impl<'r> Reader<'r> {
         }
         if self.depth.saturating_sub(self.unfolding.base) > UNFOLDING_LIMIT {
             self.unfolding.pending = Some(key.clone());
-            // Ends the reading, which `unfold_from` begins again.
+            // Aborts the evaluation, which `unfold_from` repeats.
             return Err(Cause::Stopped);
         }
         let outer = std::mem::take(&mut self.binding);
@@ -316,6 +325,8 @@ impl<'r> Reader<'r> {
         self.unfolding.base = base;
         let mut open = vec![key.clone()];
         let formula = loop {
+            // `open` is an explicit stack, because recursion would be as deep as the rules are
+            // chained.
             let Some(own) = open.last().cloned() else { break Err(Cause::Stopped) };
             (self.depth, self.size) = (base, size);
             self.unfolding.path.clear();
@@ -367,7 +378,7 @@ impl<'r> Reader<'r> {
         Ok(Formula::junction(bodies, false))
     }
 
-    /// None if a side has no value.
+    /// Returns `None` if a side is undefined.
     fn compare(
         &mut self,
         operator: Comparison,
@@ -414,7 +425,7 @@ impl<'r> Reader<'r> {
         Ok(Some(self.invariant.fluent(key)))
     }
 
-    /// The value of an expression after what is applied; none if it has none.
+    /// The value of an expression after the start effects; `None` if it is undefined.
     pub(super) fn expression(&mut self, expression: &'r Expression) -> Result<Option<Linear>, Cause> {
         Ok(match expression {
             Expression::Number(number, _) => Some(Linear::constant(number.clone())),
@@ -440,7 +451,7 @@ impl<'r> Reader<'r> {
     }
 }
 
-/// An atom that is not derived, in the state before.
+/// The formula of a basic atom in the state before.
 pub(super) fn atom(world: &World<'_>, invariant: &Invariant, key: Key, holds: bool) -> Formula {
     if !world.changes(key.0) {
         return Formula::truth(world.holds_initially(&key) == holds);

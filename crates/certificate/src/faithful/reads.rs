@@ -1,6 +1,7 @@
-//! What a happening of an action reads, as it is written: every atom and every fluent in its conditions, in its duration, in the
-//! conditions of its effects and on their right-hand sides, whether or not that makes a difference. Of a quantifier
-//! all instances, and through a derived predicate all of the predicates and functions that this one depends on.
+//! The read set of a happening, as the definition of interference requires it: every atom and
+//! fluent in its conditions, its duration, the conditions of its effects and their right-hand
+//! sides, whether or not it affects the outcome. A quantifier reads all its instances; a derived
+//! predicate reads all predicates and functions that it depends on.
 
 use rustc_hash::FxHashMap;
 
@@ -20,28 +21,28 @@ pub(super) struct Reads<'r> {
     pub(super) durations: Vec<&'r Expression>,
 }
 
-/// What is looked for.
+/// The atom or fluent of a query.
 #[derive(Clone, Copy)]
-enum Wanted<'w> {
+enum ReadQuery<'w> {
     Atom(&'w Key),
     Fluent(&'w Key),
 }
 
 impl Reads<'_> {
-    /// Whether it reads what an event changes.
+    /// Returns `true` if the happening reads an atom that an event changes.
     pub(super) fn event(&self, event: &Event) -> bool {
         event.truths.keys().any(|key| self.atom(key))
     }
 
     pub(super) fn atom(&self, key: &Key) -> bool {
-        self.reads(Wanted::Atom(key))
+        self.reads(ReadQuery::Atom(key))
     }
 
     pub(super) fn fluent(&self, key: &Key) -> bool {
-        self.reads(Wanted::Fluent(key))
+        self.reads(ReadQuery::Fluent(key))
     }
 
-    fn reads(&self, wanted: Wanted<'_>) -> bool {
+    fn reads(&self, wanted: ReadQuery<'_>) -> bool {
         let mut search = Search { reads: self, wanted, scope: Vec::new() };
         self.conditions.iter().any(|condition| search.condition(condition))
             || self.effects.iter().any(|effect| search.effect(effect))
@@ -51,8 +52,8 @@ impl Reads<'_> {
 
 struct Search<'s> {
     reads: &'s Reads<'s>,
-    wanted: Wanted<'s>,
-    /// The variables of quantifiers, innermost last.
+    wanted: ReadQuery<'s>,
+    /// The quantified variables in scope, innermost last.
     scope: Vec<&'s TypedName>,
 }
 
@@ -84,14 +85,14 @@ impl<'s> Search<'s> {
     fn within(&mut self, bound: &'s [TypedName], read: impl FnOnce(&mut Self) -> bool) -> bool {
         let outer = self.scope.len();
         self.scope.extend(bound);
-        let found = read(self);
+        let is_read = read(self);
         self.scope.truncate(outer);
-        found
+        is_read
     }
 
     fn expression(&self, expression: &Expression) -> bool {
         match (expression, self.wanted) {
-            (Expression::Fluent(atom), Wanted::Fluent(key)) => self.is_instance(atom, key),
+            (Expression::Fluent(atom), ReadQuery::Fluent(key)) => self.is_instance(atom, key),
             (Expression::Operation(_, parts, _), _) => parts.iter().any(|part| self.expression(part)),
             _ => false,
         }
@@ -100,14 +101,14 @@ impl<'s> Search<'s> {
     fn atom(&self, atom: &Atom) -> bool {
         let Reads { world, axioms, .. } = self.reads;
         let Ok(symbol) = world.symbol(&atom.predicate.name) else { return false };
-        let (Wanted::Atom(key) | Wanted::Fluent(key)) = self.wanted;
+        let (ReadQuery::Atom(key) | ReadQuery::Fluent(key)) = self.wanted;
         if world.rules(symbol).is_some() {
             return axioms.depends(symbol, std::iter::once(key.0));
         }
-        matches!(self.wanted, Wanted::Atom(_)) && self.is_instance(atom, key)
+        matches!(self.wanted, ReadQuery::Atom(_)) && self.is_instance(atom, key)
     }
 
-    /// Whether an atom or a fluent stands for this one, with some objects for the variables of quantifiers.
+    /// Returns `true` if an atom or a fluent has the instance `key`.
     fn is_instance(&self, atom: &Atom, key: &Key) -> bool {
         let Reads { world, binding, .. } = self.reads;
         let mut chosen: FxHashMap<usize, u32> = FxHashMap::default();

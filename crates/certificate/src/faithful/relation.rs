@@ -9,12 +9,12 @@ use crate::faithful::key::Key;
 pub(super) struct Relation {
     atoms: FxHashSet<Key>,
     rows: FxHashMap<u32, Vec<Key>>,
-    /// The rows with an object at a place.
+    /// For each predicate, position and object, the matching rows.
     rows_with: FxHashMap<(u32, usize, u32), Vec<usize>>,
 }
 
 impl Relation {
-    /// Returns `true` if the atom is new.
+    /// Adds an atom. Returns `true` if it is new.
     pub(super) fn insert(&mut self, key: Key) -> bool {
         if !self.atoms.insert(key.clone()) {
             return false;
@@ -35,7 +35,7 @@ impl Relation {
         self.atoms.len()
     }
 
-    /// The number of [`Relation::rows`].
+    /// Number of atoms of [`Relation::rows`].
     pub(super) fn count(&self, predicate: u32, place: Option<(usize, u32)>) -> usize {
         match place {
             None => self.rows.get(&predicate).map_or(0, Vec::len),
@@ -43,7 +43,7 @@ impl Relation {
         }
     }
 
-    /// The atoms of a predicate, or those with an object at a place.
+    /// The atoms of a predicate, optionally with an object at a position.
     pub(super) fn rows(&self, predicate: u32, place: Option<(usize, u32)>) -> impl Iterator<Item = &Key> {
         let rows = self.rows.get(&predicate).map_or(&[][..], Vec::as_slice);
         let (all, some) = match place {

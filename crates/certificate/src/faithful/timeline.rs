@@ -1,13 +1,15 @@
-//! Timed initial literals while actions are executed one after another, by the definition (`validate/definition.md`).
+//! Timed initial literals under sequential execution of actions, by the definition
+//! (`validate/definition.md`).
 //!
-//! All of one time are one event. The events cut time into phases: phase i begins with event i (counted from 1), phase 0 with the plan.
-//! What an action meets depends on the phases of its start and its end, and on whether either is at the very time of an event: a
-//! *passage*. The plan may start it at any time in a passage, whatever is left of the time before.
+//! All literals of one time are one event. The events divide time into phases: phase i begins
+//! with event i (counted from 1), phase 0 with the plan. The effect of events on an action
+//! depends on the phases of its start and end, and on whether either coincides with an event: a
+//! *passage*. The plan may start the action at any time within a passage.
 //!
-//! The task has its own clock. It stands for a time t of the plan if t is not before it; here the clock's *mark* counts, which
-//! is the greatest multiple of a unit that the clock has reached: t is at or after the mark, and after it if the clock is. All times
-//! of events and all durations are multiples of the unit, so that the clock may be ahead of t by a moment that no action can
-//! tell, and never by more.
+//! The task has its own clock. The clock represents a plan time t if t is at or after the clock's
+//! *mark*, and after the mark if the clock is after it. The mark is the greatest multiple of a
+//! unit that the clock has reached. All times of events and all durations are multiples of the
+//! unit, so the clock may be ahead of t by less than a unit, which no action can observe.
 
 use std::collections::BTreeMap;
 
@@ -21,7 +23,7 @@ use crate::faithful::formula::Formula;
 use crate::faithful::key::{CLOCK, Key, PHASE, WAITED};
 use crate::faithful::linear::Linear;
 
-/// What becomes of atoms.
+/// Truth values of atoms after an event.
 pub(super) type Truths = BTreeMap<Key, bool>;
 
 /// All timed initial literals of one time.
@@ -31,28 +33,28 @@ pub(super) struct Event {
     pub(super) truths: Truths,
 }
 
-/// The least or the greatest time of a range, and whether it is left out.
+/// An end of a time range, and `true` if it is excluded.
 type End = (BigRational, bool);
 
 /// The events, in order.
 #[derive(Debug, Default)]
 pub(super) struct Timeline {
     pub(super) events: Vec<Event>,
-    /// How many of them are at time 0.
+    /// Number of events at time 0.
     pub(super) begun: usize,
 }
 
-/// Where an action lies among the events.
+/// The position of an action relative to the events.
 #[derive(Debug, Clone)]
 pub(super) struct Passage {
     from: usize,
     to: usize,
-    /// Whether it starts, and ends, at the very time of the event that begins the phase.
+    /// `true` if the action starts (or ends) exactly at the event that begins its phase.
     at_start: bool,
     at_end: bool,
-    /// Its start is not later; none if there is no limit.
+    /// The latest start; `None` if there is no limit.
     latest: Option<End>,
-    /// Its end is not earlier.
+    /// The earliest end.
     pub(super) end: End,
 }
 
@@ -69,7 +71,8 @@ pub(super) fn clock() -> Key {
 }
 
 impl Timeline {
-    /// Adds a timed initial literal; of two about one atom at one time the later one counts.
+    /// Adds a timed initial literal. A later literal about an atom and time replaces an earlier
+    /// one.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "phases are counted from 0, and each but the first one begins with an event"
@@ -95,28 +98,28 @@ impl Timeline {
         &self.events[number - 1].time
     }
 
-    /// The time at which a phase ends; none for the last one.
+    /// The end of a phase; `None` for the last phase.
     fn over(&self, phase: usize) -> Option<&BigRational> {
         self.events.get(phase).map(|event| &event.time)
     }
 
-    /// All passages that an action of this duration can have.
+    /// All possible passages of an action with this duration.
     pub(super) fn passages(&self, duration: &BigRational) -> Vec<Passage> {
         if self.is_empty() {
             let end = (duration.clone(), false);
             return vec![Passage { from: 0, to: 0, at_start: false, at_end: false, latest: None, end }];
         }
-        let mut all = Vec::new();
+        let mut passages = Vec::new();
         for from in self.begun..=self.events.len() {
             for to in from..=self.events.len() {
                 for at_start in [false, true] {
                     for at_end in [false, true] {
-                        all.extend(self.passage(duration, (from, to), (at_start, at_end)));
+                        passages.extend(self.passage(duration, (from, to), (at_start, at_end)));
                     }
                 }
             }
         }
-        all
+        passages
     }
 
     fn passage(
@@ -125,11 +128,11 @@ impl Timeline {
         (from, to): (usize, usize),
         (at_start, at_end): (bool, bool),
     ) -> Option<Passage> {
-        // At the time of the event before the first there is nothing to start at.
+        // Phase 0 begins with no event.
         if at_start && from == 0 || at_end && to == 0 {
             return None;
         }
-        // The start, from both ends of the action.
+        // The range of start times, restricted by the phases of the start and the end.
         let mut range = Range { low: (BigRational::zero(), false), high: None };
         if from > 0 {
             range.begin(self.time(from), at_start);
@@ -144,7 +147,7 @@ impl Timeline {
         (!range.is_empty()).then_some(Passage { from, to, at_start, at_end, latest: range.high, end })
     }
 
-    /// A unit of which the times of events and some durations are multiples.
+    /// A unit of which the times of events and the given durations are multiples.
     pub(super) fn unit<'d>(&'d self, durations: impl Iterator<Item = &'d BigRational>) -> BigRational {
         let times = self.events.iter().map(|event| &event.time);
         let common = times.chain(durations).fold(BigInt::one(), |common, time| common.lcm(time.denom()));
@@ -159,7 +162,7 @@ struct Range {
 }
 
 impl Range {
-    /// At a time, or later than it.
+    /// Restricts the range to times from `time` on, or exactly to `time`.
     fn begin(&mut self, time: &BigRational, at: bool) {
         self.low = self.low.clone().max((time.clone(), !at));
         if at {
@@ -182,26 +185,28 @@ impl Range {
 }
 
 impl Passage {
-    /// Nothing is done until the event that begins a phase.
+    /// The passage of waiting until the event that begins a phase.
     pub(super) fn wait(phase: usize, time: &BigRational) -> Self {
         let end = (time.clone(), false);
         Self { from: phase, to: phase, at_start: false, at_end: false, latest: None, end }
     }
 
-    /// What the state before and the clock satisfy if an action starts so: the clock is not later than its start, and not before 0.
+    /// The condition on the state and the clock before an action with this passage: the phase
+    /// matches, and the clock is between 0 and the latest start.
     pub(super) fn condition(&self, timeline: &Timeline) -> Formula {
         if timeline.is_empty() {
             return Formula::truth(true);
         }
-        let own = [Formula::Atom(phase(self.from), true), Formula::Compare(Linear::fluent(clock()), false)];
+        let conditions =
+            [Formula::Atom(phase(self.from), true), Formula::Compare(Linear::fluent(clock()), false)];
         let limit = self.latest.as_ref().map(|(time, left_out)| {
-            let left = Linear::constant(time.clone()).minus(&Linear::fluent(clock()));
-            Formula::Compare(left, *left_out)
+            let slack = Linear::constant(time.clone()).minus(&Linear::fluent(clock()));
+            Formula::Compare(slack, *left_out)
         });
-        Formula::junction(own.into_iter().chain(limit), true)
+        Formula::junction(conditions.into_iter().chain(limit), true)
     }
 
-    /// The event at the time of the start.
+    /// The event at the start of the action.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "phases are counted from 0, and each but the first one begins with an event"
@@ -219,7 +224,7 @@ impl Passage {
         &timeline.events[self.from..self.to - usize::from(self.at_end && self.to > self.from)]
     }
 
-    /// The event at the time of the end, if the action takes time.
+    /// The event at the end, if the action takes time.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "phases are counted from 0, and each but the first one begins with an event"
@@ -228,7 +233,7 @@ impl Passage {
         (self.at_end && self.to > self.from).then(|| &timeline.events[self.to - 1])
     }
 
-    /// What becomes of the phase, and of whether the last thing that happened was a wait.
+    /// The effects of a passage on the phase and on `waited`.
     pub(super) fn truths(&self, timeline: &Timeline) -> Truths {
         if timeline.is_empty() {
             return Truths::new();
@@ -239,7 +244,7 @@ impl Passage {
     }
 }
 
-/// Whether a clock that has been set so stands for every time from an end on.
+/// Returns `true` if a clock value represents every time from an end on.
 pub(super) fn stands_for(set: &BigRational, (end, left_out): &End, unit: &BigRational) -> bool {
     let mark = (set / unit).floor() * unit;
     if set.is_negative() {
@@ -256,9 +261,9 @@ mod tests {
         BigRational::new(count.into(), 4.into())
     }
 
-    /// Every start is in the one passage that the definition says.
+    /// Every start time lies in exactly the one passage that the definition requires.
     #[test]
-    fn passages_divide_the_starts() {
+    fn passages_partition_the_start_times() {
         for (events, duration) in [
             (&[][..], 3),
             (&[0], 4),
@@ -281,7 +286,7 @@ mod tests {
                     let limit = own.latest.as_ref();
                     late_enough && limit.is_none_or(|(time, out)| start < *time || start == *time && !out)
                 };
-                let found: Vec<&Passage> = passages.iter().filter(holds).collect();
+                let matching: Vec<&Passage> = passages.iter().filter(holds).collect();
                 let before = |time: i64| events.iter().filter(|event| **event <= time).count();
                 let expected = (
                     before(at),
@@ -289,16 +294,18 @@ mod tests {
                     events.contains(&at),
                     events.contains(&(at + duration)),
                 );
-                let own: Vec<_> =
-                    found.iter().map(|own| (own.from, own.to, own.at_start, own.at_end)).collect();
-                assert_eq!(own, [expected], "{events:?} {duration}: {start} to {end}");
+                let actual: Vec<_> = matching
+                    .iter()
+                    .map(|actual| (actual.from, actual.to, actual.at_start, actual.at_end))
+                    .collect();
+                assert_eq!(actual, [expected], "{events:?} {duration}: {start} to {end}");
             }
         }
     }
 
-    /// A clock that is a moment ahead stands for what comes after its mark, and for nothing at it.
+    /// A clock past its mark represents only times after the mark.
     #[test]
-    fn a_clock_stands_for_what_is_not_before_its_mark() {
+    fn a_clock_represents_times_from_its_mark_on() {
         let unit = quarters(2);
         for (set, end, expected) in [
             (4, (4, false), true),

@@ -1,4 +1,5 @@
-//! The task in terms of the files: what its variables, numbers, conditions and rules say of atoms and fluents.
+//! Expresses the task in terms of the files: variables, numbers, conditions and rules as formulas
+//! over atoms and fluents.
 
 use std::collections::BTreeMap;
 
@@ -14,26 +15,27 @@ use crate::faithful::verdict::{Cause, Difference, Obstacle};
 use crate::faithful::world::World;
 use crate::model::{self, Condition, Fact, Literal, Model};
 
-/// A condition of the task has at most so many parts once its names are replaced by what they stand for.
+/// Upper limit on the parts of one condition of the task after translation.
 const SIZE_LIMIT: usize = 200_000;
 
-/// Upper limit on the parts of all such conditions together.
+/// Upper limit on the total parts of all translated conditions.
 const TOTAL_LIMIT: usize = 16 * SIZE_LIMIT;
 
 type Result<T> = std::result::Result<T, Obstacle>;
 
-/// What the names of the task stand for.
+/// The atoms and fluents that the names of the task denote.
 pub(super) struct Names {
-    /// By variable and value; none for the last value of a variable, and for a name that the files do not have.
+    /// By variable and value; `None` for the last value of a variable and for names that the
+    /// files do not have.
     keys: Vec<Vec<Option<Key>>>,
     facts: FxHashMap<Key, Fact>,
-    /// By number.
+    /// For each number of the task, its fluent.
     pub(super) fluents: Vec<Key>,
     pub(super) numbers: FxHashMap<Key, u32>,
     pub(super) structure: Structure,
-    /// Derived atoms that are variables.
+    /// Derived atoms that are variables of the task.
     pub(super) linked: FxHashSet<Key>,
-    /// The layer in which a derived variable gets its value.
+    /// The layer of the axioms that computes a derived variable.
     layers: FxHashMap<u32, usize>,
 }
 
@@ -96,7 +98,8 @@ impl Names {
         Ok(names)
     }
 
-    /// Every derived variable has its value before a rule of another layer reads it, or reads that it does not hold.
+    /// Checks that the axioms are stratified: a rule reads derived variables of lower layers, or
+    /// positively of its own layer.
     fn layers(&mut self, model: &Model) -> Result<()> {
         for (layer, rules) in model.axioms.iter().enumerate() {
             for (head, _) in &rules.rules {
@@ -141,9 +144,10 @@ pub(super) struct Translation<'t> {
     pub(super) names: &'t Names,
     pub(super) invariant: &'t Invariant,
     pub(super) axioms: &'t Axioms,
-    /// The atoms of each variable that may ever hold, with their values.
+    /// The atoms of each variable that may hold, with their values.
     possible: Vec<Vec<(u32, &'t Key)>>,
-    /// What derived variables stand for that the files do not have, or whose value is known.
+    /// The formulas of derived variables that are not atoms of the files, or whose value is
+    /// known.
     unfolded: BTreeMap<u32, Formula>,
     /// The bodies of the rules of each derived variable.
     bodies: FxHashMap<u32, Vec<&'t Condition>>,
@@ -165,15 +169,15 @@ impl<'t> Translation<'t> {
             bodies.entry(head.0).or_default().push(body);
         }
         let unfolded = BTreeMap::new();
-        let mut own = Self { world, model, names, invariant, axioms, possible, unfolded, bodies };
+        let mut translation = Self { world, model, names, invariant, axioms, possible, unfolded, bodies };
         let mut total = 0;
         for variable in model.derived_variables() {
-            own.unfold(variable, &mut total)?;
+            translation.unfold(variable, &mut total)?;
         }
-        Ok(own)
+        Ok(translation)
     }
 
-    /// The atoms of a variable that may ever hold, with their values.
+    /// The atoms of a variable that may hold, with their values.
     pub(super) fn possible(&self, variable: u32) -> impl Iterator<Item = (u32, &'t Key)> {
         self.possible[variable as usize].iter().copied()
     }
@@ -188,10 +192,11 @@ impl<'t> Translation<'t> {
             && !self.unfolded.contains_key(&variable)
     }
 
-    /// Replaces a derived variable by its rules, after those that they read.
+    /// Replaces a derived variable by its rules, after the variables that they read.
     fn unfold(&mut self, variable: u32, total: &mut usize) -> Result<()> {
         let mut above = FxHashSet::default();
-        // Each variable, and whether what its rules read is unfolded.
+        // An explicit depth-first search: each variable, and `true` once its dependencies are
+        // finished.
         let mut open = vec![(variable, false)];
         while let Some((variable, is_ready)) = open.pop() {
             if !self.needs_unfolding(variable) {
@@ -243,16 +248,16 @@ impl<'t> Translation<'t> {
         self.bodies.get(&variable).into_iter().flatten().copied()
     }
 
-    /// The condition under which the rules of the task give a derived variable its atom.
+    /// The condition under which the rules of the task derive the atom of a variable.
     pub(super) fn rules(&self, variable: u32) -> Formula {
         Formula::junction(self.bodies(variable).map(|body| self.condition(body, &[], &[])), false)
     }
 
     fn fact(&self, (variable, value): Fact) -> Formula {
-        let none = self.model.none(variable);
-        if value == none {
-            let others = (0..none).map(|value| self.fact((variable, value)).negated());
-            return Formula::junction(others, true);
+        let last_value = self.model.none(variable);
+        if value == last_value {
+            let negations = (0..last_value).map(|value| self.fact((variable, value)).negated());
+            return Formula::junction(negations, true);
         }
         if let Some(unfolded) = self.unfolded.get(&variable) {
             return unfolded.clone();
@@ -273,7 +278,7 @@ impl<'t> Translation<'t> {
         Formula::junction(literals.iter().map(|literal| self.literal(literal)), all)
     }
 
-    /// A condition with a choice of designs.
+    /// Translates a condition for a choice of designs.
     pub(super) fn condition(&self, condition: &Condition, choice: &[u32], sizes: &[usize]) -> Formula {
         let facts = condition.facts.iter().map(|fact| self.fact(*fact));
         let clauses = condition.clauses.iter().map(|clause| self.literals(clause, false));
@@ -284,7 +289,7 @@ impl<'t> Translation<'t> {
         Formula::junction(facts.chain(clauses).chain(comparisons), true)
     }
 
-    /// Numbers times factors plus a quantity, over fluents.
+    /// Translates a linear expression over numbers to one over fluents.
     fn linear(&self, linear: &model::Linear, choice: &[u32], sizes: &[usize]) -> Linear {
         let scale = self.model.number_scale.to_rational();
         let mut sum = Linear::constant(self.model.quantity(&linear.quantity, choice, sizes).to_rational());
@@ -295,7 +300,7 @@ impl<'t> Translation<'t> {
         sum
     }
 
-    /// What a fluent becomes where a number becomes this.
+    /// The new value of a fluent when its number gets the value of `linear`.
     pub(super) fn value(&self, linear: &model::Linear, choice: &[u32], sizes: &[usize]) -> Linear {
         let value = self.linear(linear, choice, sizes).times(&self.model.number_scale.to_rational().recip());
         self.invariant.settled(&value)

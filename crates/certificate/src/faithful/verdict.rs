@@ -1,57 +1,57 @@
-//! What can come of a comparison, cause by cause.
+//! Outcomes of the grounding check, and the reasons for rejecting a certificate.
 
 use thiserror::Error;
 
-/// What came of the comparison of a task with its files.
+/// Outcome of the grounding check.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Faithful {
-    /// It stands for them.
+    /// The task refines the files.
     Yes {
-        /// Instances of actions that the witness does not rule out.
+        /// Number of action instances that the witness does not rule out.
         instances: usize,
-        /// Those of them that change nothing that the task knows.
+        /// Number of instances among them that do not change the task state.
         idle: usize,
-        /// Whether plans are measured by the durations of their actions where there is no metric.
+        /// `true` if plans are measured by duration, because there is no metric.
         timed: bool,
     },
-    /// The first thing that differs.
+    /// The first difference.
     No(Difference),
-    /// The comparison cannot tell.
+    /// The check cannot decide.
     Undecided(Cause),
 }
 
-/// What a task or a witness has otherwise than the files.
+/// A difference between the task or the witness and the files.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum Difference {
-    /// The task does not have its form.
+    /// The task is not well-formed.
     #[error("it is not a task: {reason}")]
     Form {
-        /// What is wrong with it.
+        /// Description of the error.
         reason: String,
     },
-    /// Something else holds at first.
+    /// The initial states differ.
     #[error("{what} is another one at first")]
     Initial {
         /// A variable, a number, or the metric.
         what: String,
     },
-    /// The goal of the files does not imply that of the task.
+    /// The goal of the files does not imply the goal of the task.
     #[error("the goal of the files can hold where that of the task does not")]
     Goal,
-    /// An instance of an action can be executed, and no operator has its arguments.
+    /// An instance of an action can be executed, but no operator has its arguments.
     #[error("{instance}: no operator stands for it")]
     NoOperatorFor {
         /// The action with its arguments.
         instance: String,
     },
-    /// Every operator requires something that the instance does not.
+    /// Every matching operator requires a condition that the instance does not require.
     #[error("{instance}: the operator requires more")]
     WrongCondition {
         /// The action with its arguments.
         instance: String,
     },
-    /// The operator makes something else of a variable or number, or nothing.
+    /// The operator has a different effect on a variable or a number.
     #[error("{instance}: the operator makes something else of {what}")]
     WrongEffect {
         /// The action with its arguments.
@@ -59,59 +59,59 @@ pub enum Difference {
         /// The values of the variable, or the number.
         what: String,
     },
-    /// The operator costs more.
+    /// The operator costs more than the instance.
     #[error("{instance}: it costs {cost}, and the operator more")]
     WrongCost {
         /// The action with its arguments.
         instance: String,
-        /// In units of the metric.
+        /// Cost of the instance, in units of the metric.
         cost: String,
     },
-    /// A derived atom holds elsewhere.
+    /// The rules of a derived atom are not equivalent.
     #[error("the rules of {atom} are others")]
     WrongRules {
         /// The derived atom.
         atom: String,
     },
-    /// The witness does not hold at first, or an instance leaves it.
+    /// The witness does not contain the initial state, or an instance leaves it.
     #[error("the witness leaves out what can become of {what}")]
     Witness {
         /// An atom or a number.
         what: String,
     },
-    /// The witness says that at most one of some atoms holds, and that is not shown.
+    /// A mutex group of the witness is not proved.
     #[error("nothing shows that at most one of {atoms} holds, as the witness has it")]
     Exclusive {
-        /// The atoms.
+        /// The atoms of the group.
         atoms: String,
     },
-    /// The witness cannot be read.
+    /// The witness is malformed.
     #[error("it is not a witness: {reason}")]
     WitnessForm {
-        /// What is wrong with it.
+        /// Description of the error.
         reason: String,
     },
 }
 
-/// Why there is no answer.
+/// The reason why the check cannot decide.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum Cause {
-    /// The files or the task have what the comparison does not cover.
+    /// The files or the task contain a construct that is not supported.
     #[error("the comparison of the task with the files does not cover {construct}")]
     Unsupported {
-        /// What it is.
+        /// The construct.
         construct: String,
     },
-    /// There is too much to go through.
+    /// A limit on the size is exceeded.
     #[error("the comparison of the task with the files ends at {limit} {what}")]
     TooMany {
-        /// Of what.
+        /// The kind of the counted items.
         what: String,
-        /// How many are gone through.
+        /// The limit.
         limit: usize,
     },
-    /// It does not follow that an instance keeps the atoms of a variable exclusive.
+    /// An instance is not proved to keep the atoms of a variable exclusive.
     #[error(
         "cannot tell whether the ground task stands for the files: it takes at most one of {atoms} to hold, and neither \
          {instance} nor the witness by itself shows that this stays so; no difference was found"
@@ -122,7 +122,7 @@ pub enum Cause {
         /// The values of the variable.
         atoms: String,
     },
-    /// Time or memory was up, or the user had enough.
+    /// The time or memory limit was reached, or the user cancelled the check.
     #[error("the comparison of the task with the files was stopped")]
     Stopped,
 }
@@ -133,7 +133,7 @@ impl Cause {
     }
 }
 
-/// Why a comparison ends early.
+/// The reason for ending the check early.
 #[derive(Debug)]
 pub(super) enum Obstacle {
     Differs(Difference),

@@ -1,4 +1,5 @@
-//! Objects, what holds at first, what never changes, and what follows from the rest.
+//! The static context of the files: objects, initial state, static facts, and rules of derived
+//! predicates.
 
 use num_rational::BigRational;
 use num_traits::Zero;
@@ -17,15 +18,16 @@ pub(super) struct World<'w> {
     types: TypeHierarchy,
     symbols: FxHashMap<Name, u32>,
     names: Vec<Name>,
-    /// Objects with their types; an object may be declared more than once.
+    /// Objects with their types; an object may be declared several times.
     objects: Vec<(u32, Vec<&'w TypeExpression>)>,
     by_name: FxHashMap<u32, usize>,
     facts: FxHashSet<Key>,
-    /// The facts of a predicate that never changes, and those with an object at a place.
+    /// The facts of each predicate, and for each predicate, position and object the matching
+    /// rows.
     rows: FxHashMap<u32, Vec<Vec<u32>>>,
     rows_with: FxHashMap<(u32, usize, u32), Vec<usize>>,
     values: FxHashMap<Key, BigRational>,
-    /// Predicates and functions that some action changes.
+    /// Predicates and functions that an action changes.
     changing: FxHashSet<u32>,
     pub(super) timeline: Timeline,
     /// The rules of derived predicates.
@@ -148,7 +150,7 @@ impl<'w> World<'w> {
         Ok(())
     }
 
-    /// What is so at time 0 because of the events.
+    /// Applies the events at time 0 to the initial state.
     fn begin(&mut self) {
         if self.timeline.is_empty() {
             return;
@@ -171,7 +173,7 @@ impl<'w> World<'w> {
         self.symbols.get(name).copied().ok_or_else(|| undeclared(name))
     }
 
-    /// The object that a term stands for.
+    /// The object that a term denotes.
     pub(super) fn object(&self, term: &Term, binding: &FxHashMap<&Name, u32>) -> Result<u32, Cause> {
         self.bound(term, binding).ok_or_else(|| match term {
             Term::Variable(identifier) => Cause::unsupported(format!("{}, which is free", identifier.name)),
@@ -179,7 +181,7 @@ impl<'w> World<'w> {
         })
     }
 
-    /// The object that a term stands for, if that is known.
+    /// The object that a term denotes, if it is bound.
     pub(super) fn bound(&self, term: &Term, binding: &FxHashMap<&Name, u32>) -> Option<u32> {
         match term {
             Term::Variable(identifier) => binding.get(&identifier.name).copied(),
@@ -192,7 +194,7 @@ impl<'w> World<'w> {
         Ok((self.symbol(&atom.predicate.name)?, objects.collect::<Result<_, _>>()?))
     }
 
-    /// An atom or fluent as it is written, in small letters.
+    /// The text of an atom or fluent, in lower case.
     pub(super) fn show(&self, key: &Key) -> String {
         match (key.0, &key.1[..]) {
             (PHASE, [number]) => return format!("(the phase phase {number})"),
@@ -209,12 +211,14 @@ impl<'w> World<'w> {
         self.names.get(symbol as usize).map_or("?", Name::as_str)
     }
 
-    /// The atom or fluent that is written so, those of the timeline among them; none if no symbols of the files are.
+    /// Parses the text of an atom or fluent, including those of the timeline. Returns `None` if a
+    /// symbol is unknown.
     pub(super) fn written(&self, text: &str) -> Option<Key> {
         let phases = 0..=self.timeline.events.len();
-        let own = phases.map(timeline::phase).chain([timeline::waited(), timeline::clock()]);
-        let mut own = own.filter(|key| !self.timeline.is_empty() && self.show(key) == text);
-        own.next().or_else(|| self.of_files(text))
+        let timeline_keys = phases.map(timeline::phase).chain([timeline::waited(), timeline::clock()]);
+        let mut timeline_keys =
+            timeline_keys.filter(|key| !self.timeline.is_empty() && self.show(key) == text);
+        timeline_keys.next().or_else(|| self.of_files(text))
     }
 
     fn of_files(&self, text: &str) -> Option<Key> {
@@ -224,7 +228,7 @@ impl<'w> World<'w> {
         Some((words.next()??, words.collect::<Option<_>>()?))
     }
 
-    /// Whether actions change it; what follows from the rest does not count.
+    /// Returns `true` if actions or events change a symbol. Derived predicates do not count.
     pub(super) fn changes(&self, symbol: u32) -> bool {
         self.changing.contains(&symbol)
     }
@@ -265,11 +269,11 @@ impl<'w> World<'w> {
     }
 
     pub(super) fn objects_of(&self, wanted: &TypeExpression) -> Vec<u32> {
-        let all = self.objects.iter().map(|(object, _)| *object);
-        all.filter(|object| self.is_of(*object, wanted)).collect()
+        let objects = self.objects.iter().map(|(object, _)| *object);
+        objects.filter(|object| self.is_of(*object, wanted)).collect()
     }
 
-    /// The number of [`World::rows`].
+    /// Number of facts of [`World::rows`].
     pub(super) fn count(&self, predicate: u32, place: Option<(usize, u32)>) -> usize {
         match place {
             None => self.rows.get(&predicate).map_or(0, Vec::len),
@@ -277,14 +281,14 @@ impl<'w> World<'w> {
         }
     }
 
-    /// The facts of a predicate, or those with an object at a place.
+    /// The facts of a predicate, optionally with an object at a position.
     pub(super) fn rows(&self, predicate: u32, place: Option<(usize, u32)>) -> Vec<&Vec<u32>> {
         let Some(rows) = self.rows.get(&predicate) else { return Vec::new() };
         match place {
             None => rows.iter().collect(),
             Some((place, object)) => {
-                let found = self.rows_with.get(&(predicate, place, object));
-                found.into_iter().flatten().map(|row| &rows[*row]).collect()
+                let rows_with_object = self.rows_with.get(&(predicate, place, object));
+                rows_with_object.into_iter().flatten().map(|row| &rows[*row]).collect()
             }
         }
     }

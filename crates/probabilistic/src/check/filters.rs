@@ -1,4 +1,4 @@
-//! What a filter makes of the values in several states.
+//! Evaluates filters, which aggregate the values of several states.
 
 use fixedbitset::FixedBitSet;
 use num_bigint::BigInt;
@@ -11,7 +11,7 @@ use crate::check::vector::Vector;
 use crate::number::{Number, count};
 use crate::prism::ast::{Expr, Filter, Type};
 
-/// What came out of a filter.
+/// Result of a filter.
 #[derive(Debug, Clone)]
 pub enum Filtered {
     /// A number.
@@ -20,18 +20,18 @@ pub enum Filtered {
     Truth(bool),
     /// The least and the greatest number.
     Range(Answer, Answer),
-    /// Some states, with their values.
+    /// The values of the selected states.
     States(Vec<Listed>),
 }
 
-/// The values of what is filtered.
+/// The filtered values.
 enum Values<N> {
     Numbers(Vector<N>),
     Truth(FixedBitSet),
 }
 
 impl<N: Number> Query<'_, N> {
-    /// Applies a filter.
+    /// Evaluates a filter.
     pub fn filtered(&self, filter: Filter, inner: &Expr, states: Option<&Expr>) -> Asked<Filtered> {
         let chosen = states.map_or_else(|| Ok(self.every()), |states| self.truth(states))?;
         let values = match self.kind_of(inner)? {
@@ -74,7 +74,8 @@ impl<N: Number> Query<'_, N> {
             truth: None,
             answer: Some(vector.answer(state)),
         };
-        let all = |states: Vec<usize>| Filtered::States(states.into_iter().map(listed).collect());
+        let values_of_states =
+            |states: Vec<usize>| Filtered::States(states.into_iter().map(listed).collect());
         let is_something =
             |state: &usize| vector.infinite.contains(*state) || !vector.values[*state].is_zero();
         Ok(match filter {
@@ -85,11 +86,13 @@ impl<N: Number> Query<'_, N> {
             Filter::Average => Filtered::Number(sum(vector, chosen, chosen.count_ones(..))),
             Filter::First => Filtered::Number(vector.answer(self.first(chosen))),
             Filter::State => Filtered::Number(vector.answer(only(chosen)?)),
-            Filter::Print => all(self.sorted(chosen.ones().filter(is_something))),
-            Filter::PrintAll => all(self.sorted(chosen.ones())),
+            Filter::Print => values_of_states(self.sorted(chosen.ones().filter(is_something))),
+            Filter::PrintAll => values_of_states(self.sorted(chosen.ones())),
             Filter::ArgMin | Filter::ArgMax => {
                 let best = extreme(vector, chosen, filter == Filter::ArgMax);
-                all(self.sorted(chosen.ones().filter(|state| can_be(&vector.answer(*state), &best))))
+                values_of_states(
+                    self.sorted(chosen.ones().filter(|state| can_be(&vector.answer(*state), &best))),
+                )
             }
             Filter::Count | Filter::ForAll | Filter::Exists => {
                 return Err(refusal("Q203", "this filter takes truth values, and not numbers"));
@@ -104,7 +107,7 @@ impl<N: Number> Query<'_, N> {
         values
     }
 
-    /// States by the values of their variables.
+    /// Sorts states by the values of their variables.
     fn sorted(&self, states: impl Iterator<Item = usize>) -> Vec<usize> {
         let mut states: Vec<usize> = states.collect();
         states.sort_by_cached_key(|state| self.values_of(*state));
@@ -120,7 +123,7 @@ fn whole(number: usize) -> Answer {
     Answer::from_exact(BigRational::from(BigInt::from(number)))
 }
 
-/// The only state of a set.
+/// Returns the only state of a set, or an error.
 fn only(chosen: &FixedBitSet) -> Asked<usize> {
     let mut states = chosen.ones();
     match (states.next(), states.next()) {
@@ -129,7 +132,8 @@ fn only(chosen: &FixedBitSet) -> Asked<usize> {
     }
 }
 
-/// The least or the greatest value; its bounds enclose the true one, whichever state has it.
+/// The least or greatest value over a set of states. Its bounds enclose the true extreme,
+/// whichever state attains it.
 pub fn extreme<N: Number>(vector: &Vector<N>, chosen: &FixedBitSet, greatest: bool) -> Answer {
     let mut best: Option<Quantity> = None;
     for state in chosen.ones() {
@@ -156,7 +160,7 @@ pub fn extreme<N: Number>(vector: &Vector<N>, chosen: &FixedBitSet, greatest: bo
     best.map_or(Answer::Infinite, Answer::Finite)
 }
 
-/// Whether a value can be the best one, as far as the bounds tell.
+/// Returns `true` if a value can be the extreme one according to the bounds.
 fn can_be(answer: &Answer, best: &Answer) -> bool {
     match (answer, best) {
         (Answer::Finite(a), Answer::Finite(b)) => match (&a.exact, &b.exact) {

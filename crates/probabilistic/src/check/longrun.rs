@@ -1,7 +1,8 @@
-//! What happens for ever: states that are visited again and again, rewards without end, averages in the long run.
+//! Infinite-horizon properties: Büchi objectives, total rewards, and long-run averages.
 //!
-//! A path stays in an end component from some day on, with probability 1 (de Alfaro, "Formal Verification of
-//! Probabilistic Systems", 1997), and a policy can visit all of an end component again and again.
+//! With probability 1 a path eventually stays in an end component (de Alfaro, "Formal
+//! Verification of Probabilistic Systems", 1997), and a policy can visit all states of an end
+//! component infinitely often.
 
 use fixedbitset::FixedBitSet;
 
@@ -17,11 +18,11 @@ use crate::solve::{Direction, NONE, Problem, solve_within};
 
 /// The maximal end components of a process.
 struct Ends {
-    /// For each state the number of its end component, [`NONE`] outside.
+    /// For each state the number of its end component, or [`NONE`].
     block: Vec<u32>,
-    /// How many there are.
+    /// Number of end components.
     count: usize,
-    /// The choices that stay in them.
+    /// The choices that stay in their end component.
     alive: FixedBitSet,
 }
 
@@ -33,7 +34,7 @@ impl<N: Number> Query<'_, N> {
         }
     }
 
-    /// The probabilities of visiting some states again and again.
+    /// The probabilities of visiting some states infinitely often.
     pub fn repeatedly(&self, direction: Direction, goal: &FixedBitSet) -> Asked<Valued<N>> {
         self.no_given_policy()?;
         let mut good = FixedBitSet::with_capacity(self.mdp().states());
@@ -49,7 +50,7 @@ impl<N: Number> Query<'_, N> {
                 }
                 self.solved(self.problem(Direction::Max, None, &good)).map(without_policy)
             }
-            // The opposite: to stay away from some day on.
+            // The complement: the probability of eventually avoiding the goal forever.
             Direction::Min => {
                 let ends = end_components(self.mdp(), &inverse(goal.clone()));
                 for (state, block) in ends.block.iter().enumerate() {
@@ -61,11 +62,11 @@ impl<N: Number> Query<'_, N> {
         }
     }
 
-    /// Expected rewards that are summed for ever.
+    /// Expected total rewards.
     pub fn total(&self, direction: Direction, rewards: &[N]) -> Asked<Valued<N>> {
         self.no_given_policy()?;
         if direction == Direction::Min || self.program.kind == ModelKind::Dtmc {
-            // A sum is finite if, from some day on, nothing is paid any more.
+            // A total is finite only if rewards are eventually 0 forever.
             let free = self.free_for_ever(rewards);
             return self.solved(self.problem(Direction::Min, Some(rewards), &free)).map(without_policy);
         }
@@ -77,22 +78,22 @@ impl<N: Number> Query<'_, N> {
             infinite.set(state, pays);
         }
         reach_back(mdp, &mut infinite);
-        let merged = Merged::new(mdp, &ends, rewards, &infinite)?;
+        let merged = EcQuotient::new(mdp, &ends, rewards, &infinite)?;
         let problem = Problem::new(&merged.mdp, Direction::Max, Some(&merged.rewards), &merged.end);
         let solution = worked(solve_within(problem, None, &mut self.work.borrow_mut()))?;
-        let found = Vector::solved(solution, Span::Positive);
+        let solved = Vector::solved(solution, Span::Positive);
         let place = |state: usize| merged.place[state] as usize;
         let finite = |state: &usize| !infinite.contains(*state);
         let values = (0..mdp.states())
-            .map(|state| if finite(&state) { found.values[place(state)].clone() } else { N::zero() });
+            .map(|state| if finite(&state) { solved.values[place(state)].clone() } else { N::zero() });
         let values = values.collect();
         let errors =
-            (0..mdp.states()).map(|state| if finite(&state) { found.error(place(state)) } else { 0.0 });
+            (0..mdp.states()).map(|state| if finite(&state) { solved.error(place(state)) } else { 0.0 });
         let errors = if N::EXACT { Vec::new() } else { errors.collect() };
         Ok(Vector { values, errors, infinite, span: Span::Positive }.into())
     }
 
-    /// The states in which one can go on for ever without being paid.
+    /// The states from which a policy can avoid all rewards forever (a greatest fixpoint).
     fn free_for_ever(&self, rewards: &[N]) -> FixedBitSet {
         let mdp = self.mdp();
         let mut free = self.every();
@@ -103,29 +104,29 @@ impl<N: Number> Query<'_, N> {
                         && mdp.targets(choice).iter().all(|t| free.contains(*t as usize))
                 })
             };
-            let lost: Vec<usize> = free.ones().filter(|state| !stays(*state)).collect();
-            if lost.is_empty() {
+            let removed: Vec<usize> = free.ones().filter(|state| !stays(*state)).collect();
+            if removed.is_empty() {
                 return free;
             }
-            for state in lost {
+            for state in removed {
                 free.set(state, false);
             }
         }
     }
 
-    /// Average rewards of a step of a Markov chain in the long run.
+    /// The long-run average reward per step of a Markov chain.
     ///
-    /// In each closed component one state is chosen. From one visit of it to the next, the rewards and the steps have
-    /// expected sums, and their quotient is the average (the renewal theorem); how often each component is ended up in
-    /// is a question of reachability.
+    /// One state is chosen in each bottom component. The average is the quotient of the expected
+    /// reward and the expected number of steps between two visits of that state (renewal
+    /// theorem). The probability of each component is a reachability probability.
     pub fn long_run(&self, rewards: &[N]) -> Asked<Valued<N>> {
         self.no_given_policy()?;
         let mdp = self.mdp();
         let ends = end_components(mdp, &self.every());
         let mut chosen = FixedBitSet::with_capacity(mdp.states());
-        let mut known = vec![false; ends.count];
+        let mut is_represented = vec![false; ends.count];
         for (state, block) in ends.block.iter().enumerate() {
-            if *block != NONE && !std::mem::replace(&mut known[*block as usize], true) {
+            if *block != NONE && !std::mem::replace(&mut is_represented[*block as usize], true) {
                 chosen.insert(state);
             }
         }
@@ -168,20 +169,21 @@ fn without_policy<N>(found: Valued<N>) -> Valued<N> {
     Valued { policy: None, ..found }
 }
 
-/// Adds all states from which the set can be reached.
+/// Extends a set by all states that can reach it.
 fn reach_back<N: Number>(mdp: &Mdp<N>, set: &mut FixedBitSet) {
     loop {
         let reaches =
             |state: &usize| mdp.successors(*state).iter().any(|target| set.contains(*target as usize));
-        let more: Vec<usize> = set.zeroes().filter(reaches).collect();
-        if more.is_empty() {
+        let predecessors: Vec<usize> = set.zeroes().filter(reaches).collect();
+        if predecessors.is_empty() {
             return;
         }
-        set.extend(more);
+        set.extend(predecessors);
     }
 }
 
-/// The maximal end components within some states.
+/// The maximal end components within some states, by repeated decomposition into strongly
+/// connected components.
 fn end_components<N: Number>(mdp: &Mdp<N>, inside: &FixedBitSet) -> Ends {
     let n = mdp.states();
     let within = |choice: usize| mdp.targets(choice).iter().all(|target| inside.contains(*target as usize));
@@ -208,14 +210,14 @@ fn end_components<N: Number>(mdp: &Mdp<N>, inside: &FixedBitSet) -> Ends {
             }
         }
         let leaves = |choice: &usize| {
-            let own = component[mdp.owner(*choice)];
-            mdp.targets(*choice).iter().any(|target| component[*target as usize] != own)
+            let source = component[mdp.owner(*choice)];
+            mdp.targets(*choice).iter().any(|target| component[*target as usize] != source)
         };
-        let lost: Vec<usize> = alive.ones().filter(leaves).collect();
-        if lost.is_empty() {
+        let leaving: Vec<usize> = alive.ones().filter(leaves).collect();
+        if leaving.is_empty() {
             break;
         }
-        for choice in lost {
+        for choice in leaving {
             alive.set(choice, false);
         }
     }
@@ -234,18 +236,19 @@ fn end_components<N: Number>(mdp: &Mdp<N>, inside: &FixedBitSet) -> Ends {
     Ends { block, count, alive }
 }
 
-/// A process whose end components are single states, in which one can stop.
-struct Merged<N> {
+/// The end-component quotient: each end component becomes one state with an additional choice to
+/// stop.
+struct EcQuotient<N> {
     mdp: Mdp<N>,
     rewards: Vec<N>,
     /// For each state of the other process its number here.
     place: Vec<u32>,
-    /// Where it stops.
+    /// The state in which the process stops.
     end: FixedBitSet,
 }
 
-impl<N: Number> Merged<N> {
-    /// Leaves out the states whose value is infinite.
+impl<N: Number> EcQuotient<N> {
+    /// Computes the quotient without the states of infinite value.
     fn new(mdp: &Mdp<N>, ends: &Ends, rewards: &[N], infinite: &FixedBitSet) -> Asked<Self> {
         let mut place = vec![NONE; mdp.states()];
         let mut members: Vec<Vec<usize>> = Vec::new();
@@ -267,7 +270,7 @@ impl<N: Number> Merged<N> {
         }
         let stop = members.len();
         let mut merged = Mdp::default();
-        let mut kept = Vec::new();
+        let mut kept_rewards = Vec::new();
         for states in &members {
             for state in states {
                 for choice in mdp.choices(*state).filter(|choice| !ends.alive.contains(*choice)) {
@@ -275,22 +278,22 @@ impl<N: Number> Merged<N> {
                         merged.push_transition(place[target], probability.clone());
                     }
                     merged.end_choice(mdp.action(choice))?;
-                    kept.push(rewards[choice].clone());
+                    kept_rewards.push(rewards[choice].clone());
                 }
             }
             if states.first().is_some_and(|state| ends.block[*state] != NONE) {
                 merged.push_transition(dense(stop), N::one());
                 merged.end_choice(0)?;
-                kept.push(N::zero());
+                kept_rewards.push(N::zero());
             }
             merged.end_state();
         }
         merged.push_transition(dense(stop), N::one());
         merged.end_choice(0)?;
-        kept.push(N::zero());
+        kept_rewards.push(N::zero());
         merged.end_state();
         let mut end = FixedBitSet::with_capacity(merged.states());
         end.insert(stop);
-        Ok(Self { mdp: merged, rewards: kept, place, end })
+        Ok(Self { mdp: merged, rewards: kept_rewards, place, end })
     }
 }

@@ -1,4 +1,4 @@
-//! A model and a property to an answer: explored in fractions while the model is small, and in doubles otherwise.
+//! Checks a property of a model. Small models are explored in exact rationals, others in doubles.
 
 mod answer;
 mod ask;
@@ -38,36 +38,36 @@ pub use answer::{Answer, Listed, Outcome, Precision, Quantity};
 pub use options::{Exactness, Options};
 pub use table::{PolicyTable, Row};
 
-/// Transitions up to which a model is explored in rationals unless asked otherwise.
+/// Upper limit on the transitions of a model that is explored in rationals by default.
 const SMALL: usize = 150_000;
 
-/// What exact arithmetic may cost a model with so many transitions unless it was asked for, in units of about a nanosecond.
+/// The default budget of exact arithmetic for a model, in work units of about 1 ns.
 fn budget(transitions: usize) -> u64 {
     let transitions = u64::try_from(transitions).unwrap_or(u64::MAX);
     transitions.saturating_mul(500).max(3_000_000)
 }
 
-/// What came out.
+/// The answer to a property, with statistics.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Report {
     /// The answer.
     pub outcome: Outcome,
-    /// The variables: name, and whether it is a truth value.
+    /// The variables: name, and `true` for a Boolean variable.
     pub variables: Vec<(String, bool)>,
-    /// States.
+    /// Number of states.
     pub states: usize,
-    /// Choices in all states.
+    /// Number of choices in all states.
     pub choices: usize,
-    /// Transitions.
+    /// Number of transitions.
     pub transitions: usize,
-    /// States without choice, which got a loop.
+    /// Number of states without a choice, which got a self-loop.
     pub deadlocks: usize,
-    /// The policy, if it was wanted and there is one.
+    /// The policy, if it was requested and exists.
     pub policy: Option<PolicyTable>,
-    /// The time to explore.
+    /// Exploration time.
     pub build: Duration,
-    /// The time to solve.
+    /// Solution time.
     pub solve: Duration,
 }
 
@@ -96,8 +96,8 @@ pub fn check(model: &Model, property: &Property, options: &Options<'_>) -> Resul
 /// Checks several properties of a model, which is explored once.
 ///
 /// # Errors
-/// Everything that is wrong with model, constants or policy, or that a limit was reached. What is wrong with a single property stands
-/// in its place.
+/// An error in the model, the constants or the policy, or an exceeded limit. An error in a single
+/// property is returned in the place of its report.
 pub fn check_all<'p>(
     model: &Model,
     properties: impl IntoIterator<Item = &'p Property>,
@@ -112,11 +112,11 @@ pub fn check_all<'p>(
         .map_err(|error| blame(error, model, &joined, &options.settings))?;
     let (mut wanted, mut refused) = (Vec::new(), Vec::new());
     for property in &properties {
-        let needed = property.as_ref().map_err(Clone::clone).and_then(|property| {
-            let needed = wanted_rewards(&program.reward_names, property, options)?;
-            validate(&program, property).map(|()| needed)
+        let reward_numbers = property.as_ref().map_err(Clone::clone).and_then(|property| {
+            let reward_numbers = wanted_rewards(&program.reward_names, property, options)?;
+            validate(&program, property).map(|()| reward_numbers)
         });
-        refused.push(needed.map(|needed| wanted.extend(needed)).err());
+        refused.push(reward_numbers.map(|reward_numbers| wanted.extend(reward_numbers)).err());
     }
     if !refused.iter().any(Option::is_none) {
         return Ok(refused.into_iter().flatten().map(Err).collect());
@@ -134,9 +134,9 @@ pub fn check_all<'p>(
         let exact = Program::<Fraction>::new(&joined, &options.settings)?;
         Some(exact.with_rewards(&wanted).stopping(end.as_ref()))
     };
-    let mut found = Processes::explore(&program, exact.as_ref(), options)?;
+    let mut processes = Processes::explore(&program, exact.as_ref(), options)?;
     if options.evaluate.is_none() {
-        found.forget_numbers();
+        processes.forget_numbers();
     }
     let build = start.elapsed();
     let mut reports = Vec::new();
@@ -146,14 +146,15 @@ pub fn check_all<'p>(
             continue;
         };
         let start = Instant::now();
-        let report = found.report(&program, exact.as_ref(), property, options, &wanted);
+        let report = processes.report(&program, exact.as_ref(), property, options, &wanted);
         reports.push(report.map(|report| Report { build, solve: start.elapsed(), ..report }));
     }
     Ok(reports)
 }
 
-/// Where a property is decided, so that nothing that happens later counts; none where that depends on more than the state, or where policies
-/// are asked for or given, which go on.
+/// A condition after which a property is decided, so that exploration can stop there. Returns
+/// `None` if the decision depends on more than the state, or if a policy is requested or given,
+/// which continues after it.
 fn end_of(property: &Property, names: &Names, options: &Options<'_>) -> Option<Expr> {
     if options.policy || options.evaluate.is_some() || options.secondary.is_some() {
         return None;
@@ -171,7 +172,7 @@ fn end_of(property: &Property, names: &Names, options: &Options<'_>) -> Option<E
     is_of_states(&end, names).then_some(end)
 }
 
-/// A model with the constants and labels of a file of properties.
+/// Adds the constants and labels of a property file to a model.
 fn join(model: &Model, declarations: &Declarations) -> Model {
     let mut joined = model.clone();
     joined.constants.extend(declarations.constants.iter().cloned());
@@ -179,32 +180,36 @@ fn join(model: &Model, declarations: &Declarations) -> Model {
     joined
 }
 
-/// What is wrong with a model and with declarations besides: the declarations, if the model is fine without them.
+/// Attributes an error to the model or, if the model alone is correct, to the declarations.
 fn blame(error: Error, model: &Model, joined: &Model, settings: &Settings) -> Error {
     let Error::Model(problems) = error else { return error };
     let declared = joined.constants.len() > model.constants.len() || joined.labels.len() > model.labels.len();
     if !declared {
         return Error::Model(problems);
     }
-    let known = |name: &String| model.constants.iter().any(|constant| constant.name == *name);
-    let own: Settings =
-        settings.iter().filter(|(name, _)| known(name)).map(|(k, v)| (k.clone(), v.clone())).collect();
-    match Program::<f64>::new(model, &own) {
+    let is_model_constant = |name: &String| model.constants.iter().any(|constant| constant.name == *name);
+    let model_settings: Settings = settings
+        .iter()
+        .filter(|(name, _)| is_model_constant(name))
+        .map(|(k, v)| (k.clone(), v.clone()))
+        .collect();
+    match Program::<f64>::new(model, &model_settings) {
         Err(Error::Model(problems)) => Error::Model(problems),
         _ => Error::Property(problems),
     }
 }
 
-/// A model that was explored: exactly, in doubles, or both.
+/// An explored model, in exact arithmetic, in doubles, or both.
 struct Processes {
     exact: Option<Explored<Packed, Fraction>>,
     doubles: Option<Explored<Packed, f64>>,
-    /// What exact arithmetic may cost each property.
+    /// The budget of exact arithmetic for each property, in work units.
     budget: u64,
 }
 
 impl Processes {
-    /// Explores exactly as long as the model is small, and goes on in doubles unless exact values were asked for.
+    /// Explores in rationals while the model is small, and continues in doubles unless exact
+    /// values are requested.
     fn explore(
         program: &Program<f64>,
         exact: Option<&Program<Fraction>>,
@@ -231,19 +236,20 @@ impl Processes {
             let budget = budget(exploration.found.mdp.transition_count());
             return Ok(Self { exact: Some(exploration.found), doubles: None, budget });
         }
-        let found = match exploration.rounded() {
+        let doubles = match exploration.rounded() {
             Some(mut rounded) => {
                 drop(exploration);
                 rounded.go_on(&Remembered::new(program), bounds, usize::MAX)?;
                 rounded.found
             }
-            // Says where the number stands.
+            // The exploration in doubles reports the place of the number.
             None => explore(&Remembered::new(program), bounds)?,
         };
-        Ok(Self { exact: None, doubles: Some(found), budget: 0 })
+        Ok(Self { exact: None, doubles: Some(doubles), budget: 0 })
     }
 
-    /// Gives back what only a policy that is evaluated needs, and solving has better use for.
+    /// Frees the state index, which only policy evaluation needs, so that the solver has more
+    /// memory.
     fn forget_numbers(&mut self) {
         self.exact.iter_mut().for_each(|explored| explored.states.forget_numbers());
         self.doubles.iter_mut().for_each(|explored| explored.states.forget_numbers());
@@ -270,9 +276,9 @@ impl Processes {
                 Some(rounded.map_or_else(|| explore(&Remembered::new(program), &options.bounds), Ok)?);
         }
         let explored = self.doubles.as_ref().expect("invariant: explored just now");
-        let found = Query::new(program, explored, options, wanted, 0)?.answer(property)?;
-        let found = found.expect("invariant: doubles cost nothing");
-        let wide = options.precision.is_some_and(|precision| !found.0.is_within(precision));
+        let answer = Query::new(program, explored, options, wanted, 0)?.answer(property)?;
+        let answer = answer.expect("invariant: doubles cost nothing");
+        let wide = options.precision.is_some_and(|precision| !answer.0.is_within(precision));
         if let Some(exact) = exact.filter(|_| wide) {
             let budget = MOST.saturating_mul(10);
             if self.exact.is_none() {
@@ -283,7 +289,7 @@ impl Processes {
                 return self.report(program, Some(exact), property, options, wanted);
             }
         }
-        Ok(report(program, explored, found, options))
+        Ok(report(program, explored, answer, options))
     }
 }
 
@@ -311,7 +317,8 @@ fn report<N: Number>(
     }
 }
 
-/// The reward structures that a property and the ties of its policy need, by number.
+/// The numbers of the reward structures that a property and the tie-breaking of its policy
+/// require.
 fn wanted_rewards(names: &[String], property: &Property, options: &Options<'_>) -> Result<Vec<usize>, Error> {
     let mut wanted = Vec::new();
     let mut parts = vec![property];
@@ -337,7 +344,7 @@ fn wanted_rewards(names: &[String], property: &Property, options: &Options<'_>) 
     Ok(wanted)
 }
 
-/// What a policy does in each state that it can get to.
+/// The decisions of a policy in each state that it can reach.
 fn policy_table<N: Number>(
     program: &Program<N>,
     explored: &Explored<Packed, N>,
@@ -345,9 +352,9 @@ fn policy_table<N: Number>(
 ) -> PolicyTable {
     let names = program.variables.iter().map(|variable| (variable.name.clone(), variable.is_bool)).collect();
     let mut table = PolicyTable { variables: names, rows: Vec::new() };
-    let mut seen = vec![false; explored.mdp.states()];
+    let mut visited = vec![false; explored.mdp.states()];
     let mut queue = VecDeque::from([0_usize]);
-    seen[0] = true;
+    visited[0] = true;
     let mut values = Vec::new();
     while let Some(state) = queue.pop_front() {
         let choice = policy[state];
@@ -364,7 +371,7 @@ fn policy_table<N: Number>(
                 .expect("invariant: a choice of the state"),
         });
         for target in explored.mdp.targets(choice) {
-            if !std::mem::replace(&mut seen[*target as usize], true) {
+            if !std::mem::replace(&mut visited[*target as usize], true) {
                 queue.push_back(*target as usize);
             }
         }

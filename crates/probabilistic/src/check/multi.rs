@@ -1,4 +1,4 @@
-//! Two objectives at once.
+//! Multi-objective properties with two objectives.
 
 use crate::check::answer::{Answer, Outcome};
 use crate::check::ask::{Asked, Stop, property_error, refusal};
@@ -10,7 +10,7 @@ use crate::prism::ast::{BinaryOp, Expr, ExprKind, Path, Property, RewardPath};
 use crate::solve::Direction;
 
 impl<N: Number> Query<'_, N> {
-    /// A Pareto front, or the best value under a bound.
+    /// Returns the Pareto front, or the optimum of one objective under a bound on the other.
     pub fn multi(&self, parts: &[Property]) -> Asked<Outcome> {
         let place = Place { line: 1, column: 1 };
         let [first, second] = parts else {
@@ -110,7 +110,7 @@ fn constrained<N: Number>(found: Option<Constrained<N>>, shown: impl Fn(Bounded<
     }
 }
 
-/// Whether a property sums rewards until something is reached.
+/// Returns `true` if a reward property accumulates until a set of states is reached.
 fn reaches(path: &RewardPath) -> bool {
     matches!(path, RewardPath::Reach(_))
 }

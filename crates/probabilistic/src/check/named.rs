@@ -1,4 +1,4 @@
-//! Properties that others name, `1 - "hit"`, to the same with all written out.
+//! Replaces references to named properties, as in `1 - "hit"`, by their definitions.
 
 use std::borrow::Cow;
 
@@ -7,13 +7,13 @@ use crate::error::{Diagnostic, Error, Place};
 use crate::prism::ast::{Expr, ExprKind, Model, Path, Property, RewardPath};
 use crate::property::Declarations;
 
-/// Names that are written out in a property at most.
+/// Upper limit on the number of replaced references in a property.
 const NAMES: usize = 1000;
 
-/// A property without the names of others.
+/// Returns a property without references to named properties.
 ///
 /// # Errors
-/// One that has itself as a part, or too many of them.
+/// A circular reference, or too many references.
 pub fn written_out<'p>(
     property: &'p Property,
     model: &Model,
@@ -23,16 +23,16 @@ pub fn written_out<'p>(
         return Ok(Cow::Borrowed(property));
     }
     let mut writing = Writing { model, declarations, within: Vec::new(), written: 0, problem: None };
-    let found = writing.property(property);
-    writing.problem.map_or(Ok(Cow::Owned(found)), |problem| Err(Error::Property(problem.into())))
+    let expanded = writing.property(property);
+    writing.problem.map_or(Ok(Cow::Owned(expanded)), |problem| Err(Error::Property(problem.into())))
 }
 
 struct Writing<'a> {
     model: &'a Model,
     declarations: &'a Declarations,
-    /// The names that are being written out.
+    /// The names that are being expanded, outermost first.
     within: Vec<String>,
-    /// How many were.
+    /// Number of expanded references.
     written: usize,
     problem: Option<Diagnostic>,
 }
@@ -92,7 +92,7 @@ impl Writing<'_> {
         })
     }
 
-    /// What a name of a property stands for; none where it is a label.
+    /// The definition of a named property; `None` if the name is a label.
     fn named(&mut self, name: &str, place: Place) -> Option<ExprKind> {
         let is_label = BUILT_IN.contains(&name) || self.model.labels.iter().any(|label| label.name == name);
         if is_label || self.problem.is_some() {

@@ -1,4 +1,4 @@
-//! How a property is checked.
+//! Options of a check.
 
 use crate::check::answer::Precision;
 use crate::check::table::PolicyTable;
@@ -6,19 +6,19 @@ use crate::explore::Bounds;
 use crate::prism::Settings;
 use crate::property::Declarations;
 
-/// Whether to solve in rationals.
+/// Choice of exact or floating-point arithmetic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Exactness {
-    /// While that is cheap; the result is bounds otherwise.
+    /// Exact while that is cheap; guaranteed bounds otherwise.
     #[default]
     Auto,
-    /// Always.
+    /// Always exact.
     Always,
-    /// Never.
+    /// Never exact.
     Never,
 }
 
-/// How a property is checked. Each `with_` changes one thing.
+/// Options of a check. Each `with_` method sets one option.
 #[derive(Clone, Default)]
 #[non_exhaustive]
 pub struct Options<'a> {
@@ -26,64 +26,65 @@ pub struct Options<'a> {
     pub settings: Settings,
     /// Limits of exploration.
     pub bounds: Bounds<'a>,
-    /// Whether to solve in rationals.
+    /// Choice of arithmetic.
     pub exactness: Exactness,
-    /// The reward that breaks ties of policies; the number of steps otherwise.
+    /// The reward that breaks ties between policies; the number of steps if `None`.
     pub secondary: Option<String>,
-    /// Whether a policy is wanted.
+    /// `true` if a policy is requested.
     pub policy: bool,
-    /// A policy to evaluate, in place of the best one.
+    /// A policy to evaluate instead of an optimal one.
     pub evaluate: Option<PolicyTable>,
-    /// How wide bounds may be: where they are wider in doubles, the model is solved in rationals unless that was excluded.
+    /// Required width of bounds. If the bounds in doubles are wider, the model is solved in
+    /// rationals unless that was excluded.
     pub precision: Option<Precision>,
-    /// Constants and labels besides those of the model.
+    /// Constants and labels in addition to those of the model.
     pub declarations: Declarations,
 }
 
 impl<'a> Options<'a> {
-    /// The values of all constants that are set from outside.
+    /// Sets the values of all undefined constants.
     #[must_use]
     pub fn with_settings(self, settings: Settings) -> Self {
         Self { settings, ..self }
     }
 
-    /// Limits of exploration.
+    /// Sets the limits of exploration.
     #[must_use]
     pub fn with_bounds(self, bounds: Bounds<'a>) -> Self {
         Self { bounds, ..self }
     }
 
-    /// Whether to solve in rationals.
+    /// Sets the choice of arithmetic.
     #[must_use]
     pub fn with_exactness(self, exactness: Exactness) -> Self {
         Self { exactness, ..self }
     }
 
-    /// The reward that breaks ties of policies; `None` for the number of steps.
+    /// Sets the reward that breaks ties between policies; `None` for the number of steps.
     #[must_use]
     pub fn with_secondary(self, reward: impl Into<Option<String>>) -> Self {
         Self { secondary: reward.into(), ..self }
     }
 
-    /// Whether a policy is wanted.
+    /// Requests a policy.
     #[must_use]
     pub fn with_policy(self, policy: bool) -> Self {
         Self { policy, ..self }
     }
 
-    /// A policy to evaluate; `None` for the best one.
+    /// Sets a policy to evaluate; `None` for an optimal one.
     #[must_use]
     pub fn with_evaluation(self, policy: impl Into<Option<PolicyTable>>) -> Self {
         Self { evaluate: policy.into(), ..self }
     }
 
-    /// How wide bounds may be; `None` for as wide as they come.
+    /// Sets the required width of bounds; `None` for no requirement.
     #[must_use]
     pub fn with_precision(self, precision: impl Into<Option<Precision>>) -> Self {
         Self { precision: precision.into(), ..self }
     }
 
-    /// Constants and labels besides those of the model.
+    /// Sets the constants and labels in addition to those of the model.
     #[must_use]
     pub fn with_declarations(self, declarations: Declarations) -> Self {
         Self { declarations, ..self }

@@ -1,4 +1,4 @@
-//! A property and an explored model to an outcome, in one kind of number.
+//! Evaluates a property on an explored model, in one kind of number.
 
 use fixedbitset::FixedBitSet;
 use num_rational::BigRational;
@@ -15,11 +15,11 @@ use crate::number::Number;
 use crate::prism::ast::{BinaryOp, Filter, ModelKind, Property, Question, Type};
 use crate::solve::Direction;
 
-/// An outcome, and the policy that has it.
+/// An outcome and a policy that attains it.
 pub type Found = (Outcome, Option<Vec<u32>>);
 
 impl<N: Number> Query<'_, N> {
-    /// Answers a property; none where exact arithmetic takes too long.
+    /// Evaluates a property. Returns `None` if exact arithmetic exceeds its budget.
     pub fn answer(&self, property: &Property) -> Result<Option<Found>, Error> {
         match self.outcome(property) {
             Ok(found) => Ok(Some(found)),
@@ -72,9 +72,9 @@ impl<N: Number> Query<'_, N> {
                 let mdp = self.mdp();
                 let paid = (0..mdp.choice_count())
                     .map(|choice| if holds.contains(mdp.owner(choice)) { N::one() } else { N::zero() });
-                let mut found = self.long_run(&paid.collect::<Vec<_>>())?;
-                found.vector.span = Span::Probability;
-                Ok(found)
+                let mut averages = self.long_run(&paid.collect::<Vec<_>>())?;
+                averages.vector.span = Span::Probability;
+                Ok(averages)
             }
             Property::SteadyState(..) => {
                 Err(refusal("Q403", "`S` is handled for Markov chains, and not for decision processes"))
@@ -83,7 +83,7 @@ impl<N: Number> Query<'_, N> {
         }
     }
 
-    /// The values of a property that is part of another one.
+    /// The values of a nested property.
     pub fn property_numbers(&self, property: &Property) -> Asked<Vector<N>> {
         match property {
             Property::Expression(inner) => self.numbers(inner),
@@ -113,7 +113,7 @@ impl<N: Number> Query<'_, N> {
         vector
     }
 
-    /// The states in which a property that is part of another one holds.
+    /// The states in which a nested property holds.
     pub fn property_truth(&self, property: &Property) -> Asked<FixedBitSet> {
         let n = self.mdp().states();
         match property {
@@ -122,12 +122,12 @@ impl<N: Number> Query<'_, N> {
                 Err(refusal("Q403", "a filter that is part of a property must have one value"))
             }
             Property::Filter(filter, inner, states) => {
-                let mut found = FixedBitSet::with_capacity(n);
+                let mut satisfying = FixedBitSet::with_capacity(n);
                 let Filtered::Truth(holds) = self.filtered(*filter, inner, states.as_ref())? else {
                     return Err(refusal("Q203", "a truth value is needed here, not a number"));
                 };
-                found.set_range(.., holds);
-                Ok(found)
+                satisfying.set_range(.., holds);
+                Ok(satisfying)
             }
             _ if is_number(property) => Err(refusal("Q203", "a truth value is needed here, not a number")),
             Property::Probability(question, _)
@@ -136,18 +136,18 @@ impl<N: Number> Query<'_, N> {
                 let Some((op, bound)) = &question.bound else { return Err(undecided()) };
                 let bound = self.constant(bound)?;
                 let vector = self.valued(property)?.vector;
-                let mut found = FixedBitSet::with_capacity(n);
+                let mut satisfying = FixedBitSet::with_capacity(n);
                 for state in 0..n {
-                    found.set(state, holds(&vector, state, *op, &bound).ok_or_else(undecided)?);
+                    satisfying.set(state, holds(&vector, state, *op, &bound).ok_or_else(undecided)?);
                 }
-                Ok(found)
+                Ok(satisfying)
             }
             Property::Refused(problem) => Err(Error::Property(problem.clone().into()).into()),
             Property::Multi(_) => Err(refusal("Q403", "`multi` cannot be a part of another property")),
         }
     }
 
-    /// Least or greatest: as it is asked, or as the bound needs it for all policies.
+    /// The optimisation direction: as requested, or the worst case of a bound over all policies.
     fn direction(&self, question: &Question) -> Asked<Direction> {
         match (question.direction, &question.bound) {
             (Some(direction), _) => Ok(direction),
@@ -180,7 +180,7 @@ impl<N: Number> Query<'_, N> {
         })
     }
 
-    /// The value where it starts; the range of values, if it can start in several states.
+    /// The value in the initial state, or the range of values over several initial states.
     fn of_starts(&self, vector: &Vector<N>) -> Outcome {
         if self.explored.starts == 1 {
             return Outcome::Value(vector.answer(0));
@@ -192,7 +192,8 @@ impl<N: Number> Query<'_, N> {
     }
 }
 
-/// Whether the value of a state keeps a bound; none where the bounds on the value do not tell.
+/// Returns whether the value of a state satisfies a bound; `None` if its enclosure does not
+/// decide.
 fn holds<N: Number>(vector: &Vector<N>, state: usize, op: BinaryOp, bound: &BigRational) -> Option<bool> {
     match vector.ends(state) {
         None => Some(compare(op, std::cmp::Ordering::Greater)),

@@ -1,4 +1,4 @@
-//! Paths, and rewards along them, to the values of all states.
+//! Computes the values of path formulas and of rewards in all states.
 
 use fixedbitset::FixedBitSet;
 use num_traits::ToPrimitive;
@@ -12,10 +12,10 @@ use crate::policy::with_secondary;
 use crate::prism::ast::{ModelKind, Path, RewardPath, StepBound, Steps};
 use crate::solve::{Direction, Problem, Solution, draft, solve_within};
 
-/// Fewer steps than this are counted one by one.
+/// Upper limit on step bounds.
 const STEPS: u32 = 1_000_000_000;
 
-/// Values, and a policy that has them where there is one that can be written.
+/// Values, and a policy that attains them if a memoryless one exists.
 #[derive(Debug)]
 pub struct Valued<N> {
     pub vector: Vector<N>,
@@ -28,7 +28,7 @@ impl<N> From<Vector<N>> for Valued<N> {
     }
 }
 
-/// Numbers of steps: at least, and at most where there is a bound.
+/// A step interval; `most` is `None` without an upper bound.
 #[derive(Debug, Clone, Copy)]
 pub struct Range {
     pub least: u32,
@@ -40,7 +40,7 @@ pub fn opposite(direction: Direction) -> Direction {
 }
 
 impl<N: Number> Query<'_, N> {
-    /// The least or greatest probabilities of a path.
+    /// The minimal or maximal probabilities of a path formula.
     pub fn path(&self, direction: Direction, path: &Path) -> Asked<Valued<N>> {
         let n = self.mdp().states();
         match path {
@@ -48,20 +48,20 @@ impl<N: Number> Query<'_, N> {
             Path::Not(inner) => Ok(complement(self.path(opposite(direction), inner)?)),
             Path::Next(goal) => {
                 let values = Vector::<N>::indicator(&self.truth(goal)?, n).values;
-                let none = FixedBitSet::with_capacity(n);
-                let found = self.stepped(self.problem(direction, None, &none), values, 1)?;
-                Ok(Vector::stepped(found, Span::Probability).into())
+                let no_states = FixedBitSet::with_capacity(n);
+                let stepped = self.stepped(self.problem(direction, None, &no_states), values, 1)?;
+                Ok(Vector::stepped(stepped, Span::Probability).into())
             }
             Path::Until(left, right, steps) => {
                 self.until(direction, &self.truth(left)?, &self.truth(right)?, steps.as_deref())
             }
             Path::Globally(goal, steps) => {
-                let all = self.every();
+                let every_state = self.every();
                 let bad = inverse(self.truth(goal)?);
-                Ok(complement(self.until(opposite(direction), &all, &bad, steps.as_deref())?))
+                Ok(complement(self.until(opposite(direction), &every_state, &bad, steps.as_deref())?))
             }
             Path::WeakUntil(left, right, steps) => {
-                // Not: the left one, without the right one, until neither holds.
+                // The complement: `left` without `right` holds until neither of them holds.
                 let (left, right) = (self.truth(left)?, inverse(self.truth(right)?));
                 let (mut keep, mut bad) = (left.clone(), inverse(left));
                 keep.intersect_with(&right);
@@ -80,7 +80,7 @@ impl<N: Number> Query<'_, N> {
         }
     }
 
-    /// The probabilities of reaching a state of `right`, through states of `left` only, in the number of steps that is asked for.
+    /// The probabilities of reaching `right` through states of `left`, within the step bounds.
     fn until(
         &self,
         direction: Direction,
@@ -101,14 +101,14 @@ impl<N: Number> Query<'_, N> {
             None => self.solved(problem)?.vector,
             Some(most) => {
                 let values = Vector::<N>::indicator(right, self.mdp().states()).values;
-                let found = self.stepped(problem, values, most.saturating_sub(least))?;
-                Vector::stepped(found, Span::Probability)
+                let stepped = self.stepped(problem, values, most.saturating_sub(least))?;
+                Vector::stepped(stepped, Span::Probability)
             }
         };
         if least == 0 {
             return Ok(then.into());
         }
-        // Before, the left one has to hold, whether the right one does or not.
+        // Before the lower step bound, `left` must hold, regardless of `right`.
         let (none, outside) = (FixedBitSet::with_capacity(left.len()), inverse(left.clone()));
         let before = Problem { blocked: Some(&outside), ..self.problem(direction, None, &none) };
         let errors = then.errors;
@@ -116,17 +116,17 @@ impl<N: Number> Query<'_, N> {
         for state in outside.ones() {
             values[state] = N::zero();
         }
-        let found = self.stepped(before, values, least.saturating_sub(1))?;
-        let mut vector = Vector::stepped(found, Span::Probability);
+        let stepped = self.stepped(before, values, least.saturating_sub(1))?;
+        let mut vector = Vector::stepped(stepped, Span::Probability);
         let first = errors.iter().fold(0.0_f64, |most, error| most.max(*error));
         for (error, value) in vector.errors.iter_mut().zip(&vector.values) {
-            // The first step rounds, too.
+            // The first step also rounds.
             *error += first + 64.0 * f64::EPSILON * value.to_f64();
         }
         Ok(vector.into())
     }
 
-    /// The numbers of steps that a path may have.
+    /// The step interval of a bounded operator.
     fn span(&self, steps: &Steps) -> Asked<Range> {
         let least = match &steps.least {
             None => 0,
@@ -141,14 +141,14 @@ impl<N: Number> Query<'_, N> {
         Ok(Range { least, most: Some(most) })
     }
 
-    /// The number of a bound from above.
+    /// The value of an upper step bound.
     fn at_most(&self, bound: &StepBound) -> Asked<u32> {
         self.limit(bound, 0_i8.saturating_sub(i8::from(bound.strict)))
     }
 
-    /// The number of a bound, and a little more or less.
+    /// The value of a step bound plus `more`.
     fn limit(&self, bound: &StepBound, more: i8) -> Asked<u32> {
-        // It is whole, which `validate` has seen to.
+        // `validate` has checked that the bound is an integer.
         let limit = self.constant(&bound.limit)?.to_integer() + more;
         Ok(limit.to_u32().filter(|most| *most < STEPS).ok_or_else(|| {
             let text = "the number of steps must be at least 0 and below 10^9";
@@ -156,10 +156,10 @@ impl<N: Number> Query<'_, N> {
         })?)
     }
 
-    /// Expected rewards.
+    /// Expected rewards of a reward formula.
     pub fn reward(&self, direction: Direction, name: Option<&str>, path: &RewardPath) -> Asked<Valued<N>> {
         let n = self.mdp().states();
-        let none = FixedBitSet::with_capacity(n);
+        let no_states = FixedBitSet::with_capacity(n);
         match path {
             RewardPath::Reach(goal) => {
                 let terminal = self.truth(goal)?;
@@ -167,15 +167,15 @@ impl<N: Number> Query<'_, N> {
             }
             RewardPath::Steps(bound) => {
                 let limit = self.at_most(bound)?;
-                let problem = self.problem(direction, Some(self.rewards(name)?), &none);
-                let found = self.stepped(problem, vec![N::zero(); n], limit)?;
-                Ok(Vector::stepped(found, Span::Positive).into())
+                let problem = self.problem(direction, Some(self.rewards(name)?), &no_states);
+                let stepped = self.stepped(problem, vec![N::zero(); n], limit)?;
+                Ok(Vector::stepped(stepped, Span::Positive).into())
             }
             RewardPath::Instant(limit) => {
                 let limit = self.at_most(&StepBound { limit: limit.clone(), strict: false })?;
                 let values = self.state_rewards(name)?;
-                let found = self.stepped(self.problem(direction, None, &none), values, limit)?;
-                Ok(Vector::stepped(found, Span::Positive).into())
+                let stepped = self.stepped(self.problem(direction, None, &no_states), values, limit)?;
+                Ok(Vector::stepped(stepped, Span::Positive).into())
             }
             RewardPath::Total => self.total(direction, self.rewards(name)?),
             RewardPath::LongRun if self.program.kind == ModelKind::Dtmc => self.long_run(self.rewards(name)?),
@@ -185,7 +185,7 @@ impl<N: Number> Query<'_, N> {
         }
     }
 
-    /// The least or greatest value after so many steps, or that of the policy that was given.
+    /// The optimal values after `steps` steps, or those of the given policy.
     fn stepped(&self, problem: Problem<'_, N>, values: Vec<N>, steps: u32) -> Asked<steps::Stepped<N>> {
         let problem = Problem { allowed: self.given.as_ref(), ..problem };
         worked(steps::apply(problem, values, steps, &mut self.work.borrow_mut()))
@@ -200,7 +200,7 @@ impl<N: Number> Query<'_, N> {
         Problem::new(self.mdp(), direction, rewards, terminal)
     }
 
-    /// Solves a problem, or evaluates the policy that was given; breaks the ties of the policy.
+    /// Solves a problem or evaluates the given policy, and breaks ties between optimal choices.
     pub fn solved(&self, problem: Problem<'_, N>) -> Asked<Valued<N>> {
         let span = if problem.rewards.is_none() { Span::Probability } else { Span::Positive };
         let problem = Problem { allowed: self.given.as_ref(), ..problem };
@@ -220,7 +220,8 @@ impl<N: Number> Query<'_, N> {
         Ok(Valued { vector: Vector::solved(solution, span), policy: Some(policy) })
     }
 
-    /// Solves a problem, from a policy that is good in doubles where arithmetic is exact.
+    /// Solves a problem. In exact arithmetic, policy iteration starts from an optimal policy in
+    /// doubles.
     fn solve_hinted(&self, problem: Problem<'_, N>) -> Option<Solution<N>> {
         let doubles = self.doubles.as_ref().filter(|_| problem.allowed.is_none());
         let hint = doubles.and_then(|mdp| {
@@ -233,12 +234,12 @@ impl<N: Number> Query<'_, N> {
     }
 }
 
-/// The probabilities of the opposite; a policy that is best for one is best for the other.
+/// The complementary probabilities; an optimal policy for one objective is optimal for the other.
 fn complement<N: Number>(found: Valued<N>) -> Valued<N> {
     Valued { vector: found.vector.complement(), policy: found.policy }
 }
 
-/// All other states.
+/// The complement of a set of states.
 pub fn inverse(mut set: FixedBitSet) -> FixedBitSet {
     set.toggle_range(..);
     set

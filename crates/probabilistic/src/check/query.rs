@@ -1,4 +1,4 @@
-//! A model that was explored, and how it is asked.
+//! The context of a query: an explored model, options and work budget.
 
 use std::cell::RefCell;
 
@@ -15,28 +15,28 @@ use crate::policy::choices_of;
 use crate::prism::{Packed, Program};
 use crate::solve::Work;
 
-/// What a query needs.
+/// The context of a query.
 pub struct Query<'a, N> {
     pub program: &'a Program<N>,
     pub explored: &'a Explored<Packed, N>,
     pub options: &'a Options<'a>,
-    /// The numbers of the reward structures that were computed.
+    /// The numbers of the computed reward structures.
     pub wanted: &'a [usize],
-    /// The process in doubles, to find a policy to start from.
+    /// The process in doubles, for computing an initial policy.
     pub doubles: Option<Mdp<f64>>,
-    /// What exact arithmetic may still cost.
+    /// The remaining budget of exact arithmetic.
     pub work: RefCell<Work>,
-    /// The choices of the policy that is evaluated.
+    /// The choices of the evaluated policy.
     pub given: Option<FixedBitSet>,
 }
 
-/// The number of a reward structure.
+/// Returns the number of a reward structure.
 pub fn structure(names: &[String], name: Option<&str>) -> Result<usize, Error> {
-    let found = match name {
+    let number = match name {
         None => (!names.is_empty()).then_some(0),
         Some(name) => names.iter().position(|known| known == name),
     };
-    found.ok_or_else(|| {
+    number.ok_or_else(|| {
         let text = match name {
             Some(name) => format!("there are no rewards `\"{name}\"`; there are: {}", names.join(", ")),
             None => "the model has no rewards".to_owned(),
@@ -46,10 +46,10 @@ pub fn structure(names: &[String], name: Option<&str>) -> Result<usize, Error> {
 }
 
 impl<'a, N: Number> Query<'a, N> {
-    /// What there is to be asked of a process, within a budget of exact arithmetic.
+    /// Creates a query with a budget of exact arithmetic.
     ///
     /// # Errors
-    /// The policy that is to be evaluated is one of another model.
+    /// The policy to evaluate belongs to another model.
     pub fn new(
         program: &'a Program<N>,
         explored: &'a Explored<Packed, N>,
@@ -80,7 +80,7 @@ impl<'a, N: Number> Query<'a, N> {
         Ok(&self.explored.rewards[at])
     }
 
-    /// The rewards of the states alone.
+    /// The state rewards of a structure, without transition rewards.
     pub fn state_rewards(&self, name: Option<&str>) -> Asked<Vec<N>> {
         let number = structure(&self.program.reward_names, name)?;
         let mut values = Vec::new();

@@ -1,4 +1,4 @@
-//! Expressions of properties to the states in which they hold, and to numbers, with properties in them.
+//! Evaluates state formulas and numeric expressions with nested properties.
 
 use fixedbitset::FixedBitSet;
 use num_rational::BigRational;
@@ -12,10 +12,10 @@ use crate::number::{Number, enclosing};
 use crate::prism::ast::{BinaryOp, Expr, ExprKind, Property, Type};
 use crate::prism::{Code, Names};
 
-/// The names of sets of states that are worked out before an expression; nothing in a text has such a name.
+/// Prefix of the names of precomputed state sets; no name in a text has it.
 const PREFIX: &str = "#";
 
-/// Whether a property has a number as its value.
+/// Returns `true` if the value of a property is a number.
 pub fn is_number(property: &Property) -> bool {
     use crate::prism::ast::Filter;
     match property {
@@ -33,7 +33,7 @@ pub fn is_number(property: &Property) -> bool {
     }
 }
 
-/// Whether an expression has a property with a number in it, and is itself not a truth value.
+/// Returns `true` if an expression contains a numeric property and is itself numeric.
 fn is_numeric(expression: &Expr) -> bool {
     match &expression.kind {
         ExprKind::Property(property) => is_number(property),
@@ -49,15 +49,15 @@ fn is_comparison(op: BinaryOp) -> bool {
     !op.is_arithmetic() && !matches!(op, BinaryOp::And | BinaryOp::Or | BinaryOp::Implies | BinaryOp::Iff)
 }
 
-/// The labels that are known without declaration.
+/// The predefined labels.
 pub const BUILT_IN: [&str; 2] = ["init", "deadlock"];
 
-/// Whether a label is one of those that are known without declaration, and is not declared.
+/// Returns `true` if a label is predefined and not declared.
 pub fn is_built_in(label: &str, names: &Names) -> bool {
     BUILT_IN.contains(&label) && names.label(label).is_none()
 }
 
-/// The same with truth values and numbers in the place of properties, for its type.
+/// Replaces nested properties by constants of their type, for type checking.
 pub fn with_placeholders(expression: &Expr, names: &Names) -> Expr {
     expression.rewrite(&mut |part| match &part.kind {
         ExprKind::Property(property) if is_number(property) => {
@@ -69,7 +69,7 @@ pub fn with_placeholders(expression: &Expr, names: &Names) -> Expr {
             Some(Expr { kind: ExprKind::Bool(true), place: part.place })
         }
         ExprKind::Label(label) => {
-            // Labels of a file of properties may use those that are built in.
+            // Labels of a property file may use predefined labels.
             let inner = names.label(label).filter(|inner| mentions_built_in(inner, names))?;
             Some(with_placeholders(inner, names))
         }
@@ -77,65 +77,66 @@ pub fn with_placeholders(expression: &Expr, names: &Names) -> Expr {
     })
 }
 
-/// Whether it depends on nothing but the values of variables, whatever is explored.
+/// Returns `true` if an expression depends only on the values of variables.
 pub fn is_of_states(expression: &Expr, names: &Names) -> bool {
-    let mut found = true;
+    let mut depends_on_variables_only = true;
     let _ = expression.rewrite(&mut |part| {
         match &part.kind {
-            ExprKind::Property(_) | ExprKind::Temporal(_) => found = false,
-            ExprKind::Label(label) if is_built_in(label, names) => found = false,
+            ExprKind::Property(_) | ExprKind::Temporal(_) => depends_on_variables_only = false,
+            ExprKind::Label(label) if is_built_in(label, names) => depends_on_variables_only = false,
             ExprKind::Label(label) => {
-                found &= names.label(label).is_some_and(|inner| is_of_states(inner, names));
+                depends_on_variables_only &=
+                    names.label(label).is_some_and(|inner| is_of_states(inner, names));
             }
             _ => {}
         }
         None
     });
-    found
+    depends_on_variables_only
 }
 
 fn mentions_built_in(expression: &Expr, names: &Names) -> bool {
-    let mut found = false;
+    let mut is_mentioned = false;
     let _ = expression.rewrite(&mut |part| {
-        found |= matches!(&part.kind, ExprKind::Label(label) if is_built_in(label, names));
-        found |= matches!(&part.kind, ExprKind::Property(_));
+        is_mentioned |= matches!(&part.kind, ExprKind::Label(label) if is_built_in(label, names));
+        is_mentioned |= matches!(&part.kind, ExprKind::Property(_));
         None
     });
-    found
+    is_mentioned
 }
 
 impl<N: Number> Query<'_, N> {
-    /// The type of an expression with properties in it.
+    /// The type of an expression with nested properties.
     pub fn kind_of(&self, expression: &Expr) -> Asked<Type> {
         let names = &self.program.names;
-        let found = names.clone().compile(&with_placeholders(expression, names));
-        found.map(|(_, kind)| kind).map_err(|problem| Stop::Wrong(Error::Property(problem.into())))
+        let compiled = names.clone().compile(&with_placeholders(expression, names));
+        compiled.map(|(_, kind)| kind).map_err(|problem| Stop::Wrong(Error::Property(problem.into())))
     }
 
-    /// All states.
+    /// The set of all states.
     pub fn every(&self) -> FixedBitSet {
-        let mut all = FixedBitSet::with_capacity(self.mdp().states());
-        all.insert_range(..);
-        all
+        let mut states = FixedBitSet::with_capacity(self.mdp().states());
+        states.insert_range(..);
+        states
     }
 
-    /// The states in which an expression holds.
+    /// The set of states in which an expression holds.
     pub fn truth(&self, expression: &Expr) -> Asked<FixedBitSet> {
         let (code, sets) = self.prepared(expression, Type::Bool)?;
         let n = self.mdp().states();
-        let mut found = FixedBitSet::with_capacity(n);
+        let mut satisfying = FixedBitSet::with_capacity(n);
         let mut values = Vec::new();
         for (number, state) in self.explored.states.iter().enumerate() {
             self.program.unpack(state, &mut values);
             values.extend(sets.iter().map(|set| i64::from(set.contains(number))));
             let holds =
                 code.holds(&values).map_err(|fault| property_error("Q303", expression.place, fault.0))?;
-            found.set(number, holds);
+            satisfying.set(number, holds);
         }
-        Ok(found)
+        Ok(satisfying)
     }
 
-    /// An expression as code, and the sets of states that its last variables stand for.
+    /// Compiles an expression. Also returns the state sets of its additional variables.
     fn prepared(&self, expression: &Expr, kind: Type) -> Asked<(Code, Vec<FixedBitSet>)> {
         let mut sets = Vec::new();
         let mut stopped = None;
@@ -159,7 +160,7 @@ impl<N: Number> Query<'_, N> {
         Ok((code, sets))
     }
 
-    /// The same with names of sets of states in the place of what is not an expression of the model.
+    /// Replaces subexpressions that are not expressions of the model by names of state sets.
     fn with_sets(&self, expression: &Expr, sets: &mut Vec<FixedBitSet>, stopped: &mut Option<Stop>) -> Expr {
         expression.rewrite(&mut |part| {
             let set = match &part.kind {
@@ -193,25 +194,27 @@ impl<N: Number> Query<'_, N> {
 
     fn built_in(&self, label: &str) -> FixedBitSet {
         let mdp = self.mdp();
-        let mut found = FixedBitSet::with_capacity(mdp.states());
+        let mut labelled = FixedBitSet::with_capacity(mdp.states());
         if label == "init" {
-            found.insert_range(..self.explored.starts);
-            return found;
+            labelled.insert_range(..self.explored.starts);
+            return labelled;
         }
         for state in 0..mdp.states() {
-            found.set(state, mdp.choices(state).any(|choice| mdp.action(choice) == DEADLOCK));
+            labelled.set(state, mdp.choices(state).any(|choice| mdp.action(choice) == DEADLOCK));
         }
-        found
+        labelled
     }
 
     /// The states in which a comparison of numbers holds.
     fn compared(&self, op: BinaryOp, left: &Expr, right: &Expr) -> Asked<FixedBitSet> {
         let (left, right) = (self.numbers(left)?, self.numbers(right)?);
-        let mut found = FixedBitSet::with_capacity(self.mdp().states());
+        let mut satisfying = FixedBitSet::with_capacity(self.mdp().states());
         for state in 0..self.mdp().states() {
             let order = |a: &BigRational, b: &BigRational| compare(op, a.cmp(b));
             let holds = match (left.ends(state), right.ends(state)) {
                 (Some((a, b)), Some((c, d))) => {
+                    // Decided if all corners of the two enclosures agree; equality also requires
+                    // points or disjoint enclosures.
                     let corners = [order(&a, &c), order(&a, &d), order(&b, &c), order(&b, &d)];
                     let equal = matches!(op, BinaryOp::Equal | BinaryOp::NotEqual) && (a != b || c != d);
                     let apart = b < c || d < a;
@@ -222,9 +225,9 @@ impl<N: Number> Query<'_, N> {
                 (Some(_), None) => Some(compare(op, std::cmp::Ordering::Less)),
                 (None, None) => Some(compare(op, std::cmp::Ordering::Equal)),
             };
-            found.set(state, holds.ok_or_else(undecided)?);
+            satisfying.set(state, holds.ok_or_else(undecided)?);
         }
-        Ok(found)
+        Ok(satisfying)
     }
 
     /// The values of an expression in all states.
@@ -295,7 +298,7 @@ pub fn compare(op: BinaryOp, order: std::cmp::Ordering) -> bool {
     }
 }
 
-/// Arithmetic state by state. Errors are those of the operands and of the operation.
+/// Combines values state by state. The errors include those of the operands and of the operation.
 fn joined<N: Number>(op: BinaryOp, left: &Vector<N>, right: &Vector<N>, at: &Expr) -> Asked<Vector<N>> {
     let wrong = |text: &str| Stop::Wrong(property_error("Q303", at.place, text));
     let mut vector = Vector::exactly(Vec::with_capacity(left.values.len()), Span::Any);

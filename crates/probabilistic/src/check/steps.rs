@@ -1,34 +1,35 @@
-//! Values after a bounded number of steps: repeated application of the equations.
+//! Step-bounded values by value iteration: repeated application of the Bellman operator.
 
 use crate::number::{Number, count};
 use crate::solve::{Direction, Problem, Work};
 
-/// Products of positive doubles below lose digits; values that are made of them are off by no more than this.
-const TINY: f64 = 1e-280;
+/// Underflow threshold: products of positive doubles below it lose precision. It bounds the
+/// resulting absolute error.
+const UNDERFLOW_THRESHOLD: f64 = 1e-280;
 
-/// Values after some steps.
+/// Values after a bounded number of steps.
 pub struct Stepped<N> {
-    /// For each state its value.
+    /// The value of each state.
     pub values: Vec<N>,
-    /// How far they can be from the truth, relative to each.
+    /// Upper limit on the relative error of each value.
     pub relative: f64,
-    /// Whether products became too small for doubles.
+    /// `true` if a product was below the underflow threshold.
     pub lost: bool,
 }
 
 impl<N: Number> Stepped<N> {
-    /// How far the value of a state can be from the truth.
+    /// Upper limit on the absolute error of the value of a state.
     pub fn error(&self, state: usize) -> f64 {
         let value = self.values[state].to_f64();
-        value * self.relative + if self.lost { TINY } else { 0.0 }
+        value * self.relative + if self.lost { UNDERFLOW_THRESHOLD } else { 0.0 }
     }
 }
 
-/// Applies the equations of all states so many times, starting with `values`. Those of the states at which the problem ends
-/// do not change. None where exact arithmetic takes too long.
+/// Applies the Bellman operator `steps` times, starting with `values`. The values of terminal
+/// states do not change. Returns `None` if exact arithmetic exceeds its budget.
 ///
-/// All that is added and multiplied is positive, so that each step makes the error of a value a little greater, relative to
-/// that value.
+/// All operands are nonnegative, so each step increases the relative error of a value by a
+/// bounded amount.
 pub fn apply<N: Number>(
     problem: Problem<'_, N>,
     mut values: Vec<N>,
@@ -48,7 +49,7 @@ pub fn apply<N: Number>(
                     .transitions(choice)
                     .fold(start, |sum, (target, p)| sum.plus(&p.times(&values[target])));
                 lost |= !N::EXACT
-                    && value.to_f64() < TINY
+                    && value.to_f64() < UNDERFLOW_THRESHOLD
                     && mdp.targets(choice).iter().any(|target| !values[*target as usize].is_zero());
                 work.spend(&value, mdp.targets(choice).len())?;
                 let better = best.as_ref().is_none_or(|best| match problem.direction {
@@ -69,7 +70,7 @@ pub fn apply<N: Number>(
             break;
         }
     }
-    // Values that settle may do so because of rounding, so that all steps count.
+    // Values may become stationary by rounding, so the error counts all steps.
     let relative = if N::EXACT { 0.0 } else { f64::from(steps) * (count(widest) + 4.0) * f64::EPSILON };
     Some(Stepped { values, relative, lost })
 }

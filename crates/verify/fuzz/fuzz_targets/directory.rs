@@ -1,8 +1,9 @@
-//! The directory of a certificate as a whole: the bytes decide which certificate is changed, and how. The verifier must answer
-//! within a stack of 8 MB, as the program has it, and within the memory that `-rss_limit_mb` gives.
+//! Fuzzes a certificate directory: the bytes select a certificate and its mutations. The verifier
+//! must answer within a stack of 8 MB, the stack of the program, and within the memory limit
+//! `-rss_limit_mb`.
 //!
-//! The certificates are those of `crates/verify/tests/certificates`, and those in the folder that `METAPLAN_CERTIFICATES` names: there
-//! can be missions with knowledge bases among them.
+//! The certificates are those of `crates/verify/tests/certificates` and of the folder named by
+//! `METAPLAN_CERTIFICATES`, which may contain missions with knowledge bases.
 
 #![no_main]
 
@@ -17,21 +18,21 @@ use libfuzzer_sys::fuzz_target;
 use metaplan_verify::{Verifier, json};
 use mutate::{Draw, Files, certificates, mutate, write};
 
-/// The stack of the verification, in bytes.
+/// The stack size of the verification, in bytes.
 const STACK: usize = 8 << 20;
 
 static CERTIFICATES: OnceLock<Vec<Files>> = OnceLock::new();
 
 fuzz_target!(|bytes: &[u8]| {
-    let all = CERTIFICATES.get_or_init(|| {
-        let mut all = certificates(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/certificates"));
+    let corpus = CERTIFICATES.get_or_init(|| {
+        let mut certificates_and_files = certificates(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/certificates"));
         if let Some(folder) = std::env::var_os("METAPLAN_CERTIFICATES") {
-            all.extend(certificates(Path::new(&folder)));
+            certificates_and_files.extend(certificates(Path::new(&folder)));
         }
-        all
+        certificates_and_files
     });
     let mut draw = Draw::Bytes(bytes);
-    let original = &all[draw.below(all.len())];
+    let original = &corpus[draw.below(corpus.len())];
     let changed = mutate(original, &mut draw);
     let directory = tempfile::tempdir().expect("a directory");
     write(directory.path(), &changed);

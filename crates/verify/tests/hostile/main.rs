@@ -1,5 +1,6 @@
-//! Certificates that were changed at random, by bytes, words, lists and JSON values, mostly with a manifest that goes with it: the
-//! verifier answers, without a panic and within a small stack.
+//! Verifies randomly mutated certificates. Mutations change bytes, words, lists and JSON values,
+//! mostly with a manifest that matches. The verifier must answer without a panic and within a
+//! small stack.
 
 #[allow(dead_code, reason = "shared with a fuzz target")]
 mod mutate;
@@ -10,10 +11,10 @@ use std::time::{Duration, Instant};
 use metaplan_verify::Verifier;
 use mutate::{Draw, Files, certificates, mutate, write};
 
-/// The stack of a thread of tests, without optimisation; the program has four times as much.
+/// The stack size of a test thread, without optimisation; the program has four times as much.
 const STACK: usize = 2 << 20;
 
-/// Upper limit on the time for one certificate, on a busy machine.
+/// Upper limit on the time for one certificate on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 fn originals() -> Vec<Files> {
@@ -22,14 +23,14 @@ fn originals() -> Vec<Files> {
     all
 }
 
-/// Verifies a certificate in a thread of its own; `None` if that panics.
+/// Verifies a certificate in a separate thread. Returns `None` on a panic.
 fn verified(files: &Files) -> Option<bool> {
     let directory = tempfile::tempdir().expect("a directory");
     write(directory.path(), files);
     std::thread::scope(|scope| {
         let verify = || {
             let verification = Verifier::new(directory.path()).time_limit(Duration::from_secs(2)).verify();
-            // The answer is written, too.
+            // Formatting the answer must not panic either.
             assert!(verification.to_string().ends_with('\n'));
             verification.verified()
         };
@@ -38,7 +39,8 @@ fn verified(files: &Files) -> Option<bool> {
     })
 }
 
-/// Changes each certificate for each seed; returns how many changed ones are verified.
+/// Mutates each certificate with each seed and verifies it. Returns the number of verified
+/// mutants.
 fn withstand(seeds: std::ops::Range<u64>) -> usize {
     let mut accepted = 0;
     for (certificate, files) in originals().iter().enumerate() {
@@ -65,7 +67,7 @@ fn the_small_certificates_are_verified() {
 #[test]
 fn changed_certificates_are_answered() {
     let accepted = withstand(0..150);
-    // Some changes make no difference: white space, the order of a list.
+    // Some mutations have no effect, e.g. white space or the order of a list.
     assert!(accepted > 0 && accepted < 300, "{accepted} of 600");
 }
 

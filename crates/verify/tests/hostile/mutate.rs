@@ -1,4 +1,4 @@
-//! Changes of the files of a certificate, from random numbers or from the bytes of a fuzzer.
+//! Mutates the files of a certificate, driven by random numbers or by the bytes of a fuzzer.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -9,19 +9,19 @@ use serde_json::{Value, json};
 /// The files of a certificate by name.
 pub type Files = BTreeMap<String, Vec<u8>>;
 
-/// Upper limit on repetitions of a part of a file.
+/// Upper limit on the repetitions of a part of a file.
 const REPETITION_LIMIT: usize = 300;
 
 /// A source of decisions.
 pub enum Draw<'d> {
-    /// Random numbers, the same in every run (`SplitMix64`).
+    /// Deterministic pseudo-random numbers (`SplitMix64`).
     Random(u64),
-    /// The bytes of a fuzzer; 0 behind the last one.
+    /// The bytes of a fuzzer, followed by zeros.
     Bytes(&'d [u8]),
 }
 
 impl Draw<'_> {
-    /// A number below a limit, which is not 0.
+    /// Returns a number below `limit`, which must not be 0.
     pub fn below(&mut self, limit: usize) -> usize {
         let number = match self {
             Self::Random(state) => {
@@ -46,7 +46,7 @@ impl Draw<'_> {
     }
 }
 
-/// The certificates of a folder.
+/// Reads all certificates of a folder.
 pub fn certificates(folder: &Path) -> Vec<Files> {
     let entries = |path: &Path| {
         let mut all: Vec<_> =
@@ -60,7 +60,8 @@ pub fn certificates(folder: &Path) -> Vec<Files> {
     folders.map(|path| entries(&path).iter().map(read).collect()).collect()
 }
 
-/// Changes a certificate in up to three places. Mostly the manifest has the sizes and hashes of the changed files.
+/// Mutates a certificate in up to three places. In most cases the manifest is updated with the
+/// sizes and hashes of the mutated files.
 pub fn mutate(files: &Files, draw: &mut Draw<'_>) -> Files {
     let mut files = files.clone();
     let names: Vec<String> = files.keys().cloned().collect();
@@ -85,7 +86,7 @@ pub fn mutate(files: &Files, draw: &mut Draw<'_>) -> Files {
     files
 }
 
-/// Gives the manifest the sizes and hashes of the files.
+/// Updates the sizes and hashes of the manifest.
 fn mend(files: &mut Files) {
     let Ok(mut manifest) = serde_json::from_slice::<Value>(&files["manifest.json"]) else { return };
     let listed = manifest.get_mut("files").and_then(Value::as_array_mut);
@@ -98,7 +99,7 @@ fn mend(files: &mut Files) {
     files.insert("manifest.json".to_owned(), manifest.to_string().into_bytes());
 }
 
-/// A range goes, comes again, or is replaced.
+/// Deletes, repeats or replaces a range of bytes.
 fn bytes(old: &[u8], draw: &mut Draw<'_>) -> Vec<u8> {
     let start = draw.below(old.len() + 1);
     let end = (start + draw.below(40)).min(old.len());
@@ -111,7 +112,7 @@ fn bytes(old: &[u8], draw: &mut Draw<'_>) -> Vec<u8> {
     [&old[..start], &middle, &old[end..]].concat()
 }
 
-/// A word or number becomes another one of the text, or an extreme one.
+/// Replaces a word or number by another word of the text or by an extreme value.
 fn tokens(text: &str, draw: &mut Draw<'_>) -> String {
     let is_part = |c: char| c.is_alphanumeric() || "_-.?:".contains(c);
     let starts = text.match_indices(is_part).filter(|(at, _)| !text[..*at].ends_with(is_part));
@@ -127,7 +128,7 @@ fn tokens(text: &str, draw: &mut Draw<'_>) -> String {
     format!("{}{other}{}", &text[..at], &text[at + word.len()..])
 }
 
-/// A list in parentheses goes, comes again, becomes another one, or gets more around it.
+/// Deletes, repeats, replaces or nests a parenthesised list.
 fn lists(text: &str, draw: &mut Draw<'_>) -> String {
     let mut open = Vec::new();
     let mut all: Vec<(usize, usize)> = Vec::new();
@@ -153,7 +154,7 @@ fn lists(text: &str, draw: &mut Draw<'_>) -> String {
         2 => other.to_owned(),
         3 => format!("(and {own} {other})"),
         4 => {
-            // The validator goes through all objects for each variable, and polls no limit while it does so.
+            // The validator enumerates all objects for each variable without polling a limit.
             let often = if around.contains('?') { 1 + often % 4 } else { often };
             format!("{}{own}{}", around.repeat(often), ")".repeat(often))
         }
@@ -165,7 +166,7 @@ fn lists(text: &str, draw: &mut Draw<'_>) -> String {
     format!("{}{new}{}", &text[..start], &text[end..])
 }
 
-/// A part of a JSON document goes, comes again, or becomes another one.
+/// Deletes, repeats or replaces a part of a JSON document.
 fn structure(document: &mut Value, draw: &mut Draw<'_>) {
     let mut paths = Vec::new();
     collect(document, String::new(), &mut paths);
