@@ -10,7 +10,7 @@ mod pages;
 
 use std::path::{Path, PathBuf};
 
-const FILE_LINES: usize = 500;
+const FILE_LINES: usize = 800;
 const FUNCTION_LINES: usize = 100;
 
 /// Folder, and what its source must not mention.
