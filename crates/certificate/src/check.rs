@@ -137,7 +137,7 @@ pub(super) fn parse(
     for (document, format, expected) in
         [("the task", &model.format, TASK_FORMAT), ("the argument", &argument.format, ARGUMENT_FORMAT)]
     {
-        if found != expected {
+        if format != expected {
             return Err(form(document, format!("format `{format}`, where `{expected}` is expected")));
         }
     }

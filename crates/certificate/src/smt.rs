@@ -202,7 +202,8 @@ impl Writer<'_> {
             let key = row(slots);
             let last = rows.last().map_or_else(|| "0".to_owned(), number);
             let earlier_rows = rows.iter().enumerate().rev().skip(1);
-            earlier_rows.fold(last, |cases, (row, value)| format!("(ite (= {key} {row}) {} {cases})", number(value)))
+            earlier_rows
+                .fold(last, |cases, (row, value)| format!("(ite (= {key} {row}) {} {cases})", number(value)))
         });
         join("+", "0", std::iter::once(number(&quantity.constant)).chain(tables))
     }

@@ -30,5 +30,5 @@ fn main() -> ExitCode {
         are_verified &= verification.verified();
     }
     println!("{}", if are_verified { "all verified" } else { "not all verified" });
-    ExitCode::from(u8::from(!all))
+    ExitCode::from(u8::from(!are_verified))
 }

@@ -71,7 +71,7 @@ pub(crate) fn read(directory: &Path) -> Result<(Manifest, Vec<(String, String)>)
             ));
         }
         let sha256 = digest(text.as_bytes());
-        if found != file.sha256 {
+        if sha256 != file.sha256 {
             return Err(format!("{}: SHA-256 is {sha256}, where {} is expected", file.name, file.sha256));
         }
         contents.push((file.name.clone(), text));

@@ -87,7 +87,8 @@ fn provenance(origin: &Origin) -> Result<String, String> {
             format!("`{}` (not shipped, SHA-256 {short}…)", name.rsplit('/').next().unwrap_or(name))
         });
     }
-    let missing = origin.shipped.keys().find(|name| !origin.rules.iter().any(|(rule_name, _)| rule_name == *name));
+    let missing =
+        origin.shipped.keys().find(|name| !origin.rules.iter().any(|(rule_name, _)| rule_name == *name));
     match missing {
         Some(name) => Err(format!("the rules `{name}` are named and not there")),
         None if descriptions.is_empty() => Ok("no rule files".to_owned()),

@@ -92,7 +92,7 @@ fn ordered(number: &Bits, constant: &Integer) -> Vec<(Literal, bool)> {
     let last = number.len() - 1;
     let turned = |(position, literal): (usize, &Literal)| {
         let is_sign = position == last;
-        (if is_sign { -*literal } else { *literal }, other.bit(position) != is_sign)
+        (if is_sign { -*literal } else { *literal }, constant.bit(position) != is_sign)
     };
     number.iter().enumerate().map(turned).collect()
 }

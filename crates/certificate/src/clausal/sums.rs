@@ -238,11 +238,12 @@ impl Adder<'_> {
             let comparisons: Vec<Vec<Linear>> =
                 self.model.operators.iter().map(|operator| table_comparisons(operator, number)).collect();
             let count = comparisons.iter().map(Vec::len).max().unwrap_or(0);
-            for place in 0..most {
+            for place in 0..count {
                 let parts: Vec<Option<&Quantity>> =
                     comparisons.iter().map(|list| list.get(place).map(|linear| &linear.quantity)).collect();
                 let sum = self.sum(formula, bits, &parts, &format!("comparison {place} of number {number}"));
-                for (operator, _) in self.timeline.operators.iter().zip(&parts).filter(|(_, part)| part.is_some())
+                for (operator, _) in
+                    self.timeline.operators.iter().zip(&parts).filter(|(_, part)| part.is_some())
                 {
                     formula.clause(&[-*operator, -sign(&sum)]);
                 }
@@ -275,7 +276,7 @@ impl Adder<'_> {
             sum = formula.add(&sum, &added, &format!("{name} with the constant of step {step}"));
         }
         let tables = parts.iter().flatten().map(|quantity| quantity.tables.len()).max().unwrap_or(0);
-        for place in 0..most {
+        for place in 0..tables {
             let added = self.table(formula, parts, place, (base.len(), name));
             sum = formula.add(&sum, &added, &format!("{name} with table {place} of step {step}"));
         }
@@ -298,7 +299,9 @@ impl Adder<'_> {
         let step = self.step;
         let added = formula.bits(width, &format!("table {place} added to {name} at step {step}"));
         let mut kinds: BTreeMap<Option<Kind<'_>>, Vec<Literal>> = BTreeMap::new();
-        for ((operator, literal), part) in self.model.operators.iter().zip(&self.timeline.operators).zip(parts) {
+        for ((operator, literal), part) in
+            self.model.operators.iter().zip(&self.timeline.operators).zip(parts)
+        {
             let table = part.and_then(|quantity| quantity.tables.get(place));
             let kind = table.map(|(slots, table)| (operator.uses, slots.as_slice(), *table));
             kinds.entry(kind).or_default().push(*literal);

@@ -33,7 +33,8 @@ impl Timeline {
     fn state(model: &Model, formula: &mut Formula, time: usize) -> Vec<Vec<Literal>> {
         let variables = model.variables.iter().enumerate().map(|(variable, values)| {
             let name = |value: &String| format!("{value} (variable {variable}) after step {time}");
-            let literals: Vec<Literal> = values.iter().map(|value| formula.variable(|| name(value))).collect();
+            let literals: Vec<Literal> =
+                values.iter().map(|value| formula.variable(|| name(value))).collect();
             formula.clause(&literals);
             formula.at_most_one(&literals, &format!("the values of variable {variable} after step {time}"));
             literals
@@ -99,7 +100,8 @@ impl Timeline {
         self.chosen = Vec::new();
         for (slot, designs) in model.slots.iter().enumerate() {
             let name = |design: &u32| format!("{} in slot {slot} at step {number}", object(model, *design));
-            let literals: Vec<Literal> = designs.iter().map(|design| formula.variable(|| name(design))).collect();
+            let literals: Vec<Literal> =
+                designs.iter().map(|design| formula.variable(|| name(design))).collect();
             formula.at_most_one(&literals, &format!("the designs of slot {slot} at step {number}"));
             self.chosen.push(literals);
         }

@@ -73,7 +73,8 @@ pub(super) fn cases<'r>(
                 if event.is_some_and(|event| reads().event(event)) {
                     continue;
                 }
-                let condition_at_start = all_of(&condition, [passage.condition(timeline), moment.leaves(event)]);
+                let condition_at_start =
+                    all_of(&condition, [passage.condition(timeline), moment.leaves(event)]);
                 let applied = Applied { truths: passage.truths(timeline), ..Applied::default() };
                 for known in Known::default().assume(structure, &condition_at_start)? {
                     cases.extend(moment.last(structure, known, &applied, (&passage, None))?);
@@ -109,7 +110,8 @@ struct Durative<'r> {
 impl<'r> Durative<'r> {
     fn condition(&self, reader: &mut Reader<'r>, times: &[ConditionTime]) -> Result<Formula, Cause> {
         let timed = self.conditions.iter().filter(|(time, _)| times.contains(time));
-        let conditions: Result<Vec<_>, _> = timed.map(|(_, condition)| reader.formula(condition, true)).collect();
+        let conditions: Result<Vec<_>, _> =
+            timed.map(|(_, condition)| reader.formula(condition, true)).collect();
         Ok(Formula::junction(conditions?, true))
     }
 
@@ -159,11 +161,17 @@ impl<'r> Durative<'r> {
             if event.is_some_and(|event| reads.iter().any(|half| half.event(event))) {
                 continue;
             }
-            let conditions = [condition, at_end, &apart, &passage.condition(timeline), &happening.leaves(event)];
+            let conditions =
+                [condition, at_end, &apart, &passage.condition(timeline), &happening.leaves(event)];
             let applied = Applied { truths: passage.truths(timeline), ..Applied::default() };
             let conditions = Formula::junction(conditions.into_iter().cloned(), true);
             for known in Known::default().assume(structure, &conditions)? {
-                cases.extend(happening.last(structure, known, &applied, (&passage, reader.length.as_ref()))?);
+                cases.extend(happening.last(
+                    structure,
+                    known,
+                    &applied,
+                    (&passage, reader.length.as_ref()),
+                )?);
             }
         }
         Ok(cases)

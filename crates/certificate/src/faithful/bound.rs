@@ -157,7 +157,8 @@ impl Occurrence<'_> {
         }
         // Extends each row by the candidates of one unbound parameter at a time.
         let mut rows: Vec<Vec<(&Name, u32)>> = vec![Vec::new()];
-        let open = parameters.iter().filter(|parameter| !reader.binding.contains_key(&parameter.identifier.name));
+        let open =
+            parameters.iter().filter(|parameter| !reader.binding.contains_key(&parameter.identifier.name));
         for parameter in open.collect::<Vec<_>>() {
             let mut longer = Vec::new();
             for row in rows {
@@ -182,7 +183,8 @@ impl Occurrence<'_> {
         let mut heads = Vec::new();
         for row in rows {
             reader.binding.extend(row);
-            let objects = parameters.iter().map(|parameter| reader.binding[&parameter.identifier.name]).collect();
+            let objects =
+                parameters.iter().map(|parameter| reader.binding[&parameter.identifier.name]).collect();
             let key = (symbol, objects);
             if !axioms.bound.contains(&key) && reader.is_possible(&self.rule.condition)? {
                 heads.push(key);

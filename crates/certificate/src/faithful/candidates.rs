@@ -18,7 +18,9 @@ impl Reader<'_> {
         let Some(first) = bound.first() else { return Vec::new() };
         let hidden: Vec<&Name> = bound.iter().map(|variable| &variable.identifier.name).collect();
         match within.and_then(|within| self.restricted(&first.identifier.name, within, &hidden)) {
-            Some(objects) => objects.into_iter().filter(|object| self.world.is_of(*object, &first.r#type)).collect(),
+            Some(objects) => {
+                objects.into_iter().filter(|object| self.world.is_of(*object, &first.r#type)).collect()
+            }
             None => self.world.objects_of(&first.r#type),
         }
     }
@@ -26,7 +28,9 @@ impl Reader<'_> {
     /// Returns the candidates of a variable in a conjunction.
     pub(super) fn candidates_where(&self, variable: &TypedName, conditions: &[&Condition]) -> Vec<u32> {
         match self.restricted_by_all(&variable.identifier.name, conditions.iter().copied(), &[]) {
-            Some(objects) => objects.into_iter().filter(|object| self.world.is_of(*object, &variable.r#type)).collect(),
+            Some(objects) => {
+                objects.into_iter().filter(|object| self.world.is_of(*object, &variable.r#type)).collect()
+            }
             None => self.world.objects_of(&variable.r#type),
         }
     }
@@ -104,10 +108,14 @@ impl Reader<'_> {
     fn in_atom(&self, name: &Name, atom: &Atom, hidden: &[&Name]) -> Option<BTreeSet<u32>> {
         let place = atom.arguments.iter().position(|term| is(term, name))?;
         let symbol = self.world.symbol(&atom.predicate.name).ok()?;
-        let arguments: Vec<Option<u32>> = atom.arguments.iter().map(|term| self.known(term, hidden)).collect();
+        let arguments: Vec<Option<u32>> =
+            atom.arguments.iter().map(|term| self.known(term, hidden)).collect();
         let fits = |row: &[u32]| {
             row.len() == arguments.len()
-                && row.iter().zip(&arguments).all(|(object, argument)| argument.is_none_or(|bound| bound == *object))
+                && row
+                    .iter()
+                    .zip(&arguments)
+                    .all(|(object, argument)| argument.is_none_or(|bound| bound == *object))
         };
         let of = |row: &[u32]| row.get(place).copied().filter(|_| fits(row));
         let key = arguments.iter().enumerate().find_map(|(place, argument)| Some((place, (*argument)?)));

@@ -153,8 +153,8 @@ impl<'c> Comparison<'c> {
         let task_goal = self.task.condition(&self.task.model.goal, &[], &[]);
         // No plan ends with a wait.
         let not_waited = Formula::Atom(timeline::waited(), false);
-        for known in
-            Known::default().assume(&self.task.names.structure, &Formula::junction([goal, not_waited], true))?
+        for known in Known::default()
+            .assume(&self.task.names.structure, &Formula::junction([goal, not_waited], true))?
         {
             if !self.follows(known, &task_goal, &|_| true) {
                 return Err(Difference::Goal.into());
@@ -318,7 +318,9 @@ impl<'c> Comparison<'c> {
     fn keeps_time(&self, (operator, choice): (&Operator, &[u32]), case: &Case) -> bool {
         let Some(number) = self.task.names.numbers.get(&timeline::clock()) else { return true };
         // Time never decreases, so a clock that stands still is a lower bound.
-        let Some((_, value)) = operator.changes.iter().find(|(changed, _)| changed == number) else { return true };
+        let Some((_, value)) = operator.changes.iter().find(|(changed, _)| changed == number) else {
+            return true;
+        };
         let value = self.task.value(value, choice, &self.task.model.sizes(operator));
         let passed = value.clone().minus(&Linear::fluent(timeline::clock()));
         match (passed.value(), value.value()) {

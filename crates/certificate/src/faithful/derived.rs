@@ -28,7 +28,8 @@ pub(super) fn axioms(
     let bodies = bodies(world, invariant, &axioms)?;
     // Both sets are sound at any time; each iteration may sharpen either by the other.
     loop {
-        let may = fixpoint(&bodies, |formula, atoms_so_far| possible(world, formula, atoms_so_far, &axioms.must));
+        let may =
+            fixpoint(&bodies, |formula, atoms_so_far| possible(world, formula, atoms_so_far, &axioms.must));
         let must = fixpoint(&bodies, |formula, atoms_so_far| certain(world, formula, atoms_so_far, &may));
         let settled = may == axioms.may && must == axioms.must;
         (axioms.may, axioms.must) = (may, must);

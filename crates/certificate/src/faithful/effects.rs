@@ -112,9 +112,9 @@ impl<'v> Variable<'v> {
             |facts: &[(u32, u32)]| facts.iter().rev().find(|fact| fact.0 == variable).map(|fact| fact.1);
         let conditional = operator.into_iter().flat_map(|operator| &operator.conditional);
         let conditional = conditional
-            .filter_map(|effect| Some((task.literals(&effect.condition, true), own(&effect.effects)?)))
+            .filter_map(|effect| Some((task.literals(&effect.condition, true), assigned(&effect.effects)?)))
             .collect();
-        let certain = operator.and_then(|operator| own(&operator.effects));
+        let certain = operator.and_then(|operator| assigned(&operator.effects));
         Self { task, own: variable, case, effects, touched, certain, conditional }
     }
 

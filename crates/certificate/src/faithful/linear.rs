@@ -94,7 +94,10 @@ impl Linear {
         let mut range = Interval::point(&self.constant);
         for (key, factor) in &self.factors {
             let bounds = interval(key);
-            let (low, high) = (bounds.and_then(|bounds| bounds.low.as_ref()), bounds.and_then(|bounds| bounds.high.as_ref()));
+            let (low, high) = (
+                bounds.and_then(|bounds| bounds.low.as_ref()),
+                bounds.and_then(|bounds| bounds.high.as_ref()),
+            );
             let (low, high) = if factor.is_negative() { (high, low) } else { (low, high) };
             let add = |sum: Option<BigRational>, end: Option<&BigRational>| Some(sum? + end? * factor);
             range = Interval { low: add(range.low, low), high: add(range.high, high) };

@@ -197,7 +197,8 @@ impl Passage {
         if timeline.is_empty() {
             return Formula::truth(true);
         }
-        let conditions = [Formula::Atom(phase(self.from), true), Formula::Compare(Linear::fluent(clock()), false)];
+        let conditions =
+            [Formula::Atom(phase(self.from), true), Formula::Compare(Linear::fluent(clock()), false)];
         let limit = self.latest.as_ref().map(|(time, left_out)| {
             let slack = Linear::constant(time.clone()).minus(&Linear::fluent(clock()));
             Formula::Compare(slack, *left_out)
@@ -293,8 +294,10 @@ mod tests {
                     events.contains(&at),
                     events.contains(&(at + duration)),
                 );
-                let actual: Vec<_> =
-                    matching.iter().map(|actual| (actual.from, actual.to, actual.at_start, actual.at_end)).collect();
+                let actual: Vec<_> = matching
+                    .iter()
+                    .map(|actual| (actual.from, actual.to, actual.at_start, actual.at_end))
+                    .collect();
                 assert_eq!(actual, [expected], "{events:?} {duration}: {start} to {end}");
             }
         }

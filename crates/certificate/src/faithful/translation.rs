@@ -256,7 +256,7 @@ impl<'t> Translation<'t> {
     fn fact(&self, (variable, value): Fact) -> Formula {
         let last_value = self.model.none(variable);
         if value == last_value {
-            let negations = (0..none).map(|value| self.fact((variable, value)).negated());
+            let negations = (0..last_value).map(|value| self.fact((variable, value)).negated());
             return Formula::junction(negations, true);
         }
         if let Some(unfolded) = self.unfolded.get(&variable) {

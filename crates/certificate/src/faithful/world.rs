@@ -216,7 +216,8 @@ impl<'w> World<'w> {
     pub(super) fn written(&self, text: &str) -> Option<Key> {
         let phases = 0..=self.timeline.events.len();
         let timeline_keys = phases.map(timeline::phase).chain([timeline::waited(), timeline::clock()]);
-        let mut timeline_keys = timeline_keys.filter(|key| !self.timeline.is_empty() && self.show(key) == text);
+        let mut timeline_keys =
+            timeline_keys.filter(|key| !self.timeline.is_empty() && self.show(key) == text);
         timeline_keys.next().or_else(|| self.of_files(text))
     }
 

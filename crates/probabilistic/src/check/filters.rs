@@ -74,7 +74,8 @@ impl<N: Number> Query<'_, N> {
             truth: None,
             answer: Some(vector.answer(state)),
         };
-        let values_of_states = |states: Vec<usize>| Filtered::States(states.into_iter().map(listed).collect());
+        let values_of_states =
+            |states: Vec<usize>| Filtered::States(states.into_iter().map(listed).collect());
         let is_something =
             |state: &usize| vector.infinite.contains(*state) || !vector.values[*state].is_zero();
         Ok(match filter {
@@ -85,11 +86,13 @@ impl<N: Number> Query<'_, N> {
             Filter::Average => Filtered::Number(sum(vector, chosen, chosen.count_ones(..))),
             Filter::First => Filtered::Number(vector.answer(self.first(chosen))),
             Filter::State => Filtered::Number(vector.answer(only(chosen)?)),
-            Filter::Print => all(self.sorted(chosen.ones().filter(is_something))),
-            Filter::PrintAll => all(self.sorted(chosen.ones())),
+            Filter::Print => values_of_states(self.sorted(chosen.ones().filter(is_something))),
+            Filter::PrintAll => values_of_states(self.sorted(chosen.ones())),
             Filter::ArgMin | Filter::ArgMax => {
                 let best = extreme(vector, chosen, filter == Filter::ArgMax);
-                all(self.sorted(chosen.ones().filter(|state| can_be(&vector.answer(*state), &best))))
+                values_of_states(
+                    self.sorted(chosen.ones().filter(|state| can_be(&vector.answer(*state), &best))),
+                )
             }
             Filter::Count | Filter::ForAll | Filter::Exists => {
                 return Err(refusal("Q203", "this filter takes truth values, and not numbers"));

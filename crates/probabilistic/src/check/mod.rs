@@ -188,8 +188,11 @@ fn blame(error: Error, model: &Model, joined: &Model, settings: &Settings) -> Er
         return Error::Model(problems);
     }
     let is_model_constant = |name: &String| model.constants.iter().any(|constant| constant.name == *name);
-    let model_settings: Settings =
-        settings.iter().filter(|(name, _)| known(name)).map(|(k, v)| (k.clone(), v.clone())).collect();
+    let model_settings: Settings = settings
+        .iter()
+        .filter(|(name, _)| is_model_constant(name))
+        .map(|(k, v)| (k.clone(), v.clone()))
+        .collect();
     match Program::<f64>::new(model, &model_settings) {
         Err(Error::Model(problems)) => Error::Model(problems),
         _ => Error::Property(problems),

@@ -85,7 +85,8 @@ pub fn is_of_states(expression: &Expr, names: &Names) -> bool {
             ExprKind::Property(_) | ExprKind::Temporal(_) => depends_on_variables_only = false,
             ExprKind::Label(label) if is_built_in(label, names) => depends_on_variables_only = false,
             ExprKind::Label(label) => {
-                depends_on_variables_only &= names.label(label).is_some_and(|inner| is_of_states(inner, names));
+                depends_on_variables_only &=
+                    names.label(label).is_some_and(|inner| is_of_states(inner, names));
             }
             _ => {}
         }
