@@ -1,6 +1,6 @@
-//! What the codes of messages mean that this crate gives.
+//! The catalogue of this crate's error codes.
 
-/// Codes in their order, each with what it means, what causes it, and what to do.
+/// The codes in ascending order: code, meaning, cause, remedy.
 pub const CODES: &[[&str; 4]] = &[
     [
         "Q101",

@@ -1,9 +1,9 @@
-//! What can be wrong with a model or a property, and with how large it is.
+//! Errors about models, properties and limits.
 
 use diagnostics::Errors;
 use thiserror::Error;
 
-/// A place in a text: line and column from 1, the column in characters.
+/// A position in a text: line and column from 1, the column in characters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub struct Place {
     /// Line, from 1.
@@ -12,16 +12,16 @@ pub struct Place {
     pub column: usize,
 }
 
-/// One thing that is wrong with a text.
+/// An error in a text.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("{}:{}: {message}", place.line, place.column)]
 #[non_exhaustive]
 pub struct Diagnostic {
     /// The stable code of the cause, `Q…`.
     pub code: &'static str,
-    /// Where.
+    /// Position of the error.
     pub place: Place,
-    /// What is wrong, and what would be right.
+    /// Description of the error and of the remedy.
     pub message: String,
 }
 
@@ -31,40 +31,40 @@ impl Diagnostic {
     }
 }
 
-/// Why there is no answer.
+/// The reason for which a check has no answer.
 #[derive(Debug, Clone, Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The model cannot be read, or does something in a reachable state that it must not do.
+    /// The model is malformed, or is invalid in a reachable state.
     #[error("the model is wrong:\n{0}")]
     Model(Errors<Diagnostic>),
-    /// The property cannot be read, or does not fit the model.
+    /// The property is malformed or does not match the model.
     #[error("the property is wrong:\n{0}")]
     Property(Errors<Diagnostic>),
-    /// A constant that is set from outside is not there, or a value does not fit it.
+    /// An undefined constant has no value, or a value does not match a constant.
     #[error("{0}")]
     Constant(String),
-    /// There are more states than allowed.
+    /// The model has more states than allowed.
     #[error("more than {limit} states; {states} were reached")]
     StateLimit {
-        /// States that were reached.
+        /// Number of reached states.
         states: usize,
         /// The limit.
         limit: usize,
     },
-    /// The caller asked to stop.
+    /// The caller cancelled the exploration.
     #[error("stopped after {states} states")]
     Interrupted {
-        /// States that were reached.
+        /// Number of reached states.
         states: usize,
     },
-    /// A policy does not fit the model.
+    /// A policy does not match the model.
     #[error("{0}")]
     Policy(String),
 }
 
 impl Error {
-    /// What is wrong with the text of the model or of the property, with places; nothing where it is not for them.
+    /// The errors in the text of the model or of the property; empty for other errors.
     pub fn diagnostics(&self) -> &[Diagnostic] {
         match self {
             Self::Model(problems) | Self::Property(problems) => problems,

@@ -1,7 +1,7 @@
-//! A generator of successors to the process of all states that it reaches, breadth first.
+//! Explores the reachable states of a generator breadth first and builds the sparse process.
 //!
-//! A generator computes the successors of a state natively. It is the one place where the meaning of a state is
-//! known; whatever comes after knows numbers only.
+//! A generator computes the successors of a state. It is the only code that interprets states;
+//! all later stages use state numbers.
 
 use std::hash::Hash;
 
@@ -11,33 +11,33 @@ use crate::mdp::{MOST, Mdp, dense};
 use crate::number::Number;
 use crate::states::{Look, States};
 
-/// The action of the loop that a state without choices gets.
+/// The action of the self-loop that a state without choices gets.
 pub const DEADLOCK: u32 = u32::MAX;
 
-/// How a model moves.
+/// A model that generates states and transitions on the fly.
 pub trait Generator<N: Number> {
-    /// What a model remembers.
+    /// The type of states.
     type State: Clone + Eq + Hash;
 
-    /// Where it starts.
+    /// The initial state.
     fn initial(&self) -> Self::State;
 
-    /// All states in which it can start, if there are several.
+    /// All initial states, if there are several.
     fn starts(&self) -> Vec<Self::State> {
         vec![self.initial()]
     }
 
-    /// How many rewards each choice has.
+    /// Number of rewards of each choice.
     fn rewards(&self) -> usize;
 
-    /// How many codes there are, where [`code`](Self::code) numbers the states that can be thought of; then states are
-    /// found in a table and not by hashing.
+    /// Number of codes, if [`code`](Self::code) numbers all conceivable states. States are then
+    /// indexed by a table instead of a hash map.
     fn codes(&self) -> Option<usize> {
         None
     }
 
-    /// The code of a state, less than [`codes`](Self::codes). States that lead to each other should have codes that
-    /// are close.
+    /// The code of a state, less than [`codes`](Self::codes). States that are connected by
+    /// transitions should have close codes, for locality of memory accesses.
     fn code(&self, _state: &Self::State) -> usize {
         0
     }
@@ -45,15 +45,15 @@ pub trait Generator<N: Number> {
     /// Writes all choices of a state.
     ///
     /// # Errors
-    /// What the model does there and must not do.
+    /// The model is invalid in this state, e.g. probabilities do not sum to 1.
     fn successors(&self, state: &Self::State, choices: &mut Choices<Self::State, N>) -> Result<(), Error>;
 }
 
-/// The choices of one state after the other, as a generator writes them.
+/// The choices that a generator writes, for one state after another.
 #[derive(Debug)]
 pub struct Choices<S, N> {
     transitions: Vec<(S, N)>,
-    /// Action, and the end of its transitions.
+    /// Action and end of the transitions of each choice.
     ends: Vec<(u32, usize)>,
     rewards: Vec<N>,
 }
@@ -64,11 +64,11 @@ impl<S, N> Default for Choices<S, N> {
     }
 }
 
-/// The transitions of a choice and its rewards.
+/// The transitions and rewards of a choice.
 pub type Written<'a, S, N> = (&'a [(S, N)], &'a [N]);
 
 impl<S: Clone, N: Number> Choices<S, N> {
-    /// Where the first choice with an action leads, and its rewards.
+    /// The transitions and rewards of the first choice with an action.
     pub fn find(&self, action: u32) -> Option<Written<'_, S, N>> {
         let at = self.ends.iter().position(|(known, _)| *known == action)?;
         let begin = at.checked_sub(1).map_or(0, |before| self.ends[before].1);
@@ -77,25 +77,25 @@ impl<S: Clone, N: Number> Choices<S, N> {
         Some((&self.transitions[begin..self.ends[at].1], rewards))
     }
 
-    /// Adds a transition to the choice that is being written. Those of probability 0 are dropped.
+    /// Adds a transition to the current choice. Transitions of probability 0 are dropped.
     pub fn to(&mut self, state: S, probability: N) {
         if !probability.is_zero() {
             self.transitions.push((state, probability));
         }
     }
 
-    /// Ends the choice that is being written.
+    /// Ends the current choice.
     pub fn end(&mut self, action: u32, rewards: impl IntoIterator<Item = N>) {
         self.rewards.extend(rewards);
         self.ends.push((action, self.transitions.len()));
     }
 
-    /// How much was written so far.
+    /// The current position, for [`Self::back_to`].
     pub(crate) fn mark(&self) -> [usize; 3] {
         [self.transitions.len(), self.ends.len(), self.rewards.len()]
     }
 
-    /// Forgets what was written after a mark.
+    /// Removes everything that was written after a mark.
     pub(crate) fn back_to(&mut self, [transitions, ends, rewards]: [usize; 3]) {
         self.transitions.truncate(transitions);
         self.ends.truncate(ends);
@@ -109,24 +109,25 @@ impl<S: Clone, N: Number> Choices<S, N> {
     }
 }
 
-/// When exploration has to stop. Each `with_` changes one thing.
+/// Limits of exploration. Each `with_` method sets one limit.
 #[derive(Clone, Copy)]
 #[non_exhaustive]
 pub struct Bounds<'a> {
-    /// More states than this are an error.
+    /// Upper limit on the number of states.
     pub states: usize,
-    /// Told the number of states from time to time; false stops.
+    /// Callback that receives the number of states periodically; `false` cancels the exploration.
     pub progress: &'a dyn Fn(usize) -> bool,
 }
 
 impl<'a> Bounds<'a> {
-    /// More states than this are an error; 50 million unless said otherwise.
+    /// Sets the upper limit on the number of states (default: 50 million).
     #[must_use]
     pub fn with_states(self, states: usize) -> Self {
         Self { states, ..self }
     }
 
-    /// Told the number of states from time to time; false stops.
+    /// Sets the callback that receives the number of states periodically; `false` cancels the
+    /// exploration.
     #[must_use]
     pub fn with_progress(self, progress: &'a dyn Fn(usize) -> bool) -> Self {
         Self { progress, ..self }
@@ -139,25 +140,25 @@ impl Default for Bounds<'_> {
     }
 }
 
-/// A process with what its states and choices mean.
+/// An explored process with its states and rewards.
 #[derive(Debug)]
 pub struct Explored<S, N> {
-    /// The process; it starts in state 0, or in one of the first ones.
+    /// The process. The initial states are the first ones.
     pub mdp: Mdp<N>,
-    /// How many states it can start in.
+    /// Number of initial states.
     pub starts: usize,
     /// The states by number.
     pub states: States<S>,
-    /// For each reward its value for each choice.
+    /// For each reward structure, the reward of each choice.
     pub rewards: Vec<Vec<N>>,
-    /// How many states had no choice and got a loop.
+    /// Number of states without a choice, which got a self-loop.
     pub deadlocks: usize,
 }
 
-/// Explores all states.
+/// Explores all reachable states.
 ///
 /// # Errors
-/// What the model must not do, a limit, or that the caller wants to stop.
+/// The model is invalid in a reachable state, a limit is exceeded, or the caller cancels.
 pub fn explore<N: Number, G: Generator<N>>(
     generator: &G,
     bounds: &Bounds<'_>,
@@ -167,32 +168,33 @@ pub fn explore<N: Number, G: Generator<N>>(
     Ok(exploration.found)
 }
 
-/// An exploration that can be interrupted.
+/// A resumable exploration.
 pub(crate) struct Exploration<S, N> {
-    /// What was found so far.
+    /// The process so far.
     pub found: Explored<S, N>,
-    /// The state that is next.
+    /// The next state to expand.
     next: usize,
-    /// The state from which on progress is told again.
+    /// The state at which progress is reported next.
     told: usize,
 }
 
 impl<S: Clone + Eq + Hash, N: Number> Exploration<S, N> {
-    /// Knows the states in which a model starts.
+    /// Creates an exploration with the initial states.
     pub fn new<G: Generator<N, State = S>>(generator: &G, bounds: &Bounds<'_>) -> Result<Self, Error> {
         let mut states = States::new(generator.codes());
         for start in generator.starts() {
             let look = states.look(&start, |state| generator.code(state));
-            let known = states.insert(start, look);
-            known
+            let number = states.insert(start, look);
+            number
                 .ok_or_else(|| Error::StateLimit { states: states.len(), limit: bounds.states.min(MOST) })?;
         }
         let rewards = vec![Vec::new(); generator.rewards()];
-        let found = Explored { mdp: Mdp::default(), starts: states.len(), states, rewards, deadlocks: 0 };
-        Ok(Self { found, next: 0, told: 0 })
+        let explored = Explored { mdp: Mdp::default(), starts: states.len(), states, rewards, deadlocks: 0 };
+        Ok(Self { found: explored, next: 0, told: 0 })
     }
 
-    /// Explores until all is known or there are so many transitions, or a few more; whether all is known.
+    /// Explores until all states are expanded or `transitions` is reached, possibly exceeded by
+    /// one batch. Returns `true` if all states are expanded.
     pub fn go_on<G: Generator<N, State = S>>(
         &mut self,
         generator: &G,
@@ -200,7 +202,7 @@ impl<S: Clone + Eq + Hash, N: Number> Exploration<S, N> {
         transitions: usize,
     ) -> Result<bool, Error> {
         let mut batch = Batch { choices: Choices::default(), ends: Vec::new(), looks: Vec::new() };
-        let most = bounds.states.min(MOST);
+        let limit = bounds.states.min(MOST);
         loop {
             let begin = self.next;
             let end = self.found.states.len().min(begin.saturating_add(BATCH));
@@ -217,23 +219,24 @@ impl<S: Clone + Eq + Hash, N: Number> Exploration<S, N> {
                 }
             }
             batch.write(generator, &self.found.states, begin..end)?;
-            self.found.add(&mut batch, begin, most)?;
+            self.found.add(&mut batch, begin, limit)?;
             self.next = end;
         }
     }
 }
 
-/// States whose successors are written before they are looked up.
+/// Number of states whose successors are generated before they are looked up, so that memory
+/// latencies overlap.
 const BATCH: usize = 32;
-/// States between two words on progress.
+/// Number of states between two progress reports.
 const TELL: usize = 65_536;
 
-/// The choices of a few states that come after each other.
+/// The choices of a few consecutive states.
 struct Batch<S, N> {
     choices: Choices<S, N>,
-    /// For each state the end of its choices.
+    /// The end of the choices of each state.
     ends: Vec<usize>,
-    /// For each transition a first look at its target.
+    /// For each transition, a first lookup of its target.
     looks: Vec<Look>,
 }
 
@@ -301,14 +304,14 @@ impl<S: Clone + Eq + Hash, N: Number> Explored<S, N> {
 }
 
 impl<S: Clone> Exploration<S, Fraction> {
-    /// The same in doubles; none where a number is too large or too small for them.
+    /// Converts to doubles. Returns `None` if a number is out of range.
     pub fn rounded(&self) -> Option<Exploration<S, f64>> {
         Some(Exploration { found: self.found.rounded()?, next: self.next, told: self.told })
     }
 }
 
 impl<S: Clone> Explored<S, Fraction> {
-    /// The same in doubles; none where a number is too large or too small for them.
+    /// Converts to doubles. Returns `None` if a number is out of range.
     pub(crate) fn rounded(&self) -> Option<Explored<S, f64>> {
         let rewards = self.rewards.iter().map(|values| values.iter().map(Fraction::rounded).collect());
         Some(Explored {

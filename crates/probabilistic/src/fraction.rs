@@ -1,8 +1,9 @@
-//! Fractions that are cheap while they are short.
+//! Rational numbers with a compact representation of small values.
 //!
-//! Probabilities and rewards of models are fractions of small whole numbers, and so is most of what becomes of them in small models. A
-//! fraction whose two parts fit into a word each needs no other memory, and its arithmetic divides common factors out before it
-//! multiplies (Knuth, The Art of Computer Programming 2, 4.5.1). What does not fit is a rational of any size, until it fits again.
+//! Probabilities and rewards of models are mostly fractions of small integers. A fraction whose
+//! parts fit into one word each needs no heap memory, and its arithmetic cancels common factors
+//! before it multiplies (Knuth, The Art of Computer Programming 2, 4.5.1). Other values are
+//! arbitrary-precision rationals.
 
 use std::borrow::Cow;
 use std::cmp::Ordering;
@@ -14,21 +15,22 @@ use num_traits::ToPrimitive;
 
 use crate::number::{Number, rounded};
 
-/// A fraction in lowest terms; its denominator is positive.
+/// A fraction in lowest terms with a positive denominator.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Fraction {
-    /// Numerator and denominator, wherever both fit into a signed word.
+    /// Numerator and denominator, whenever both fit into a signed word.
     Short(i64, NonZeroU64),
-    /// Whatever does not fit.
+    /// All other fractions.
     Long(Box<BigRational>),
 }
 
 use Fraction::{Long, Short};
 
-/// Whole numbers up to here are doubles.
+/// Integers up to this magnitude are exact doubles.
 const WHOLE: u64 = 1 << 53;
 
-/// The greatest common divisor (Stein, J. Comp. Phys. 1, 1967); 1 at least.
+/// The greatest common divisor by the binary algorithm (Stein, J. Comp. Phys. 1, 1967); at least
+/// 1.
 #[expect(clippy::arithmetic_side_effects, reason = "the smaller one is taken off the greater one")]
 const fn divisor(mut left: u64, mut right: u64) -> u64 {
     if left == 0 || right == 0 {
@@ -48,7 +50,7 @@ const fn divisor(mut left: u64, mut right: u64) -> u64 {
     }
 }
 
-/// A fraction in lowest terms from its parts; the denominator is not zero.
+/// Creates a fraction from coprime parts; the denominator is not zero.
 fn reduced(numerator: i128, denominator: u128) -> Fraction {
     let below = i64::try_from(denominator).ok().and_then(|below| NonZeroU64::new(below.unsigned_abs()));
     if let (Ok(numerator), Some(denominator)) = (i64::try_from(numerator), below) {
@@ -57,7 +59,7 @@ fn reduced(numerator: i128, denominator: u128) -> Fraction {
     Long(Box::new(BigRational::new_raw(BigInt::from(numerator), BigInt::from(denominator))))
 }
 
-/// The sum of two short fractions, or their difference.
+/// The sum or the difference of two short fractions.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "products of two words below 2^63 and the sum of two such products fit into 128 bits; divisors are at least 1"
@@ -68,12 +70,12 @@ fn sum((a, b): (i64, NonZeroU64), (c, d): (i64, NonZeroU64), is_difference: bool
     let common = if b == d { b } else { divisor(b, d) };
     let (left, right) = (b / common, d / common);
     let sum = i128::from(a) * i128::from(right) + c * i128::from(left);
-    // What is left to be divided out divides the common divisor.
-    let rest = if common == 1 { 1 } else { divisor(remainder(sum, common), common) };
-    reduced(sum / i128::from(rest), u128::from(left) * u128::from(d / rest))
+    // The remaining common factor divides the common divisor of the denominators.
+    let factor = if common == 1 { 1 } else { divisor(remainder(sum, common), common) };
+    reduced(sum / i128::from(factor), u128::from(left) * u128::from(d / factor))
 }
 
-/// What is left of the magnitude of a sum when it is divided.
+/// The magnitude of a sum modulo a divisor.
 #[expect(
     clippy::arithmetic_side_effects,
     clippy::cast_possible_truncation,
@@ -84,7 +86,8 @@ const fn remainder(sum: i128, divisor: u64) -> u64 {
     if magnitude >> 64 == 0 { magnitude as u64 % divisor } else { (magnitude % divisor as u128) as u64 }
 }
 
-/// The product of two short fractions, the second one of any sign above and below.
+/// The product of two short fractions; the second one is given by its sign and the magnitudes of
+/// its parts.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "the product of two magnitudes up to 2^63 fits into 128 bits; divisors are at least 1"
@@ -99,7 +102,7 @@ fn product((a, b): (i64, NonZeroU64), is_negative: bool, (c, d): (u64, u64)) -> 
 }
 
 impl Fraction {
-    /// The same as a rational.
+    /// Converts to an arbitrary-precision rational.
     fn long(&self) -> Cow<'_, BigRational> {
         match self {
             Short(numerator, denominator) => {
@@ -113,16 +116,17 @@ impl Fraction {
         Self::fitting(&rational).unwrap_or_else(|| Long(Box::new(rational)))
     }
 
-    /// A rational whose parts fit into words.
+    /// Converts a rational whose parts fit into words.
     fn fitting(rational: &BigRational) -> Option<Self> {
         let denominator = rational.denom().to_i64()?.unsigned_abs();
         Some(Short(rational.numer().to_i64()?, NonZeroU64::new(denominator)?))
     }
 
-    /// The quotient of the parts where both are doubles, so that it is rounded once.
+    /// The quotient of the parts if both are exact doubles, so that the division rounds once.
     ///
-    /// It is whole only if nothing was rounded: it is below 2^53 / d for the denominator d, so that it is off by less than 1 / d, and what is
-    /// not whole is that far from what is.
+    /// The quotient is an integer only if it is exact: its magnitude is below 2^53 / d for the
+    /// denominator d, so the rounding error is less than 1 / d, and a fraction that is not an
+    /// integer differs from every integer by at least 1 / d.
     #[expect(clippy::cast_precision_loss, reason = "both are at most 2^53")]
     fn quotient(&self) -> Option<f64> {
         match self {
@@ -135,7 +139,7 @@ impl Fraction {
         }
     }
 
-    /// The nearest double, as [`rounded`] has it.
+    /// The nearest double, see [`rounded`].
     pub fn rounded(&self) -> Option<f64> {
         self.quotient().or_else(|| rounded(&self.long()))
     }
@@ -226,7 +230,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Whole numbers of all lengths, and those beside the ends of a word.
+    /// Integers of all lengths, including the bounds of a word.
     fn part() -> impl Strategy<Value = i128> {
         let sizes = (0_u32..72, any::<i128>()).prop_map(|(bits, number)| number >> (127 - bits));
         let word = i128::from(i64::MAX);
@@ -239,7 +243,8 @@ mod tests {
             .prop_map(|(above, below)| BigRational::new(BigInt::from(above), BigInt::from(below)))
     }
 
-    /// The fraction is this rational, in words exactly where both of its parts fit.
+    /// Checks that a fraction has a value, and that it is short exactly if both parts fit into
+    /// words.
     fn is(found: &Fraction, expected: &BigRational) {
         let fits = i64::try_from(expected.numer()).is_ok() && i64::try_from(expected.denom()).is_ok();
         assert_eq!(matches!(found, Short(..)), fits, "{found:?} {expected}");

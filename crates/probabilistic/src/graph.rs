@@ -1,32 +1,33 @@
-//! A graph to its strongly connected components in reverse topological order, without recursion.
+//! Computes strongly connected components in reverse topological order, without recursion.
 //!
-//! Tarjan's algorithm with one number for each node (Pearce, "A Space-Efficient Algorithm for Finding Strongly Connected
-//! Components", IPL 116(1), 2016): nodes that are components by themselves, most of them in practice, never get on the
-//! stack, and each component is handed over as soon as it is complete.
+//! Tarjan's algorithm with one number per node (Pearce, "A Space-Efficient Algorithm for Finding
+//! Strongly Connected Components", IPL 116(1), 2016). Trivial components, the majority in
+//! practice, never enter the stack, and each component is reported as soon as it is complete.
 
 use crate::mdp::dense;
 
-/// A node that has not been visited.
+/// The number of an unvisited node.
 const UNSEEN: u32 = 0;
-/// A node whose component is complete.
+/// The number of a node whose component is complete.
 const DONE: u32 = u32::MAX;
 
-/// Nodes of a component that is worth the time to give memory back.
-const LARGE: usize = 100_000;
+/// Size of a component from which on memory is released before the component is reported.
+const SHRINK_THRESHOLD: usize = 100_000;
 
-/// A visit that has begun.
+/// A call frame of the depth-first search.
 struct Frame {
     node: u32,
-    /// The number that the node got.
+    /// The visit number of the node.
     own: u32,
-    /// How many of its edges were followed.
+    /// Number of its edges that have been followed.
     followed: u32,
 }
 
-/// Hands over the strongly connected components of the nodes `0..n`, each after all that can be reached from it.
+/// Reports the strongly connected components of the nodes `0..n`, each after all components that
+/// it can reach.
 ///
 /// # Errors
-/// What `take` says, at once.
+/// The first error of `take`.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "nodes are numbered from 1 to n, which is below the greatest number of 32 bits; begin is above 0"
@@ -36,7 +37,7 @@ pub fn visit_components<'a, E>(
     successors: impl Fn(u32) -> &'a [u32],
     mut take: impl FnMut(&[u32]) -> Result<(), E>,
 ) -> Result<(), E> {
-    // The least number of a node that is known to be reachable and not complete.
+    // For each node, the least number of an incomplete node that it is known to reach.
     let mut low = vec![UNSEEN; n];
     let mut stack: Vec<u32> = Vec::new();
     let mut frames: Vec<Frame> = Vec::new();
@@ -54,12 +55,12 @@ pub fn visit_components<'a, E>(
             let mut least = low[v];
             let mut child = None;
             for target in edges {
-                let found = low[*target as usize];
-                if found == UNSEEN {
+                let number = low[*target as usize];
+                if number == UNSEEN {
                     child = Some(*target);
                     break;
                 }
-                least = least.min(found);
+                least = least.min(number);
                 frame.followed += 1;
             }
             low[v] = least;
@@ -85,8 +86,9 @@ pub fn visit_components<'a, E>(
                 take(&[node])?;
             } else {
                 stack.push(node);
-                if stack.len() - begin >= LARGE {
-                    // What took many visits takes much memory, which is better left to whom it is handed over.
+                if stack.len() - begin >= SHRINK_THRESHOLD {
+                    // A deep search has used much memory, which the receiver of a large component
+                    // may require.
                     frames.shrink_to_fit();
                 }
                 take(&stack[begin..])?;
@@ -97,22 +99,22 @@ pub fn visit_components<'a, E>(
     Ok(())
 }
 
-/// Strongly connected components; each comes after all that can be reached from it.
+/// Strongly connected components in reverse topological order.
 #[derive(Debug, Clone)]
 pub struct Components {
     /// The nodes, component by component.
     nodes: Vec<u32>,
-    /// Where each component starts in `nodes`, and the end.
+    /// The start of each component in `nodes`, and the end.
     starts: Vec<u32>,
 }
 
 impl Components {
-    /// The components in reverse topological order: successors first.
+    /// Iterates over the components in reverse topological order: successors first.
     pub fn iter(&self) -> impl DoubleEndedIterator<Item = &[u32]> {
         self.starts.windows(2).map(|window| &self.nodes[window[0] as usize..window[1] as usize])
     }
 
-    /// How many there are.
+    /// Number of components.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "the end is listed, too, so that the list is never empty"
@@ -121,19 +123,19 @@ impl Components {
         self.starts.len() - 1
     }
 
-    /// Whether there are none.
+    /// Returns `true` if there are no components.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 }
 
-/// The strongly connected components of the nodes `0..n` with the successors that a function tells.
+/// Computes the strongly connected components of the nodes `0..n`.
 pub fn components<'a>(n: usize, successors: impl Fn(u32) -> &'a [u32]) -> Components {
-    let mut found = Components { nodes: Vec::with_capacity(n), starts: vec![0] };
+    let mut result = Components { nodes: Vec::with_capacity(n), starts: vec![0] };
     let Ok(()) = visit_components(n, successors, |component| {
-        found.nodes.extend_from_slice(component);
-        found.starts.push(dense(found.nodes.len()));
+        result.nodes.extend_from_slice(component);
+        result.starts.push(dense(result.nodes.len()));
         Ok::<(), std::convert::Infallible>(())
     });
-    found
+    result
 }

@@ -1,7 +1,8 @@
-//! A model in the PRISM language to JANI (jani-spec.org, version 1), for other model checkers.
+//! Translates PRISM models to JANI (jani-spec.org, version 1).
 //!
-//! One automaton with one location for each module; modules synchronise on their actions. Labels become transient
-//! variables of type bool, rewards transient variables of type real. Formulas are written out, so no name is used twice.
+//! Each module becomes an automaton with one location; automata synchronise on their actions.
+//! Labels become transient Boolean variables, rewards transient real variables. Formulas are
+//! expanded, so no name is used twice.
 
 use std::collections::BTreeMap;
 
@@ -14,10 +15,11 @@ use crate::prism::ast::{
     Variable,
 };
 
-/// A model as JANI. Constants without value become parameters of the JANI model.
+/// Translates a model to JANI. Undefined constants become parameters of the JANI model.
 ///
 /// # Errors
-/// What JANI cannot say: rewards of commands without action; formulas that contain themselves.
+/// A construct that JANI cannot express (rewards of commands without an action), or a formula
+/// that contains itself.
 pub fn write(name: &str, model: &Model) -> Result<Value, Error> {
     let endless: Vec<Diagnostic> =
         model.formulas.iter().filter_map(|formula| endless(model, formula)).collect();
@@ -37,7 +39,7 @@ pub fn write(name: &str, model: &Model) -> Result<Value, Error> {
         let name = reward_name(model, &rewards.name);
         variables.push(json!({ "name": name, "type": "real", "transient": true, "initial-value": 0 }));
     }
-    // Every automaton writes what belongs to it; labels and rewards of states belong to the first one.
+    // Rewards and labels of states are assigned by the first automaton only.
     let automata: Vec<Value> = model
         .modules
         .iter()
@@ -75,19 +77,19 @@ pub fn write(name: &str, model: &Model) -> Result<Value, Error> {
     }))
 }
 
-/// Whether a variable or a constant has this name.
+/// Returns `true` if a variable or a constant has this name.
 fn is_taken(model: &Model, name: &str) -> bool {
     let declared = model.modules.iter().flat_map(|module| &module.variables).chain(&model.globals);
     let mut names = declared.map(|v| &v.name).chain(model.constants.iter().map(|constant| &constant.name));
     names.any(|known| known == name)
 }
 
-/// Labels keep their names where they can.
+/// The name of a label; prefixed if it is taken.
 fn label_name(model: &Model, name: &str) -> String {
     if is_taken(model, name) { format!("label_{name}") } else { name.to_owned() }
 }
 
-/// So do rewards.
+/// The name of a reward structure; prefixed if it is taken.
 fn reward_name(model: &Model, name: &str) -> String {
     let taken = is_taken(model, name) || model.labels.iter().any(|label| label.name == name);
     match name {
@@ -101,7 +103,7 @@ fn type_name(kind: Type) -> &'static str {
     if kind == Type::Double { "real" } else { kind.name() }
 }
 
-/// The actions, each with the modules that take part.
+/// The actions with their participating modules.
 fn actions(model: &Model) -> BTreeMap<&str, Vec<usize>> {
     let mut actions: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
     for (number, module) in model.modules.iter().enumerate() {
@@ -126,7 +128,7 @@ fn system(model: &Model, actions: &BTreeMap<&str, Vec<usize>>) -> Value {
     })
 }
 
-/// Formulas are written out, which one that contains itself cannot be.
+/// Reports a formula that contains itself, which cannot be expanded.
 fn endless(model: &Model, formula: &Named) -> Option<Diagnostic> {
     let mut used = Vec::new();
     formula.expression.names(&mut used);
@@ -145,17 +147,17 @@ fn endless(model: &Model, formula: &Named) -> Option<Diagnostic> {
     None
 }
 
-/// What has to hold together for a condition to hold.
+/// The conjuncts of a condition.
 fn parts(condition: &Expr) -> Vec<&Expr> {
-    let (mut open, mut found) = (vec![condition], Vec::new());
+    let (mut open, mut conjuncts) = (vec![condition], Vec::new());
     while let Some(part) = open.pop() {
         match &part.kind {
-            // The left one comes first.
+            // The stack yields the left operand first.
             ExprKind::Binary(BinaryOp::And, left, right) => open.extend([&**right, &**left]),
-            _ => found.push(part),
+            _ => conjuncts.push(part),
         }
     }
-    found
+    conjuncts
 }
 
 struct Writer<'a> {
@@ -192,7 +194,7 @@ impl Writer<'_> {
     }
 
     fn edge(&self, model: &Model, module: &Module, command: &Command) -> Value {
-        // Of the modules that share an action, the first one carries its rewards.
+        // The first of the synchronised modules carries the rewards of the action.
         let action = command.action.as_deref();
         let shares = |other: &&Module| other.commands.iter().any(|c| c.action.as_deref() == action);
         let carries =
@@ -201,8 +203,8 @@ impl Writer<'_> {
         if carries {
             let fixed = self.fixed(&command.guard);
             for Rewards { name, items, .. } in &model.rewards {
-                let own = items.iter().filter(|item| item.action == Some(command.action.clone()));
-                if let Some(value) = self.sum(own, &fixed) {
+                let action_rewards = items.iter().filter(|item| item.action == Some(command.action.clone()));
+                if let Some(value) = self.sum(action_rewards, &fixed) {
                     assignments.push(json!({ "ref": reward_name(model, name), "value": value }));
                 }
             }
@@ -211,14 +213,14 @@ impl Writer<'_> {
             .updates
             .iter()
             .map(|update| {
-                let mut all = assignments.clone();
-                all.extend(
+                let mut assignments_and_rewards = assignments.clone();
+                assignments_and_rewards.extend(
                     update
                         .assignments
                         .iter()
                         .map(|(name, value, _)| json!({ "ref": name, "value": self.expression(value) })),
                 );
-                let mut destination = json!({ "location": "run", "assignments": all });
+                let mut destination = json!({ "location": "run", "assignments": assignments_and_rewards });
                 if let Some(probability) = &update.probability {
                     destination["probability"] = json!({ "exp": self.expression(probability) });
                 }
@@ -236,21 +238,22 @@ impl Writer<'_> {
         edge
     }
 
-    /// The sum of rewards, each where its guard holds; variables that are known to have some value are not asked for again.
+    /// The sum of rewards under their guards. Conditions on variables in `fixed` are evaluated
+    /// statically.
     fn sum<'a>(&self, items: impl Iterator<Item = &'a RewardItem>, fixed: &[(&str, i64)]) -> Option<Value> {
         items
             .filter_map(|item| {
-                let mut left: Option<Expr> = None;
+                let mut remaining: Option<Expr> = None;
                 for part in parts(&item.guard) {
-                    let known = self.fixes(part).and_then(|(name, value)| {
-                        fixed.iter().find(|(known, _)| *known == name).map(|(_, known)| *known == value)
+                    let static_truth = self.fixes(part).and_then(|(name, value)| {
+                        fixed.iter().find(|(fixed, _)| *fixed == name).map(|(_, fixed)| *fixed == value)
                     });
-                    match known {
+                    match static_truth {
                         Some(true) => {}
                         Some(false) => return None,
                         None if part.kind == ExprKind::Bool(true) => {}
                         None => {
-                            left = Some(match left {
+                            remaining = Some(match remaining {
                                 Some(before) => before.op(BinaryOp::And, part.clone()),
                                 None => part.clone(),
                             });
@@ -258,7 +261,7 @@ impl Writer<'_> {
                     }
                 }
                 let reward = self.expression(&item.reward);
-                Some(match left {
+                Some(match remaining {
                     None => reward,
                     Some(guard) => {
                         json!({ "op": "ite", "if": self.expression(&guard), "then": reward, "else": 0 })
@@ -268,7 +271,7 @@ impl Writer<'_> {
             .reduce(|left, right| json!({ "op": "+", "left": left, "right": right }))
     }
 
-    /// The variables that have one value where a condition holds.
+    /// The variables whose value a condition determines.
     fn fixed<'a>(&self, condition: &'a Expr) -> Vec<(&'a str, i64)> {
         parts(condition).into_iter().filter_map(|part| self.fixes(part)).collect()
     }
@@ -316,7 +319,7 @@ impl Writer<'_> {
                 "else": self.expression(otherwise),
             }),
             ExprKind::Call(function, arguments) => self.call(*function, arguments),
-            // They stand in no model.
+            // Properties do not occur in models.
             ExprKind::Property(_) | ExprKind::Temporal(_) => json!(true),
         }
     }
@@ -339,7 +342,7 @@ impl Writer<'_> {
     }
 }
 
-/// A decimal as a number; a fraction that is none as a division.
+/// Writes a decimal as a number, and any other fraction as a division.
 fn number(value: &num_rational::BigRational) -> Value {
     let (text, _) = crate::prism::decimal(value);
     text.parse::<serde_json::Number>().map_or_else(

@@ -5,7 +5,7 @@
 //! bounds and policies; [`policy`] evaluates a given policy; [`pareto`] trades two objectives. [`check`] does all of
 //! this for a property in PRISM's syntax.
 //!
-//! The crate knows no OWL and no PDDL, opens no file and prints nothing.
+//! What is absent: OWL, PDDL, file access and output.
 
 #![warn(
     clippy::cast_possible_truncation,

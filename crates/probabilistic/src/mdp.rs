@@ -1,7 +1,8 @@
-//! Choices and distributions to a sparse Markov decision process.
+//! Sparse Markov decision processes.
 //!
-//! States, choices and transitions lie in three arrays, each state's choices and each choice's transitions side
-//! by side. So all successors of a state are one slice, which is what the graph algorithms run over.
+//! States, choices and transitions are stored in three arrays; the choices of a state and the
+//! transitions of a choice are contiguous. All successors of a state are therefore one slice,
+//! which the graph algorithms iterate over.
 
 use num_rational::BigRational;
 
@@ -9,27 +10,28 @@ use crate::error::Error;
 use crate::fraction::Fraction;
 use crate::number::Number;
 
-/// A process has at most so many states and choices: two numbers of 32 bits are left for what is none of them.
+/// Upper limit on the number of states and of choices; the two greatest 32-bit numbers are
+/// reserved.
 pub(crate) const MOST: usize = 0xFFFF_FFFE;
 
-/// A position as a number of 32 bits: of a state, a choice or a transition, of which a process has no more than 32 bits count,
-/// or of a part of a text, which is shorter than that in memory.
+/// Converts a position to 32 bits. Positions of states, choices, transitions and characters of a
+/// text are below 2^32.
 pub(crate) fn dense(position: usize) -> u32 {
     u32::try_from(position).expect("invariant: positions are below 2^32")
 }
 
-/// A Markov decision process; a Markov chain is one with a single choice in each state.
+/// A Markov decision process. A Markov chain is a process with a single choice in each state.
 ///
-/// States are numbers from 0, choices are numbered through over all states.
+/// States are numbered from 0; choices are numbered consecutively over all states.
 #[derive(Debug, Clone)]
 pub struct Mdp<N> {
-    /// For each state its first choice, and the number of choices at the end.
+    /// The first choice of each state, and the number of choices at the end.
     first_choice: Vec<u32>,
-    /// For each choice its first transition, and the number of transitions at the end.
+    /// The first transition of each choice, and the number of transitions at the end.
     first_transition: Vec<u32>,
     targets: Vec<u32>,
     probabilities: Vec<N>,
-    /// For each choice the number of its action.
+    /// The action of each choice.
     actions: Vec<u32>,
 }
 
@@ -46,7 +48,7 @@ impl<N: Number> Default for Mdp<N> {
 }
 
 impl<N: Number> Mdp<N> {
-    /// How many states there are.
+    /// Number of states.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "the end is listed, too, so that the list is never empty"
@@ -55,12 +57,12 @@ impl<N: Number> Mdp<N> {
         self.first_choice.len() - 1
     }
 
-    /// How many choices there are in all states together.
+    /// Number of choices in all states.
     pub fn choice_count(&self) -> usize {
         self.actions.len()
     }
 
-    /// How many transitions there are.
+    /// Number of transitions.
     pub fn transition_count(&self) -> usize {
         self.targets.len()
     }
@@ -74,7 +76,7 @@ impl<N: Number> Mdp<N> {
         self.first_choice[state] as usize..self.first_choice[state + 1] as usize
     }
 
-    /// The state that a choice belongs to.
+    /// The state of a choice.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "the first state starts with choice 0, so that there is one that starts before"
@@ -83,7 +85,7 @@ impl<N: Number> Mdp<N> {
         self.first_choice.partition_point(|first| *first as usize <= choice) - 1
     }
 
-    /// The action of a choice, as the generator numbered it.
+    /// The action of a choice, as numbered by the generator.
     pub fn action(&self, choice: usize) -> u32 {
         self.actions[choice]
     }
@@ -96,25 +98,25 @@ impl<N: Number> Mdp<N> {
         self.first_transition[choice] as usize..self.first_transition[choice + 1] as usize
     }
 
-    /// The states that a choice can lead to, each once.
+    /// The successors of a choice, without repetition.
     pub fn targets(&self, choice: usize) -> &[u32] {
         &self.targets[self.range(choice)]
     }
 
-    /// Where a choice leads, and with which probability.
+    /// The transitions of a choice: successor and probability.
     pub fn transitions(&self, choice: usize) -> impl ExactSizeIterator<Item = (usize, &N)> {
         let range = self.range(choice);
         self.targets[range.clone()].iter().map(|state| *state as usize).zip(&self.probabilities[range])
     }
 
-    /// All successors of a state, by choice; a state can occur more than once.
+    /// All successors of a state, by choice, possibly with repetition.
     pub fn successors(&self, state: usize) -> &[u32] {
         let choices = self.choices(state);
         let first = self.first_transition[choices.start] as usize;
         &self.targets[first..self.first_transition[choices.end] as usize]
     }
 
-    /// Adds a transition to the choice that is being written; transitions to one state are added up.
+    /// Adds a transition to the current choice. Probabilities of equal targets are added.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "a position in the list behind the first transition of the choice"
@@ -129,10 +131,10 @@ impl<N: Number> Mdp<N> {
         }
     }
 
-    /// Ends the choice that is being written.
+    /// Ends the current choice.
     ///
     /// # Errors
-    /// There are more choices or transitions than 32 bits can count.
+    /// More choices or transitions than 32 bits can count.
     pub fn end_choice(&mut self, action: u32) -> Result<(), Error> {
         let end = u32::try_from(self.targets.len()).map_err(|_| self.too_large())?;
         if self.actions.len() >= MOST {
@@ -143,12 +145,12 @@ impl<N: Number> Mdp<N> {
         Ok(())
     }
 
-    /// Ends the state that is being written.
+    /// Ends the current state.
     pub fn end_state(&mut self) {
         self.first_choice.push(dense(self.actions.len()));
     }
 
-    /// How many choices the state that is being written has so far.
+    /// Number of choices of the current state so far.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "the state that is being written starts after the choices of those before"
@@ -161,7 +163,7 @@ impl<N: Number> Mdp<N> {
         Error::StateLimit { states: self.states(), limit: self.states() }
     }
 
-    /// The same process in doubles.
+    /// Converts the probabilities to doubles.
     pub fn to_f64(&self) -> Mdp<f64> {
         Mdp {
             first_choice: self.first_choice.clone(),
@@ -174,7 +176,7 @@ impl<N: Number> Mdp<N> {
 }
 
 impl Mdp<Fraction> {
-    /// The same process in doubles; none where a probability is too small for them.
+    /// Converts the probabilities to doubles. Returns `None` if a probability is out of range.
     pub(crate) fn rounded(&self) -> Option<Mdp<f64>> {
         Some(Mdp {
             first_choice: self.first_choice.clone(),
@@ -186,7 +188,7 @@ impl Mdp<Fraction> {
     }
 }
 
-/// What a decimal of the model stands for in the kind of number that is solved in.
+/// Converts an exact number of the model to the kind of number that is solved in.
 pub fn number<N: Number>(value: &BigRational) -> N {
     N::from_rational(value)
 }

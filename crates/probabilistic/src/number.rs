@@ -1,25 +1,26 @@
-//! The two kinds of numbers that a model can be solved in: doubles, and rationals of any size.
+//! The kinds of numbers that a model can be solved in: doubles and exact rationals.
 //!
-//! One implementation of every algorithm serves both. Doubles are for size and need certified bounds; rationals
-//! are for small models and need none.
+//! Every algorithm is generic over them. Doubles scale to large models and require certified
+//! bounds; rationals serve small models.
 
 use std::fmt::Debug;
 
 use num_rational::BigRational;
 use num_traits::{One, ToPrimitive, Zero};
 
-/// Relative difference of doubles below which one is not better than the other.
+/// Relative difference below which two doubles count as equally good.
 const TOLERANCE: f64 = 1e-12;
 
-/// Whole doubles below are exact numbers of the model, or sums of such numbers.
+/// Integral doubles below this value are exact numbers of the model or exact sums of such
+/// numbers.
 const WHOLE: f64 = 4e15;
 
-/// Whether a double is a sum of whole numbers that were not rounded.
+/// Returns `true` if a double is an exact sum of integers.
 pub(crate) fn is_whole(value: f64) -> bool {
     value.fract() == 0.0 && value < WHOLE
 }
 
-/// A count of things in memory as a double.
+/// Converts a count of objects in memory to a double.
 #[expect(
     clippy::cast_precision_loss,
     reason = "what is counted is in memory, so that there is less of it than 2^53"
@@ -28,23 +29,23 @@ pub(crate) fn count(things: usize) -> f64 {
     things as f64
 }
 
-/// A field with an order; probabilities, rewards and values.
+/// An ordered field, for probabilities, rewards and values.
 pub trait Number: Clone + Debug + PartialOrd + Send + Sync + 'static {
-    /// Whether arithmetic is exact.
+    /// `true` if arithmetic is exact.
     const EXACT: bool;
 
     /// Zero.
     fn zero() -> Self;
     /// One.
     fn one() -> Self;
-    /// The nearest number of this kind; where doubles are whole, they are exact: what would be rounded to a whole double
-    /// becomes the one beside it.
+    /// The nearest number of this kind. A double is integral only if it is exact: a value that
+    /// would be rounded to an integer becomes the adjacent double.
     fn from_rational(value: &BigRational) -> Self;
-    /// The number that a double is; zero for what is not finite.
+    /// Converts a double; zero if it is not finite.
     fn from_f64(value: f64) -> Self;
     /// The nearest double.
     fn to_f64(&self) -> f64;
-    /// The rational, where arithmetic is exact.
+    /// The rational value, if arithmetic is exact.
     fn to_rational(&self) -> Option<BigRational>;
     /// Sum.
     #[must_use]
@@ -58,17 +59,17 @@ pub trait Number: Clone + Debug + PartialOrd + Send + Sync + 'static {
     /// Quotient; the divisor must not be zero.
     #[must_use]
     fn over(&self, other: &Self) -> Self;
-    /// Whether this is exactly zero.
+    /// Returns `true` for exactly zero.
     fn is_zero(&self) -> bool;
-    /// Whether this is exactly one.
+    /// Returns `true` for exactly one.
     fn is_unit(&self) -> bool;
-    /// Less than `other` by more than rounding errors can explain.
+    /// Returns `true` if the number is less than `other` by more than rounding errors explain.
     fn clearly_less(&self, other: &Self) -> bool;
-    /// Bits that the number takes; what makes exact solving slow.
+    /// Size of the number in bits, the measure of the cost of exact arithmetic.
     fn size(&self) -> u64;
 }
 
-/// What both kinds have operators for.
+/// The operations that both kinds implement by operators.
 macro_rules! arithmetic {
     () => {
         fn plus(&self, other: &Self) -> Self {
@@ -167,15 +168,15 @@ impl Number for BigRational {
     }
 }
 
-/// A probability or a reward in the kind of number that is solved in; none where doubles would lose digits that the bounds on
-/// results count on.
+/// Converts a probability or a reward to the kind of number that is solved in. Returns `None` if
+/// it is so small or large that doubles lose digits on which the bounds depend.
 pub(crate) fn rounded<N: Number>(value: &BigRational) -> Option<N> {
     let number = N::from_rational(value);
     let magnitude = number.to_f64().abs();
     (N::EXACT || Zero::is_zero(value) || (1e-250..=1e250).contains(&magnitude)).then_some(number)
 }
 
-/// A decimal as it is written, `1.25e-3`, exactly; none where the text is not a number.
+/// Parses a decimal such as `1.25e-3` exactly. Returns `None` if the text is not a number.
 pub fn parse_decimal(text: &str) -> Option<BigRational> {
     let (mantissa, exponent) = match text.split_once(['e', 'E']) {
         Some((mantissa, exponent)) => (mantissa, exponent.parse::<i32>().ok()?),
@@ -191,9 +192,10 @@ pub fn parse_decimal(text: &str) -> Option<BigRational> {
     Some(if shift >= 0 { BigRational::from(digits * power) } else { BigRational::new(digits, power) })
 }
 
-/// A rational from a double, as the shortest decimal that reads as this double.
+/// Converts a double to the rational value of its shortest decimal representation.
 ///
-/// What stands in a file as `0.1` means one tenth, and not the double beside it. None for infinities and NaN.
+/// `0.1` in a file means one tenth, not the nearest double. Returns `None` for infinities and
+/// NaN.
 pub fn from_shortest_decimal(value: f64) -> Option<BigRational> {
     let negative = value.is_sign_negative();
     let magnitude = parse_decimal(&format!("{:e}", value.abs()))?;

@@ -1,10 +1,12 @@
-//! Two objectives to the vertices of their Pareto front, and to the best value of one under a bound on the other.
+//! Computes the Pareto front of two objectives, and the optimum of one under a bound on the
+//! other.
 //!
-//! Each objective is a loss: an expected cost until its target, or the probability of missing its target. While neither
-//! target is reached, a weighted sum of both is minimised; what comes after the first one is one objective alone, and
-//! enters as the worth of the states in which the first target is reached (Etessami et al., LMCS 4(4:8), 2008;
-//! the search for vertices by normals is that of Forejt, Kwiatkowska and Parker, ATVA 2012). So the vertices are those of
-//! policies that remember which targets have been reached, and nothing else.
+//! Each objective is a loss: an expected cost until its target, or the probability of missing its
+//! target. Until the first target is reached, a weighted sum of both losses is minimised;
+//! afterwards only one objective remains, and its optimal value is the terminal value of the
+//! state (Etessami et al., LMCS 4(4:8), 2008; the search for vertices by normals is that of
+//! Forejt, Kwiatkowska and Parker, ATVA 2012). The vertices are attained by policies whose memory
+//! is the set of reached targets.
 
 use std::collections::VecDeque;
 
@@ -15,57 +17,57 @@ use crate::number::Number;
 use crate::policy::{choices_of, conserving};
 use crate::solve::{Direction, NONE, Problem, Solution, solve};
 
-/// Exact arithmetic would take too long.
+/// Exact arithmetic exceeds its budget.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Exhausted;
 
 /// One of two objectives.
 #[derive(Debug, Clone)]
 pub struct Objective<N> {
-    /// The rewards whose expected sum is to be small; none for the probability of the target, which is to be great.
+    /// The rewards whose expected sum is minimised; `None` for the probability of the target,
+    /// which is maximised.
     pub rewards: Option<Vec<N>>,
-    /// Its target.
+    /// The target states.
     pub target: FixedBitSet,
 }
 
-/// A policy and what it is worth.
+/// A policy and its losses.
 #[derive(Debug, Clone)]
 pub struct Point<N> {
     /// The losses: expected cost, or probability of missing the target.
     pub losses: [N; 2],
-    /// How far each loss can be from what the policy loses; 0 where arithmetic is exact.
+    /// Upper limit on the absolute error of each loss; 0 if arithmetic is exact.
     pub errors: [f64; 2],
     /// The choices until the first target.
     pub policy: Vec<u32>,
 }
 
-/// The least value of the first objective under a bound on the second.
+/// The minimum of the first objective under a bound on the second.
 ///
-/// In doubles the bound counts as kept where it is missed by no more than 10^-12 (relative to the bound, if that is
-/// above 1).
+/// In doubles, the bound may be exceeded by 10^-12 (relative to the bound, if that is above 1).
 #[derive(Debug, Clone)]
 pub struct Constrained<N> {
-    /// By policies that may draw lots.
+    /// Over randomised policies.
     pub randomised: Bounded<N>,
-    /// By policies that may not (and that remember only which targets have been reached); with whether it is proved
-    /// to be the least one. None where there is none.
+    /// Over deterministic policies whose memory is the set of reached targets, with `true` if it
+    /// is proved optimal. `None` if no such policy was found.
     pub deterministic: Option<(Bounded<N>, bool)>,
 }
 
-/// A loss with bounds, which say nothing where arithmetic is exact.
+/// A loss with bounds, which are unused if arithmetic is exact.
 #[derive(Debug, Clone)]
 pub struct Bounded<N> {
     /// The loss.
     pub value: N,
-    /// It is at least this.
+    /// Lower bound on the loss.
     pub lower: f64,
-    /// It is at most this.
+    /// Upper bound on the loss.
     pub upper: f64,
 }
 
-/// How many vertices are looked for at most.
+/// Upper limit on the number of vertices.
 const VERTICES: usize = 2000;
-/// How many restrictions of the process are tried for the best deterministic policy.
+/// Upper limit on the number of branch-and-bound nodes for the best deterministic policy.
 const BRANCHES: usize = 3000;
 
 /// Two objectives in one process.
@@ -73,13 +75,13 @@ const BRANCHES: usize = 3000;
 pub struct Pareto<'a, N> {
     mdp: &'a Mdp<N>,
     objectives: &'a [Objective<N>; 2],
-    /// What each objective is worth alone, as a loss; infinite states apart.
+    /// The optimal loss of each objective alone, except in states of infinite cost.
     alone: [Vec<N>; 2],
-    /// The greatest error of that.
+    /// The greatest error of `alone`.
     alone_errors: [f64; 2],
-    /// Both targets.
+    /// The states of either target.
     terminal: FixedBitSet,
-    /// States that leave no hope for a cost.
+    /// The states from which a cost is infinite.
     blocked: FixedBitSet,
     has_costs: bool,
 }
@@ -88,7 +90,7 @@ impl<'a, N: Number> Pareto<'a, N> {
     /// Prepares two objectives.
     ///
     /// # Errors
-    /// Exact arithmetic takes too long.
+    /// Exact arithmetic exceeds its budget.
     pub fn new(mdp: &'a Mdp<N>, objectives: &'a [Objective<N>; 2]) -> Result<Self, Exhausted> {
         let n = mdp.states();
         let mut terminal = FixedBitSet::with_capacity(n);
@@ -105,7 +107,7 @@ impl<'a, N: Number> Pareto<'a, N> {
             alone_errors[number] = solution.errors.iter().fold(0.0, |most: f64, error| most.max(*error));
             blocked.union_with(&solution.infinite);
         }
-        // A state from which a cost is infinite must be avoided before its target, not after it.
+        // A state of infinite cost must be avoided before the target of that cost, not after it.
         let avoided: Vec<usize> = blocked.ones().collect();
         for state in avoided {
             let pending = objectives.iter().any(|o| o.rewards.is_some() && !o.target.contains(state));
@@ -115,16 +117,16 @@ impl<'a, N: Number> Pareto<'a, N> {
         Ok(Self { mdp, objectives, alone, alone_errors, terminal, blocked, has_costs })
     }
 
-    /// The worth of the targets for one objective.
+    /// The terminal values for one objective.
     fn worth(&self, objective: usize) -> Vec<N> {
         let target = &self.objectives[objective].target;
-        let own = |state: usize| {
+        let terminal_value = |state: usize| {
             if target.contains(state) { N::zero() } else { self.alone[objective][state].clone() }
         };
-        (0..self.mdp.states()).map(own).collect()
+        (0..self.mdp.states()).map(terminal_value).collect()
     }
 
-    /// Least weighted loss, by the choices that are allowed.
+    /// Minimises a weighted loss over the allowed choices.
     fn solve(
         &self,
         weights: &[N; 2],
@@ -141,10 +143,10 @@ impl<'a, N: Number> Pareto<'a, N> {
             (0..self.mdp.choice_count()).map(|choice| mix([reward(0, choice), reward(1, choice)])).collect()
         });
         if !self.has_costs {
-            // Two probabilities: never reaching a target is allowed, and loses both.
-            let all = weights[0].plus(&weights[1]);
+            // For two probabilities, never reaching a target is admissible and loses both.
+            let total = weights[0].plus(&weights[1]);
             for worth in &mut worth {
-                *worth = all.minus(worth);
+                *worth = total.minus(worth);
             }
         }
         let problem = Problem {
@@ -161,7 +163,7 @@ impl<'a, N: Number> Pareto<'a, N> {
         Ok((solution, kept))
     }
 
-    /// What a policy loses by each objective.
+    /// The losses of a policy.
     fn point(&self, policy: Vec<u32>) -> Result<Point<N>, Exhausted> {
         let allowed = choices_of(self.mdp, &policy);
         let unit = [[N::one(), N::zero()], [N::zero(), N::one()]];
@@ -171,14 +173,15 @@ impl<'a, N: Number> Pareto<'a, N> {
             let value = solution.values[0].clone();
             losses[number] = if self.has_costs { value } else { N::one().minus(&value) };
             if !N::EXACT {
-                // Values as complements of probabilities are rounded once more, at the start and at the end.
+                // Complements of probabilities are rounded twice more, in the terminal values and
+                // in the result.
                 errors[number] = solution.errors[0] + self.alone_errors[number] + 2.0 * f64::EPSILON;
             }
         }
         Ok(Point { losses, errors, policy })
     }
 
-    /// The best point for one objective, and for the other among those.
+    /// The lexicographic optimum with `first` as the primary objective.
     fn extreme(&self, first: usize, allowed: Option<&FixedBitSet>) -> Result<Option<Point<N>>, Exhausted> {
         let unit = |number: usize| {
             let mut weights = [N::zero(), N::zero()];
@@ -189,16 +192,17 @@ impl<'a, N: Number> Pareto<'a, N> {
         if best.infinite.contains(0) {
             return Ok(None);
         }
-        let other = usize::from(first == 0);
-        let (second, _) = self.solve(&unit(other), Some(&kept))?;
+        let secondary = usize::from(first == 0);
+        let (second, _) = self.solve(&unit(secondary), Some(&kept))?;
         let policy = second.policy.iter().zip(&best.policy).map(|(s, b)| if *s == NONE { *b } else { *s });
         self.point(policy.collect()).map(Some)
     }
 
-    /// The vertices of the front, by the first objective; no vertex where a cost is infinite whatever is done.
+    /// The vertices of the front in the order of the first objective; empty if a cost is infinite
+    /// under every policy.
     ///
     /// # Errors
-    /// Exact arithmetic takes too long.
+    /// Exact arithmetic exceeds its budget.
     pub fn vertices(&self, allowed: Option<&FixedBitSet>) -> Result<Vec<Point<N>>, Exhausted> {
         let Some(first) = self.extreme(0, allowed)? else { return Ok(Vec::new()) };
         let Some(last) = self.extreme(1, allowed)? else { return Ok(Vec::new()) };
@@ -224,7 +228,7 @@ impl<'a, N: Number> Pareto<'a, N> {
             } else {
                 let next = open.pop();
                 if flat && done.is_empty() && open.is_empty() {
-                    // Both objectives have the same best point.
+                    // One point is optimal for both objectives.
                     return Ok(vec![at]);
                 }
                 done.push(std::mem::replace(&mut at, next.ok_or(Exhausted)?));
@@ -234,10 +238,11 @@ impl<'a, N: Number> Pareto<'a, N> {
         Ok(done)
     }
 
-    /// The least first loss where the second one is at most `limit`; none where no policy keeps it.
+    /// The minimum of the first loss under an upper limit on the second one; `None` if no policy
+    /// satisfies the limit.
     ///
     /// # Errors
-    /// Exact arithmetic takes too long.
+    /// Exact arithmetic exceeds its budget.
     pub fn constrained(&self, limit: &N) -> Result<Option<Constrained<N>>, Exhausted> {
         let vertices = self.vertices(None)?;
         let Some((value, segment)) = lower_hull(&vertices, limit) else { return Ok(None) };
@@ -247,8 +252,8 @@ impl<'a, N: Number> Pareto<'a, N> {
         Ok(Some(Constrained { randomised, deterministic }))
     }
 
-    /// What no mixture of policies gets below while it keeps the limit: each has a weighted sum of losses that is at least
-    /// the least one.
+    /// Lower bound on the first loss of every mixture of policies within the limit: its weighted
+    /// loss is at least the minimum.
     fn below(
         &self,
         vertices: &[Point<N>],
@@ -273,18 +278,18 @@ impl<'a, N: Number> Pareto<'a, N> {
         Ok(((least - spent - error - rounding) / first).next_down().max(0.0))
     }
 
-    /// Branch and bound over the choices at states where two neighbouring vertices differ; the randomised optimum of a
-    /// restricted process bounds what is left.
+    /// Branch and bound over the choices of states in which two neighbouring vertices differ. The
+    /// randomised optimum of a restricted process is the lower bound of a node.
     fn deterministic(&self, limit: &N) -> Result<Option<(Bounded<N>, bool)>, Exhausted> {
         let mut best: Option<Bounded<N>> = None;
-        // What has been given up is at least so much.
+        // Lower bound on all pruned nodes.
         let mut lower = f64::INFINITY;
-        let mut all = FixedBitSet::with_capacity(self.mdp.choice_count());
-        all.insert_range(..);
-        let mut open = vec![all];
-        let mut left = 0..BRANCHES;
+        let mut choices = FixedBitSet::with_capacity(self.mdp.choice_count());
+        choices.insert_range(..);
+        let mut open = vec![choices];
+        let mut remaining_nodes = 0..BRANCHES;
         while let Some(allowed) = open.pop() {
-            if left.next().is_none() {
+            if remaining_nodes.next().is_none() {
                 return Ok(best.map(|best| (Bounded { lower: 0.0, ..best }, false)));
             }
             let vertices = self.vertices(Some(&allowed))?;
@@ -315,11 +320,11 @@ impl<'a, N: Number> Pareto<'a, N> {
         Ok(best.map(|best| (Bounded { lower: lower.min(best.upper), ..best }, true)))
     }
 
-    /// The first state on the way of a policy at which another one does something else.
+    /// The first state, in breadth-first order under a policy, in which another policy differs.
     fn difference(&self, policy: &[u32], other: &[u32]) -> Option<usize> {
-        let mut seen = FixedBitSet::with_capacity(self.mdp.states());
+        let mut visited = FixedBitSet::with_capacity(self.mdp.states());
         let mut queue = VecDeque::from([0]);
-        seen.insert(0);
+        visited.insert(0);
         while let Some(state) = queue.pop_front() {
             if policy[state] == NONE || self.terminal.contains(state) {
                 continue;
@@ -328,7 +333,7 @@ impl<'a, N: Number> Pareto<'a, N> {
                 return Some(state);
             }
             for target in self.mdp.targets(policy[state] as usize) {
-                if !seen.put(*target as usize) {
+                if !visited.put(*target as usize) {
                     queue.push_back(*target as usize);
                 }
             }
@@ -350,12 +355,12 @@ fn keeps<N: Number>(loss: &N, limit: &N) -> bool {
     if N::EXACT { loss <= limit } else { loss.to_f64() <= kept_limit(limit.to_f64()) }
 }
 
-/// What still counts as keeping a limit in doubles.
+/// The limit with its tolerance in doubles.
 fn kept_limit(limit: f64) -> f64 {
     limit + 1e-12 * limit.max(1.0)
 }
 
-/// What a mixture of two vertices that keeps the limit loses at most.
+/// Upper bound on the first loss of a mixture of two vertices within the limit.
 fn above<N: Number>(vertices: &[Point<N>], segment: Option<(usize, usize)>, limit: &N) -> f64 {
     let worst = |point: &Point<N>, number: usize| point.losses[number].to_f64() + point.errors[number];
     let limit = limit.to_f64();
@@ -369,13 +374,14 @@ fn above<N: Number>(vertices: &[Point<N>], segment: Option<(usize, usize)>, limi
     }
     let share = ((worst(a, 1) - limit) / (worst(a, 1) - worst(b, 1))).clamp(0.0, 1.0);
     let share = if left == right { 1.0 } else { share };
-    let most = worst(a, 0) * (1.0 - share) + worst(b, 0) * share;
-    most + 16.0 * f64::EPSILON * (worst(a, 0) + worst(b, 0))
+    let bound = worst(a, 0) * (1.0 - share) + worst(b, 0) * share;
+    bound + 16.0 * f64::EPSILON * (worst(a, 0) + worst(b, 0))
 }
 
-/// The least first loss of mixtures of vertices that keep the limit; with the two vertices that are mixed, if it takes two.
+/// The least first loss of mixtures of vertices within the limit, with the two mixed vertices if
+/// there are two.
 fn lower_hull<N: Number>(vertices: &[Point<N>], limit: &N) -> Option<(N, Option<(usize, usize)>)> {
-    // Vertices go from small first losses to small second ones.
+    // The vertices are ordered by increasing first and decreasing second loss.
     let right = vertices.iter().position(|vertex| keeps(&vertex.losses[1], limit))?;
     let Some(left) = right.checked_sub(1) else {
         return Some((vertices[right].losses[0].clone(), None));

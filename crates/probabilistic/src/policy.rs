@@ -1,4 +1,4 @@
-//! A policy and a process to what the policy is worth; secondary objectives; values under the condition of success.
+//! Policy evaluation, secondary objectives, and conditioning on success.
 
 use fixedbitset::FixedBitSet;
 
@@ -6,7 +6,7 @@ use crate::mdp::{Mdp, dense};
 use crate::number::Number;
 use crate::solve::{Direction, NONE, Problem, Solution, solve};
 
-/// The choices that a policy makes.
+/// The choices of a policy.
 pub fn choices_of<N: Number>(mdp: &Mdp<N>, policy: &[u32]) -> FixedBitSet {
     let mut allowed = FixedBitSet::with_capacity(mdp.choice_count());
     for choice in policy.iter().filter(|choice| **choice != NONE) {
@@ -15,19 +15,18 @@ pub fn choices_of<N: Number>(mdp: &Mdp<N>, policy: &[u32]) -> FixedBitSet {
     allowed
 }
 
-/// What a policy is worth in a problem: its own choices and no others. States for which it makes no choice count as
-/// ends without success.
+/// Evaluates a policy in a problem. States without a choice count as unsuccessful ends.
 pub fn evaluate<N: Number>(problem: Problem<'_, N>, policy: &[u32]) -> Option<Solution<N>> {
     let allowed = choices_of(problem.mdp, policy);
     solve(Problem { allowed: Some(&allowed), ..problem }, None)
 }
 
-/// The choices that keep the value of a solution, at each state where it is finite and positive or costs count.
+/// The optimal choices with respect to a solution, in the states of finite value.
 ///
-/// With doubles, differences that rounding can explain count as none.
+/// In doubles, differences within rounding errors are ignored.
 pub fn conserving<N: Number>(problem: &Problem<'_, N>, solution: &Solution<N>) -> FixedBitSet {
     let mdp = problem.mdp;
-    let mut kept = FixedBitSet::with_capacity(mdp.choice_count());
+    let mut optimal = FixedBitSet::with_capacity(mdp.choice_count());
     for state in (0..mdp.states()).filter(|state| !problem.is_sink(*state)) {
         if solution.infinite.contains(state) {
             continue;
@@ -43,18 +42,19 @@ pub fn conserving<N: Number>(problem: &Problem<'_, N>, solution: &Solution<N>) -
             let difference = (worth.to_f64() - value.to_f64()).abs();
             let keeps = if N::EXACT { worth == *value } else { difference <= 1e-9 * value.to_f64() };
             if keeps || solution.policy[state] as usize == choice {
-                kept.insert(choice);
+                optimal.insert(choice);
             }
         }
     }
-    kept
+    optimal
 }
 
-/// Makes a policy that is best for a problem best for a second reward, too, among the policies that are best for the first.
+/// Minimises a secondary reward over the policies that are optimal for a problem.
 ///
-/// A policy for a probability alone may wander: what it does before or without success costs nothing. The result goes
-/// to where the first problem is decided (its end, or states from which nothing can be gained) at the least expected
-/// second reward. None where exact arithmetic takes too long, or the first problem's value is that of staying for ever.
+/// An optimal policy for a probability may contain cycles before success or after failure, which
+/// are free. The result reaches a state that decides the first problem (a terminal state or a
+/// state of value 0) at the least expected secondary reward. Returns `None` if exact arithmetic
+/// exceeds its budget, or if the optimum of the first problem may require to continue forever.
 pub fn with_secondary<N: Number>(
     problem: &Problem<'_, N>,
     solution: &Solution<N>,
@@ -83,9 +83,9 @@ pub fn with_secondary<N: Number>(
     solve(second, None)
 }
 
-/// The chain of a policy under the condition that its end is reached (Doob's transform): each transition is weighted
-/// with the probability of success after it. The choices keep the numbers of their order in the result; its second
-/// part tells for each choice which one of the process it was.
+/// The Markov chain of a policy conditioned on reaching `end` (Doob's h-transform): each
+/// transition is weighted with the probability of success after it. Also returns the original
+/// choice of each choice of the result.
 pub fn conditioned<N: Number>(
     mdp: &Mdp<N>,
     policy: &[u32],

@@ -1,83 +1,83 @@
-//! Values as they are reported.
+//! The values that a check reports.
 
 use num_rational::BigRational;
 
 use crate::number::{Number, enclosing};
 
-/// A number that was asked for, with bounds on it.
+/// A number with guaranteed bounds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Quantity {
-    /// The value, as near as it is known.
+    /// The best approximation of the value.
     pub value: f64,
-    /// The true value is at least this.
+    /// Lower bound on the true value.
     pub lower: f64,
-    /// The true value is at most this; may be infinite where nothing better was found.
+    /// Upper bound on the true value; infinite if no finite bound is proved.
     pub upper: f64,
-    /// The true value, where it was computed exactly.
+    /// The true value, if it was computed exactly.
     pub exact: Option<BigRational>,
 }
 
-/// How wide the bounds on a value may be.
+/// Required width of the bounds on a value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Precision {
-    /// So much, as a part of the value.
+    /// Upper limit on the width, relative to the value.
     Relative(f64),
-    /// So much.
+    /// Upper limit on the width.
     Absolute(f64),
 }
 
 impl Precision {
-    /// Whether the bounds on a value are within it.
+    /// Returns `true` if the bounds on a value are narrow enough.
     pub fn holds(self, quantity: &Quantity) -> bool {
         let width = quantity.upper - quantity.lower;
         match self {
             _ if quantity.exact.is_some() => true,
-            // The ends are rounded to doubles.
+            // The ends are rounded to doubles, so a smaller width cannot be reached.
             Self::Relative(most) => width <= (most.max(4.0 * f64::EPSILON)) * quantity.value.abs(),
             Self::Absolute(most) => width <= most.max(4.0 * f64::EPSILON * quantity.value.abs()),
         }
     }
 }
 
-/// A value that was asked for.
+/// The value of a property.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Answer {
     /// A number.
     Finite(Quantity),
     /// Infinity.
     Infinite,
-    /// There is no such value: no policy does what is asked.
+    /// Undefined: no policy satisfies the constraints.
     Undefined,
 }
 
-/// What a property is answered with.
+/// The answer to a property.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outcome {
     /// A value.
     Value(Answer),
-    /// Whether a bound is kept, with the value; none where the bounds on the value do not decide it.
+    /// A truth value, with the compared value if the property has a single one.
     Truth(bool, Option<Answer>),
-    /// The bounds on the value do not decide whether the bound is kept.
+    /// The enclosure of the value does not decide the comparison.
     Undecided(Answer),
-    /// The least and the greatest value, where there are several states to start in or it was asked for.
+    /// The least and the greatest value, over several initial states or by a filter.
     Range(Answer, Answer),
-    /// Some states, with their values.
+    /// Some states with their values.
     States(Vec<Listed>),
     /// The vertices of a Pareto front.
     Front(Vec<[Answer; 2]>),
-    /// The best value under a bound on a second objective.
+    /// The optimum of one objective under a bound on another.
     Constrained {
-        /// By policies that may draw lots.
+        /// Over randomised policies.
         randomised: Answer,
-        /// By policies that may not.
+        /// Over deterministic policies.
         deterministic: Answer,
-        /// Whether the latter is proved to be the best.
+        /// `true` if the deterministic value is proved optimal.
         proved: bool,
     },
 }
 
 impl Outcome {
-    /// Whether the bounds on all of its values are within a width.
+    /// Returns `true` if the bounds on all values are narrow enough.
     pub fn is_within(&self, precision: Precision) -> bool {
         let fits = |answer: &Answer| answer.quantity().is_none_or(|quantity| precision.holds(quantity));
         match self {
@@ -86,7 +86,7 @@ impl Outcome {
             Self::States(states) => states.iter().filter_map(|state| state.answer.as_ref()).all(fits),
             Self::Front(vertices) => vertices.iter().flatten().all(fits),
             Self::Constrained { randomised, deterministic, .. } => fits(randomised) && fits(deterministic),
-            // What is decided is decided.
+            // A truth value has no width.
             Self::Truth(..) => true,
         }
     }
@@ -97,14 +97,14 @@ impl Outcome {
 pub struct Listed {
     /// The values of the variables, in their order.
     pub values: Vec<i64>,
-    /// Whether the property holds, for one that does or does not.
+    /// The truth value of a Boolean property.
     pub truth: Option<bool>,
-    /// The value, for a property that has one.
+    /// The value of a numeric property.
     pub answer: Option<Answer>,
 }
 
 impl Answer {
-    /// From an exact or rounded number with its error.
+    /// Creates an answer from an exact number, or from a rounded number and its absolute error.
     pub fn from_number<N: Number>(value: &N, error: f64) -> Self {
         if let Some(exact) = value.to_rational() {
             return Self::from_exact(exact);
@@ -117,18 +117,18 @@ impl Answer {
         Self::Finite(Quantity { value, lower: lower.max(0.0), upper, exact: None })
     }
 
-    /// From a rounded number and its bounds.
+    /// Creates an answer from a rounded number and its bounds.
     pub fn between(value: f64, [lower, upper]: [f64; 2]) -> Self {
         Self::Finite(Quantity { value, lower, upper, exact: None })
     }
 
-    /// From an exact number.
+    /// Creates an answer from an exact number.
     pub fn from_exact(exact: BigRational) -> Self {
         let (lower, upper) = enclosing(&exact);
         Self::Finite(Quantity { value: Number::to_f64(&exact), lower, upper, exact: Some(exact) })
     }
 
-    /// A probability from that of its complement.
+    /// The complementary probability.
     #[must_use]
     pub fn complement(self) -> Self {
         match self {
@@ -145,7 +145,7 @@ impl Answer {
         }
     }
 
-    /// As a probability: bounds within 0 and 1.
+    /// Clamps a probability and its upper bound to 1.
     #[must_use]
     pub fn probability(self) -> Self {
         match self {
@@ -158,7 +158,7 @@ impl Answer {
         }
     }
 
-    /// The number, if it is one.
+    /// The number, if the answer is one.
     pub fn quantity(&self) -> Option<&Quantity> {
         match self {
             Self::Finite(quantity) => Some(quantity),

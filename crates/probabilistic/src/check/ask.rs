@@ -1,13 +1,13 @@
-//! Why there is no answer yet: something is wrong, or exact arithmetic takes too long.
+//! The result type of checks: an error, or an exceeded budget of exact arithmetic.
 
 use crate::error::{Diagnostic, Error, Place};
 
-/// Why there is no answer.
+/// The reason for ending a computation without a result.
 #[derive(Debug)]
 pub enum Stop {
-    /// Something is wrong.
+    /// An error in the input, or an exceeded limit.
     Wrong(Error),
-    /// Exact arithmetic takes too long.
+    /// Exact arithmetic exceeds its budget.
     TooMuchWork,
 }
 
@@ -17,20 +17,20 @@ impl From<Error> for Stop {
     }
 }
 
-/// Something that was asked for.
+/// The result of a part of a check.
 pub type Asked<T> = Result<T, Stop>;
 
-/// What exact arithmetic came to.
+/// Converts `None`, the result of exact arithmetic that exceeded its budget, to an error.
 pub fn worked<T>(found: Option<T>) -> Asked<T> {
     found.ok_or(Stop::TooMuchWork)
 }
 
-/// Something that is wrong with a property.
+/// An error in a property.
 pub fn property_error(code: &'static str, place: Place, text: &str) -> Error {
     Error::Property(Diagnostic::new(code, place, text).into())
 }
 
-/// Something that is wrong with a property, at a place that is not known.
+/// An error in a property at an unknown place.
 pub fn refusal(code: &'static str, text: &str) -> Stop {
     Stop::Wrong(property_error(code, Place { line: 1, column: 1 }, text))
 }

@@ -1,8 +1,9 @@
-//! Probabilities of reaching something before a reward exceeds a bound.
+//! Cost-bounded reachability probabilities.
 //!
-//! The rewards are whole numbers. For each budget, from 0 on, choices that earn nothing stay within it, and choices that earn
-//! something lead to states with the values of a smaller budget, which are known (Hartmanns, Junges, Katoen and Quatmann,
-//! "Multi-Cost Bounded Reachability in MDP", TACAS 2018).
+//! Rewards are integers. For each budget from 0 on, choices without reward stay within the
+//! budget, and choices with a reward lead to values of a smaller budget, which are already known
+//! (Hartmanns, Junges, Katoen and Quatmann, "Multi-Cost Bounded Reachability in MDP", TACAS
+//! 2018).
 
 use fixedbitset::FixedBitSet;
 use num_traits::{Signed, ToPrimitive};
@@ -17,11 +18,12 @@ use crate::number::{Number, count};
 use crate::prism::ast::Steps;
 use crate::solve::{Direction, Problem, Work, solve_within};
 
-/// Budgets that are kept at most.
+/// Upper limit on the budget.
 const BUDGETS: usize = 100_000;
 
 impl<N: Number> Query<'_, N> {
-    /// The probabilities of reaching the end of a problem while a reward is at most as large as it says.
+    /// The probabilities of reaching the terminal states of a problem while a reward stays within
+    /// a bound.
     pub fn until_within_reward(
         &self,
         problem: Problem<'_, N>,
@@ -51,18 +53,18 @@ impl<N: Number> Query<'_, N> {
         let layers = Layers::new(self.mdp(), problem, &earned)?;
         let n = self.mdp().states();
         let greatest = earned.iter().max().copied().unwrap_or(0);
-        // The values of the last budgets, as many as a choice can reach back.
-        let mut known: Vec<Vec<N>> = Vec::new();
+        // The values of the last budgets, as far back as a choice can refer.
+        let mut previous: Vec<Vec<N>> = Vec::new();
         let mut vector = Vector::exactly(vec![N::zero(); n], Span::Probability);
         let mut error = 0.0_f64;
         let sweep = Sweep::new(&layers, problem, &earned);
         for budget in 0..=budgets {
-            // One is left over from a budget that no choice reaches back to.
-            let mut values = if known.len() > greatest { known.remove(0) } else { vec![N::zero(); n] };
+            // The oldest vector is reused: no choice refers to its budget.
+            let mut values = if previous.len() > greatest { previous.remove(0) } else { vec![N::zero(); n] };
             if let Some(sweep) = &sweep {
-                worked(sweep.layer(&mut values, &known, budget, &mut self.work.borrow_mut()))?;
+                worked(sweep.layer(&mut values, &previous, budget, &mut self.work.borrow_mut()))?;
                 error += sweep.error;
-                known.push(values);
+                previous.push(values);
                 continue;
             }
             let mut worth = vec![N::zero(); layers.mdp.states()];
@@ -72,7 +74,7 @@ impl<N: Number> Query<'_, N> {
             for (number, choice) in layers.paid.iter().enumerate() {
                 let Some(before) = budget.checked_sub(earned[*choice]) else { continue };
                 let age = budget.saturating_sub(before);
-                let values = &known[known.len().saturating_sub(age)];
+                let values = &previous[previous.len().saturating_sub(age)];
                 worth[n.saturating_add(number)] = self
                     .mdp()
                     .transitions(*choice)
@@ -88,51 +90,53 @@ impl<N: Number> Query<'_, N> {
                 allowed: None,
             };
             let solution = worked(solve_within(layer, None, &mut self.work.borrow_mut()))?;
-            let own = solution.errors.iter().fold(0.0_f64, |most, error| most.max(*error));
+            let layer_error = solution.errors.iter().fold(0.0_f64, |most, error| most.max(*error));
             // The sums over the targets round, too.
-            error += own + 256.0 * f64::EPSILON;
+            error += layer_error + 256.0 * f64::EPSILON;
             values = solution.values;
             values.truncate(n);
-            known.push(values);
+            previous.push(values);
         }
-        vector.values = known.pop().unwrap_or_default();
+        vector.values = previous.pop().unwrap_or_default();
         vector.errors.fill(error);
         Ok(vector.into())
     }
 }
 
-/// The rewards as whole numbers.
+/// Converts rewards to integers, or returns an error.
 fn whole_rewards<N: Number>(rewards: &[N]) -> Asked<Vec<usize>> {
     let whole = |reward: &N| {
         let value = reward.to_f64();
         let exact = reward.to_rational().is_none_or(|exact| exact.is_integer());
         (exact && value.fract() == 0.0).then(|| value.to_usize()).flatten()
     };
-    let found: Option<Vec<usize>> = rewards.iter().map(whole).collect();
-    found.ok_or_else(|| refusal("Q403", "a bound on a reward is handled where all rewards are whole numbers"))
+    let integers: Option<Vec<usize>> = rewards.iter().map(whole).collect();
+    integers
+        .ok_or_else(|| refusal("Q403", "a bound on a reward is handled where all rewards are whole numbers"))
 }
 
-/// A process in which choices that earn something end.
+/// The process of one budget, in which choices with a reward end.
 struct Layers<N> {
     mdp: Mdp<N>,
-    /// The choices that earn something; each leads to a state behind those of the process.
+    /// The choices with a reward; each leads to an additional state.
     paid: Vec<usize>,
     ends: FixedBitSet,
     blocked: FixedBitSet,
 }
 
-/// The equations of a budget where what earns nothing goes round nowhere: each state after all that it depends on.
+/// The equations of a budget if choices without reward form no cycle: a topological order of the
+/// states.
 struct Sweep<'a, N> {
     problem: Problem<'a, N>,
     earned: &'a [usize],
-    /// The states at which the problem does not end; what they lead to without earning comes first.
+    /// The nonterminal states, successors without reward first.
     order: Vec<u32>,
-    /// How far values of a budget can be from the truth because of rounding in it.
+    /// Upper limit on the rounding error of one budget.
     error: f64,
 }
 
 impl<'a, N: Number> Sweep<'a, N> {
-    /// None where something that earns nothing goes round.
+    /// Returns `None` if choices without reward form a cycle.
     fn new(layers: &Layers<N>, problem: Problem<'a, N>, earned: &'a [usize]) -> Option<Self> {
         let mdp = problem.mdp;
         let n = mdp.states();
@@ -166,12 +170,14 @@ impl<'a, N: Number> Sweep<'a, N> {
             Ok(())
         });
         visited.ok()?;
-        // Each sum rounds its products, its probabilities and itself, and adds to what its parts are wrong by.
+        // Each sum rounds its products, its probabilities and itself, and inherits the errors of
+        // its operands.
         let error = if N::EXACT { 0.0 } else { f64::from(deepest) * (count(widest) + 4.0) * f64::EPSILON };
         Some(Self { problem, earned, order, error })
     }
 
-    /// The values of a budget, from those of the budgets before; none where exact arithmetic takes too long.
+    /// Computes the values of a budget from those of smaller budgets. Returns `None` if exact
+    /// arithmetic exceeds its budget.
     fn layer(&self, values: &mut [N], known: &[Vec<N>], budget: usize, work: &mut Work) -> Option<()> {
         let mdp = self.problem.mdp;
         for (state, value) in values.iter_mut().enumerate() {

@@ -1,4 +1,4 @@
-//! A policy by the values of variables: for files, and back from them.
+//! Policies as tables over the values of variables, for JSON files.
 
 use serde_json::{Map, Value, json};
 
@@ -9,36 +9,37 @@ use crate::number::Number;
 use crate::prism::{Packed, Program};
 use crate::solve::NONE;
 
-/// What a policy does in each state that it can get to.
+/// The decisions of a policy in each state that it can reach.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PolicyTable {
-    /// The variables: name, and whether it is a truth value.
+    /// The variables: name, and `true` for a Boolean variable.
     pub variables: Vec<(String, bool)>,
     /// The states.
     pub rows: Vec<Row>,
 }
 
-/// What a policy does in one state.
+/// The decision of a policy in one state.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Row {
     /// The values of the variables.
     pub values: Vec<i64>,
-    /// The action, empty for a command without one.
+    /// The action; empty for a command without one.
     pub action: String,
-    /// Which of the state's choices it is, from 0, in the order of the commands.
+    /// The position of the choice among the choices of the state, from 0, in the order of the
+    /// commands.
     pub choice: usize,
 }
 
-/// What is wrong with a state, by its place in the list, from 1.
+/// Prefixes an error with the position of a state, from 1.
 fn numbered(number: usize, what: &str) -> String {
     format!("state {}: {what}", number.saturating_add(1))
 }
 
-/// The name and version of the format.
+/// Name and version of the format.
 const FORMAT: &str = "metaplan-policy/1";
 
 impl PolicyTable {
-    /// As JSON.
+    /// Converts the table to JSON.
     pub fn to_json(&self) -> Value {
         let row = |row: &Row| {
             let values = self.variables.iter().zip(&row.values).map(|((name, is_bool), value)| {
@@ -50,10 +51,10 @@ impl PolicyTable {
         json!({ "format": FORMAT, "states": self.rows.iter().map(row).collect::<Vec<_>>() })
     }
 
-    /// From JSON, for the variables of a model.
+    /// Parses JSON.
     ///
     /// # Errors
-    /// What is not as it should be.
+    /// The first violation of the format.
     pub fn from_json(text: &str) -> Result<Self, Error> {
         let wrong = |what: String| Error::Policy(what);
         let json: Value = serde_json::from_str(text).map_err(|error| wrong(format!("not JSON: {error}")))?;
@@ -86,10 +87,11 @@ impl PolicyTable {
         Ok(table)
     }
 
-    /// The choices that it makes in a process; those it says nothing about get none.
+    /// Returns the choice of each state in an explored model; [`NONE`] for states without an
+    /// entry.
     ///
     /// # Errors
-    /// It is about another model.
+    /// The table belongs to another model.
     pub fn choices<N: Number>(
         &self,
         program: &Program<N>,
@@ -97,9 +99,9 @@ impl PolicyTable {
     ) -> Result<Vec<u32>, Error> {
         let mut order = Vec::new();
         for variable in &program.variables {
-            let found = self.variables.iter().position(|(name, _)| *name == variable.name);
+            let position = self.variables.iter().position(|(name, _)| *name == variable.name);
             let missing = || Error::Policy(format!("the policy has no variable `{}`", variable.name));
-            order.push(found.ok_or_else(missing)?);
+            order.push(position.ok_or_else(missing)?);
         }
         let mut policy = vec![NONE; explored.mdp.states()];
         for (number, row) in self.rows.iter().enumerate() {

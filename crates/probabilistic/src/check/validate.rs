@@ -1,4 +1,4 @@
-//! What is wrong with a property, before anything is explored.
+//! Checks names and types of a property before the model is explored.
 
 use crate::check::state::with_placeholders;
 use crate::error::{Diagnostic, Error};
@@ -11,14 +11,14 @@ struct Validation {
     problems: Vec<Diagnostic>,
 }
 
-/// Finds names and types that are wrong.
+/// Reports unknown names and type errors.
 pub fn validate<N: Number>(program: &Program<N>, property: &Property) -> Result<(), Error> {
     let mut validation = Validation { names: program.names.clone(), problems: Vec::new() };
     validation.property(property);
     if validation.problems.is_empty() { Ok(()) } else { Err(Error::Property(validation.problems.into())) }
 }
 
-/// The properties in an expression.
+/// Collects the properties that are nested in an expression.
 pub fn properties_in<'a>(expression: &'a Expr, found: &mut Vec<&'a Property>) {
     match &expression.kind {
         ExprKind::Property(property) => found.push(property),
@@ -41,7 +41,7 @@ pub fn properties_in<'a>(expression: &'a Expr, found: &mut Vec<&'a Property>) {
     }
 }
 
-/// The expressions over states in a property.
+/// The state expressions of a property.
 pub fn expressions_of(property: &Property) -> Vec<&Expr> {
     match property {
         Property::Probability(_, path) => of_path(path),
@@ -67,7 +67,7 @@ fn of_path(path: &Path) -> Vec<&Expr> {
     }
 }
 
-/// The bounds of a path, if it has any.
+/// The step bounds of a path formula, if it has any.
 pub fn steps_of(path: &Path) -> Option<&Steps> {
     match path {
         Path::Not(inner) => steps_of(inner),

@@ -8,50 +8,50 @@ use crate::check::steps::Stepped;
 use crate::number::{Number, enclosing};
 use crate::solve::Solution;
 
-/// What values can be by their nature.
+/// The range of values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Span {
     /// From 0 to 1.
     Probability,
     /// At least 0.
     Positive,
-    /// Anything.
+    /// Unrestricted.
     Any,
 }
 
 /// The values of a property in all states.
 #[derive(Debug, Clone)]
 pub struct Vector<N> {
-    /// For each state its value, 0 where it is infinite.
+    /// The value of each state; 0 if it is infinite.
     pub values: Vec<N>,
-    /// How far each can be from the truth; empty where arithmetic is exact.
+    /// Upper limit on the absolute error of each value; empty if arithmetic is exact.
     pub errors: Vec<f64>,
-    /// Where they are infinite.
+    /// The states with an infinite value.
     pub infinite: FixedBitSet,
-    /// What they can be.
+    /// The range of the values.
     pub span: Span,
 }
 
 impl<N: Number> Vector<N> {
-    /// Values without error.
+    /// Creates values without error.
     pub fn exactly(values: Vec<N>, span: Span) -> Self {
         let errors = if N::EXACT { Vec::new() } else { vec![0.0; values.len()] };
         Self { infinite: FixedBitSet::with_capacity(values.len()), values, errors, span }
     }
 
-    /// 1 in some states, 0 in the others.
+    /// The indicator function of a set of states.
     pub fn indicator(set: &FixedBitSet, states: usize) -> Self {
         let values = (0..states).map(|state| if set.contains(state) { N::one() } else { N::zero() });
         Self::exactly(values.collect(), Span::Probability)
     }
 
-    /// What was solved for.
+    /// Converts a solution.
     pub fn solved(solution: Solution<N>, span: Span) -> Self {
         let Solution { values, errors, infinite, .. } = solution;
         Self { values, errors, infinite, span }
     }
 
-    /// What was found step by step.
+    /// Converts step-bounded values.
     pub fn stepped(found: Stepped<N>, span: Span) -> Self {
         let states = found.values.len();
         let errors =
@@ -59,28 +59,28 @@ impl<N: Number> Vector<N> {
         Self { values: found.values, errors, infinite: FixedBitSet::with_capacity(states), span }
     }
 
-    /// How far the value of a state can be from the truth.
+    /// Upper limit on the absolute error of the value of a state.
     pub fn error(&self, state: usize) -> f64 {
         self.errors.get(state).copied().unwrap_or(0.0)
     }
 
-    /// The probabilities of the opposite.
+    /// The complementary probabilities.
     #[must_use]
     pub fn complement(mut self) -> Self {
         for (state, value) in self.values.iter_mut().enumerate() {
-            let rest = N::one().minus(value);
+            let complement = N::one().minus(value);
             if let Some(error) = self.errors.get_mut(state)
-                && (*error > 0.0 || !(value.is_zero() || rest.is_zero()))
+                && (*error > 0.0 || !(value.is_zero() || complement.is_zero()))
             {
                 *error += f64::EPSILON;
             }
-            // Rounding can put a probability a little above one.
-            *value = if rest < N::zero() { N::zero() } else { rest };
+            // Rounding can raise a probability above 1.
+            *value = if complement < N::zero() { N::zero() } else { complement };
         }
         self
     }
 
-    /// The value of a state, with its bounds.
+    /// The value of a state with its bounds.
     pub fn answer(&self, state: usize) -> Answer {
         if self.infinite.contains(state) {
             return Answer::Infinite;
@@ -104,20 +104,20 @@ impl<N: Number> Vector<N> {
         Answer::Finite(Quantity { value, lower, upper, exact: None })
     }
 
-    /// The least and the greatest number that the value of a state can be; none where it is infinite.
+    /// The ends of the enclosure of the value of a state; `None` if it is infinite.
     pub fn ends(&self, state: usize) -> Option<(BigRational, BigRational)> {
         match self.answer(state) {
             Answer::Finite(Quantity { exact: Some(exact), .. }) => Some((exact.clone(), exact)),
             Answer::Finite(quantity) => Some((
                 BigRational::from_float(quantity.lower)?,
-                // What has no bound is above all that it is compared with.
+                // An unbounded value is greater than all numbers that it is compared with.
                 BigRational::from_float(quantity.upper).or_else(|| BigRational::from_float(f64::MAX))?,
             )),
             _ => None,
         }
     }
 
-    /// A number that is the same everywhere.
+    /// A constant vector.
     pub fn everywhere(value: &BigRational, states: usize) -> Self {
         let rounded = N::from_rational(value);
         let (lower, upper) = enclosing(value);

@@ -1,27 +1,27 @@
-//! The syntax tree of a PRISM model: the fragment of Markov chains and decision processes.
+//! Syntax tree of PRISM models (Markov chains and decision processes) and properties.
 
 use num_rational::BigRational;
 
 use crate::error::{Diagnostic, Place};
 use crate::solve::Direction;
 
-/// An expression and where it starts.
+/// An expression with its position.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Expr {
-    /// What it is.
+    /// The kind and operands.
     pub kind: ExprKind,
-    /// Where it starts; line 0 for expressions that were not read.
+    /// Start of the expression; line 0 for expressions that were not parsed.
     pub place: Place,
 }
 
-/// What an expression is.
+/// The kinds of expressions.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ExprKind {
     /// `true`, `false`.
     Bool(bool),
-    /// A whole number.
+    /// An integer.
     Int(i64),
-    /// A number that is written with a point or an exponent.
+    /// A number with a decimal point or an exponent.
     Number(BigRational),
     /// A constant, formula or variable.
     Name(String),
@@ -31,38 +31,39 @@ pub enum ExprKind {
     Not(Box<Expr>),
     /// `-`.
     Negative(Box<Expr>),
-    /// An operator between two expressions.
+    /// A binary operation.
     Binary(BinaryOp, Box<Expr>, Box<Expr>),
     /// `condition ? then : otherwise`.
     If(Box<Expr>, Box<Expr>, Box<Expr>),
-    /// A function.
+    /// A function call.
     Call(Function, Vec<Expr>),
-    /// The value of a property, or whether it holds; in properties only.
+    /// The value or truth value of a property; in properties only.
     Property(Box<Property>),
-    /// Whether a path is as it says; within the brackets of properties only.
+    /// A path formula; within the brackets of properties only.
     Temporal(Box<Temporal>),
 }
 
-/// What is asked of a model.
+/// A property.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Property {
     /// `P`: a probability.
     Probability(Question, Path),
-    /// `R`: an expected reward, with the name of its structure where there is one.
+    /// `R`: an expected reward, with the name of its structure if there is one.
     Reward(Question, Option<String>, RewardPath),
-    /// `S`: in which share of the time, in the long run, states hold.
+    /// `S`: the long-run fraction of time in some states.
     SteadyState(Question, Expr),
-    /// Several objectives at once.
+    /// `multi`: several objectives.
     Multi(Vec<Self>),
-    /// Something of the values of a property in some states; all of them unless it says which.
+    /// An aggregate of the values of a property over some states, or over all states.
     Filter(Filter, Expr, Option<Expr>),
-    /// A number or a truth value that is made of properties and of what holds in a state.
+    /// A numeric or Boolean expression over properties and states.
     Expression(Expr),
-    /// One that is not handled, and why; it stands in a file, where others are answered.
+    /// A property that is not supported, with the reason; other properties of its file can be
+    /// checked.
     Refused(Diagnostic),
 }
 
-/// What a filter makes of the values in several states.
+/// The aggregation of a filter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[allow(missing_docs, reason = "the names are those of the operators")]
 pub enum Filter {
@@ -73,13 +74,13 @@ pub enum Filter {
     Count,
     ForAll,
     Exists,
-    /// The value in the first of the states, by the values of the variables.
+    /// The value in the first state, ordered by the values of the variables.
     First,
     /// The value in the only state.
     State,
     /// The least and the greatest value.
     Range,
-    /// The states with their values, without those that are zero or false.
+    /// The states with their values, except those with value zero or false.
     Print,
     /// The states with their values.
     PrintAll,
@@ -89,87 +90,89 @@ pub enum Filter {
     ArgMax,
 }
 
-/// For the value, or whether it keeps a bound.
+/// A query for a value, or a comparison of the value with a bound.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Question {
-    /// Least or greatest; none where the model has one policy only, or the bound says it.
+    /// Minimum or maximum; `None` if the model has only one policy or the bound determines it.
     pub direction: Option<Direction>,
-    /// The bound; none for the value.
+    /// The bound; `None` to query the value.
     pub bound: Option<(BinaryOp, Expr)>,
 }
 
-/// Paths.
+/// Path formulas.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Path {
-    /// The first state is one of these.
+    /// A condition on the first state.
     State(Expr),
-    /// The path is not of that kind.
+    /// Negation.
     Not(Box<Self>),
     /// `X`: in the next state.
     Next(Expr),
-    /// `U`, and `F` with `true` on the left: the right one holds some day (in so many steps), the left one until then.
+    /// `U`, and `F` with `true` on the left: the right operand eventually holds (within the
+    /// bounds), and the left one until then.
     Until(Expr, Expr, Option<Box<Steps>>),
-    /// `G`: always (in so many steps).
+    /// `G`: always (within the bounds).
     Globally(Expr, Option<Box<Steps>>),
-    /// `W`: `U`, or the left one holds always.
+    /// `W`: `U`, or the left operand always holds.
     WeakUntil(Expr, Expr, Option<Box<Steps>>),
-    /// `R`: the right one holds until the left one does, too, or always.
+    /// `R`: the right operand holds up to and including the first state of the left one, or
+    /// always.
     Release(Expr, Expr, Option<Box<Steps>>),
-    /// `G F`: again and again.
+    /// `G F`: infinitely often.
     Repeatedly(Expr),
-    /// `F G`: from some day on.
+    /// `F G`: eventually always.
     Persistently(Expr),
 }
 
-/// Bounds on the number of steps, or on a reward that is earned on the way.
+/// Bounds on the number of steps or on an accumulated reward.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Steps {
-    /// At least so many, or more than that.
+    /// The lower bound.
     pub least: Option<StepBound>,
-    /// At most so many, or less than that.
+    /// The upper bound.
     pub most: Option<StepBound>,
-    /// The reward that is bounded in place of the steps, with its name where it has one.
+    /// The bounded reward, with its name if it has one; `None` if steps are bounded.
     pub reward: Option<Option<String>>,
 }
 
-/// A number of steps.
+/// A bound on the number of steps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StepBound {
-    /// The number.
+    /// The limit.
     pub limit: Expr,
-    /// Whether the number itself is excluded.
+    /// `true` if the limit itself is excluded.
     pub strict: bool,
 }
 
-/// Over what a reward is summed.
+/// The accumulation of a reward.
 #[derive(Debug, Clone, PartialEq)]
 pub enum RewardPath {
     /// `F`: until a state is reached.
     Reach(Expr),
-    /// `C<=k`: over so many steps.
+    /// `C<=k`: over k steps.
     Steps(StepBound),
-    /// `C`: for ever.
+    /// `C`: over the infinite path.
     Total,
-    /// `I=k`: that of the state after so many steps.
+    /// `I=k`: the state reward after k steps.
     Instant(Expr),
-    /// `S`: the average of a step in the long run.
+    /// `S`: the long-run average per step.
     LongRun,
 }
 
-/// A temporal operator with what it is applied to; the left side is `true` for operators that have one side.
+/// A temporal operator with its operands; the left operand of unary operators is `true`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Temporal {
     /// The letter of the operator.
     pub letter: char,
-    /// Its bounds.
+    /// The bounds.
     pub steps: Option<Box<Steps>>,
-    /// Its left side.
+    /// The left operand.
     pub left: Expr,
-    /// Its right side.
+    /// The right operand.
     pub right: Expr,
 }
 
-/// Operators between two expressions.
+/// Binary operators.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[allow(missing_docs, reason = "the names are those of the operations")]
 pub enum BinaryOp {
@@ -190,12 +193,12 @@ pub enum BinaryOp {
 }
 
 impl BinaryOp {
-    /// Whether it makes a number of two.
+    /// Returns `true` for operators on numbers with a numeric result.
     pub fn is_arithmetic(self) -> bool {
         matches!(self, Self::Plus | Self::Minus | Self::Times | Self::Divide)
     }
 
-    /// How it is written, and how strongly it binds.
+    /// The symbol and the precedence.
     pub fn sign(self) -> (&'static str, u8) {
         match self {
             Self::Iff => ("<=>", 2),
@@ -215,7 +218,7 @@ impl BinaryOp {
         }
     }
 
-    /// All of them.
+    /// All operators.
     pub const ALL: [Self; 14] = [
         Self::Iff,
         Self::Implies,
@@ -249,7 +252,7 @@ pub enum Function {
 }
 
 impl Function {
-    /// All of them with their names.
+    /// All functions with their names.
     pub const ALL: [(&'static str, Self); 8] = [
         ("min", Self::Min),
         ("max", Self::Max),
@@ -261,7 +264,7 @@ impl Function {
         ("log", Self::Log),
     ];
 
-    /// Its name.
+    /// The name.
     pub fn name(self) -> &'static str {
         Self::ALL.iter().find(|(_, function)| *function == self).map_or("", |(name, _)| name)
     }
@@ -277,7 +280,7 @@ pub enum Type {
 }
 
 impl Type {
-    /// How it is written.
+    /// The keyword.
     pub fn name(self) -> &'static str {
         match self {
             Self::Bool => "bool",
@@ -287,7 +290,7 @@ impl Type {
     }
 }
 
-/// What kind of process a model is.
+/// The kind of process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ModelKind {
     /// Markov decision process.
@@ -296,47 +299,47 @@ pub enum ModelKind {
     Dtmc,
 }
 
-/// A constant; without value it is set from outside.
+/// A constant; without a value it is undefined and set by the user.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Constant {
-    /// Its name.
+    /// The name.
     pub name: String,
-    /// Its type.
+    /// The type.
     pub kind: Type,
-    /// Its value.
+    /// The value.
     pub value: Option<Expr>,
-    /// Where its name stands.
+    /// Position of the name.
     pub place: Place,
 }
 
-/// A name and the expression that it stands for: a formula or a label.
+/// A named expression: a formula or a label.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Named {
-    /// Its name.
+    /// The name.
     pub name: String,
-    /// What it stands for.
+    /// The expression.
     pub expression: Expr,
-    /// Where its name stands.
+    /// Position of the name.
     pub place: Place,
 }
 
 /// A variable.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Variable {
-    /// Its name.
+    /// The name.
     pub name: String,
-    /// Least and greatest value; none for truth values.
+    /// Least and greatest value; `None` for Boolean variables.
     pub range: Option<(Expr, Expr)>,
-    /// Its value at the start: otherwise false, or the least.
+    /// The initial value; by default false or the least value.
     pub initial: Option<Expr>,
-    /// Where its name stands.
+    /// Position of the name.
     pub place: Place,
 }
 
-/// What can happen with some probability.
+/// A probabilistic alternative of a command.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Update {
-    /// With which probability; none for certainty.
+    /// The probability; `None` for 1.
     pub probability: Option<Expr>,
     /// Variables and their new values.
     pub assignments: Vec<(String, Expr, Place)>,
@@ -347,102 +350,103 @@ pub struct Update {
 pub struct Command {
     /// The action on which modules synchronise.
     pub action: Option<String>,
-    /// When it can happen.
+    /// The guard.
     pub guard: Expr,
-    /// What happens.
+    /// The alternatives.
     pub updates: Vec<Update>,
-    /// Where it starts.
+    /// Start of the command.
     pub place: Place,
 }
 
 /// A module.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Module {
-    /// Its name.
+    /// The name.
     pub name: String,
-    /// Its variables.
+    /// The variables.
     pub variables: Vec<Variable>,
-    /// Its commands.
+    /// The commands.
     pub commands: Vec<Command>,
-    /// Where its name stands.
+    /// Position of the name.
     pub place: Place,
 }
 
-/// For which states or transitions a reward is given.
+/// A reward item of states or transitions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RewardItem {
-    /// None for a reward of states; else the action of the transitions, none for those without name.
+    /// `None` for a state reward; else the action of the transitions, `None` for commands without
+    /// an action.
     pub action: Option<Option<String>>,
-    /// In which states.
+    /// The guard.
     pub guard: Expr,
-    /// How much.
+    /// The reward.
     pub reward: Expr,
-    /// Where it starts.
+    /// Start of the item.
     pub place: Place,
 }
 
 /// A reward structure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rewards {
-    /// Its name, perhaps empty.
+    /// The name, possibly empty.
     pub name: String,
-    /// Its items, which are added up.
+    /// The items, whose rewards are added.
     pub items: Vec<RewardItem>,
-    /// Where it starts.
+    /// Start of the structure.
     pub place: Place,
 }
 
 /// A model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Model {
-    /// What kind of process it is.
+    /// The kind of process.
     pub kind: ModelKind,
-    /// A remark that stands before it, perhaps empty.
+    /// The leading comment, possibly empty.
     pub remark: String,
-    /// Its constants.
+    /// The constants.
     pub constants: Vec<Constant>,
-    /// Its formulas.
+    /// The formulas.
     pub formulas: Vec<Named>,
-    /// Variables of no module.
+    /// The global variables.
     pub globals: Vec<Variable>,
-    /// Its modules.
+    /// The modules.
     pub modules: Vec<Module>,
-    /// Its rewards.
+    /// The reward structures.
     pub rewards: Vec<Rewards>,
-    /// Its labels.
+    /// The labels.
     pub labels: Vec<Named>,
-    /// `init … endinit`: where it can start.
+    /// `init … endinit`: the condition on initial states.
     pub initial: Option<Expr>,
 }
 
 impl Expr {
-    /// An expression that was not read.
+    /// Creates an expression without a position.
     pub fn new(kind: ExprKind) -> Self {
         Self { kind, place: Place::default() }
     }
 
-    /// A name.
+    /// Creates a name.
     pub fn name(name: &str) -> Self {
         Self::new(ExprKind::Name(name.to_owned()))
     }
 
-    /// A whole number.
+    /// Creates an integer.
     pub fn int(value: i64) -> Self {
         Self::new(ExprKind::Int(value))
     }
 
-    /// A truth value.
+    /// Creates a truth value.
     pub fn bool(value: bool) -> Self {
         Self::new(ExprKind::Bool(value))
     }
 
-    /// An operation.
+    /// Creates a binary operation.
     #[must_use]
     pub fn op(self, op: BinaryOp, other: Self) -> Self {
         Self::new(ExprKind::Binary(op, Box::new(self), Box::new(other)))
     }
 
-    /// The names that occur in it.
+    /// Collects the names in the expression.
     pub fn names<'a>(&'a self, found: &mut Vec<(&'a str, Place)>) {
         match &self.kind {
             ExprKind::Name(name) => found.push((name, self.place)),
@@ -466,7 +470,7 @@ impl Expr {
         }
     }
 
-    /// The same with each name replaced, where the function has something for it.
+    /// Returns the expression with names replaced by `with`; `None` keeps a name.
     #[must_use]
     pub fn replace(&self, with: &dyn Fn(&str) -> Option<Self>) -> Self {
         self.rewrite(&mut |part| match &part.kind {
@@ -475,7 +479,8 @@ impl Expr {
         })
     }
 
-    /// The same with each part replaced, where the function has something for it; larger parts are asked for first.
+    /// Returns the expression with subexpressions replaced by `with`, outermost first; `None`
+    /// descends.
     #[must_use]
     pub fn rewrite(&self, with: &mut dyn FnMut(&Self) -> Option<Self>) -> Self {
         if let Some(other) = with(self) {

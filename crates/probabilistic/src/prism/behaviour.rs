@@ -1,7 +1,7 @@
-//! What a module can do, by the values of the variables that this depends on.
+//! Caches the enabled commands of a module by the values of the variables that they read.
 //!
-//! A model of many states has modules of few: each meets the same values of its variables again and again. So what its commands do
-//! there is found once, and written as what becomes of the words of a state.
+//! Modules have few local states, which recur in many states of the model. The commands of each
+//! local state are evaluated once and stored as edits of the words of a packed state.
 
 use std::collections::BTreeSet;
 
@@ -14,29 +14,31 @@ use crate::prism::model::{Group, Program};
 use crate::prism::run::{Values, enabled};
 use crate::prism::state::{Edit, Packed};
 
-/// The actions that behaviours are found for, at most.
+/// Upper limit on the number of actions.
 pub const ACTIONS: usize = 128;
-/// Behaviours and changes of each module that are kept; what comes later is found anew each time.
+/// Upper limits on the cached behaviours and edits of each module; further ones are computed each
+/// time.
 const KEPT: [usize; 2] = [1 << 16, 1 << 20];
-/// The number of a behaviour that cannot be told, because something is wrong with it.
+/// The number of a behaviour whose evaluation has failed.
 const WRONG: u32 = u32::MAX - 1;
 
-/// A module: its commands by action, and its behaviours that are known.
+/// A module: its commands by action, and its cached behaviours.
 #[derive(Debug)]
 pub struct Module<N> {
     /// The actions that it takes part in, and where their commands stand in the program: action, position.
     pub actions: Vec<(usize, usize)>,
     numbers: Option<Numbers>,
-    /// For each behaviour the actions that it prevents, as bits.
+    /// For each behaviour, the disabled actions as a bit set.
     prevented: Vec<u128>,
-    /// For each behaviour where its commands without action begin, then for each action where its commands do, and the end.
+    /// For each behaviour, the start of its commands without action, then the start of its
+    /// commands for each action, and the end.
     slots: Vec<u32>,
-    /// For each command the end of its updates.
+    /// The end of the updates of each command.
     commands: Vec<u32>,
-    /// The probability of each update that is possible, and where its changes end.
+    /// The probability of each possible update and the end of its edits.
     updates: Vec<(N, u32)>,
     edits: Vec<Edit>,
-    /// How much of these lists is kept: behaviours, commands, updates, changes.
+    /// Cached lengths of the lists: behaviours, commands, updates, edits.
     kept: [usize; 4],
 }
 
@@ -44,7 +46,7 @@ pub struct Module<N> {
 pub type Chosen = u32;
 
 impl<N: Number> Module<N> {
-    /// A module of a program, by number.
+    /// Creates a module of a program.
     pub fn new(program: &Program<N>, number: usize) -> Self {
         let mut actions = Vec::new();
         for (action, groups) in program.synchronised.iter().enumerate() {
@@ -69,7 +71,7 @@ impl<N: Number> Module<N> {
         }
     }
 
-    /// The behaviour in a state; none where it cannot be told. It stays until the next one is asked for.
+    /// The behaviour in a state; `None` if its evaluation fails. It is valid until the next call.
     pub fn behaviour(
         &mut self,
         program: &Program<N>,
@@ -82,24 +84,24 @@ impl<N: Number> Module<N> {
         }
         self.forget();
         let is_full = self.numbers.is_none() || self.kept[0] >= KEPT[0] || self.kept[3] >= KEPT[1];
-        let found = self.write(program, number, &values()).ok().map(|()| self.kept[0]);
-        if found.is_none() {
+        let behaviour = self.write(program, number, &values()).ok().map(|()| self.kept[0]);
+        if behaviour.is_none() {
             self.forget();
         }
         if !is_full {
             self.kept = self.lengths();
             if let Some(numbers) = &mut self.numbers {
-                numbers.note(state, found.map_or(WRONG, dense));
+                numbers.note(state, behaviour.map_or(WRONG, dense));
             }
         }
-        found
+        behaviour
     }
 
     fn lengths(&self) -> [usize; 4] {
         [self.prevented.len(), self.commands.len(), self.updates.len(), self.edits.len()]
     }
 
-    /// Forgets what is not kept.
+    /// Removes what is not cached.
     fn forget(&mut self) {
         let [behaviours, commands, updates, edits] = self.kept;
         self.prevented.truncate(behaviours);
@@ -109,7 +111,7 @@ impl<N: Number> Module<N> {
         self.edits.truncate(edits);
     }
 
-    /// How many numbers a behaviour has in `slots`.
+    /// Number of entries of a behaviour in `slots`.
     fn width(&self) -> usize {
         self.actions.len().saturating_add(2)
     }
@@ -163,17 +165,17 @@ impl<N: Number> Module<N> {
         Ok(())
     }
 
-    /// The actions that a behaviour prevents, as bits.
+    /// The disabled actions of a behaviour, as a bit set.
     pub fn prevented(&self, behaviour: usize) -> u128 {
         self.prevented[behaviour]
     }
 
-    /// The commands without action of a behaviour.
+    /// The commands of a behaviour without action.
     pub fn free(&self, behaviour: usize) -> std::ops::Range<Chosen> {
         self.slot(behaviour, 0)
     }
 
-    /// The commands of a behaviour for one of the module's actions, by its position.
+    /// The commands of a behaviour for one of the module's actions, by position.
     pub fn acting(&self, behaviour: usize, at: usize) -> std::ops::Range<Chosen> {
         self.slot(behaviour, at.saturating_add(1))
     }
@@ -183,7 +185,7 @@ impl<N: Number> Module<N> {
         self.slots[at]..self.slots[at.saturating_add(1)]
     }
 
-    /// The updates of a command: their probabilities, and what they change.
+    /// The updates of a command: probabilities and edits.
     pub fn updates(&self, command: Chosen) -> impl ExactSizeIterator<Item = (&N, &[Edit])> {
         let range = self.range(command);
         let mut begin = range.start.checked_sub(1).map_or(0, |before| self.updates[before].1);
@@ -194,7 +196,7 @@ impl<N: Number> Module<N> {
         })
     }
 
-    /// How many updates commands have that stand side by side.
+    /// Total number of updates of consecutive commands.
     pub fn count(&self, commands: std::ops::Range<Chosen>) -> usize {
         commands.map(|command| self.range(command).len()).sum()
     }

@@ -1,4 +1,4 @@
-//! Declarations, commands and rewards of the syntax tree to those of a program.
+//! Compiles declarations, commands and rewards of the syntax tree.
 
 use num_traits::Signed;
 
@@ -61,8 +61,8 @@ pub fn compile_command<N: Number>(
         };
         let mut assignments = Vec::new();
         for (number, (name, value, place)) in update.assignments.iter().enumerate() {
-            let known = names.find_variable(name);
-            let problem = match known {
+            let declared = names.find_variable(name);
+            let problem = match declared {
                 None => Some(("Q201", format!("`{name}` is not a variable of the model"))),
                 Some(_) if !writable(name) => {
                     Some(("Q208", format!("this command cannot change `{name}`, which is not of its module")))
@@ -74,7 +74,7 @@ pub fn compile_command<N: Number>(
             };
             if let Some((code, text)) = problem {
                 keep(Err(Diagnostic::new(code, *place, text)));
-            } else if let Some((number, kind)) = known {
+            } else if let Some((number, kind)) = declared {
                 assignments.push((number, keep(names.typed(value, kind)), *place));
             }
         }
