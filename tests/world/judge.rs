@@ -71,7 +71,7 @@ impl Judge {
                 self.belief.observe(design, latest);
             }
             "action_started" | "action_progress" => {
-                self.belief.imply(action.unwrap_or_default(), &self.asked)
+                self.belief.imply(action.unwrap_or_default(), &self.asked);
             }
             "action_succeeded" => {
                 self.belief.imply(action.unwrap_or_default(), &self.asked);

@@ -164,7 +164,7 @@ impl<'f> Files<'f> {
                 return Err(instances::too_many("actions").into());
             }
         }
-        Ok(Self { domain, world, model, names, instances: instances, stop })
+        Ok(Self { domain, world, model, names, instances, stop })
     }
 
     fn stopped(&self) -> std::result::Result<(), Cause> {

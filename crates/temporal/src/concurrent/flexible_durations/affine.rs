@@ -49,7 +49,7 @@ impl Affine {
                     right_terms.next();
                 }
                 (Some((column, _)), Some((other, _))) if column < other => {
-                    terms.extend(left_terms.next().cloned())
+                    terms.extend(left_terms.next().cloned());
                 }
                 (_, Some((other, more))) => {
                     terms.push((*other, more.clone() * times));
