@@ -23,7 +23,7 @@ while read -r row; do
 done <"$temporary/rows"
 echo 'docs/explanation/proved.md has the numbers of lines'
 
-stored=../verify/tests/certificates
+stored=../crates/verify/tests/certificates
 accepted() {
   ocaml/prepare "$1" >"$temporary/evidence.txt" || fail "no evidence for $1"
   answer=$(ocaml/check "$1" "$temporary/evidence.txt") || fail "$1: $answer"
