@@ -285,7 +285,10 @@ impl Judge {
     }
 }
 
-/// What is to be believed of the function's design by the table of `docs/reference/events.md`, written without a look at the loop.
+/// Design that the loop must believe, by the table of `docs/reference/events.md`.
+///
+/// The author had read `src/mapek/acknowledge.rs` before, so a misreading of the table may be in both. Independent
+/// of the loop is only the comparison with the robot's actual design.
 #[derive(Debug, Default)]
 struct Belief {
     design: Option<String>,

@@ -4,7 +4,7 @@
 //! reconfigurations and actions fail; the loop crashes and comes back from its snapshot and the lines since. After some
 //! time the robot is fair: nothing is lost, nothing fails any more, and what was said last is said again.
 //!
-//! The judge knows [`DESIGNS`], the messages, and the robot. It demands:
+//! The judge knows [`DESIGNS`], the messages, and the robot; rules (a) and (f) also read the beliefs of the loop. It demands:
 //! - (a) after each reaction, before any planning: once all effects have arrived that the loop waits for, and after them those that are on their way, no action moves
 //!   with a design that is forbidden by the reports delivered so far, without one, or with another one than the loop has given it; and
 //!   the robot does not do so for longer than a bound;

@@ -1,6 +1,6 @@
 //! Traversal of the syntax tree: the parts of a node, and a walk over all nodes below it, parents first.
 //!
-//! A function that treats most kinds of nodes alike matches the kinds that matter and leaves the others to `parts`.
+//! A function that treats most kinds of nodes alike matches the special kinds and recurses into `parts` for the others.
 
 use std::slice::{from_mut, from_ref};
 
@@ -30,7 +30,7 @@ pub enum Node<'t> {
 pub type Visit<'v, 't> = &'v mut dyn FnMut(Node<'t>);
 
 impl Domain {
-    /// Visits the conditions, effects, expressions, constraints and preferences of a domain.
+    /// Visits all conditions, effects, expressions, constraints and preferences of the domain.
     pub fn walk<'t>(&'t self, visit: Visit<'_, 't>) {
         self.constraints.iter().for_each(|constraint| constraint.walk(visit));
         self.derived.iter().for_each(|derived| derived.condition.walk(visit));
@@ -56,7 +56,7 @@ impl Problem {
 }
 
 impl ActionBody {
-    /// The conditions, whatever their time.
+    /// Conditions of the action, of all times.
     pub fn conditions(&self) -> impl Iterator<Item = &Condition> {
         let (single, timed) = match self {
             Self::Instantaneous { precondition, .. } => (Some(precondition), &[][..]),
@@ -65,7 +65,7 @@ impl ActionBody {
         single.into_iter().chain(timed.iter().map(|(_, condition)| condition))
     }
 
-    /// The effects, whatever their time.
+    /// Effects of the action, of all times.
     pub fn effects(&self) -> impl Iterator<Item = &Effect> {
         let (single, timed) = match self {
             Self::Instantaneous { effect, .. } => (Some(effect), &[][..]),
@@ -74,7 +74,7 @@ impl ActionBody {
         single.into_iter().chain(timed.iter().map(|(_, effect)| effect))
     }
 
-    /// The constraints on the duration.
+    /// Duration constraints; empty for instantaneous actions.
     pub fn durations(&self) -> &[DurationConstraint] {
         match self {
             Self::Instantaneous { .. } => &[],
@@ -125,7 +125,7 @@ impl Trajectory {
 }
 
 impl Condition {
-    /// The conditions of which this one consists, from left to right.
+    /// Direct subconditions, from left to right.
     pub fn parts(&self) -> impl Iterator<Item = &Self> {
         let (first, second): (&[Self], &[Self]) = match self {
             Self::And(parts) | Self::Or(parts) => (parts, &[]),
@@ -136,7 +136,7 @@ impl Condition {
         first.iter().chain(second)
     }
 
-    /// As [`Condition::parts`], to change them.
+    /// Mutable variant of [`Condition::parts`].
     pub fn parts_mut(&mut self) -> impl Iterator<Item = &mut Self> {
         let (first, second): (&mut [Self], &mut [Self]) = match self {
             Self::And(parts) | Self::Or(parts) => (parts, &mut []),
@@ -162,7 +162,7 @@ impl Condition {
         self.walk(&mut |node| node.fluent().into_iter().for_each(&mut *visit));
     }
 
-    /// Visits the expressions of the condition that have no operands, to change them.
+    /// Applies a change to every expression of the condition that has no operands.
     pub fn change_leaves(&mut self, change: &mut dyn FnMut(&mut Expression)) {
         self.parts_mut().for_each(|part| part.change_leaves(change));
         if let Self::Compare(_, left, right, _) = self {
@@ -173,7 +173,7 @@ impl Condition {
 }
 
 impl Effect {
-    /// The effects of which this one consists, from left to right.
+    /// Direct subeffects, from left to right.
     pub fn parts(&self) -> &[Self] {
         match self {
             Self::And(parts) => parts,
@@ -182,7 +182,7 @@ impl Effect {
         }
     }
 
-    /// As [`Effect::parts`], to change them.
+    /// Mutable variant of [`Effect::parts`].
     pub fn parts_mut(&mut self) -> &mut [Self] {
         match self {
             Self::And(parts) => parts,
@@ -203,7 +203,7 @@ impl Effect {
         self.parts().iter().for_each(|part| part.walk(visit));
     }
 
-    /// Visits the expressions of the effect that have no operands, to change them.
+    /// Applies a change to every expression of the effect that has no operands.
     pub fn change_leaves(&mut self, change: &mut dyn FnMut(&mut Expression)) {
         match self {
             Self::When(condition, _) => condition.change_leaves(change),
@@ -215,7 +215,7 @@ impl Effect {
 }
 
 impl Expression {
-    /// The operands of an operation, from left to right.
+    /// Operands from left to right; empty for numbers and fluents.
     pub fn operands(&self) -> &[Self] {
         match self {
             Self::Operation(_, operands, _) => operands,
@@ -234,7 +234,7 @@ impl Expression {
         self.walk(&mut |node| node.fluent().into_iter().for_each(&mut *visit));
     }
 
-    /// Visits the parts that have no operands, to change them.
+    /// Applies a change to every subexpression that has no operands.
     pub fn change_leaves(&mut self, change: &mut dyn FnMut(&mut Self)) {
         match self {
             Self::Operation(_, operands, _) => {
@@ -248,7 +248,7 @@ impl Expression {
 }
 
 impl<'t> Node<'t> {
-    /// The numeric function that an expression is.
+    /// Returns the numeric fluent if the node is one.
     pub fn fluent(self) -> Option<&'t Atom> {
         match self {
             Self::Expression(Expression::Fluent(atom)) => Some(atom),
@@ -256,7 +256,7 @@ impl<'t> Node<'t> {
         }
     }
 
-    /// The atom that a condition is.
+    /// Returns the atom if the node is an atomic condition.
     pub fn atom(self) -> Option<&'t Atom> {
         match self {
             Self::Condition(Condition::Atom(atom)) => Some(atom),

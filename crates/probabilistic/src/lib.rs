@@ -5,7 +5,7 @@
 //! bounds and policies; [`policy`] evaluates a given policy; [`pareto`] trades two objectives. [`check`] does all of
 //! this for a property in PRISM's syntax.
 //!
-//! What is absent: OWL, PDDL, file access and output.
+//! Not here: OWL, PDDL, file access and output.
 
 #![warn(
     clippy::cast_possible_truncation,

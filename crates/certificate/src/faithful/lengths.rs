@@ -12,7 +12,7 @@ use pddl::ast::{Comparison, DurationConstraint};
 type End = (BigRational, bool);
 
 impl<'r> Reader<'r> {
-    /// Returns the durations that satisfy all constraints; `None` if there are none or if a bound
+    /// Returns the durations that satisfy all constraints; `None` if no duration does or if a bound
     /// is undefined.
     pub(super) fn lengths(&mut self, constraints: &'r [DurationConstraint]) -> Result<Option<Length>, Cause> {
         // Durations are not negative.
