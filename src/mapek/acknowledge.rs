@@ -12,7 +12,7 @@
 
 use crate::mapek::answer::Command;
 use crate::mapek::beliefs::Beliefs;
-use crate::mapek::receipts::Acknowledged;
+use crate::mapek::receipts::{Acknowledged, Before};
 
 /// The consequence of an acknowledgement.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -97,15 +97,18 @@ impl Beliefs {
             if let Some(design) = own.superseded.remove(&effect) {
                 return Failure::Design(design);
             }
-            let Some(last) = own.last.as_mut().filter(|last| last.effect == effect && !last.failed) else {
+            let Some(last) = own.last.as_mut() else { continue };
+            // Without the reconfiguration before the last one nobody knows what a failure of the last one leads to.
+            last.before.take_if(|before| before.effect == Some(effect));
+            if last.effect != effect || last.failed {
                 continue;
-            };
+            }
             last.failed = true;
             let design = last.design.clone();
             match last.before.clone() {
                 // Somebody else may have changed it since.
                 _ if self.configuration.get(function) != Some(&design) => {}
-                Some(before) => drop(self.configuration.insert(function.clone(), before)),
+                Some(before) => drop(self.configuration.insert(function.clone(), before.design)),
                 None => drop(self.configuration.remove(function)),
             }
             return Failure::Design(design);
@@ -131,6 +134,9 @@ impl Beliefs {
         };
         // The function was seen with the design before its acknowledgement came: nobody knows the one that it had before.
         let before = before.filter(|before| is_before_known && *before != design);
+        let source = own.last.as_ref().filter(|last| !last.failed && Some(&last.design) == before.as_ref());
+        let source = source.map(|last| last.effect);
+        let before = before.map(|design| Before { design, effect: source });
         own.last = Some(Acknowledged { effect, design, before, failed: is_doubtful });
         if is_doubtful { Receipt::Doubtful(function) } else { Receipt::Taken }
     }

@@ -143,7 +143,7 @@ impl Adapting<'_> {
         let Some(mut running) = self.beliefs.running.clone().filter(|own| own.provisional) else { return };
         running.provisional = false;
         if !running.cancelling && self.can_go_on(&running) {
-            reconfigure(self.beliefs, running.action, &running.step.clone(), answers);
+            reconfigure(self.beliefs, running.action, &running.step, None, answers);
             resume_suspended(self.beliefs, &mut running, answers);
         }
         self.beliefs.running = Some(running);
@@ -225,7 +225,7 @@ impl Adapting<'_> {
         };
         if !running.step.configuration.iter().all(has) {
             let (action, step) = (running.action, running.step.clone());
-            reconfigure(self.beliefs, action, &step, answers);
+            reconfigure(self.beliefs, action, &step, None, answers);
         }
     }
 
@@ -328,10 +328,11 @@ impl Adapting<'_> {
         answers.push(Answer::PlanFound { cost, optimal: proved, steps: steps.clone() });
         let mut steps: std::collections::VecDeque<PlannedStep> = steps.into();
         if let Some(mut running) = self.beliefs.running.take() {
-            if let Some(first) = steps.pop_front() {
-                running.step = first;
-            }
-            reconfigure(self.beliefs, running.action, &running.step.clone(), answers);
+            let step = steps.pop_front().unwrap_or_else(|| running.step.clone());
+            // A resumption names the designs by itself.
+            let instructed = Some(&running.step).filter(|_| !running.suspended);
+            reconfigure(self.beliefs, running.action, &step, instructed, answers);
+            running.step = step;
             resume_suspended(self.beliefs, &mut running, answers);
             self.beliefs.running = Some(running);
         }

@@ -7,7 +7,7 @@ use serde::ser::{Serialize, SerializeMap, Serializer};
 use serde_json::Value;
 
 use crate::knowledge::{Contradiction, Fault};
-use crate::mapek::step::PlannedStep;
+use crate::mapek::step::{PlannedStep, configuration_to_json};
 use crate::number;
 
 /// One line of output.
@@ -199,8 +199,11 @@ pub enum Command {
         /// Why, in a sentence.
         because: String,
     },
-    /// A suspended action goes on.
-    Resume,
+    /// A suspended action goes on as soon as its functions have these designs.
+    Resume {
+        /// Functions with their designs, in the order of the step.
+        configuration: Vec<(String, String)>,
+    },
 }
 
 impl Command {
@@ -211,7 +214,7 @@ impl Command {
             Self::Request { .. } => "request_action",
             Self::Cancel { .. } => "cancel_action",
             Self::Suspend { .. } => "suspend_action",
-            Self::Resume => "resume_action",
+            Self::Resume { .. } => "resume_action",
         }
     }
 
@@ -228,7 +231,7 @@ impl Command {
     /// Whether it says if an action goes on. A report of that action may have been on its way before the command, so that
     /// it does not show that the command has arrived.
     pub(super) fn is_about_going_on(&self) -> bool {
-        matches!(self, Self::Cancel { .. } | Self::Suspend { .. } | Self::Resume)
+        matches!(self, Self::Cancel { .. } | Self::Suspend { .. } | Self::Resume { .. })
     }
 }
 
@@ -362,7 +365,10 @@ impl Effect {
                 Command::Cancel { because } | Command::Suspend { because } => {
                     object.serialize_entry("because", because)?;
                 }
-                Command::Request { .. } | Command::Resume => {}
+                Command::Resume { configuration } => {
+                    object.serialize_entry("configuration", &configuration_to_json(configuration))?;
+                }
+                Command::Request { .. } => {}
             }
             object.serialize_entry("action", &self.action)?;
         }

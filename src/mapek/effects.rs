@@ -23,7 +23,7 @@ pub(super) fn finish(beliefs: &mut Beliefs, answers: &mut Vec<Answer>) {
 pub(super) fn request(beliefs: &mut Beliefs, step: PlannedStep, answers: &mut Vec<Answer>) {
     beliefs.actions += 1;
     let action = beliefs.actions;
-    reconfigure(beliefs, action, &step, answers);
+    reconfigure(beliefs, action, &step, None, answers);
     effect(beliefs, action, Command::Request { step: step.clone() }, answers);
     let progress = num_rational::BigRational::from_integer(0.into());
     beliefs.running = Some(Running {
@@ -42,9 +42,19 @@ pub(super) fn request(beliefs: &mut Beliefs, step: PlannedStep, answers: &mut Ve
 }
 
 /// Gives functions the designs of a step, and the knowledge base its objectives.
-pub(super) fn reconfigure(beliefs: &mut Beliefs, action: u64, step: &PlannedStep, answers: &mut Vec<Answer>) {
+///
+/// `instructed` is the step as the action that is moving was told last. It may still wait for a design of that step, and is told where
+/// it gets another one, also if the function has that design already.
+pub(super) fn reconfigure(
+    beliefs: &mut Beliefs,
+    action: u64,
+    step: &PlannedStep,
+    instructed: Option<&PlannedStep>,
+    answers: &mut Vec<Answer>,
+) {
     for (function, design) in &step.configuration {
-        if beliefs.expected(function) != Some(design) {
+        let is_changed = instructed.is_some_and(|old| old.design(function) != Some(design));
+        if is_changed || beliefs.expected(function) != Some(design) {
             let from = beliefs.configuration.get(function).cloned();
             let command = Command::Reconfigure { function: function.clone(), from, to: design.clone() };
             effect(beliefs, action, command, answers);
@@ -122,7 +132,8 @@ pub(super) fn resume_suspended(beliefs: &mut Beliefs, running: &mut Running, ans
     running.provisional = false;
     if std::mem::take(&mut running.suspended) {
         (running.heard, running.overdue) = (beliefs.now, 0);
-        effect(beliefs, running.action, Command::Resume, answers);
+        let configuration = running.step.configuration.clone();
+        effect(beliefs, running.action, Command::Resume { configuration }, answers);
     }
 }
 

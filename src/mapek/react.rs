@@ -35,7 +35,7 @@ pub(super) fn react(
         SafeReaction::Suspend => None,
     };
     if let Some(step) = other {
-        reconfigure(beliefs, running.action, &step, answers);
+        reconfigure(beliefs, running.action, &step, Some(&running.step), answers);
         running.step = step;
     } else {
         let because = format!("{reason}; it stands still until it is decided what becomes of it");

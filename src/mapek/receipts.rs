@@ -32,10 +32,18 @@ pub(super) struct Received {
 pub(super) struct Acknowledged {
     pub(super) effect: u64,
     pub(super) design: String,
-    /// The design before.
-    pub(super) before: Option<String>,
+    /// The design before, where it is known.
+    pub(super) before: Option<Before>,
     /// Whether it has failed after it was acknowledged.
     pub(super) failed: bool,
+}
+
+/// The design that a function had before a reconfiguration.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Before {
+    pub(super) design: String,
+    /// Number of the reconfiguration by which the function had got it; `None` if it was observed.
+    pub(super) effect: Option<u64>,
 }
 
 impl Receipts {
@@ -84,7 +92,10 @@ impl Receipts {
     pub(super) fn to_record(&self) -> Value {
         let function = |(name, own): (&String, &Received)| {
             let last =
-                own.last.as_ref().map(|last| json!([last.effect, last.design, last.before, last.failed]));
+                own.last.as_ref().map(|last| {
+                    let before = last.before.as_ref().map(|before| json!([before.design, before.effect]));
+                    json!([last.effect, last.design, before, last.failed])
+                });
             json!([name, last, own.superseded.iter().collect::<Vec<_>>(), own.doubted])
         };
         json!([self.by_number, self.functions.iter().map(function).collect::<Vec<_>>()])
@@ -94,13 +105,14 @@ impl Receipts {
     pub(super) fn from_record(record: &Value) -> Option<Self> {
         let text = |value: &Value| value.as_str().map(ToOwned::to_owned);
         let superseded = |pair: &Value| Some((pair.get(0)?.as_u64()?, text(pair.get(1)?)?));
+        let before = |pair: &Value| Some(Before { design: text(pair.get(0)?)?, effect: pair.get(1)?.as_u64() });
         let function = |record: &Value| {
             let last = match record.get(1)? {
                 Value::Null => None,
                 last => Some(Acknowledged {
                     effect: last.get(0)?.as_u64()?,
                     design: text(last.get(1)?)?,
-                    before: text(last.get(2)?),
+                    before: before(last.get(2)?),
                     failed: last.get(3)?.as_bool()?,
                 }),
             };

@@ -13,7 +13,7 @@ use crate::mapek::beliefs::{Beliefs, Retry, Running, Wait};
 use crate::mapek::filter::FilterStates;
 use crate::mapek::receipts::Receipts;
 use crate::mapek::sequence::Numbers;
-use crate::mapek::step::PlannedStep;
+use crate::mapek::step::{PlannedStep, configuration_from_record};
 use crate::message::Message;
 
 /// What one observation has led to.
@@ -228,7 +228,7 @@ fn effect_to_record(effect: &Effect) -> Value {
         Command::Request { step } => json!(["request", step.to_record()]),
         Command::Cancel { because } => json!(["cancel", because]),
         Command::Suspend { because } => json!(["suspend", because]),
-        Command::Resume => json!(["resume"]),
+        Command::Resume { configuration } => json!(["resume", configuration]),
     };
     json!([effect.number, effect.action, command, effect.supersedes])
 }
@@ -245,7 +245,7 @@ fn effect_from_record(record: &Value) -> Option<Effect> {
         "request" => Command::Request { step: PlannedStep::from_record(command.get(1)?)? },
         "cancel" => Command::Cancel { because: text(command.get(1)?)? },
         "suspend" => Command::Suspend { because: text(command.get(1)?)? },
-        "resume" => Command::Resume,
+        "resume" => Command::Resume { configuration: configuration_from_record(command.get(1)?)? },
         _ => return None,
     };
     let (number, action) = (record.get(0)?.as_u64()?, record.get(1)?.as_u64()?);

@@ -143,11 +143,9 @@ impl PlannedStep {
 
     /// Writes what stands behind the name of the step as an object of the format.
     pub(crate) fn fields<M: SerializeMap>(&self, object: &mut M) -> Result<(), M::Error> {
-        let configuration: Map<String, Value> =
-            self.configuration.iter().map(|(function, design)| (function.clone(), json!(design))).collect();
         let written = self.arguments.get(..self.written).unwrap_or(&self.arguments);
         object.serialize_entry("arguments", written)?;
-        object.serialize_entry("configuration", &configuration)?;
+        object.serialize_entry("configuration", &configuration_to_json(&self.configuration))?;
         object.serialize_entry("duration", &number::to_json(&self.duration))?;
         object.serialize_entry("cost", &number::to_json(&self.cost))
     }
@@ -171,16 +169,27 @@ impl PlannedStep {
         else {
             return None;
         };
-        let pair = |value: &Value| Some((text(value.get(0)?)?, text(value.get(1)?)?));
         Some(Self {
             action: text(action)?,
             arguments: arguments.as_array()?.iter().map(text).collect::<Option<_>>()?,
             written: written.as_u64()? as usize,
-            configuration: configuration.as_array()?.iter().map(pair).collect::<Option<_>>()?,
+            configuration: configuration_from_record(configuration)?,
             duration: duration.as_str()?.parse().ok()?,
             cost: cost.as_str()?.parse().ok()?,
         })
     }
+}
+
+/// Functions with their designs, as an object of the format.
+pub(super) fn configuration_to_json(configuration: &[(String, String)]) -> Map<String, Value> {
+    configuration.iter().map(|(function, design)| (function.clone(), json!(design))).collect()
+}
+
+/// Functions with their designs, from an array of pairs in the journal.
+pub(super) fn configuration_from_record(record: &Value) -> Option<Vec<(String, String)>> {
+    let text = |value: &Value| value.as_str().map(ToOwned::to_owned);
+    let pair = |value: &Value| Some((text(value.get(0)?)?, text(value.get(1)?)?));
+    record.as_array()?.iter().map(pair).collect()
 }
 
 /// Steps for the validator.

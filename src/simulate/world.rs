@@ -158,9 +158,9 @@ impl World {
                 Some(_) => vec![Event::Cancelled { action: effect.action }],
                 None => Vec::new(),
             },
-            Command::Suspend { .. } | Command::Resume => {
+            Command::Suspend { .. } | Command::Resume { .. } => {
                 if let Some(job) = self.job.as_mut().filter(|job| job.action == effect.action) {
-                    job.suspended = effect.command != Command::Resume;
+                    job.suspended = matches!(effect.command, Command::Suspend { .. });
                 }
                 vec![Event::Acknowledged { effect: effect.number }]
             }

@@ -212,7 +212,7 @@ impl<'a> Life<'a> {
                 Command::Request { step } => {
                     step.configuration.iter().for_each(|(_, design)| allowed(design));
                 }
-                Command::Resume => running.clone().into_iter().flatten().for_each(allowed),
+                Command::Resume { .. } => running.clone().into_iter().flatten().for_each(allowed),
                 _ => {}
             }
         }

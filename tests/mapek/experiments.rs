@@ -30,7 +30,7 @@ fn words(answer: &Answer) -> Option<String> {
             Command::Request { step } => format!("request {}: {}", effect.action, step.summary()),
             Command::Cancel { .. } => format!("cancel {}", effect.action),
             Command::Suspend { .. } => format!("suspend {}", effect.action),
-            Command::Resume => format!("resume {}", effect.action),
+            Command::Resume { .. } => format!("resume {}", effect.action),
             other => panic!("unexpected: {other:?}"),
         },
         Answer::GoalReached => "goal".to_owned(),

@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use cpu_time::ThreadTime;
 use metaplan::mapek::{Answer, Command, Loop, Observation, SafeReaction, Settings};
 use metaplan::setup::Setup;
 
@@ -218,13 +219,6 @@ fn a_planner_that_never_ends_does_not_delay_the_safe_effect() {
     assert!(begun.elapsed() < Duration::from_secs(5));
 }
 
-/// The processor time of this thread so far; zero where the system does not say.
-fn processor_time() -> Duration {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
-    let nanoseconds = text.split(' ').next().and_then(|word| word.parse().ok());
-    Duration::from_nanos(nanoseconds.unwrap_or_default())
-}
-
 /// The processor time from an observation to its safe effect, beside a search that never ends.
 #[test]
 #[ignore = "measures; only an optimised build is of interest"]
@@ -237,7 +231,7 @@ fn the_safe_effect_comes_within_five_milliseconds() {
     let stop = thinker.stop();
     let search = std::thread::spawn(move || thinker.think());
     let mut late = Vec::new();
-    for (mission, count) in [("camara_like", 200), ("ugv", 1_000), ("uuv", 1_000)] {
+    for (mission, count) in [("camara_like", 1_000), ("ugv", 1_000), ("uuv", 1_000)] {
         let mut robot = control(mission);
         robot.start();
         feed(&mut robot, r#"{"event":"action_started","action":1}"#);
@@ -251,10 +245,10 @@ fn the_safe_effect_comes_within_five_milliseconds() {
             let line = |realisable: bool| {
                 format!(r#"{{"event":"design_status","design":"{design}","realisable":{realisable}}}"#)
             };
-            let begun = (Instant::now(), processor_time());
+            let begun = (Instant::now(), ThreadTime::now());
             let answers = react(&mut robot, &line(false));
             walls.push(begun.0.elapsed());
-            times.push(processor_time().saturating_sub(begun.1));
+            times.push(begun.1.elapsed());
             assert!(answers.iter().any(|answer| answer.effect().is_some()), "{mission}: {answers:?}");
             react(&mut robot, &line(true));
             if robot.beliefs().suspended() {

@@ -13,7 +13,7 @@ fn words(answers: &[Answer]) -> Vec<String> {
         Command::Request { step } => Some(format!("request {}", step.action)),
         Command::Cancel { .. } => Some("cancel".to_owned()),
         Command::Suspend { .. } => Some("suspend".to_owned()),
-        Command::Resume => Some("resume".to_owned()),
+        Command::Resume { .. } => Some("resume".to_owned()),
         _ => None,
     };
     answers.iter().filter_map(word).collect()

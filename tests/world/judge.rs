@@ -27,6 +27,13 @@ pub struct Judge {
     /// Whether the last observation of the function that was delivered was outdated by then. Observations do not say how old they
     /// are, so that no loop can know.
     is_misled: bool,
+    /// Whether such an observation has led to the design before the last reconfiguration.
+    was_misled: bool,
+    /// Actions of which the loop has heard the start, and those of which it has heard progress.
+    started: BTreeSet<u64>,
+    progressed: BTreeSet<u64>,
+    /// The action that is waited for beyond its deadline, as the loop has said.
+    awaited: Option<u64>,
     /// Actions of which the loop has heard the end.
     ended: BTreeSet<u64>,
     /// The last decision on plans, and whether the goal is reached.
@@ -59,8 +66,17 @@ impl Judge {
             "component_status" => {
                 self.failed.remove(&component);
             }
-            "acknowledged" => self.belief.acknowledge(effect.unwrap_or_default()),
-            "reconfiguration_failed" => self.refused.extend(self.belief.fail(effect.unwrap_or_default())),
+            "acknowledged" => {
+                let last = self.belief.last.as_ref().map(|last| last.effect);
+                self.belief.acknowledge(effect.unwrap_or_default());
+                if self.belief.last.as_ref().map(|last| last.effect) != last {
+                    self.was_misled = self.is_misled;
+                }
+            }
+            "reconfiguration_failed" => {
+                self.is_misled |= self.was_misled && self.belief.last.as_ref().map(|last| last.effect) == effect;
+                self.refused.extend(self.belief.fail(effect.unwrap_or_default()));
+            }
             "design_status" => {
                 self.refused.remove(event["design"].as_str().unwrap_or_default());
             }
@@ -71,6 +87,8 @@ impl Judge {
                 self.belief.observe(design, latest);
             }
             "action_started" | "action_progress" => {
+                self.started.extend(action);
+                self.progressed.extend(action.filter(|_| event["event"] == "action_progress"));
                 self.belief.imply(action.unwrap_or_default(), &self.asked);
             }
             "action_succeeded" => {
@@ -94,13 +112,14 @@ impl Judge {
                     self.belief.ask(effect.number, to);
                 }
                 if matches!(effect.command, Command::Request { .. }) && !effect.repeated {
-                    self.plan = Plan::Open;
+                    (self.plan, self.awaited) = (Plan::Open, None);
                 }
             }
             Answer::GoalReached => self.plan = Plan::Reached,
             Answer::PlanNone { status, .. } => self.plan = Plan::None(status),
             Answer::PlanFound { .. } => self.plan = Plan::Open,
-            Answer::Overdue { effect, outcome, .. } => {
+            Answer::Overdue { effect, action, outcome, .. } => {
+                self.awaited = Some(*action).filter(|_| *outcome == OverdueOutcome::Waiting);
                 if matches!(outcome, OverdueOutcome::Failed | OverdueOutcome::Cancelled) {
                     self.given_up.extend(*effect);
                 }
@@ -131,8 +150,10 @@ impl Judge {
             return Ok(());
         }
         let mut robot_then = robot.prospect();
-        // The loop cannot know of a failure before its report comes.
-        let unknown = robot.refused.filter(|number| !self.belief.failed.contains(number));
+        // The loop cannot know of a failure before its report comes, unless it has observed the design since.
+        let is_observed = self.belief.is_settled() && self.belief.design == robot.design;
+        let is_unknown = |number: &u64| !self.belief.failed.contains(number) && !is_observed;
+        let unknown = robot.refused.filter(is_unknown);
         if let Some(effect) = unknown.and_then(|number| self.asked.get(&number)) {
             robot_then.carry_out(effect);
         }
@@ -151,8 +172,20 @@ impl Judge {
                 robot_then.carry_out(effect);
             }
         }
-        let action = robot_then.action.as_ref().filter(|own| own.is_moving());
-        let Some(action) = action.filter(|own| !self.ended.contains(&own.number)) else { return Ok(()) };
+        let Some(action) = robot_then.action.as_ref().filter(|own| !self.ended.contains(&own.number)) else {
+            return Ok(());
+        };
+        let goes_on = beliefs.running().is_some_and(|(number, _)| number == action.number)
+            && !beliefs.suspended()
+            && !beliefs.cancelling();
+        if !action.is_moving() {
+            // A robot that has lost the design of its function in a restart waits for it, and the report of that may be lost.
+            return if goes_on && (action.suspended || !robot.has_lost_design) {
+                Err(format!("(g) action {} stands still, and is to go on: {action:?}", action.number))
+            } else {
+                Ok(())
+            };
+        }
         let Some(design) = &robot_then.design else {
             return Err(format!("(a) action {} goes on without a design", action.number));
         };
@@ -210,6 +243,27 @@ impl Judge {
         }
     }
 
+    /// (e) After a restart of the loop all reconfigurations without an answer are asked for again at once.
+    pub fn repeated(&self, answers: &[Answer]) -> Result<(), String> {
+        let numbers: BTreeSet<u64> =
+            answers.iter().filter_map(Answer::effect).map(|effect| effect.number).collect();
+        match self.belief.pending.keys().find(|number| !numbers.contains(number)) {
+            Some(number) => Err(format!("(e) effect {number} is not repeated after a restart")),
+            None => Ok(()),
+        }
+    }
+
+    /// (h) After planning an action stands still only if no design is available, or there is no plan.
+    pub fn standstill(&self, control: &Loop) -> Result<(), String> {
+        let beliefs = control.beliefs();
+        let is_possible = DESIGNS.iter().any(|(design, _)| beliefs.available().contains(*design));
+        let is_still = beliefs.suspended() && !beliefs.cancelling();
+        if is_still && is_possible && !matches!(self.plan, Plan::None(_)) {
+            return Err(format!("(h) an action stands still with {:?}", beliefs.available()));
+        }
+        Ok(())
+    }
+
     /// (a) The robot does not move with a forbidden design for longer than the bound, in steps.
     pub fn motion(&mut self, robot: &Robot, bound: Option<u64>) -> Result<(), String> {
         let is_moving = robot.action.as_ref().is_some_and(Action::is_moving);
@@ -256,6 +310,15 @@ impl Judge {
         }
     }
 
+    /// Returns `true` if a robot that reports what it has reported so far would have reported more of an action by now.
+    fn is_report_due(&self, action: u64) -> bool {
+        if self.started.contains(&action) {
+            self.progressed.contains(&action)
+        } else {
+            !self.started.is_empty()
+        }
+    }
+
     /// (c) Each effect was carried out, superseded, about an action that has ended, or given up aloud. (d) The goal is reached, or
     /// there is no plan.
     pub fn at_the_end(&self, robot: &Robot) -> Result<(), String> {
@@ -265,7 +328,8 @@ impl Judge {
             let is_closed = robot.seen.contains(number)
                 || self.superseded.contains(number)
                 || self.given_up.contains(number);
-            !is_closed && !is_moot
+            // Of a robot that has never acknowledged anything, as far as the loop was told, nothing is expected.
+            !is_closed && !is_moot && self.belief.has_receipts
         };
         let open: Vec<&u64> = self.asked.iter().filter(is_open).map(|(number, _)| number).collect();
         if !open.is_empty() {
@@ -280,9 +344,20 @@ impl Judge {
             // The same step has failed three times in a row; it is not tried again until something changes.
             Plan::None("failed") => Ok(()),
             Plan::None("unsolvable") if !is_possible => Ok(()),
+            // A robot that has forgotten its action, and reports as little of actions as it did of this one, is waited for.
+            Plan::Open if self.awaited.is_some_and(|action| !self.is_report_due(action)) => Ok(()),
             plan => Err(format!("(d) the last decision is {plan:?}; a plan is possible: {is_possible}")),
         }
     }
+}
+
+/// The last reconfiguration that was carried out, as far as the loop was told.
+#[derive(Debug)]
+struct Last {
+    effect: u64,
+    design: String,
+    /// The design before, and the reconfiguration that has led to it, if one has.
+    before: Option<(String, Option<u64>)>,
 }
 
 /// Design that the loop must believe, by the table of `docs/reference/events.md`.
@@ -297,8 +372,8 @@ struct Belief {
     /// The reconfiguration that was asked for last and has no answer, and those before that were superseded without one.
     pending: BTreeMap<u64, String>,
     superseded: BTreeMap<u64, String>,
-    /// The greatest reconfiguration that was acknowledged and has not failed since, its design, and the design before.
-    last: Option<(u64, String, Option<String>)>,
+    /// The greatest reconfiguration that was acknowledged and has not failed since.
+    last: Option<Last>,
     greatest: u64,
     /// Reconfigurations up to this one may have been carried out before or after an observation.
     crossed: u64,
@@ -334,7 +409,9 @@ impl Belief {
             (self.design, self.last) = (None, None);
         } else {
             let before = self.design.replace(to.clone()).filter(|before| is_before_known && *before != to);
-            self.last = Some((effect, to, before));
+            let source = self.last.take().filter(|last| before.as_ref() == Some(&last.design));
+            let before = before.map(|before| (before, source.map(|last| last.effect)));
+            self.last = Some(Last { effect, design: to, before });
         }
     }
 
@@ -357,9 +434,12 @@ impl Belief {
         if let Some(design) = self.pending.remove(&effect).or_else(|| self.superseded.remove(&effect)) {
             return Some(design);
         }
-        let (_, design, before) = self.last.take_if(|last| last.0 == effect)?;
+        if let Some(last) = &mut self.last {
+            last.before.take_if(|before| before.1 == Some(effect));
+        }
+        let Last { design, before, .. } = self.last.take_if(|last| last.effect == effect)?;
         if self.design.as_ref() == Some(&design) {
-            self.design = before;
+            self.design = before.map(|before| before.0);
         }
         Some(design)
     }

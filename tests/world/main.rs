@@ -12,8 +12,11 @@
 //!   nothing is pending it is the actual one;
 //! - (c) at the end, each effect was carried out, superseded, about an action that has ended, or given up aloud;
 //! - (d) at the end, the robot is at the goal, or the last decision is that there is no plan, and there is none;
+//! - (e) a loop that is brought back from its snapshot and the steps since is in the state of the one that has crashed, and repeats
+//!   the reconfigurations that have no answer;
 //! - (f) a line that takes its design from the action under way is answered with a safe effect at once;
-//! - (e) a loop that is brought back from its snapshot and the steps since is in the state of the one that has crashed.
+//! - (g) once all effects have arrived, the action that the loop lets go on does not stand still;
+//! - (h) after planning an action stands still only where no design is available or there is no plan.
 
 mod judge;
 mod robot;

@@ -14,14 +14,14 @@ const WORK: u32 = 4;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Action {
     pub number: u64,
-    /// Number of the effect that has requested it.
+    /// Number of the effect that has requested or resumed it last.
     request: u64,
     /// Steps of work done so far.
     pub done: u32,
     pub suspended: bool,
     /// The place where the action ends.
     pub to: String,
-    /// The design that the action waits for before it begins.
+    /// The design that the action waits for before it begins or goes on.
     wanted: Option<String>,
 }
 
@@ -162,11 +162,16 @@ impl Robot {
             (Command::Suspend { .. }, Some(own)) => own.suspended = true,
             // What is said of an action before its request comes holds when it begins.
             (Command::Suspend { .. }, None) => drop(self.still.insert(number)),
-            (Command::Resume, None) => drop(self.still.remove(&number)),
-            (Command::Resume, Some(own)) => {
-                own.suspended = false;
-                // The action goes on with the design that the function has now.
-                if own.wanted.take_if(|_| self.design.is_some()).is_some() {
+            (Command::Resume { .. }, None) => drop(self.still.remove(&number)),
+            (Command::Resume { configuration }, Some(own)) => {
+                let design = configuration.iter().find(|(function, _)| function == FUNCTION).map(|own| &own.1);
+                // A later reconfiguration for the action may have come before.
+                let is_later = self.design.is_some() && self.configured > (number, effect.number);
+                let wanted = design.filter(|design| !is_later && self.design.as_ref() != Some(design));
+                (own.suspended, own.request) = (false, effect.number);
+                let has_waited = own.wanted.is_some();
+                own.wanted = wanted.cloned();
+                if has_waited && own.wanted.is_none() {
                     return Some(json!({ "event": "action_started", "action": number }));
                 }
             }
@@ -205,10 +210,11 @@ impl Robot {
         Some(report)
     }
 
-    /// Restarts. The function has no design any more, and the action under way has failed. Returns its reports.
-    pub fn restart(&mut self) -> Vec<Value> {
+    /// Restarts. The function has no design any more, and the action under way has ended; `forgets` if the robot does not know any
+    /// more that there was one. Returns its reports.
+    pub fn restart(&mut self, forgets: bool) -> Vec<Value> {
         (self.design, self.has_restarted, self.has_lost_design, self.before) = (None, true, true, None);
-        let failed = self.action.take();
+        let failed = self.action.take().filter(|_| !forgets);
         let failed = failed.map(|own| json!({ "event": "action_failed", "action": own.number }));
         self.said.extend(failed.clone());
         failed.into_iter().chain([self.observed()]).collect()

@@ -17,6 +17,9 @@ const STEP: Duration = Duration::from_millis(500);
 /// Steps with faults, and fair steps after them.
 const STEPS: (u64, u64) = (60, 300);
 
+/// Steps that a belated message is under way: longer than two deadlines.
+const BELATED: (u64, u64) = (45, 90);
+
 /// Number of lines after which the loop gets a new snapshot to be restored from.
 const SNAPSHOT_EVERY: usize = 23;
 
@@ -40,6 +43,10 @@ pub struct Faults {
     pub late: u32,
     /// Observations of the function's design.
     pub observes: u32,
+    /// Messages that arrive after deadlines have passed.
+    pub belated: u32,
+    /// Whether a robot that restarts does not know any more which action was under way.
+    pub forgets: bool,
     /// Whether the effects of the start may be lost, too.
     pub start: bool,
     /// Whether lines have numbers.
@@ -70,6 +77,8 @@ impl Faults {
             quiet: random.bool(),
             late: 0,
             observes: 0,
+            belated: 0,
+            forgets: false,
         }
         .with_later_kinds(seed)
     }
@@ -78,12 +87,13 @@ impl Faults {
     fn with_later_kinds(self, seed: u64) -> Self {
         let mut random = Rng::with_seed(seed ^ 0x1a7e);
         let mut share = |most: u32| if random.bool() { 0 } else { random.u32(0..=most) };
-        Self { late: share(4), observes: share(6), ..self }
+        let (late, observes) = (share(4), share(6));
+        Self { late, observes, belated: share(8), forgets: random.bool(), ..self }
     }
 
     /// The same without the kinds that were added later.
     pub fn of_earlier_kinds(self) -> Self {
-        Self { late: 0, observes: 0, ..self }
+        Self { late: 0, observes: 0, belated: 0, forgets: false, ..self }
     }
 
     /// The same where the effects of the start may be lost.
@@ -199,7 +209,7 @@ impl<'a> Schedule<'a> {
         }
         if self.chance(self.faults.restarts) {
             self.log(|| "the robot restarts".to_owned());
-            let reports = self.robot.restart();
+            let reports = self.robot.restart(self.faults.forgets);
             for report in reports {
                 self.report(report);
             }
@@ -280,8 +290,10 @@ impl<'a> Schedule<'a> {
             && self.faults.refuses == 0
             && self.faults.restarts == 0
             && self.faults.late == 0
+            && self.faults.belated == 0
             && self.faults.observes == 0;
-        if self.now > STEPS.0 + self.faults.delay {
+        let last_arrival = if self.faults.belated > 0 { BELATED.1 } else { self.faults.delay };
+        if self.now > STEPS.0 + last_arrival {
             Some(deadlines)
         } else {
             is_reliable.then_some(self.faults.delay + 2)
@@ -324,6 +336,9 @@ impl<'a> Schedule<'a> {
             if self.is_unfair() {
                 arrival += self.random.u64(0..=self.faults.delay);
                 order = self.random.u64(..1 << 40);
+                if self.faults.belated > 0 && self.random.u32(..100) < self.faults.belated {
+                    arrival += self.random.u64(BELATED.0..=BELATED.1);
+                }
             }
             let mut key = (arrival.max(self.now + 1), order);
             while self.messages.contains_key(&key) {
@@ -393,6 +408,7 @@ impl<'a> Schedule<'a> {
         if self.control.has_agenda() {
             self.deliberate();
             self.judge.intended_motion(&self.robot, &self.control, self.messages.values())?;
+            self.judge.standstill(&self.control)?;
         }
         Ok(())
     }
@@ -447,8 +463,9 @@ impl<'a> Schedule<'a> {
         for answer in &repeated {
             self.judge.note(answer);
         }
+        let verdict = self.judge.repeated(&repeated);
         self.send(repeated);
-        Ok(())
+        verdict
     }
 }
 

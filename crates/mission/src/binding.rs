@@ -5,7 +5,7 @@
 //! a class, a predicate to a relation between designs, functions and actions, and a numeric
 //! function to an estimated or measured attribute.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 use num_rational::BigRational;
 
@@ -295,7 +295,8 @@ impl Fill<'_> {
     fn objects(&mut self, domain: &Domain, r#type: &Name, class: &str) {
         let members = self.known.members(&self.view, class);
         let present = domain.constants.iter().chain(&self.problem.objects);
-        let mut names: BTreeSet<Name> = present.map(|object| object.identifier.name.clone()).collect();
+        let names: HashSet<&Name> = present.map(|object| &object.identifier.name).collect();
+        let (mut added, mut objects) = (HashSet::new(), Vec::new());
         for Individual { iri, name } in &*members {
             let spelled = Name::new(name);
             if !is_pddl_name(name) {
@@ -303,12 +304,13 @@ impl Fill<'_> {
                     "<{iri}> is left out: `{name}` is not a PDDL name; give it another one under `[bindings.names]`"
                 );
                 self.warnings.push(Message::warning("M201", text));
-            } else if names.insert(spelled.clone()) {
+            } else if !names.contains(&spelled) && added.insert(spelled.clone()) {
                 let alternatives = vec![identifier(r#type)];
                 let r#type = TypeExpression { alternatives };
-                self.problem.objects.push(TypedName { identifier: identifier(&spelled), r#type });
+                objects.push(TypedName { identifier: identifier(&spelled), r#type });
             }
         }
+        self.problem.objects.extend(objects);
     }
 
     /// Adds a fact, unless an argument is an individual without a PDDL name.
@@ -319,7 +321,7 @@ impl Fill<'_> {
     }
 
     /// Returns the argument lists of the facts that the problem states with a predicate.
-    fn stated(&self, predicate: &Name) -> BTreeSet<Vec<Name>> {
+    fn stated(&self, predicate: &Name) -> HashSet<Vec<Name>> {
         let arguments = |element: &InitialElement| match element {
             InitialElement::Fact(atom) if atom.predicate.name == *predicate => Some(names(&atom.arguments)),
             _ => None,
@@ -398,17 +400,6 @@ impl Fill<'_> {
 
     fn values(&mut self, declared: &Declaration, query: &Query) {
         let name = &declared.identifier.name;
-        let stated: BTreeSet<Vec<Name>> = self
-            .problem
-            .init
-            .iter()
-            .filter_map(|element| match element {
-                InitialElement::Value(atom, _, _) if atom.predicate.name == *name => {
-                    Some(names(&atom.arguments))
-                }
-                _ => None,
-            })
-            .collect();
         let mut values: Vec<(Vec<String>, BigRational)> = Vec::new();
         match query {
             Query::Estimation(attribute) if declared.parameters.len() == 1 => {
@@ -424,6 +415,14 @@ impl Fill<'_> {
             }
             _ => {}
         }
+        if values.is_empty() {
+            return;
+        }
+        let arguments_of = |element: &InitialElement| match element {
+            InitialElement::Value(atom, _, _) if atom.predicate.name == *name => Some(names(&atom.arguments)),
+            _ => None,
+        };
+        let stated: HashSet<Vec<Name>> = self.problem.init.iter().filter_map(arguments_of).collect();
         for (arguments, value) in values {
             let key: Vec<Name> = arguments.iter().map(|argument| Name::new(argument)).collect();
             if !stated.contains(&key) && arguments.iter().all(|argument| is_pddl_name(argument)) {
