@@ -84,18 +84,19 @@ impl Beliefs {
             return Failure::NotReconfiguration;
         }
         match self.outstanding.get(&effect).map(|own| &own.command) {
-            Some(Command::Reconfigure { to, .. }) => {
-                let design = to.clone();
+            Some(Command::Reconfigure { function, to, .. }) => {
+                let (function, design) = (function.clone(), to.clone());
                 self.outstanding.remove(&effect);
                 self.waits.remove(&effect);
-                return Failure::Design(design);
+                return self.unanswered_failed(&function, design);
             }
             Some(_) => return Failure::NotReconfiguration,
             None => {}
         }
         for (function, own) in &mut self.receipts.functions {
             if let Some(design) = own.superseded.remove(&effect) {
-                return Failure::Design(design);
+                let function = function.clone();
+                return self.unanswered_failed(&function, design);
             }
             let Some(last) = own.last.as_mut() else { continue };
             // Without the reconfiguration before the last one nobody knows what a failure of the last one leads to.
@@ -114,6 +115,15 @@ impl Beliefs {
             return Failure::Design(design);
         }
         Failure::Stale
+    }
+
+    /// Takes the failure of a reconfiguration without an answer so far. The function keeps the design before. But if it was seen with
+    /// the design meanwhile, the reconfiguration was carried out and has failed later: nobody knows the design before.
+    fn unanswered_failed(&mut self, function: &str, design: String) -> Failure {
+        if self.configuration.get(function) == Some(&design) {
+            self.configuration.remove(function);
+        }
+        Failure::Design(design)
     }
 
     /// Believes that a function has got a design by a reconfiguration, unless a later one was acknowledged. The function was seen

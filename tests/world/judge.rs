@@ -153,8 +153,8 @@ impl Judge {
         // The loop cannot know of a failure before its report comes, unless it has observed the design since.
         let is_observed = self.belief.is_settled() && self.belief.design == robot.design;
         let is_unknown = |number: &u64| !self.belief.failed.contains(number) && !is_observed;
-        let unknown = robot.refused.filter(is_unknown);
-        if let Some(effect) = unknown.and_then(|number| self.asked.get(&number)) {
+        let unknown = robot.refused.iter().filter(|number| is_unknown(number));
+        for effect in unknown.filter_map(|number| self.asked.get(number)) {
             robot_then.carry_out(effect);
         }
         let on_their_way: BTreeMap<u64, &Effect> = messages
@@ -432,6 +432,8 @@ impl Belief {
     fn fail(&mut self, effect: u64) -> Option<String> {
         self.failed.insert(effect);
         if let Some(design) = self.pending.remove(&effect).or_else(|| self.superseded.remove(&effect)) {
+            // It was carried out if the function was seen with the design.
+            self.design.take_if(|own| *own == design);
             return Some(design);
         }
         if let Some(last) = &mut self.last {

@@ -44,8 +44,8 @@ pub struct Robot {
     pub place: String,
     /// Numbers of effects that were carried out, refused, or superseded before they came.
     pub seen: BTreeSet<u64>,
-    /// The last reconfiguration, if it was refused, or has failed after it was acknowledged.
-    pub refused: Option<u64>,
+    /// Reconfigurations since the last successful one that were refused, and that one if it has failed after it was acknowledged.
+    pub refused: BTreeSet<u64>,
     /// Answers to effects and ends of actions, to be reported again.
     pub said: Vec<Value>,
     /// The greatest number of an action that has begun.
@@ -69,7 +69,7 @@ impl Default for Robot {
             action: None,
             place: START.to_owned(),
             seen: BTreeSet::new(),
-            refused: None,
+            refused: BTreeSet::new(),
             said: Vec::new(),
             begun: 0,
             has_restarted: false,
@@ -94,7 +94,11 @@ impl Robot {
         let kind = if is_refused { "reconfiguration_failed" } else { "acknowledged" };
         let mut reports = vec![json!({ "event": kind, "effect": effect.number })];
         if matches!(effect.command, Command::Reconfigure { .. }) {
-            self.refused = is_refused.then_some(effect.number);
+            if is_refused {
+                self.refused.insert(effect.number);
+            } else {
+                self.refused.clear();
+            }
         }
         if !is_refused {
             reports.extend(self.carry_out(effect));
@@ -106,7 +110,8 @@ impl Robot {
     /// The last reconfiguration fails after it was acknowledged: the function has the design before again. Returns the report.
     pub fn fail_late(&mut self) -> Option<Value> {
         let (effect, design) = self.before.take()?;
-        (self.design, self.refused) = (Some(design), Some(effect));
+        self.design = Some(design);
+        self.refused.insert(effect);
         let report = json!({ "event": "reconfiguration_failed", "effect": effect });
         self.said.push(report.clone());
         Some(report)
@@ -123,6 +128,7 @@ impl Robot {
             said: self.said.iter().filter(|said| is_end(said)).cloned().collect(),
             still: self.still.clone(),
             before: None,
+            refused: BTreeSet::new(),
             ..*self
         }
     }
