@@ -143,11 +143,11 @@ impl Beliefs {
             self.configuration.insert(function.clone(), design.clone())
         };
         // The function was seen with the design before its acknowledgement came: nobody knows the one that it had before.
-        let before = before.filter(|before| is_before_known && *before != design);
+        let before = before.filter(|before| is_before_known && !is_doubtful && *before != design);
         let source = own.last.as_ref().filter(|last| !last.failed && Some(&last.design) == before.as_ref());
         let source = source.map(|last| last.effect);
         let before = before.map(|design| Before { design, effect: source });
-        own.last = Some(Acknowledged { effect, design, before, failed: is_doubtful });
+        own.last = Some(Acknowledged { effect, design, before, failed: false });
         if is_doubtful { Receipt::Doubtful(function) } else { Receipt::Taken }
     }
 }

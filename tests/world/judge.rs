@@ -406,7 +406,8 @@ impl Belief {
         }
         self.greatest = effect;
         if self.crossed >= effect {
-            (self.design, self.last) = (None, None);
+            self.design = None;
+            self.last = Some(Last { effect, design: to, before: None });
         } else {
             let before = self.design.replace(to.clone()).filter(|before| is_before_known && *before != to);
             let source = self.last.take().filter(|last| before.as_ref() == Some(&last.design));

@@ -1,6 +1,6 @@
 //! A robot with one function: it carries effects out, each once, and reports.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use metaplan::mapek::{Command, Effect};
 use serde_json::{Value, json};
@@ -59,6 +59,8 @@ pub struct Robot {
     configured: (u64, u64),
     /// Actions to come that are to stand still from their beginning.
     still: BTreeSet<u64>,
+    /// Actions to come that were suspended and resumed, with the number of the resumption and its design.
+    resumed: BTreeMap<u64, (u64, Option<String>)>,
 }
 
 impl Default for Robot {
@@ -77,6 +79,7 @@ impl Default for Robot {
             before: None,
             configured: (0, 0),
             still: BTreeSet::new(),
+            resumed: BTreeMap::new(),
         }
     }
 }
@@ -127,6 +130,7 @@ impl Robot {
             seen: self.seen.clone(),
             said: self.said.iter().filter(|said| is_end(said)).cloned().collect(),
             still: self.still.clone(),
+            resumed: self.resumed.clone(),
             before: None,
             refused: BTreeSet::new(),
             ..*self
@@ -156,21 +160,25 @@ impl Robot {
             (Command::Request { step }, _) if number > self.begun => {
                 self.begun = number;
                 let to = step.arguments.get(1).cloned().unwrap_or_default();
-                let wanted = step.design(FUNCTION).filter(|design| self.design.as_deref() != Some(design));
-                // A later reconfiguration for the action may have come before its request.
-                let is_later = self.design.is_some() && self.configured > (number, effect.number);
-                let wanted = wanted.filter(|_| !is_later).map(ToOwned::to_owned);
+                // Later effects for the action may have come before its request.
+                let of_request = (effect.number, step.design(FUNCTION).map(ToOwned::to_owned));
+                let (request, design) = self.resumed.get(&number).cloned().unwrap_or(of_request);
+                let is_later = self.design.is_some() && self.configured > (number, request);
+                let wanted = design.filter(|design| !is_later && self.design.as_ref() != Some(design));
                 let is_begun = wanted.is_none();
-                let (request, suspended) = (effect.number, self.still.contains(&number));
+                let suspended = self.still.contains(&number);
                 self.action = Some(Action { number, request, done: 0, suspended, to, wanted });
                 return is_begun.then(|| json!({ "event": "action_started", "action": number }));
             }
             (Command::Suspend { .. }, Some(own)) => own.suspended = true,
             // What is said of an action before its request comes holds when it begins.
             (Command::Suspend { .. }, None) => drop(self.still.insert(number)),
-            (Command::Resume { .. }, None) => drop(self.still.remove(&number)),
+            (Command::Resume { configuration }, None) => {
+                self.still.remove(&number);
+                self.resumed.insert(number, (effect.number, design_in(configuration).cloned()));
+            }
             (Command::Resume { configuration }, Some(own)) => {
-                let design = configuration.iter().find(|(function, _)| function == FUNCTION).map(|own| &own.1);
+                let design = design_in(configuration);
                 // A later reconfiguration for the action may have come before.
                 let is_later = self.design.is_some() && self.configured > (number, effect.number);
                 let wanted = design.filter(|design| !is_later && self.design.as_ref() != Some(design));
@@ -245,6 +253,11 @@ impl Robot {
         reports.extend(self.has_restarted.then(|| self.observed()));
         reports
     }
+}
+
+/// Returns the design of the function in a configuration.
+fn design_in(configuration: &[(String, String)]) -> Option<&String> {
+    configuration.iter().find(|(function, _)| function == FUNCTION).map(|pair| &pair.1)
 }
 
 fn is_end(said: &Value) -> bool {
