@@ -99,8 +99,14 @@ impl Beliefs {
                 return self.unanswered_failed(&function, design);
             }
             let Some(last) = own.last.as_mut() else { continue };
-            // Without the reconfiguration before the last one nobody knows what a failure of the last one leads to.
-            last.before.take_if(|before| before.effect == Some(effect));
+            // Without the reconfiguration before the last one nobody knows what a failure of the last one leads to, or has led to.
+            if let Some(before) = last.before.take_if(|before| before.effect == Some(effect))
+                && last.failed
+                && self.configuration.get(function) == Some(&before.design)
+            {
+                self.configuration.remove(function);
+                return Failure::Design(before.design);
+            }
             if last.effect != effect || last.failed {
                 continue;
             }

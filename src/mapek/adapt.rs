@@ -54,7 +54,16 @@ pub(super) struct Adapting<'a> {
 
 impl Adapting<'_> {
     /// Reacts to what has changed and to what the analysis has found in it, up to a plan.
-    pub(super) fn adapt(&mut self, mut changes: Changes, findings: Findings, answers: &mut Vec<Answer>) {
+    pub(super) fn adapt(&mut self, changes: Changes, findings: Findings, answers: &mut Vec<Answer>) {
+        let is_observed = changes.observed;
+        self.decide(changes, findings, answers);
+        // The action goes on with the design that was observed, and may wait for the one before.
+        if is_observed {
+            self.configure_again(answers);
+        }
+    }
+
+    fn decide(&mut self, mut changes: Changes, findings: Findings, answers: &mut Vec<Answer>) {
         self.chances(&findings, &changes);
         let is_change = changes.facts || !changes.must.is_empty() || !findings.gained.is_empty();
         if self.gave_up(&changes, answers) {
@@ -143,7 +152,7 @@ impl Adapting<'_> {
         let Some(mut running) = self.beliefs.running.clone().filter(|own| own.provisional) else { return };
         running.provisional = false;
         if !running.cancelling && self.can_go_on(&running) {
-            reconfigure(self.beliefs, running.action, &running.step, None, answers);
+            reconfigure(self.beliefs, &mut running, answers);
             resume_suspended(self.beliefs, &mut running, answers);
         }
         self.beliefs.running = Some(running);
@@ -219,14 +228,11 @@ impl Adapting<'_> {
 
     /// Gives the functions of the action under way their designs where they have lost them.
     fn configure_again(&mut self, answers: &mut Vec<Answer>) {
-        let Some(running) = &self.beliefs.running else { return };
-        let has = |(function, design): &(String, String)| {
-            self.beliefs.expected(function).is_some_and(|own| own == design)
-        };
-        if !running.step.configuration.iter().all(has) {
-            let (action, step) = (running.action, running.step.clone());
-            reconfigure(self.beliefs, action, &step, None, answers);
+        let Some(mut running) = self.beliefs.running.take() else { return };
+        if !running.suspended && !running.cancelling {
+            reconfigure(self.beliefs, &mut running, answers);
         }
+        self.beliefs.running = Some(running);
     }
 
     /// Cancels or suspends the action under way if that is better than `going_on`, the plan that begins with what is left of
@@ -328,11 +334,10 @@ impl Adapting<'_> {
         answers.push(Answer::PlanFound { cost, optimal: proved, steps: steps.clone() });
         let mut steps: std::collections::VecDeque<PlannedStep> = steps.into();
         if let Some(mut running) = self.beliefs.running.take() {
-            let step = steps.pop_front().unwrap_or_else(|| running.step.clone());
-            // A resumption names the designs by itself.
-            let instructed = Some(&running.step).filter(|_| !running.suspended);
-            reconfigure(self.beliefs, running.action, &step, instructed, answers);
-            running.step = step;
+            if let Some(first) = steps.pop_front() {
+                running.step = first;
+            }
+            reconfigure(self.beliefs, &mut running, answers);
             resume_suspended(self.beliefs, &mut running, answers);
             self.beliefs.running = Some(running);
         }

@@ -105,6 +105,10 @@ pub(super) struct Running {
     pub(super) started: bool,
     /// Whether its progress was reported.
     pub(super) progressed: bool,
+    /// Whether it was suspended and resumed.
+    pub(super) resumed: bool,
+    /// Functions with the designs that the action was told to use last.
+    pub(super) instructed: Vec<(String, String)>,
 }
 
 /// A search for a plan that is to be repeated.

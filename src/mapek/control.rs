@@ -405,8 +405,8 @@ impl Loop {
     /// Gives the action under way other designs.
     pub(crate) fn reconfigure_now(&mut self, step: PlannedStep, answers: &mut Vec<Answer>) {
         if let Some(mut running) = self.beliefs.running.take() {
-            reconfigure(&mut self.beliefs, running.action, &step, Some(&running.step), answers);
             running.step = step;
+            reconfigure(&mut self.beliefs, &mut running, answers);
             self.beliefs.running = Some(running);
         }
     }

@@ -122,6 +122,12 @@ fn action(beliefs: &mut Beliefs, settings: &Settings, answers: &mut Vec<Answer>)
         OverdueOutcome::Cancelled => {
             let running = running.clone();
             let because = format!("nothing was heard of action {action} for {seconds} s");
+            // An action that has never started may lack a design that its function is believed to have.
+            if !running.started {
+                for (function, _) in &running.step.configuration {
+                    beliefs.configuration.remove(function);
+                }
+            }
             cancel(beliefs, running, because, answers);
         }
         OverdueOutcome::Failed | OverdueOutcome::Waiting => {}

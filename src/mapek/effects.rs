@@ -23,44 +23,43 @@ pub(super) fn finish(beliefs: &mut Beliefs, answers: &mut Vec<Answer>) {
 pub(super) fn request(beliefs: &mut Beliefs, step: PlannedStep, answers: &mut Vec<Answer>) {
     beliefs.actions += 1;
     let action = beliefs.actions;
-    reconfigure(beliefs, action, &step, None, answers);
-    effect(beliefs, action, Command::Request { step: step.clone() }, answers);
-    let progress = num_rational::BigRational::from_integer(0.into());
-    beliefs.running = Some(Running {
+    let mut running = Running {
         action,
+        instructed: step.configuration.clone(),
         step,
-        progress,
+        progress: num_rational::BigRational::from_integer(0.into()),
         cancelling: false,
         suspended: false,
         provisional: false,
-        request: beliefs.effects,
+        request: 0,
         heard: beliefs.now,
         overdue: 0,
         started: false,
         progressed: false,
-    });
+        resumed: false,
+    };
+    reconfigure(beliefs, &mut running, answers);
+    effect(beliefs, action, Command::Request { step: running.step.clone() }, answers);
+    running.request = beliefs.effects;
+    beliefs.running = Some(running);
 }
 
-/// Gives functions the designs of a step, and the knowledge base its objectives.
+/// Gives functions the designs of an action, and the knowledge base its objectives.
 ///
-/// `instructed` is the step as the action that is moving was told last. It may still wait for a design of that step, and is told where
-/// it gets another one, also if the function has that design already.
-pub(super) fn reconfigure(
-    beliefs: &mut Beliefs,
-    action: u64,
-    step: &PlannedStep,
-    instructed: Option<&PlannedStep>,
-    answers: &mut Vec<Answer>,
-) {
-    for (function, design) in &step.configuration {
-        let is_changed = instructed.is_some_and(|old| old.design(function) != Some(design));
-        if is_changed || beliefs.expected(function) != Some(design) {
+/// An action may still wait for designs that it was told to use. If it gets others it is told so, also where its functions have
+/// them already.
+pub(super) fn reconfigure(beliefs: &mut Beliefs, running: &mut Running, answers: &mut Vec<Answer>) {
+    let may_wait = !running.suspended && (!running.started || running.resumed);
+    for pair in &running.step.configuration {
+        let (function, design) = pair;
+        if beliefs.expected(function) != Some(design) || may_wait && !running.instructed.contains(pair) {
             let from = beliefs.configuration.get(function).cloned();
             let command = Command::Reconfigure { function: function.clone(), from, to: design.clone() };
-            effect(beliefs, action, command, answers);
+            effect(beliefs, running.action, command, answers);
         }
     }
-    objectives(beliefs, Some(step), answers);
+    running.instructed.clone_from(&running.step.configuration);
+    objectives(beliefs, Some(&running.step), answers);
 }
 
 /// Asks the managed system for something.
@@ -132,6 +131,7 @@ pub(super) fn resume_suspended(beliefs: &mut Beliefs, running: &mut Running, ans
     running.provisional = false;
     if std::mem::take(&mut running.suspended) {
         (running.heard, running.overdue) = (beliefs.now, 0);
+        running.resumed = true;
         let configuration = running.step.configuration.clone();
         effect(beliefs, running.action, Command::Resume { configuration }, answers);
     }

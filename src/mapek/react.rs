@@ -35,8 +35,8 @@ pub(super) fn react(
         SafeReaction::Suspend => None,
     };
     if let Some(step) = other {
-        reconfigure(beliefs, running.action, &step, Some(&running.step), answers);
         running.step = step;
+        reconfigure(beliefs, &mut running, answers);
     } else {
         let because = format!("{reason}; it stands still until it is decided what becomes of it");
         effect(beliefs, running.action, Command::Suspend { because }, answers);

@@ -75,6 +75,8 @@ pub(super) fn snapshot(known: &Beliefs) -> Snapshot {
             running.overdue,
             running.progressed,
             running.started,
+            running.resumed,
+            running.instructed,
         ])
     });
     Snapshot(json!({
@@ -219,6 +221,8 @@ fn running_from_record(record: &Value) -> Option<Running> {
         overdue: u32::try_from(record.get(8)?.as_u64()?).ok()?,
         progressed: record.get(9)?.as_bool()?,
         started: record.get(10)?.as_bool()?,
+        resumed: record.get(11)?.as_bool()?,
+        instructed: configuration_from_record(record.get(12)?)?,
     })
 }
 

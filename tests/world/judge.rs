@@ -38,8 +38,8 @@ pub struct Judge {
     ended: BTreeSet<u64>,
     /// The last decision on plans, and whether the goal is reached.
     plan: Plan,
-    /// Number of steps in a row in which the robot has moved with a forbidden design.
-    forbidden: u64,
+    /// Failed component with which the robot moves, and the number of steps in a row in which it has done so.
+    forbidden: Option<(&'static str, u64)>,
 }
 
 /// The last decision on plans.
@@ -120,6 +120,9 @@ impl Judge {
             Answer::PlanFound { .. } => self.plan = Plan::Open,
             Answer::Overdue { effect, action, outcome, .. } => {
                 self.awaited = Some(*action).filter(|_| *outcome == OverdueOutcome::Waiting);
+                if *outcome == OverdueOutcome::Cancelled && !self.started.contains(action) {
+                    self.belief.design = None;
+                }
                 if matches!(outcome, OverdueOutcome::Failed | OverdueOutcome::Cancelled) {
                     self.given_up.extend(*effect);
                 }
@@ -177,7 +180,8 @@ impl Judge {
         };
         let goes_on = beliefs.running().is_some_and(|(number, _)| number == action.number)
             && !beliefs.suspended()
-            && !beliefs.cancelling();
+            && !beliefs.cancelling()
+            && !control.has_agenda();
         if !action.is_moving() {
             // A robot that has lost the design of its function in a restart waits for it, and the report of that may be lost.
             return if goes_on && (action.suspended || !robot.has_lost_design) {
@@ -268,11 +272,12 @@ impl Judge {
     pub fn motion(&mut self, robot: &Robot, bound: Option<u64>) -> Result<(), String> {
         let is_moving = robot.action.as_ref().is_some_and(Action::is_moving);
         let forbidden = robot.design.as_ref().filter(|_| is_moving).and_then(|design| self.forbids(design));
-        self.forbidden = if forbidden.is_some() { self.forbidden + 1 } else { 0 };
-        match (forbidden, bound) {
-            (Some(component), Some(bound)) if self.forbidden > bound => Err(format!(
-                "(a) the robot has moved for {} steps with {:?}, which needs {component}",
-                self.forbidden, robot.design
+        let before = self.forbidden.filter(|before| Some(before.0) == forbidden).map_or(0, |before| before.1);
+        self.forbidden = forbidden.map(|component| (component, before + 1));
+        match (self.forbidden, bound) {
+            (Some((component, steps)), Some(bound)) if steps > bound => Err(format!(
+                "(a) the robot has moved for {steps} steps with {:?}, which needs {component}",
+                robot.design
             )),
             _ => Ok(()),
         }
@@ -379,11 +384,13 @@ struct Belief {
     crossed: u64,
     /// Reconfigurations that have failed, as the loop was told.
     failed: BTreeSet<u64>,
+    /// Superseded reconfigurations up to this one have no effect on the design that was observed after them.
+    settled: u64,
 }
 
 impl Belief {
     fn is_settled(&self) -> bool {
-        self.pending.is_empty() && self.superseded.is_empty()
+        self.pending.is_empty() && self.superseded.range(self.settled + 1..).next().is_none()
     }
 
     fn ask(&mut self, effect: u64, to: &str) {
@@ -442,8 +449,10 @@ impl Belief {
         }
         let Last { design, before, .. } = self.last.take_if(|last| last.effect == effect)?;
         if self.design.as_ref() == Some(&design) {
-            self.design = before.map(|before| before.0);
+            self.design = before.as_ref().map(|before| before.0.clone());
         }
+        // The reconfiguration before may fail, too.
+        self.last = before.and_then(|(design, effect)| Some(Last { effect: effect?, design, before: None }));
         Some(design)
     }
 
@@ -458,7 +467,11 @@ impl Belief {
     fn observe(&mut self, design: Option<String>, latest: u64) {
         let is_news = self.design != design;
         match self.pending.last_key_value().map(|(_, to)| to.clone()) {
-            None => self.superseded.clear(),
+            None => {
+                // They may still be on their way.
+                let last = self.superseded.last_key_value().map_or(0, |(number, _)| *number);
+                (self.settled, self.crossed) = (self.settled.max(last), self.crossed.max(last));
+            }
             pending => {
                 if (is_news || design.is_none()) && design != pending {
                     self.crossed = latest;

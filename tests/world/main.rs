@@ -15,7 +15,7 @@
 //! - (e) a loop that is brought back from its snapshot and the steps since is in the state of the one that has crashed, and repeats
 //!   the reconfigurations that have no answer;
 //! - (f) a line that takes its design from the action under way is answered with a safe effect at once;
-//! - (g) once all effects have arrived, the action that the loop lets go on does not stand still;
+//! - (g) after planning, once all effects have arrived, the action that the loop lets go on does not stand still;
 //! - (h) after planning an action stands still only where no design is available or there is no plan.
 
 mod judge;

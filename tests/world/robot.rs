@@ -46,6 +46,8 @@ pub struct Robot {
     pub seen: BTreeSet<u64>,
     /// Reconfigurations since the last successful one that were refused, and that one if it has failed after it was acknowledged.
     pub refused: BTreeSet<u64>,
+    /// As `refused`, for the design before the last reconfiguration.
+    refused_before: BTreeSet<u64>,
     /// Answers to effects and ends of actions, to be reported again.
     pub said: Vec<Value>,
     /// The greatest number of an action that has begun.
@@ -72,6 +74,7 @@ impl Default for Robot {
             place: START.to_owned(),
             seen: BTreeSet::new(),
             refused: BTreeSet::new(),
+            refused_before: BTreeSet::new(),
             said: Vec::new(),
             begun: 0,
             has_restarted: false,
@@ -100,7 +103,7 @@ impl Robot {
             if is_refused {
                 self.refused.insert(effect.number);
             } else {
-                self.refused.clear();
+                self.refused_before = std::mem::take(&mut self.refused);
             }
         }
         if !is_refused {
@@ -114,6 +117,7 @@ impl Robot {
     pub fn fail_late(&mut self) -> Option<Value> {
         let (effect, design) = self.before.take()?;
         self.design = Some(design);
+        self.refused.append(&mut self.refused_before);
         self.refused.insert(effect);
         let report = json!({ "event": "reconfiguration_failed", "effect": effect });
         self.said.push(report.clone());
@@ -133,6 +137,7 @@ impl Robot {
             resumed: self.resumed.clone(),
             before: None,
             refused: BTreeSet::new(),
+            refused_before: BTreeSet::new(),
             ..*self
         }
     }
