@@ -1,7 +1,7 @@
-//! What an aggregate makes of a group of matches.
+//! Evaluation of aggregates over a group of matches.
 //!
-//! The outcome depends on the values alone, not on their order: numbers compare by their exact values and floating-point
-//! sums run from the least to the greatest.
+//! The result depends on the values alone and not on their order: numbers are compared by their exact
+//! values, and floating-point sums are computed in ascending order.
 
 use std::cmp::Ordering;
 
@@ -16,12 +16,12 @@ use crate::symbol::{Symbol, Symbols};
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Function {
     pub aggregate: Aggregate,
-    /// The value of a row: a column, as the number of a variable, or a constant.
+    /// Aggregated operand of a row: a column (as a variable number) or a constant.
     pub value: Source,
 }
 
 impl Function {
-    /// The aggregate of rows; `None` where it has no value.
+    /// Aggregate of rows; `None` if it has no value.
     pub fn of<'r>(&self, rows: impl Iterator<Item = &'r [Symbol]>, symbols: &Symbols) -> Option<Literal> {
         let literal = |row: &[Symbol]| {
             symbols.as_literal(match self.value {
@@ -45,11 +45,12 @@ fn sum(values: &[&Literal]) -> Option<Literal> {
     if !values.iter().all(|value| value.is_numeric()) {
         return None;
     }
+    // Decimals are summed exactly, and rounded once.
     let exact: Decimal = values.iter().filter_map(|value| as_decimal(value)).sum();
     let exact = Literal::Decimal(exact);
-    let others = values.iter().copied().filter(|value| as_decimal(value).is_none());
-    let values = others.clone().chain([&exact]);
-    if others.clone().any(|value| matches!(value, Literal::Double(_))) {
+    let floats = values.iter().copied().filter(|value| as_decimal(value).is_none());
+    let values = floats.clone().chain([&exact]);
+    if floats.clone().any(|value| matches!(value, Literal::Double(_))) {
         let mut values: Vec<f64> = values.filter_map(Literal::as_f64).collect();
         values.sort_by(f64::total_cmp);
         return Some(Literal::double(values.into_iter().sum()));
@@ -66,8 +67,8 @@ fn as_decimal(value: &Literal) -> Option<&Decimal> {
     }
 }
 
-/// The value that lies before all others in the given direction; of equal ones a decimal, or else the first by datatype
-/// and spelling.
+/// First value in the given direction. Among equal values, a decimal is preferred, and then the first by
+/// datatype and lexical form.
 fn extreme(values: &[&Literal], direction: Ordering) -> Option<Literal> {
     let mut best: Option<&Literal> = None;
     for &value in values {
@@ -82,24 +83,26 @@ fn extreme(values: &[&Literal], direction: Ordering) -> Option<Literal> {
             best = Some(value);
         }
     }
+    // NaN and values of other kinds are incomparable, so there is no extreme value.
     let best = best?;
     let is_extreme = |value: &&Literal| compare(value, best).is_some_and(|order| order != direction);
     values.iter().all(is_extreme).then(|| best.clone())
 }
 
-/// Exact numbers first.
+/// Sort key for equal values: exact numbers first.
 fn spelling(value: &Literal) -> (bool, &str, String) {
     (as_decimal(value).is_none(), value.datatype(), value.lexical())
 }
 
-/// As [`Literal::compare`], but numbers by their exact values, which is transitive over all numeric types.
+/// Compares literals like [`Literal::compare`], but numbers by their exact values. This order is transitive
+/// over all numeric types.
 fn compare(left: &Literal, right: &Literal) -> Option<Ordering> {
     match (left, right) {
         (Literal::Decimal(left), Literal::Decimal(right)) => Some(left.cmp(right)),
         _ if left.is_numeric() && right.is_numeric() => {
             match (left.as_rational(), right.as_rational()) {
                 (Some(left), Some(right)) => Some(BigRational::cmp(&left, &right)),
-                // At least one is infinite or not a number.
+                // At least one value is infinite or NaN.
                 _ => infinite(left)?.partial_cmp(&infinite(right)?),
             }
         }
@@ -107,7 +110,7 @@ fn compare(left: &Literal, right: &Literal) -> Option<Ordering> {
     }
 }
 
-/// The infinities as themselves and any finite number as 0.
+/// Maps infinities to themselves, and finite numbers to 0.
 fn infinite(value: &Literal) -> Option<f64> {
     match value {
         Literal::Decimal(_) => Some(0.0),
@@ -129,8 +132,8 @@ mod tests {
         let value = Source::Variable(0);
         let function = Function { aggregate: aggregate(crate::rule::Variable(0).into()), value };
         for _ in 0..2 {
-            let found = function.of(rows.iter().map(<[Symbol; 1]>::as_slice), &symbols);
-            assert_eq!(found, expected.as_ref().map(read), "{values:?}");
+            let result = function.of(rows.iter().map(<[Symbol; 1]>::as_slice), &symbols);
+            assert_eq!(result, expected.as_ref().map(read), "{values:?}");
             rows.reverse();
         }
     }

@@ -1,9 +1,10 @@
-//! A program and its facts in, consequences out, and kept so under insertion and deletion.
+//! Evaluation of a program, and its incremental maintenance under insertion and deletion of facts.
 //!
-//! Every derived row records the derivation by which it was first concluded, and these derivations never support each
-//! other in a circle. Deletion is delete-and-rederive [1] restricted to them: a row loses its support only when its
-//! recorded derivation loses an atom, where the original algorithm over-deletes whatever *some* derivation loses. What
-//! is over-deleted is rederived stratum by stratum, so that a deletion seldom spreads.
+//! Every derived row records its first derivation, and these derivations never support each other in a
+//! circle. Deletion is delete-and-rederive [1], restricted to the recorded derivations: a row loses its
+//! support only if its recorded derivation loses an atom. The original algorithm over-deletes a row if
+//! *any* derivation loses an atom. Over-deleted rows are rederived stratum by stratum, so that a deletion
+//! seldom propagates far.
 //!
 //! [1] Gupta, Mumick, Subrahmanian, "Maintaining views incrementally", SIGMOD 1993.
 
@@ -26,16 +27,17 @@ use crate::store::Store;
 use crate::symbol::Symbols;
 use crate::vocabulary::SAME_AS;
 
-/// Joins are planned anew when the facts have grown by this factor ...
+/// Joins are planned again when the number of facts has grown by this factor …
 const REPLAN_FACTOR: usize = 4;
-/// ... of at least so many.
+/// … over the number at the last planning, or over this number if it is larger.
 const REPLAN_FROM: usize = 32;
 
 impl Engine {
-    /// Derives everything that follows.
+    /// Derives all facts that follow.
     ///
     /// # Errors
-    /// All errors of all rules: R2xx, R302, R303; or R301 where the rules do not come to an end.
+    /// Returns all errors of all rules (R2xx, R302, R303), or R301 if the derivation exceeds the step
+    /// budget.
     pub fn new(
         symbols: Symbols,
         program: Program,
@@ -44,10 +46,10 @@ impl Engine {
         Self::with_limits(symbols, program, facts, Limits::default())
     }
 
-    /// As [`Engine::new`], within limits for this derivation and each later update.
+    /// Derives all facts that follow, within limits for this derivation and for each later update.
     ///
     /// # Errors
-    /// As [`Engine::new`]; or R304 where the evaluation was interrupted.
+    /// Returns the errors of [`Engine::new`], or R304 if the evaluation was interrupted.
     pub fn with_limits(
         symbols: Symbols,
         program: Program,
@@ -61,9 +63,9 @@ impl Engine {
             return Err(vec![error].into());
         }
         let mut symbols = symbols;
-        let same = program.equality.then(|| symbols.name(SAME_AS));
+        let same_as = program.equality.then(|| symbols.name(SAME_AS));
         let (program, symbols) = (Arc::new(program), Arc::new(symbols));
-        let equality = same.map(|same| Arc::new(Equality::new(same, &program)));
+        let equality = same_as.map(|same_as| Arc::new(Equality::new(same_as, &program)));
         let (network, store, records) = (Arc::default(), Store::default(), Records::default());
         let mut engine = Self { symbols, program, network, store, records, limits, equality };
         engine.build(facts)?;
@@ -71,7 +73,7 @@ impl Engine {
         Ok(engine)
     }
 
-    /// Derives everything from stated facts, in an engine that holds nothing.
+    /// Derives all facts from stated facts, in an engine without facts.
     fn build(&mut self, facts: Vec<Fact>) -> Result<(), Errors> {
         let mut evaluated = Arc::clone(&self.program);
         if self.equality.is_some() {
@@ -91,20 +93,23 @@ impl Engine {
         self.settle().map_err(Errors::from)
     }
 
-    /// Changes which facts are stated and returns the net change of all facts that hold, stated or derived, sorted.
+    /// Changes the set of stated facts. Returns the net change of all facts that hold, stated or derived,
+    /// sorted.
     ///
-    /// Facts that are already stated, and deletions of facts that are not, change nothing.
+    /// Insertions of facts that are already stated and deletions of facts that are not stated have no
+    /// effect.
     ///
     /// # Errors
-    /// R301 where the step budget is used up, R304 where the evaluation was interrupted, R302 and R303; the engine is then
-    /// as it was before.
+    /// Returns R301 if the step budget is exhausted, R304 if the evaluation was interrupted, R302 or R303.
+    /// After an error, the engine is in its previous state.
     pub fn apply(&mut self, delta: Delta) -> Result<Delta, Error> {
         let span = info_span!("update", stated = delta.insert.len() + delta.delete.len(), changed = Empty);
         let _entered = span.enter();
         for fact in delta.insert.iter().chain(&delta.delete) {
             check_fact(fact, &self.symbols)?;
         }
-        // To derive everything anew would take longer than whoever interrupts wants to wait.
+        // After an interrupt, the caller expects a prompt return. A copy is restored faster than a new
+        // derivation.
         let before = self.limits.interrupt.is_some().then(|| self.clone());
         let result = match self.equality.take() {
             Some(equality) => self.apply_equally(equality, &delta, None),
@@ -122,7 +127,7 @@ impl Engine {
         })
     }
 
-    /// On an error also what takes the change back.
+    /// Applies a change without equality. An error comes with the change that restores the stated facts.
     pub(crate) fn apply_plainly(&mut self, delta: Delta) -> Result<Delta, (Error, Delta)> {
         self.replan().map_err(|error| (error, Delta::default()))?;
         let stated = state_change(self, delta);
@@ -133,7 +138,8 @@ impl Engine {
         }
     }
 
-    /// As [`Engine::apply`], for rows of the store, which is in no defined state after an error.
+    /// Applies a change like [`Engine::apply`], to rows of the store. After an error, the store is in an
+    /// undefined state.
     pub(crate) fn apply_rows(&mut self, delta: Delta) -> Result<Delta, Error> {
         self.replan()?;
         let stated = state_change(self, delta);
@@ -142,7 +148,7 @@ impl Engine {
         Ok(maintenance.finish())
     }
 
-    /// Plans the joins anew once there are many more facts than they were planned for.
+    /// Plans the joins again if the number of facts has grown by [`REPLAN_FACTOR`].
     fn replan(&mut self) -> Result<(), Error> {
         if self.store.len() <= REPLAN_FACTOR * self.network.planned_for.max(REPLAN_FROM) {
             return Ok(());
@@ -151,17 +157,17 @@ impl Engine {
         network.plan(&mut self.store, true, (&self.program, &self.limits))
     }
 
-    /// Derives everything anew after an update that was stopped, from what was stated before.
+    /// Derives all facts again after an aborted update, from the facts stated before it.
     pub(crate) fn restore(&mut self, undo: &Delta) {
-        let (stated, gone) = (self.stated(), FxHashSet::from_iter(&undo.delete));
-        let kept = stated.into_iter().filter(|fact| !gone.contains(fact));
-        let facts: Vec<Fact> = kept.chain(undo.insert.iter().cloned()).collect();
-        let without = Limits { steps: u64::MAX, interrupt: None };
-        let limits = std::mem::replace(&mut self.limits, without);
+        let (stated, undone) = (self.stated(), FxHashSet::from_iter(&undo.delete));
+        let previous = stated.into_iter().filter(|fact| !undone.contains(fact));
+        let facts: Vec<Fact> = previous.chain(undo.insert.iter().cloned()).collect();
+        let unlimited = Limits { steps: u64::MAX, interrupt: None };
+        let limits = std::mem::replace(&mut self.limits, unlimited);
         if let Some(equality) = &mut self.equality {
             *equality = Arc::new(equality.emptied(&self.program));
             self.store = Store::default();
-            // It was without errors and ended within the budget before, and so does now without one.
+            // The same derivation succeeded within the budget before, so it cannot fail without a budget.
             let _ = self.build(facts);
         } else {
             for relation in &mut self.store.relations {
@@ -175,7 +181,9 @@ impl Engine {
     }
 }
 
+/// Checks the arity of a fact, and that its symbols are interned.
 pub(crate) fn check_fact(fact: &Fact, symbols: &Symbols) -> Result<(), Error> {
+    // An index holds the set of its columns as the bits of a `u32`.
     if fact.arguments.len() > 32 {
         return Err(Error::FactArity { count: fact.arguments.len() });
     }

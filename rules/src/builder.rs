@@ -1,4 +1,4 @@
-//! The front door: rule texts and facts to an engine.
+//! Builder: creates an engine from rule texts and facts.
 
 use crate::builtin::BuiltIn;
 use crate::engine::Engine;
@@ -10,7 +10,7 @@ use crate::rule::Program;
 use crate::swrl::{Prefixes, Syntax, parse_rules_as};
 use crate::symbol::{Symbol, Symbols};
 
-/// Puts rules and facts together; [`Engine::builder`] makes it.
+/// Collects rules and facts; created by [`Engine::builder`].
 ///
 /// ```
 /// use metaplan_rules::{Delta, Engine, Fact};
@@ -43,35 +43,36 @@ pub struct EngineBuilder {
 }
 
 impl EngineBuilder {
-    /// The symbols of [`EngineBuilder::program`] and [`EngineBuilder::facts`]; those of rule texts are added to them.
+    /// Sets the interner of [`EngineBuilder::program`] and [`EngineBuilder::facts`]. Symbols of rule texts
+    /// are added to it.
     #[must_use]
     pub fn symbols(self, symbols: Symbols) -> Self {
         Self { symbols, ..self }
     }
 
-    /// What a prefix stands for in the rule texts that do not declare it themselves.
+    /// Defines a prefix for rule texts that do not declare it.
     #[must_use]
     pub fn prefix(mut self, prefix: &str, iri: &str) -> Self {
         self.prefixes.insert(prefix, iri);
         self
     }
 
-    /// Rules in SWRL's human-readable syntax; `source` names the text in errors and in the identities of the rules. A rule without a
-    /// body states facts.
+    /// Adds rules in SWRL's human-readable syntax. `source` names the text in errors and in the identities
+    /// of the rules. A rule without a body states facts.
     #[must_use]
     pub fn rules(mut self, source: &str, text: &str) -> Self {
         self.texts.push((source.to_owned(), text.to_owned()));
         self
     }
 
-    /// Built-ins that the rule texts may use besides SWRL's.
+    /// Adds a built-in for the rule texts, in addition to those of SWRL.
     #[must_use]
     pub fn built_in(mut self, built_in: BuiltIn) -> Self {
         self.syntax.built_ins.push(built_in);
         self
     }
 
-    /// Rules as data, before those of the texts.
+    /// Adds rules as data, before those of the texts.
     #[must_use]
     pub fn program(mut self, program: Program) -> Self {
         self.program.rules.extend(program.rules);
@@ -79,48 +80,49 @@ impl EngineBuilder {
         self
     }
 
-    /// What is stated at first.
+    /// Adds stated facts.
     #[must_use]
     pub fn facts(mut self, facts: impl IntoIterator<Item = Fact>) -> Self {
         self.facts.extend(facts);
         self
     }
 
-    /// The limits of this derivation and of each later update.
+    /// Sets the limits of the first derivation and of each later update.
     #[must_use]
     pub fn limits(self, limits: Limits) -> Self {
         Self { limits, ..self }
     }
 
-    /// Derives everything that follows.
+    /// Derives all facts that follow.
     ///
     /// # Errors
-    /// All errors of all texts: R101 to R105; or, where the texts are right, those of [`Engine::new`].
+    /// Returns all errors of all texts (R101 to R105). If the texts have none, returns the errors of
+    /// [`Engine::new`].
     pub fn build(mut self) -> Result<Engine, Errors> {
-        let mut wrong: Vec<Error> = Vec::new();
+        let mut errors: Vec<Error> = Vec::new();
         for (source, text) in &self.texts {
             match parse_rules_as(text, source, &mut self.symbols, &self.prefixes, &self.syntax) {
                 Ok(program) => self.program.rules.extend(program.rules),
-                Err(more) => wrong.extend(more),
+                Err(text_errors) => errors.extend(text_errors),
             }
         }
-        Errors::unless_empty(wrong)?;
+        Errors::unless_empty(errors)?;
         Engine::with_limits(self.symbols, self.program, self.facts, self.limits)
     }
 }
 
 impl Engine {
-    /// Begins with neither rules nor facts.
+    /// Creates a builder without rules or facts.
     pub fn builder() -> EngineBuilder {
         EngineBuilder::default()
     }
 
-    /// The symbol of a name, such as an IRI, for facts.
+    /// Returns the symbol of a name, such as an IRI, for facts.
     pub fn name(&mut self, name: &str) -> Symbol {
         self.symbols_mut().name(name)
     }
 
-    /// The symbol of a value, for facts.
+    /// Returns the symbol of a value, for facts.
     pub fn literal(&mut self, literal: Literal) -> Symbol {
         self.symbols_mut().literal(literal)
     }

@@ -6,82 +6,86 @@ use crate::fact::Fact;
 use crate::rule::RuleIdentity;
 use crate::symbol::{Symbol, Symbols};
 
-/// A derivation: each fact that it rests on once, so that its size is that of the facts involved, not of the tree
-/// that repeats them.
+/// A derivation as a directed acyclic graph: each fact occurs once, so that the size is that of the facts
+/// and not of the derivation tree.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Derivation {
-    /// The first is the fact asked for; supports come after what they support.
+    /// Steps of the derivation. The first one is the explained fact. Supports come after the facts that
+    /// they support.
     pub steps: Vec<DerivationStep>,
 }
 
-/// A fact and what makes it hold.
+/// A fact with its reason.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct DerivationStep {
-    /// What holds.
+    /// The fact.
     pub fact: Fact,
-    /// By what.
+    /// Its reason.
     pub reason: Reason,
 }
 
-/// What makes a fact hold.
+/// Reason of a fact.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Reason {
-    /// It is stated.
+    /// The fact is stated.
     Asserted,
-    /// The same holds of other names of the individuals.
+    /// The corresponding fact holds about other names of the individuals.
     Equality {
-        /// The positions in [`Derivation::steps`] of that fact and of the pairs of names; for a pair of names, of the
-        /// pairs between them.
+        /// Positions in [`Derivation::steps`] of the corresponding fact and of the equal pairs of names.
+        /// For an equality: positions of the pairs on a path between its names.
         supports: Vec<usize>,
     },
-    /// A rule concludes it.
+    /// A rule derives the fact.
     Rule {
-        /// Which rule.
+        /// Identity of the rule.
         identity: RuleIdentity,
-        /// The rule's variables and their values, those of aggregates' own left out; variables are named without
+        /// Variables of the rule with their values, without variables local to aggregates. Names have no
         /// question mark.
         bindings: Vec<(String, Symbol)>,
-        /// For each relation atom of the body, in order, the position of its fact in [`Derivation::steps`].
+        /// Positions in [`Derivation::steps`] of the facts matched by the relation atoms of the body, in
+        /// order.
         supports: Vec<usize>,
-        /// For each negated atom of the body, in order, the fact that does not hold.
+        /// Facts whose absence the negated atoms of the body require, in order.
         absent: Vec<Fact>,
-        /// For each aggregate of the body, in order, what it ran over.
+        /// Aggregates of the body, in order.
         aggregates: Vec<Aggregated>,
     },
 }
 
-/// The value of an aggregate and the matches that it comes from.
+/// Value of an aggregate, with its matches.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Aggregated {
-    /// The value.
+    /// Value of the aggregate.
     pub result: Symbol,
-    /// For each match the positions in [`Derivation::steps`] of the facts that its relation atoms found.
+    /// By match: positions in [`Derivation::steps`] of the facts matched by the relation atoms of the
+    /// aggregate.
     pub matches: Vec<Vec<usize>>,
 }
 
-/// Something that must not hold, and does.
+/// A violation of an integrity constraint or of a datatype.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub struct Violation {
-    /// What is violated.
+    /// Violated constraint.
     pub cause: Cause,
-    /// The facts that together violate it.
+    /// Facts that cause the violation together.
     pub supports: Vec<Fact>,
 }
 
-/// What a [`Violation`] violates.
+/// Cause of a [`Violation`].
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
 #[non_exhaustive]
 pub enum Cause {
-    /// A rule with an empty head.
+    /// A rule with an empty head whose body holds.
     Constraint(RuleIdentity),
-    /// A literal whose lexical form its datatype forbids.
+    /// A literal whose lexical form is outside its datatype.
     IllTyped(Symbol),
-    /// A literal that would be the same as another literal or as an individual.
+    /// A literal stated or derived to equal a different literal or an individual.
     Clash,
 }
 
 impl Cause {
-    /// Prints what is violated in a line without its end: the label of a constraint or where it stands, or a sentence.
+    /// Formats the cause as one line, without a line break: the label or identity of a constraint, or a
+    /// sentence.
     pub fn display<'a>(&'a self, symbols: &'a Symbols) -> impl fmt::Display + 'a {
         DisplayCause { cause: self, symbols }
     }
@@ -106,7 +110,7 @@ impl fmt::Display for DisplayCause<'_> {
 }
 
 impl Violation {
-    /// Prints what is violated and the facts that violate it together, in a line without its end.
+    /// Formats the cause and the facts of the violation as one line, without a line break.
     pub fn display<'a>(&'a self, symbols: &'a Symbols) -> impl fmt::Display + 'a {
         DisplayViolation { violation: self, symbols }
     }
@@ -128,8 +132,8 @@ impl fmt::Display for DisplayViolation<'_> {
 }
 
 impl Derivation {
-    /// Prints the derivation as an indented tree, a fact a line with its reason; what was printed before is not
-    /// explained again.
+    /// Formats the derivation as an indented tree, with one fact and its reason per line. A fact that
+    /// occurs again is not explained again.
     pub fn display<'a>(&'a self, symbols: &'a Symbols) -> impl fmt::Display + 'a {
         DisplayDerivation { derivation: self, symbols }
     }
@@ -165,9 +169,11 @@ impl fmt::Display for DisplayDerivation<'_> {
                         let (result, count) = (self.symbols.value(*result), matches.len());
                         writeln!(f, "{:indent$}{result} from {count} matches", "", indent = 2 * depth + 2)?;
                     }
-                    let matched =
+                    let matches =
                         aggregates.iter().rev().flat_map(|aggregate| aggregate.matches.iter().rev());
-                    stack.extend(matched.flat_map(|found| found.iter().rev().map(|&at| (at, depth + 2))));
+                    stack.extend(
+                        matches.flat_map(|facts| facts.iter().rev().map(|&support| (support, depth + 2))),
+                    );
                     stack.extend(supports.iter().rev().map(|&support| (support, depth + 1)));
                 }
             }

@@ -1,4 +1,4 @@
-//! Facts, rules and everything that follows from them, and what can be asked of it.
+//! The engine: facts, rules and all consequences, with queries.
 
 use std::sync::Arc;
 
@@ -13,19 +13,19 @@ use crate::rule::Program;
 use crate::store::{Store, columns, state};
 use crate::symbol::{Symbol, Symbols};
 
-/// A change: facts that begin and facts that cease to be stated (input) or to hold (output).
+/// A change: facts to insert and delete (input), or facts that start and cease to hold (output).
 #[derive(Clone, PartialEq, Eq, Default, Debug)]
 pub struct Delta {
-    /// What is new.
+    /// Facts that are added.
     pub insert: Vec<Fact>,
-    /// What is gone. A fact that is in both lists of an input is stated afterwards.
+    /// Facts that are removed. A fact in both lists of an input is stated afterwards.
     pub delete: Vec<Fact>,
 }
 
-/// Facts, rules, and everything that follows from them.
+/// Facts, rules, and all facts that follow from them.
 ///
-/// A clone answers what would be if: it shares everything with its original, and either copies a relation, the bindings
-/// recorded for a rule or the symbols when it first changes them.
+/// A clone answers hypothetical queries. It shares all data with its original. Either of the two copies a
+/// relation, the recorded bindings of a rule or the symbols when it first changes them.
 #[derive(Clone, Debug)]
 pub struct Engine {
     pub(crate) symbols: Arc<Symbols>,
@@ -34,23 +34,23 @@ pub struct Engine {
     pub(crate) store: Store,
     pub(crate) records: Records,
     pub(crate) limits: Limits,
-    /// Where `owl:sameAs` is equality, the names of each individual; the store then knows one of each.
+    /// Equality classes, if `owl:sameAs` is equality. The store then contains representatives only.
     pub(crate) equality: Option<Arc<Equality>>,
 }
 
 impl Engine {
-    /// The limits of later updates.
+    /// Limits of later updates.
     pub fn limits(&self) -> &Limits {
         &self.limits
     }
 
-    /// Sets the limits of later updates. Where there is an interrupt, an update keeps what was there before until it ends, which
-    /// costs a copy of each relation that changes.
+    /// Sets the limits of later updates. With an interrupt, an update keeps the previous state until it
+    /// ends, which costs a copy of each relation that changes.
     pub fn set_limits(&mut self, limits: Limits) {
         self.limits = limits;
     }
 
-    /// Everything that is stated.
+    /// All stated facts.
     pub(crate) fn stated(&self) -> Vec<Fact> {
         match &self.equality {
             Some(equality) => equality.stated(self),
@@ -58,7 +58,7 @@ impl Engine {
         }
     }
 
-    /// Whether a fact holds.
+    /// Returns `true` if a fact holds.
     pub fn holds(&self, fact: &Fact) -> bool {
         match &self.equality {
             Some(equality) => equality.holds(self, fact),
@@ -66,7 +66,7 @@ impl Engine {
         }
     }
 
-    /// Whether a fact is stated, whether or not it would also be derived.
+    /// Returns `true` if a fact is stated, even if it also follows from other facts.
     pub fn is_asserted(&self, fact: &Fact) -> bool {
         match &self.equality {
             Some(equality) => equality.is_stated(self, fact),
@@ -74,13 +74,13 @@ impl Engine {
         }
     }
 
-    /// The state of a row, where it is in the store.
+    /// State bits of a row; `None` if the row is not in the store.
     pub(crate) fn row_state(&self, row: &Fact) -> Option<u8> {
         let relation = self.store.get(self.store.find(row.predicate, row.arguments.len())?);
         Some(relation.state(relation.find(&row.arguments)?))
     }
 
-    /// Everything that holds, in the order of symbols.
+    /// All facts that hold, in the order of symbols.
     pub fn facts(&self) -> impl Iterator<Item = Fact> {
         let mut facts: Vec<Fact> = match &self.equality {
             Some(equality) => equality.facts(self, usize::MAX),
@@ -90,13 +90,13 @@ impl Engine {
         facts.into_iter()
     }
 
-    /// What holds and is not stated, in the order of the engine's history: equal histories give equal orders. That names stand
-    /// for one individual is said of an individual of more than `most` names only by the pairs with its first name, from
-    /// which the others follow.
-    pub fn inferred_in_brief(&self, most: usize) -> Vec<Fact> {
+    /// All facts that hold and are not stated, in the order of the engine's history: equal histories give
+    /// equal orders. For an individual with more than `max_names` names, the result contains only the
+    /// equalities with its first name, from which the others follow.
+    pub fn inferred_in_brief(&self, max_names: usize) -> Vec<Fact> {
         match &self.equality {
             Some(equality) => {
-                let mut facts = equality.facts(self, most);
+                let mut facts = equality.facts(self, max_names);
                 facts.retain(|fact| !equality.is_stated(self, fact));
                 facts
             }
@@ -104,19 +104,20 @@ impl Engine {
         }
     }
 
-    /// The predicates of all facts that hold, each with the number of its arguments, in no particular order; of some of them
-    /// no fact holds any more.
+    /// Predicates of all facts that hold, each with its number of arguments, in no particular order. The
+    /// result may contain predicates whose facts no longer hold.
     pub fn predicates(&self) -> impl Iterator<Item = (Symbol, usize)> {
         let relations = self.store.relations.iter();
         relations.filter_map(|relation| Some((relation.predicate?, relation.arity())))
     }
 
-    /// The rows of the store with these state bits, those of constraints and aggregates left out.
+    /// Rows of the store with these state bits, except those of constraints and aggregates.
     pub(crate) fn rows_with(&self, bits: u8) -> impl Iterator<Item = Fact> {
         self.rows_where(move |state| state & bits == bits)
     }
 
     fn rows_where(&self, fits: impl Fn(u8) -> bool + Copy) -> impl Iterator<Item = Fact> {
+        // Relations of constraints and aggregates have no predicate.
         let named = self.store.relations.iter().filter_map(|relation| Some((relation, relation.predicate?)));
         named.flat_map(move |(relation, predicate)| {
             let rows = relation.scan().filter(move |&row| fits(relation.state(row)));
@@ -124,8 +125,9 @@ impl Engine {
         })
     }
 
-    /// The arguments of the facts of a predicate that agree with the pattern where it is given, by index where there
-    /// is one. The order is that of the engine's history: equal histories give equal orders.
+    /// Arguments of the facts of a predicate that agree with the pattern in all columns that are not
+    /// `None`. Uses an index if one exists. The order is that of the engine's history: equal histories give
+    /// equal orders.
     pub fn matching<'a>(
         &'a self,
         predicate: Symbol,
@@ -138,7 +140,7 @@ impl Engine {
         named.into_iter().flatten().chain(rows)
     }
 
-    /// As [`Engine::matching`], for rows of the store.
+    /// Rows of the store that agree with a pattern, like [`Engine::matching`].
     pub(crate) fn matching_rows<'a>(
         &'a self,
         predicate: Symbol,
@@ -149,28 +151,29 @@ impl Engine {
         relation.into_iter().flat_map(move |relation| {
             let pattern = pattern.clone();
             let bound = (0..pattern.len()).filter(|&c| pattern[c].is_some()).fold(0, |mask, c| mask | 1 << c);
-            let found = relation.best_index(bound).map(|(index, mask)| {
+            let indexed = relation.best_index(bound).map(|(index, mask)| {
                 let key: SmallVec<[Symbol; 4]> = columns(mask).filter_map(|column| pattern[column]).collect();
                 relation.lookup(index, &key)
             });
-            let scanned = found.is_none().then(|| relation.scan());
-            let rows = found.into_iter().flatten().chain(scanned.into_iter().flatten());
+            let scanned = indexed.is_none().then(|| relation.scan());
+            let rows = indexed.into_iter().flatten().chain(scanned.into_iter().flatten());
+            // The index may cover only some of the bound columns.
             rows.map(|row| relation.row(row))
                 .filter(move |row| row.iter().zip(&pattern).all(|(&v, wanted)| wanted.is_none_or(|w| w == v)))
         })
     }
 
-    /// The interner that facts and rules refer to.
+    /// Interner to which facts and rules refer.
     pub fn symbols(&self) -> &Symbols {
         &self.symbols
     }
 
-    /// The interner, to add names and literals for new facts.
+    /// Interner, to add names and literals for new facts.
     pub fn symbols_mut(&mut self) -> &mut Symbols {
         Arc::make_mut(&mut self.symbols)
     }
 
-    /// Takes the names and values of an engine that began as a clone of this one, and has interned more since.
+    /// Adopts the interner of an engine that is a clone of this engine and has interned more symbols since.
     pub fn adopt_symbols(&mut self, other: &Self) {
         self.symbols = Arc::clone(&other.symbols);
     }

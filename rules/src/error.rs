@@ -1,16 +1,16 @@
-//! Everything that can be wrong with rules or an update, one numbered variant per cause.
+//! Errors of rules and updates, with one numbered variant per cause.
 
 use crate::builtin::{BuiltIn, SWRLB};
 use crate::rule::RuleIdentity;
 
-/// Everything that is wrong with rules or an update.
+/// All errors of a set of rules or of an update.
 pub type Errors = diagnostics::Errors<Error>;
 
-/// What is wrong. R1xx: rule text; R2xx: a rule; R3xx: an update.
+/// An error. R1xx: rule text; R2xx: a rule; R3xx: an update.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The text is not a rule.
+    /// The text is not a well-formed rule.
     #[error("{file}:{line}:{column}: R101 {message}")]
     Syntax {
         /// The source as named by the caller.
@@ -19,10 +19,10 @@ pub enum Error {
         line: u32,
         /// In characters, counted from 1.
         column: u32,
-        /// What was expected, what was found.
+        /// Expected and actual token.
         message: String,
     },
-    /// A prefix that nothing declares.
+    /// An undeclared prefix.
     #[error("{file}:{line}:{column}: R102 undeclared prefix `{prefix}:`")]
     UndeclaredPrefix {
         /// The source as named by the caller.
@@ -34,7 +34,7 @@ pub enum Error {
         /// Without the colon.
         prefix: String,
     },
-    /// A `swrlb` name that SWRL does not have.
+    /// A `swrlb` name without a built-in.
     #[error("{file}:{line}:{column}: R104 there is no built-in `{name}`{}", did_you_mean(&format!("{SWRLB}{name}")))]
     UnknownBuiltIn {
         /// The source as named by the caller.
@@ -43,10 +43,10 @@ pub enum Error {
         line: u32,
         /// In characters, counted from 1.
         column: u32,
-        /// As written.
+        /// Name as written.
         name: String,
     },
-    /// A `swrlb` name whose arguments or results are lists.
+    /// A `swrlb` built-in on lists.
     #[error(
         "{file}:{line}:{column}: R104 built-in `{name}` works on lists, which the engine has no values for"
     )]
@@ -57,10 +57,10 @@ pub enum Error {
         line: u32,
         /// In characters, counted from 1.
         column: u32,
-        /// As written.
+        /// Name as written.
         name: String,
     },
-    /// A built-in of a library that the engine does not have.
+    /// An unsupported built-in of a known library.
     #[error(
         "{file}:{line}:{column}: R104 built-in <{name}> belongs to a library that the engine does not have{}",
         did_you_mean(name)
@@ -72,10 +72,10 @@ pub enum Error {
         line: u32,
         /// In characters, counted from 1.
         column: u32,
-        /// Its IRI.
+        /// IRI of the built-in.
         name: String,
     },
-    /// An atom that no class and no property can have, and that no rule concludes.
+    /// An atom that is neither a class, a property, nor derived by a rule.
     #[error(
         "{file}:{line}:{column}: R104 <{name}> with {count} arguments is not a class, a property or anything that a rule \
          concludes, and a built-in of this name is not known"
@@ -87,12 +87,12 @@ pub enum Error {
         line: u32,
         /// In characters, counted from 1.
         column: u32,
-        /// Its IRI.
+        /// IRI of the relation.
         name: String,
-        /// How many arguments it has.
+        /// Number of arguments.
         count: usize,
     },
-    /// An atom that SWRL does not have, in text that is to be SWRL.
+    /// An atom outside plain SWRL, although the options require plain SWRL.
     #[error("{file}:{line}:{column}: R105 {what} is not SWRL")]
     NotSwrl {
         /// The source as named by the caller.
@@ -107,7 +107,7 @@ pub enum Error {
     /// A head variable that no body atom binds.
     #[error("R202 rule {rule}: variable ?{variable} in the head is not bound by the body")]
     UnsafeHead {
-        /// Which rule.
+        /// The rule.
         rule: RuleIdentity,
         /// Without question mark.
         variable: String,
@@ -117,23 +117,23 @@ pub enum Error {
     UnsafeBody {
         /// Which rule.
         rule: RuleIdentity,
-        /// Without question mark.
+        /// The rule.
         variable: String,
     },
     /// A built-in with too few or too many arguments.
     #[error("R204 rule {rule}: built-in {built_in} does not take {count} arguments")]
     BuiltInArity {
-        /// Which rule.
+        /// The rule.
         rule: RuleIdentity,
         /// Local name.
         built_in: &'static str,
-        /// How many it was given.
+        /// Number of arguments.
         count: usize,
     },
-    /// A head atom that cannot be concluded.
+    /// A head atom that no rule can derive.
     #[error("R205 rule {rule}: a head may not contain {what}")]
     HeadAtom {
-        /// Which rule.
+        /// The rule.
         rule: RuleIdentity,
         /// The kind of atom.
         what: &'static str,
@@ -148,12 +148,12 @@ pub enum Error {
         /// The negated predicate.
         predicate: String,
     },
-    /// An atom with more arguments than the engine stores.
+    /// An atom with more arguments than the engine supports.
     #[error("R207 rule {rule}: {count} arguments, at most 32 are supported")]
     Arity {
-        /// Which rule.
+        /// The rule.
         rule: RuleIdentity,
-        /// How many there are.
+        /// Number of arguments.
         count: usize,
     },
     /// An aggregate through recursion.
@@ -163,57 +163,57 @@ pub enum Error {
     UnstratifiedAggregate {
         /// A rule on the cycle.
         rule: RuleIdentity,
-        /// Which aggregate.
+        /// Name of the aggregate.
         aggregate: &'static str,
     },
-    /// An aggregate within an aggregate.
+    /// A nested aggregate.
     #[error(
         "R209 rule {rule}: an aggregate within an aggregate; conclude the inner one by a rule of its own"
     )]
     NestedAggregate {
-        /// Which rule.
+        /// The rule.
         rule: RuleIdentity,
     },
-    /// A regular expression that cannot be used.
+    /// An invalid regular expression.
     #[error("R210 rule {rule} has a pattern that cannot be used, {fault}")]
     Pattern {
-        /// Which rule.
+        /// The rule.
         rule: RuleIdentity,
-        /// The pattern in quotes, and what is wrong with it.
+        /// The pattern in quotes, with the error.
         fault: Box<str>,
     },
-    /// The evaluation was stopped; the engine is as it was before the update.
-    #[error("R301 step budget of {budget} used up, last in rule {rule}{}", growing(value.as_deref()))]
+    /// The step budget is exhausted. The engine is in its state before the update.
+    #[error("R301 step budget of {budget} used up, last in rule {rule}{}", value_note(value.as_deref()))]
     BudgetExhausted {
         /// The rule that was being evaluated.
         rule: RuleIdentity,
-        /// In steps.
+        /// Budget in steps.
         budget: u64,
-        /// The value that the rule computed last, in short, where values used up the budget.
+        /// Abbreviated last computed value, if new values used up the budget.
         value: Option<Box<str>>,
     },
-    /// The evaluation was interrupted; the engine is as it was before the update.
+    /// The evaluation was interrupted. The engine is in its state before the update.
     #[error("R304 interrupted, last in rule {rule}")]
     Interrupted {
         /// The rule that was being evaluated.
         rule: RuleIdentity,
     },
-    /// A fact or rule with a symbol that the engine's interner never gave out.
+    /// A fact or rule with a symbol that is not interned.
     #[error("R302 symbol number {index} is not in the engine's symbols")]
     UnknownSymbol {
-        /// Its number.
+        /// Number of the symbol.
         index: usize,
     },
-    /// A fact with more arguments than the engine stores.
+    /// A fact with more arguments than the engine supports.
     #[error("R303 a fact with {count} arguments, at most 32 are supported")]
     FactArity {
-        /// How many there are.
+        /// Number of arguments.
         count: usize,
     },
 }
 
 impl Error {
-    /// The stable code of the cause.
+    /// Returns the stable code of the cause.
     pub fn code(&self) -> &'static str {
         match self {
             Self::Syntax { .. } => "R101",
@@ -239,7 +239,7 @@ impl Error {
         }
     }
 
-    /// The file, line and column, counted from 1, where the error has a place in a text.
+    /// Returns the file, line and column (counted from 1) of an error in a text.
     pub fn place(&self) -> Option<(&str, usize, usize)> {
         match self {
             Self::Syntax { file, line, column, .. }
@@ -254,13 +254,13 @@ impl Error {
     }
 }
 
-/// The built-in that the author of an unknown one may have meant.
+/// Suggests a built-in with a similar name.
 fn did_you_mean(iri: &str) -> String {
     BuiltIn::similar(iri).map_or_else(String::new, |name| format!("; did you mean `{name}`?"))
 }
 
-/// That a rule makes new values of its own conclusions.
-fn growing(value: Option<&str>) -> String {
+/// Notes in the message that a rule computes new values from its own conclusions.
+fn value_note(value: Option<&str>) -> String {
     value.map_or_else(String::new, |value| {
         format!(", which makes new values of its own conclusions; the last one is {value}")
     })

@@ -1,4 +1,4 @@
-//! Why a fact holds, from the derivations that the engine recorded; and which integrity constraints are violated.
+//! Explanations of facts by recorded derivations, and the list of violated integrity constraints.
 
 use rustc_hash::FxHashMap;
 
@@ -16,8 +16,9 @@ use crate::symbol::Symbol;
 use crate::vocabulary::{DIFFERENT_FROM, SAME_AS};
 
 impl Engine {
-    /// Why a fact holds: the derivation by which it was first concluded, down to what is stated. `None` where it does
-    /// not hold. Takes time proportional to the answer. A fact that is stated and derived is reported as stated.
+    /// Returns the first derivation of a fact, down to stated facts, or `None` if it does not hold. The
+    /// time is proportional to the size of the result. A fact that is both stated and derived is reported
+    /// as stated.
     ///
     /// ```
     /// use metaplan_rules::{Engine, Fact};
@@ -46,9 +47,10 @@ impl Engine {
         Some(Derivation { steps })
     }
 
-    /// The integrity constraints (rules with an empty head) that fire, once per match, and the facts with ill-typed
-    /// literals; sorted. A knowledge base is consistent where there are none. Under equality a match is one of
-    /// individuals, whatever names they have, and its supports are what is stated of them, as far as it is.
+    /// Returns all violations, sorted: the matches of integrity constraints (rules with an empty head) and
+    /// the facts with ill-typed literals. A knowledge base is consistent if there are no violations. Under
+    /// equality, a match binds individuals rather than names, and its supports are stated facts where
+    /// possible.
     pub fn violations(&self) -> Vec<Violation> {
         let mut violations = Vec::new();
         for &(relation, position) in &self.network.constraints {
@@ -86,7 +88,7 @@ impl Engine {
         })
     }
 
-    /// The ground relation atoms of a recorded derivation's body, or its negated ones.
+    /// Ground relation atoms of the body of a recorded derivation, positive or negated.
     pub(crate) fn body_facts(&self, record: Record, negated: bool) -> Vec<Fact> {
         let bound = self.records.get(record);
         self.body(record, negated)
@@ -97,7 +99,7 @@ impl Engine {
             .collect()
     }
 
-    /// The fact that a head atom concludes under the bindings of a record.
+    /// Fact that a head atom derives under the bindings of a record.
     pub(crate) fn concluded(&self, head: &Atom, bound: &[Symbol]) -> Option<Fact> {
         let predicate = match head {
             Atom::Relation { predicate, .. } => *predicate,
@@ -109,7 +111,7 @@ impl Engine {
         Some(Fact::new(predicate, arguments))
     }
 
-    /// The aggregates of a recorded derivation's body: what they run over, their group and their result.
+    /// Aggregates in the body of a recorded derivation: relation of the matches, group and result.
     pub(crate) fn aggregates(
         &self,
         record: Record,
@@ -134,7 +136,7 @@ impl Engine {
         })
     }
 
-    /// The rows of a relation that begin with these values.
+    /// Rows of a relation that begin with the values of a key.
     pub(crate) fn group(
         &self,
         relation: RelationId,
@@ -143,10 +145,11 @@ impl Engine {
         let relation = self.store.get(relation);
         let bound = (0..key.len()).fold(0, |mask, column| mask | 1 << column);
         let index = relation.best_index(bound).filter(|&(_, columns)| columns == bound);
-        let found = index.map(|(index, _)| relation.lookup(index, key));
-        let scanned = if found.is_none() { 0..relation.bound() } else { 0..0 };
-        let rows = found.into_iter().flatten().chain(scanned);
+        let indexed = index.map(|(index, _)| relation.lookup(index, key));
+        let scanned = if indexed.is_none() { 0..relation.bound() } else { 0..0 };
+        let rows = indexed.into_iter().flatten().chain(scanned);
         let visible = rows.filter(|&row| relation.state(row) & state::FREE == 0);
+        // The scan returns all rows, so the key is checked again.
         let key = key.to_vec();
         visible.map(|row| (row, relation.row(row))).filter(move |(_, row)| row[..key.len()] == key[..])
     }
@@ -156,7 +159,7 @@ impl Engine {
     }
 }
 
-/// A breadth-first walk from a row through recorded derivations.
+/// Breadth-first traversal of recorded derivations.
 struct Search<'a> {
     engine: &'a Engine,
     positions: FxHashMap<(RelationId, Row), usize>,
@@ -178,16 +181,16 @@ impl Search<'_> {
         let asserted = engine.store.get(relation).state(row) & state::ASSERTED != 0;
         let Some(rule) = engine.rule_of(record).filter(|_| !asserted) else { return Reason::Asserted };
         let bound = engine.records.get(record);
-        let used =
+        let variables =
             (0..).zip(bound_variables(rule)).filter(|&(_, is_bound)| is_bound).map(|(v, _)| Variable(v));
-        let bindings = used.map(|v| (rule.variable_name(v), bound[usize::from(v.0)])).collect();
+        let bindings = variables.map(|v| (rule.variable_name(v), bound[usize::from(v.0)])).collect();
         let supports = self.supports(record);
         let absent = engine.body_facts(record, true);
         let aggregates = self.aggregates(record);
         Reason::Rule { identity: rule.identity.clone(), bindings, supports, absent, aggregates }
     }
 
-    /// The positions of the facts that the relation atoms of a recorded derivation found.
+    /// Positions of the facts matched by the relation atoms of a recorded derivation.
     fn supports(&mut self, record: Record) -> Vec<usize> {
         let engine = self.engine;
         let bound = engine.records.get(record);

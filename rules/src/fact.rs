@@ -1,4 +1,4 @@
-//! What may hold: a predicate applied to interned arguments.
+//! Facts: predicates applied to interned arguments.
 
 use std::fmt;
 
@@ -6,7 +6,7 @@ use smallvec::SmallVec;
 
 use crate::symbol::{Symbol, Symbols};
 
-/// The arguments of a fact; up to three are stored inline.
+/// Arguments of a fact. Up to three are stored inline.
 pub type Arguments = SmallVec<[Symbol; 3]>;
 
 /// A ground atom. A class assertion has one argument, a property assertion two; other arities are free.
@@ -19,12 +19,12 @@ pub struct Fact {
 }
 
 impl Fact {
-    /// A fact from its parts.
+    /// Creates a fact from its parts.
     pub fn new(predicate: Symbol, arguments: impl IntoIterator<Item = Symbol>) -> Self {
         Self { predicate, arguments: arguments.into_iter().collect() }
     }
 
-    /// Prints `predicate(argument, …)` with names as they were interned.
+    /// Formats the fact as `predicate(argument, …)`, with names as they were interned.
     pub fn display<'a>(&'a self, symbols: &'a Symbols) -> impl fmt::Display + 'a {
         DisplayFact { fact: self, symbols }
     }

@@ -1,13 +1,14 @@
-//! One round of evaluation as one fixed crepe program over rules that are data.
+//! Evaluates one semi-naive round by a fixed crepe program that interprets plans.
 //!
-//! A change enters as `Delta`: ranges of changed rows, per plan. `Match` says that a block of partial matches has
-//! passed so many steps of its plan; extending a block by the next atom is a look-up in the persistent store, which
-//! the program sees by reference. `Head` is a block of complete matches. Evaluation is set-at-a-time: crepe's tuples
-//! name blocks of matches, so its own bookkeeping costs nothing per match, and the store is never copied.
+//! A change enters as `Delta`: ranges of changed rows, per plan. `Match` is a block of partial matches with
+//! the number of steps that it has passed. The extension of a block by the next atom is a look-up in the
+//! persistent store, to which the program has a reference. `Head` is a block of complete matches.
+//! Evaluation is set-at-a-time: crepe's tuples contain block numbers, so crepe's bookkeeping costs nothing
+//! per match, and the store is never copied.
 //!
-//! A block is handed over, not shared: it is consumed by the one rule that extends it. A small block passes all steps of
-//! its plan in that one rule: an update by one report starts some plans on one or two matches each, where bookkeeping for
-//! each step would take longer than the steps.
+//! A block has one owner: the rule that extends it consumes it. A small block passes all remaining steps of
+//! its plan within one rule application. A typical update starts plans on one or two matches each;
+//! bookkeeping for each step would then take longer than the steps.
 
 use std::cell::RefCell;
 use std::hash::{BuildHasherDefault, Hash, Hasher};
@@ -24,58 +25,59 @@ use crate::source::Source;
 use crate::store::{Relation, RelationId, Row, Store, state};
 use crate::symbol::{Symbol, Symbols};
 
-/// A position in the plans of a round.
+/// Index into the plans of a round.
 pub(crate) type PlanId = u32;
 
-/// Where the evaluation of a plan starts.
+/// Start of the evaluation of a plan.
 #[derive(Clone, Debug)]
 pub(crate) struct Seed {
     pub plan: PlanId,
     pub start: Start,
 }
 
-/// What a plan starts from.
+/// Initial matches of a plan.
 #[derive(Clone, Debug)]
 pub(crate) enum Start {
     /// One empty match.
     Nothing,
     /// Changed rows of a relation: a range of [`Round::rows`].
     Rows { relation: RelationId, from: u32, to: u32 },
-    /// Partial matches that an earlier run put off.
+    /// Partial matches deferred by an earlier run.
     Matches { step: u32, bindings: Vec<Symbol> },
 }
 
-/// Partial matches that one step of one block may produce before the rest of the block is put off.
+/// Number of partial matches that one step may produce from a block before the rest of the block is
+/// deferred.
 const BLOCK_MATCHES: usize = 1 << 16;
 
-/// A block of so many partial matches is small.
+/// Number of partial matches up to which a block is small.
 const SMALL_MATCHES: usize = 64;
 
-/// Complete matches of a plan, side by side.
+/// Complete matches of a plan: `bindings` contains the variables of all matches, one match after the other.
 #[derive(Debug)]
 pub(crate) struct Matches {
     pub plan: PlanId,
     pub bindings: Vec<Symbol>,
 }
 
-/// What a round reads, and the blocks it passes along.
+/// Inputs of a round, and the blocks in progress.
 pub(crate) struct Round<'a> {
     pub store: &'a Store,
     pub plans: &'a [Plan],
-    /// Variables per match, by compiled rule.
+    /// Number of variables per match, by compiled rule.
     pub widths: &'a [usize],
     pub symbols: RefCell<&'a mut Arc<Symbols>>,
-    /// Changed rows, as ranges of [`Seed`]s.
+    /// Changed rows. Each [`Seed`] refers to a range.
     pub rows: &'a [Row],
-    /// Whether the state before the update is asked for, of which the store holds a superset.
+    /// Selects the state before the update, of which the store holds a superset.
     pub retracting: bool,
     pub budget: &'a Budget,
     pub blocks: RefCell<Vec<Vec<Symbol>>>,
-    /// What was put off to bound memory, to be evaluated by later runs.
+    /// Matches deferred to bound memory, for later runs.
     pub deferred: RefCell<Vec<Seed>>,
 }
 
-/// A block in [`Round::blocks`].
+/// Index into [`Round::blocks`].
 type BlockId = u32;
 
 mod program {
@@ -96,16 +98,17 @@ mod program {
         pub struct Head(pub PlanId, pub BlockId);
 
         Match(plan, step, block) <- Delta(seed, plan), Reads(round), let Some((step, block)) = round.seed(seed);
-        Match(plan, next, longer) <-
-            Match(plan, step, block), Reads(round), let Some((next, longer)) = round.extend(plan, step, block);
+        Match(plan, next, extended) <-
+            Match(plan, step, block), Reads(round), let Some((next, extended)) = round.extend(plan, step, block);
         Head(plan, block) <- Match(plan, step, block), Reads(round), (round.is_complete(plan, step));
     }
 }
 
-/// Identity of a round, so that crepe can keep it in a relation.
+/// Reference to a round. It is compared by address, because crepe requires equality and a hash.
 #[derive(Clone, Copy)]
 pub(crate) struct Handle<'a>(&'a dyn Evaluate);
 
+/// Operations of a round that the crepe program calls. Each returns the next step and the extended block.
 trait Evaluate {
     fn seed(&self, seed: u32) -> Option<(u32, BlockId)>;
     fn extend(&self, plan: PlanId, step: u32, block: BlockId) -> Option<(u32, BlockId)>;
@@ -144,7 +147,7 @@ impl Hash for Handle<'_> {
     }
 }
 
-/// Evaluates the plans from their seeds; matches come in the order of seeds.
+/// Evaluates the plans from their seeds. The matches are in the order of plans and blocks.
 pub(crate) fn run(round: &Round, seeds: &[Seed]) -> Vec<Matches> {
     let seeded = Seeded { round, seeds };
     let mut runtime = program::Crepe::new();
@@ -152,11 +155,13 @@ pub(crate) fn run(round: &Round, seeds: &[Seed]) -> Vec<Matches> {
     runtime.extend((0..).zip(seeds).map(|(number, seed)| program::Delta(number, seed.plan)));
     let (heads,) = runtime.run_with_hasher::<BuildHasherDefault<FxHasher>>();
     let mut heads: Vec<(PlanId, BlockId)> = heads.into_iter().map(|head| (head.0, head.1)).collect();
+    // crepe's output has no defined order.
     heads.sort_unstable();
     let matches = |(plan, block)| Matches { plan, bindings: round.take(block) };
     heads.into_iter().map(matches).collect()
 }
 
+/// A round with the seeds of one run.
 struct Seeded<'r, 'a> {
     round: &'r Round<'a>,
     seeds: &'r [Seed],
@@ -183,12 +188,13 @@ impl Evaluate for Seeded<'_, '_> {
 }
 
 impl Round<'_> {
+    /// Moves a block out of the round.
     fn take(&self, block: BlockId) -> Vec<Symbol> {
         std::mem::take(&mut self.blocks.borrow_mut()[block as usize])
     }
 
-    /// Hands a block over to the program, before a step of its plan. What is small passes the steps up to there at once, since
-    /// the program's bookkeeping would take longer than the steps.
+    /// Stores a block before a step of its plan, for the program. A small block first passes as many steps
+    /// as possible, since the program's bookkeeping would take longer than these steps.
     fn pass(&self, plan: PlanId, mut step: u32, mut block: Vec<Symbol>) -> Option<(u32, BlockId)> {
         let (steps, width) = (self.plans[plan as usize].steps.len(), self.width(&self.plans[plan as usize]));
         while (step as usize) < steps && !block.is_empty() && block.len() <= SMALL_MATCHES * width {
@@ -203,10 +209,12 @@ impl Round<'_> {
         Some((step, blocks.len() as BlockId - 1))
     }
 
+    /// Number of variables per match of a plan.
     fn width(&self, plan: &Plan) -> usize {
         self.widths[plan.rule as usize]
     }
 
+    /// First block of a seed.
     fn seed(&self, seed: &Seed) -> Vec<Symbol> {
         let plan = &self.plans[seed.plan as usize];
         let empty = vec![Symbol(0); self.width(plan)];
@@ -227,7 +235,7 @@ impl Round<'_> {
         }
     }
 
-    /// The matches that pass a step; none where there is no such step, or where evaluation has to stop.
+    /// Matches that pass a step. `None` if the plan has no such step, or if evaluation has to stop.
     fn extend(&self, plan: PlanId, step: u32, block: Vec<Symbol>) -> Option<Vec<Symbol>> {
         let (id, number) = (plan, step);
         let plan = &self.plans[id as usize];
@@ -240,12 +248,12 @@ impl Round<'_> {
             Step::Join { relation, skip, index, key, pattern, is_link } => {
                 let (relation, index) = (self.store.get(*relation), *index);
                 let lookup = Lookup { relation, skip: *skip, index, key, pattern, is_link: *is_link };
-                let (longer, done) = self.join(&lookup, &block, width, plan.rule);
+                let (extended, done) = self.join(&lookup, &block, width, plan.rule);
                 if done < block.len() {
                     let start = Start::Matches { step: number, bindings: block[done..].to_vec() };
                     self.deferred.borrow_mut().push(Seed { plan: id, start });
                 }
-                longer
+                extended
             }
             Step::Contains { relation, skip, key, is_link } => {
                 let (relation, skip) = (self.store.get(*relation), self.visibility(*skip));
@@ -254,11 +262,13 @@ impl Round<'_> {
                 };
                 retain(block, width, |bound| find(relation, key, bound).is_some_and(fits))
             }
+            // The store holds a superset of the previous state. Superfluous matches do no harm, because
+            // `retract` compares them with the recorded derivations.
             Step::Absent { .. } if self.retracting => block,
             Step::Absent { relation, key } => {
                 let relation = self.store.get(*relation);
-                let gone = |row: Row| relation.state(row) & state::DOOMED != 0;
-                retain(block, width, |bound| find(relation, key, bound).is_none_or(gone))
+                let is_doomed = |row: Row| relation.state(row) & state::DOOMED != 0;
+                retain(block, width, |bound| find(relation, key, bound).is_none_or(is_doomed))
             }
             Step::Test { built_in, arguments } => {
                 let symbols = self.symbols.borrow();
@@ -295,27 +305,29 @@ impl Round<'_> {
         })
     }
 
-    /// The row states to skip: when retracting, everything that held before is visible.
+    /// Row states to skip. All rows that held before the update are visible while retracting.
     fn visibility(&self, skip: u8) -> u8 {
         if self.retracting { state::FREE } else { skip }
     }
 
-    /// Extends matches by the rows that fit them, up to about [`BLOCK_MATCHES`]; also how much of the block that took.
+    /// Extends matches by the fitting rows, up to about [`BLOCK_MATCHES`] matches. Also returns the length
+    /// of the processed part of the block.
     fn join(&self, lookup: &Lookup, block: &[Symbol], width: usize, rule: u32) -> (Vec<Symbol>, usize) {
         let (relation, skip) = (lookup.relation, self.visibility(lookup.skip));
-        let mut longer = Vec::with_capacity(block.len());
+        let mut extended = Vec::with_capacity(block.len());
         let mut key = [Symbol(0); 32];
         for (position, bound) in block.chunks_exact(width).enumerate() {
-            if longer.len() > BLOCK_MATCHES * width {
-                return (longer, position * width);
+            if extended.len() > BLOCK_MATCHES * width {
+                return (extended, position * width);
             }
-            let before = longer.len();
-            let mut looked_at = 0;
+            let before = extended.len();
+            let mut visited = 0;
             let mut visit = |row: Row| {
-                looked_at += 1;
+                visited += 1;
                 if relation.state(row) & skip == 0 && !(lookup.is_link && relation.record(row).rule == rule) {
-                    extend_match(&mut longer, bound, relation.row(row), lookup.pattern);
+                    extend_match(&mut extended, bound, relation.row(row), lookup.pattern);
                 }
+                // Without key columns, all rows are candidates.
             };
             if let Some(index) = lookup.index {
                 for (slot, source) in key.iter_mut().zip(lookup.key) {
@@ -325,15 +337,15 @@ impl Round<'_> {
             } else {
                 (0..relation.bound()).for_each(&mut visit);
             }
-            let steps = ((longer.len() - before) / width) as u64;
-            if !self.budget.spend(steps, rule) || !self.budget.visit(looked_at, rule) {
+            let steps = ((extended.len() - before) / width) as u64;
+            if !self.budget.spend(steps, rule) || !self.budget.visit(visited, rule) {
                 return (Vec::new(), block.len());
             }
         }
-        (longer, block.len())
+        (extended, block.len())
     }
 
-    /// Binds or checks what an aggregate comes to; when retracting, what it came to before the update.
+    /// Binds or checks the result of an aggregate; while retracting, its result before the update.
     fn aggregate(
         &self,
         mut block: Vec<Symbol>,
@@ -344,18 +356,19 @@ impl Round<'_> {
     ) -> Vec<Symbol> {
         let skip = if self.retracting { state::FREE | state::NEW } else { HIDDEN };
         let visible = |row: &Row| group.relation.state(*row) & skip == 0;
-        let (mut kept, mut last) = (0, None::<(Arguments, Option<Symbol>)>);
+        let (mut end, mut last) = (0, None::<(Arguments, Option<Symbol>)>);
         for start in (0..block.len()).step_by(width) {
             let bound = &mut block[start..start + width];
+            // Adjacent matches often share a group, so the last result is cached.
             let key: Arguments = group.key.iter().map(|&source| resolve(source, bound)).collect();
-            let known = last.as_ref().filter(|(other, _)| *other == key).map(|&(_, value)| value);
-            let value = known.unwrap_or_else(|| {
+            let cached = last.as_ref().filter(|(other, _)| *other == key).map(|&(_, value)| value);
+            let value = cached.unwrap_or_else(|| {
                 let mut symbols = self.symbols.borrow_mut();
                 let rows = |row| group.relation.row(row);
                 let value = match group.index {
                     Some(index) => {
-                        let found = group.relation.lookup(index, &key).filter(visible);
-                        function.of(found.map(rows), &symbols)
+                        let members = group.relation.lookup(index, &key).filter(visible);
+                        function.of(members.map(rows), &symbols)
                     }
                     None => function.of(group.relation.scan().filter(visible).map(rows), &symbols),
                 };
@@ -368,12 +381,13 @@ impl Round<'_> {
                 source if resolve(source, bound) != value => continue,
                 _ => {}
             }
-            block.copy_within(start..start + width, kept);
-            kept += width;
+            block.copy_within(start..start + width, end);
+            end += width;
         }
-        block.truncate(kept);
+        block.truncate(end);
         block
     }
+    /// Binds the result of a function for each match. A match for which the function is undefined is dropped.
 
     fn compute(
         &self,
@@ -383,36 +397,36 @@ impl Round<'_> {
         function: impl Fn(&Symbols, &[Symbol]) -> Option<Literal>,
     ) -> Vec<Symbol> {
         let mut symbols = self.symbols.borrow_mut();
-        let mut kept = 0;
+        let mut end = 0;
         for start in (0..block.len()).step_by(width) {
             let Some(value) = function(&symbols, &block[start..start + width]) else { continue };
-            let known = symbols.len();
+            let symbols_before = symbols.len();
             block[start + usize::from(result)] = intern(&mut symbols, value);
             let computed = symbols.as_literal(block[start + usize::from(result)]);
-            if symbols.len() > known && !self.budget.spend_on_value(computed, rule) {
+            if symbols.len() > symbols_before && !self.budget.spend_on_value(computed, rule) {
                 return Vec::new();
             }
-            block.copy_within(start..start + width, kept);
-            kept += width;
+            block.copy_within(start..start + width, end);
+            end += width;
         }
-        block.truncate(kept);
+        block.truncate(end);
         block
     }
 }
 
-/// The symbol of a computed value; symbols that a clone shares are copied only for a new one.
+/// Symbol of a computed value. A shared interner is cloned only for a new symbol.
 pub(crate) fn intern(symbols: &mut Arc<Symbols>, value: Literal) -> Symbol {
     symbols.find_literal(&value).unwrap_or_else(|| Arc::make_mut(symbols).literal(value))
 }
 
-/// Rows that begin with the values of a key.
+/// Rows whose first columns have the values of a key.
 struct Group<'a> {
     relation: &'a Relation,
     index: Option<usize>,
     key: &'a [Source],
 }
 
-/// The parts of a join step.
+/// Parameters of a join step.
 struct Lookup<'a> {
     relation: &'a Relation,
     skip: u8,
@@ -423,20 +437,21 @@ struct Lookup<'a> {
     is_link: bool,
 }
 
-/// Appends a partial match, extended by a row, where the row fits.
+/// Appends a partial match extended by a row, if the row fits the pattern.
 fn extend_match(block: &mut Vec<Symbol>, bound: &[Symbol], row: &[Symbol], pattern: &Pattern) {
+    // A variable may occur twice in the row, so the columns are checked only after all variables are bound.
     let start = block.len();
     block.extend_from_slice(bound);
-    let longer = &mut block[start..];
+    let extended = &mut block[start..];
     for &(column, variable) in &pattern.binds {
-        longer[usize::from(variable)] = row[column];
+        extended[usize::from(variable)] = row[column];
     }
-    if pattern.checks.iter().any(|&(column, source)| resolve(source, longer) != row[column]) {
+    if pattern.checks.iter().any(|&(column, source)| resolve(source, extended) != row[column]) {
         block.truncate(start);
     }
 }
 
-/// The value of a source under a match.
+/// Value of an operand under a match.
 pub(crate) fn resolve(source: Source, bound: &[Symbol]) -> Symbol {
     match source {
         Source::Variable(number) => bound[usize::from(number)],
@@ -452,19 +467,20 @@ fn find(relation: &Relation, key: &[Source], bound: &[Symbol]) -> Option<Row> {
     relation.find(&arguments[..key.len()])
 }
 
+/// Literals of operands. `None` if one of them is a name.
 fn literals<'s>(symbols: &'s Symbols, sources: &[Source], bound: &[Symbol]) -> Option<Vec<&'s Literal>> {
     sources.iter().map(|&source| symbols.as_literal(resolve(source, bound))).collect()
 }
 
 /// Keeps the matches that pass a test, in place.
 fn retain(mut block: Vec<Symbol>, width: usize, test: impl Fn(&[Symbol]) -> bool) -> Vec<Symbol> {
-    let mut kept = 0;
+    let mut end = 0;
     for start in (0..block.len()).step_by(width) {
         if test(&block[start..start + width]) {
-            block.copy_within(start..start + width, kept);
-            kept += width;
+            block.copy_within(start..start + width, end);
+            end += width;
         }
     }
-    block.truncate(kept);
+    block.truncate(end);
     block
 }

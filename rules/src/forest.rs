@@ -1,27 +1,27 @@
-//! Which symbols are connected, by union-find: linear in the pairs, whatever the sizes of classes.
+//! Connected components of symbols, by union-find. The time is nearly linear in the number of pairs.
 
 use rustc_hash::FxHashMap;
 
 use crate::symbol::Symbol;
 
-/// Classes of symbols, each a tree.
+/// Disjoint-set forest of symbols: the parent of each symbol that is not a root.
 #[derive(Default, Debug)]
 pub(crate) struct Forest(FxHashMap<Symbol, Symbol>);
 
 impl Forest {
     fn root(&mut self, symbol: Symbol) -> Symbol {
-        let mut at = symbol;
-        while let Some(&above) = self.0.get(&at) {
-            // Halves the path.
+        let mut current = symbol;
+        while let Some(&above) = self.0.get(&current) {
+            // Path halving: the node skips its parent.
             if let Some(&higher) = self.0.get(&above) {
-                self.0.insert(at, higher);
+                self.0.insert(current, higher);
             }
-            at = above;
+            current = above;
         }
-        at
+        current
     }
 
-    /// Connects two symbols; `false` where they were connected already.
+    /// Connects two symbols. Returns `false` if they were already connected.
     pub fn connect(&mut self, left: Symbol, right: Symbol) -> bool {
         let (left, right) = (self.root(left), self.root(right));
         if left != right {

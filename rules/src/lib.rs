@@ -1,4 +1,4 @@
-//! What follows: SWRL and Datalog rules over interned facts, maintained incrementally.
+//! SWRL and Datalog rules over interned facts, maintained incrementally.
 #![doc = include_str!("../README.md")]
 
 mod aggregate;
@@ -50,9 +50,9 @@ pub use symbol::{Symbol, Symbols, Value};
 pub use why_not::{NearMiss, Obstacle};
 pub use {num_rational::BigRational, smallvec::SmallVec};
 
-/// The status rules of the `TOMASys` metamodel as rule text, written for retraction; the names are those of
+/// Status rules of the `TOMASys` metamodel as rule text, written for retraction. All names are in
 /// `http://metacontrol.org/tomasys#`.
 pub const TOMASYS_RULES: &str = include_str!("../swrl/tomasys.swrl");
 
-/// Rules that say which function designs are available, as rule text over `http://metacontrol.org/tomasys#`.
+/// Rules for the availability of function designs, as rule text over `http://metacontrol.org/tomasys#`.
 pub const COADAPTATION_RULES: &str = include_str!("../swrl/coadaptation.swrl");

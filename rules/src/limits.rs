@@ -1,4 +1,4 @@
-//! When evaluation stops before its end: a budget of steps, and a question that its caller answers.
+//! Limits of evaluation: a budget of steps, and an interrupt function of the caller.
 
 use std::cell::{Cell, RefCell};
 use std::fmt;
@@ -8,29 +8,31 @@ use crate::error::Error;
 use crate::literal::Literal;
 use crate::rule::RuleIdentity;
 
-/// How many steps one update may take, unless the caller says otherwise.
+/// Default number of steps that one update may take.
 pub const DEFAULT_STEP_BUDGET: u64 = 10_000_000_000;
 
-/// The steps that a value costs which a recursive rule computes and nothing has named before: nothing but the budget ends
-/// a rule that counts, and its rounds are dear.
-const VALUE_STEPS: u64 = 25_000;
+/// Steps charged for a value that a recursive rule computes for the first time. Only the budget stops a
+/// rule that counts upwards, and each of its rounds is expensive.
+const STEPS_PER_NEW_VALUE: u64 = 25_000;
 
-/// A value costs [`VALUE_STEPS`] again for each so many bytes: a rule that doubles a number makes longer and longer ones.
-const BYTES_PER_VALUE: u64 = 8;
+/// Number of bytes of a value for which [`STEPS_PER_NEW_VALUE`] is charged once more. A rule that doubles a
+/// number creates longer and longer values.
+const BYTES_PER_CHARGE: u64 = 8;
 
-/// A message shows at most so many characters of a value.
-const SHOWN_CHARACTERS: usize = 40;
+/// Maximum length of a value in an error message, in characters.
+const MAX_SHOWN_CHARACTERS: usize = 40;
 
-/// The caller is asked after so many rows at most.
-const ROWS_BETWEEN_QUESTIONS: u64 = 1 << 14;
+/// Number of visited rows between two calls of the interrupt function.
+const ROWS_PER_INTERRUPT_CHECK: u64 = 1 << 14;
 
-/// How far evaluation goes.
+/// Limits of one derivation or update.
 #[derive(Clone, Debug)]
 pub struct Limits {
-    /// How many steps one update may take. A step extends one partial match of a rule's body; a value that a recursive rule
-    /// computes for the first time costs 25,000, and as many for every 8 bytes of its digits or text.
+    /// Number of steps that one update may take. A step extends one partial match of a rule's body. A value
+    /// that a recursive rule computes for the first time costs 25,000 steps, and 25,000 more for every 8
+    /// bytes of its digits or text.
     pub steps: u64,
-    /// Asked every few thousand rows, which is some microseconds to a millisecond apart.
+    /// Called after about every 16,000 visited rows, that is every few microseconds to a millisecond.
     pub interrupt: Option<Interrupt>,
 }
 
@@ -40,12 +42,13 @@ impl Default for Limits {
     }
 }
 
-/// Whether evaluation is to stop at once: a deadline that has passed, a key that was pressed.
+/// Stop condition of the caller: an expired deadline or a pressed key, for example.
 #[derive(Clone)]
 pub struct Interrupt(Arc<dyn Fn() -> bool + Send + Sync>);
 
 impl Interrupt {
-    /// Stops evaluation when the function says `true`. It is called often, so it has to be cheap.
+    /// Creates an interrupt that stops evaluation as soon as the function returns `true`. The function is
+    /// called often, so it has to be fast.
     pub fn new(is_over: impl Fn() -> bool + Send + Sync + 'static) -> Self {
         Self(Arc::new(is_over))
     }
@@ -57,23 +60,23 @@ impl fmt::Debug for Interrupt {
     }
 }
 
-/// Why an update stopped.
+/// Reason for which an update stopped.
 #[derive(Clone, Copy, Debug)]
 enum Stop {
     Exhausted,
     Interrupted,
 }
 
-/// What an update has left, and the compiled rule at which it stopped.
+/// Remaining budget of an update, and the compiled rule at which it stopped.
 #[derive(Debug)]
 pub(crate) struct Budget {
     limits: Limits,
-    left: Cell<u64>,
-    rows: Cell<u64>,
-    /// Whether the rules that are evaluated feed on their own conclusions.
+    remaining_steps: Cell<u64>,
+    rows_until_check: Cell<u64>,
+    /// `true` while recursive rules are evaluated.
     pub recursive: Cell<bool>,
     stopped: Cell<Option<(Stop, u32)>>,
-    /// The last value that a recursive rule computed, once the budget is used up by values.
+    /// Last value that a recursive rule computed before the budget was exhausted.
     value: RefCell<Option<Box<str>>>,
 }
 
@@ -81,58 +84,62 @@ impl Budget {
     pub fn new(limits: &Limits) -> Self {
         Self {
             limits: limits.clone(),
-            left: Cell::new(limits.steps),
-            rows: Cell::new(ROWS_BETWEEN_QUESTIONS),
+            remaining_steps: Cell::new(limits.steps),
+            rows_until_check: Cell::new(ROWS_PER_INTERRUPT_CHECK),
             recursive: Cell::new(false),
             stopped: Cell::new(None),
             value: RefCell::new(None),
         }
     }
 
-    /// Takes steps of a rule; `false` once evaluation has to stop.
+    /// Charges steps to a rule. Returns `false` if evaluation has to stop.
     pub fn spend(&self, steps: u64, rule: u32) -> bool {
-        let left = self.left.get();
-        if left < steps {
+        let remaining = self.remaining_steps.get();
+        if remaining < steps {
             self.stop(Stop::Exhausted, rule);
         }
-        self.left.set(left.saturating_sub(steps));
+        self.remaining_steps.set(remaining.saturating_sub(steps));
         self.visit(steps, rule)
     }
 
-    /// Notes a value that a rule has computed for the first time; `false` once evaluation has to stop.
+    /// Charges a value that a rule has computed for the first time. Returns `false` if evaluation has to
+    /// stop.
     pub fn spend_on_value(&self, value: Option<&Literal>, rule: u32) -> bool {
+        // Without recursion, a rule computes a bounded number of values.
         if !self.recursive.get() {
             return true;
         }
         let size = value.map_or(0, Literal::size);
-        let goes_on = self.spend(VALUE_STEPS.saturating_mul(1 + size / BYTES_PER_VALUE), rule);
-        if !goes_on && self.value.borrow().is_none() {
-            self.value.replace(value.map(shown));
+        let may_continue = self.spend(STEPS_PER_NEW_VALUE.saturating_mul(1 + size / BYTES_PER_CHARGE), rule);
+        if !may_continue && self.value.borrow().is_none() {
+            self.value.replace(value.map(abbreviated));
         }
-        goes_on
+        may_continue
     }
 
-    /// Notes rows that a rule looked at; `false` once evaluation has to stop.
+    /// Counts visited rows, and calls the interrupt function when it is due. Returns `false` if evaluation
+    /// has to stop.
     pub fn visit(&self, rows: u64, rule: u32) -> bool {
-        let left = self.rows.get().saturating_sub(rows);
-        if left > 0 {
-            self.rows.set(left);
+        let remaining = self.rows_until_check.get().saturating_sub(rows);
+        if remaining > 0 {
+            self.rows_until_check.set(remaining);
             return self.stopped.get().is_none();
         }
-        self.rows.set(ROWS_BETWEEN_QUESTIONS);
+        self.rows_until_check.set(ROWS_PER_INTERRUPT_CHECK);
         if self.limits.interrupt.as_ref().is_some_and(|interrupt| (interrupt.0)()) {
             self.stop(Stop::Interrupted, rule);
         }
         self.stopped.get().is_none()
     }
 
+    /// Records the first reason to stop.
     fn stop(&self, stop: Stop, rule: u32) {
         if self.stopped.get().is_none() {
             self.stopped.set(Some((stop, rule)));
         }
     }
 
-    /// The error, once evaluation has stopped; `identity` names compiled rules.
+    /// Returns an error if evaluation has stopped. `identity` maps compiled rules to rules.
     pub fn error(&self, identity: impl Fn(u32) -> RuleIdentity) -> Option<Error> {
         self.stopped.get().map(|(stop, rule)| match stop {
             Stop::Exhausted => Error::BudgetExhausted {
@@ -145,13 +152,13 @@ impl Budget {
     }
 }
 
-/// A value as a message shows it: a long one by its beginning and its length.
-fn shown(value: &Literal) -> Box<str> {
+/// Text of a value for error messages. A long value is cut, and its length is appended.
+fn abbreviated(value: &Literal) -> Box<str> {
     let text = value.lexical();
     let length = text.chars().count();
-    if length <= SHOWN_CHARACTERS {
+    if length <= MAX_SHOWN_CHARACTERS {
         return text.into();
     }
-    let start: String = text.chars().take(SHOWN_CHARACTERS).collect();
+    let start: String = text.chars().take(MAX_SHOWN_CHARACTERS).collect();
     format!("{start}… ({length} characters)").into()
 }

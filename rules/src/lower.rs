@@ -1,5 +1,6 @@
-//! Rules to conditions and templates that name relations. The atoms of an aggregate become a rule of their own, which
-//! concludes one row for each match in a relation without a name: first the group, then what is local.
+//! Lowers rules to conditions and head templates over relations. The atoms of an aggregate become a
+//! separate rule. This rule derives one row for each match, in a relation without a name: first the group,
+//! then the local variables.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -12,16 +13,17 @@ use crate::store::{RelationId, Store};
 use crate::symbol::{Symbol, Symbols};
 use crate::vocabulary::{DIFFERENT_FROM, SAME_AS};
 
-/// Lowers rules that [`crate::safety::check`] found nothing wrong with.
+/// Lowers rules without errors of [`crate::safety::check`].
 pub(crate) struct Lowering<'a> {
     symbols: &'a mut Symbols,
     store: &'a mut Store,
-    /// The relation of each integrity constraint's matches, with its position in the program.
+    /// Relation of the matches of each integrity constraint, with the position of the constraint in the
+    /// program.
     constraints: &'a mut Vec<(RelationId, usize)>,
     /// Relations without a name that are in use.
-    taken: FxHashSet<RelationId>,
-    /// By arity, the number below which no relation without a name is free.
-    tried: FxHashMap<usize, u32>,
+    used: FxHashSet<RelationId>,
+    /// By arity: number below which no relation without a name is free.
+    first_candidates: FxHashMap<usize, u32>,
     pub lowered: Vec<Lowered>,
 }
 
@@ -38,25 +40,33 @@ impl<'a> Lowering<'a> {
         symbols: &'a mut Symbols,
         store: &'a mut Store,
         constraints: &'a mut Vec<(RelationId, usize)>,
-        taken: FxHashSet<RelationId>,
+        used: FxHashSet<RelationId>,
     ) -> Self {
-        Self { symbols, store, constraints, taken, tried: FxHashMap::default(), lowered: Vec::new() }
+        Self {
+            symbols,
+            store,
+            constraints,
+            used,
+            first_candidates: FxHashMap::default(),
+            lowered: Vec::new(),
+        }
     }
 
-    /// Lowers the rule at a position of the program, the rules of its aggregates first.
+    /// Lowers the rule at a position of the program, after the rules of its aggregates.
     pub fn rule(&mut self, position: usize, rule: &Rule) {
         let width = rule.variable_count().max(1);
         let mut body: Vec<Option<Condition>> = rule.body.iter().map(|atom| self.condition(atom)).collect();
         for scope in binding(rule).scopes {
-            body[scope.at] = self.aggregate(position, rule, &scope, &body);
+            body[scope.position] = self.aggregate(position, rule, &scope, &body);
         }
         let body: Vec<Condition> = body.into_iter().flatten().collect();
         let mut heads: Vec<Template> = rule.head.iter().filter_map(|atom| self.template(atom)).collect();
+        // The matches of a constraint are stored, so that violations can be listed and retracted.
         if rule.head.is_empty() {
-            let bound = (0..).zip(bound_variables(rule)).filter(|&(_, is_bound)| is_bound);
-            let bound: Vec<u16> = bound.map(|(number, _)| number).collect();
-            let relation = self.anonymous(bound.len());
-            heads.push(Template { relation, arguments: columns(&bound) });
+            let variables = (0..).zip(bound_variables(rule)).filter(|&(_, is_bound)| is_bound);
+            let variables: Vec<u16> = variables.map(|(number, _)| number).collect();
+            let relation = self.anonymous(variables.len());
+            heads.push(Template { relation, arguments: columns(&variables) });
             self.constraints.push((relation, position));
         }
         let is_closure = Lowered::closes(&heads, &body);
@@ -64,10 +74,10 @@ impl<'a> Lowering<'a> {
     }
 
     fn anonymous(&mut self, arity: usize) -> RelationId {
-        let tried = self.tried.entry(arity).or_default();
-        let relation = self.store.anonymous(arity, *tried, |id| self.taken.contains(&id));
-        *tried = relation.0 + 1;
-        self.taken.insert(relation);
+        let first_candidate = self.first_candidates.entry(arity).or_default();
+        let relation = self.store.anonymous(arity, *first_candidate, |id| self.used.contains(&id));
+        *first_candidate = relation.0 + 1;
+        self.used.insert(relation);
         relation
     }
 
@@ -75,7 +85,7 @@ impl<'a> Lowering<'a> {
         self.store.relation(predicate, terms.len())
     }
 
-    /// `None` for aggregates.
+    /// Returns `None` for aggregates.
     fn condition(&mut self, atom: &Atom) -> Option<Condition> {
         Some(match atom {
             Atom::Relation { predicate, arguments } => {
@@ -91,7 +101,7 @@ impl<'a> Lowering<'a> {
         })
     }
 
-    /// `None` for atoms that cannot be concluded.
+    /// Returns `None` for atoms that cannot be derived.
     fn template(&mut self, atom: &Atom) -> Option<Template> {
         let (predicate, terms) = match atom {
             Atom::Relation { predicate, arguments } => (*predicate, arguments.clone()),
@@ -102,19 +112,21 @@ impl<'a> Lowering<'a> {
         Some(Template { relation: self.relation(predicate, &terms), arguments: sources(&terms) })
     }
 
-    /// Adds the rule that concludes an aggregate's matches; `outside` holds the other conditions lowered so far.
+    /// Adds the rule that derives the matches of an aggregate. `outer_conditions` contains the conditions
+    /// lowered so far.
     fn aggregate(
         &mut self,
         position: usize,
         rule: &Rule,
         scope: &Scope,
-        outside: &[Option<Condition>],
+        outer_conditions: &[Option<Condition>],
     ) -> Option<Condition> {
-        let Atom::Aggregate { aggregate, result, body } = &rule.body[scope.at] else { return None };
+        let Atom::Aggregate { aggregate, result, body } = &rule.body[scope.position] else { return None };
         let variables = [scope.group.as_slice(), &scope.locals].concat();
         let matches = self.anonymous(variables.len());
         let mut conditions: Vec<Condition> = body.iter().filter_map(|atom| self.condition(atom)).collect();
-        conditions.extend(scope.context.iter().filter_map(|&at| outside[at].clone()));
+        // Outer conditions bind the variables that the aggregate's own atoms leave open.
+        conditions.extend(scope.context.iter().filter_map(|&at| outer_conditions[at].clone()));
         let heads = vec![Template { relation: matches, arguments: columns(&variables) }];
         let width = rule.variable_count().max(1);
         self.lowered.push(Lowered { rule: position, width, heads, body: conditions, is_closure: false });

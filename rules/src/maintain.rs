@@ -1,7 +1,9 @@
-//! The maintenance algorithm: from a change of what is stated to the change of what holds, stratum by stratum.
+//! Incremental maintenance: computes the change of all facts from a change of the stated facts, stratum by
+//! stratum.
 //!
-//! In each stratum: 1. over-delete the rows whose recorded derivation lost an atom; 2. rederive what has another
-//! derivation from what is left; 3. insert semi-naively what follows from new and revived rows.
+//! In each stratum: 1. over-delete the rows whose recorded derivation lost an atom; 2. rederive the
+//! over-deleted rows that have another derivation from the remaining facts; 3. insert semi-naively the
+//! consequences of new and rederived rows.
 
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -20,40 +22,41 @@ use crate::plan::HIDDEN;
 use crate::store::{Record, RelationId, Row, state};
 use crate::symbol::{Symbol, Symbols};
 
-/// Rows that start one run of the crepe program; bounds the memory of partial matches.
+/// Number of rows that start one run of the crepe program. Bounds the memory of partial matches.
 const CHUNK: usize = 2048;
 
 /// Rows by relation.
 type Rows = Vec<(RelationId, Row)>;
 
-/// What an update states, and which rows that concerned.
+/// Effective change of the stated facts, with the affected rows.
 #[derive(Default)]
 pub(crate) struct Stated {
-    /// What changed, without what was so already.
+    /// Change without insertions and deletions that have no effect.
     effective: Delta,
     added: Rows,
     doomed: Rows,
 }
 
 impl Stated {
-    /// The change that takes it back.
+    /// Returns the inverse change.
     pub fn undo(self) -> Delta {
         Delta { insert: self.effective.delete, delete: self.effective.insert }
     }
 }
 
-/// Marks in the store what a change states and no longer states.
+/// Applies a change of the stated facts to the state bits of the store. Derives nothing.
 pub(crate) fn state_change(engine: &mut Engine, delta: Delta) -> Stated {
     let store = &mut engine.store;
     let mut stated = Stated::default();
-    let kept: FxHashSet<&Fact> = delta.insert.iter().collect();
-    for fact in delta.delete.iter().filter(|fact| !kept.contains(fact)) {
+    let inserted: FxHashSet<&Fact> = delta.insert.iter().collect();
+    for fact in delta.delete.iter().filter(|fact| !inserted.contains(fact)) {
         let Some(id) = store.find(fact.predicate, fact.arguments.len()) else { continue };
         let relation = store.get_mut(id);
         let Some(row) = relation.find(&fact.arguments) else { continue };
         if relation.state(row) & state::ASSERTED == 0 {
             continue;
         }
+        // A row with a recorded derivation still holds; only its assertion ends.
         relation.clear(row, state::ASSERTED);
         if relation.record(row) == Record::NONE {
             relation.set(row, state::DOOMED);
@@ -77,19 +80,20 @@ pub(crate) fn state_change(engine: &mut Engine, delta: Delta) -> Stated {
     stated
 }
 
-/// An update in progress.
+/// State of an update in progress.
 pub(crate) struct Maintenance<'a> {
     engine: &'a mut Engine,
     network: Arc<Network>,
-    /// Rows that did not hold before.
+    /// Rows that did not hold before the update.
     added: Rows,
-    /// Rows that held before and may not any more.
+    /// Rows that held before the update and may no longer hold.
     doomed: Rows,
-    /// Rows concluded in the current round.
+    /// Rows derived in the current round.
     pending: Rows,
-    /// Strata that a change reached.
+    /// By stratum: `true` if a change affects its rules.
     touched: Vec<bool>,
-    /// Names that were concluded to be one in this update: of a class, only as many pairs are kept as connect it.
+    /// Names whose equality was derived in this update. Of the derived pairs of a class, only those of a
+    /// spanning tree are stored.
     joined: Forest,
     budget: Budget,
 }
@@ -103,7 +107,7 @@ impl<'a> Maintenance<'a> {
         Self { engine, network, added, doomed, pending, touched, joined: Forest::default(), budget }
     }
 
-    /// Derives everything from the stated facts of an engine that has derived nothing yet.
+    /// Derives all facts from the stated facts of an engine without derived facts.
     pub fn derive_all(mut self) -> Result<(), Error> {
         let network = Arc::clone(&self.network);
         for stratum in &network.strata {
@@ -116,7 +120,8 @@ impl<'a> Maintenance<'a> {
         Ok(())
     }
 
-    /// Makes the store hold what follows after a change of what is stated; what does not any more is doomed.
+    /// Updates the derived facts after a change of the stated facts. Rows that no longer hold remain marked
+    /// as doomed.
     pub fn update(&mut self, stated: &Stated) -> Result<(), Error> {
         self.begin_with(stated);
         self.propagate(&FxHashSet::default())
@@ -130,7 +135,8 @@ impl<'a> Maintenance<'a> {
         }
     }
 
-    /// As [`Maintenance::update`], where some rules are removed and others are new.
+    /// Updates the derived facts after a change of facts and rules. `heads` contains the head relations of
+    /// the removed rules; `removed` and `added` contain the numbers of compiled rules.
     pub fn update_with_rules(
         &mut self,
         stated: &Stated,
@@ -139,13 +145,14 @@ impl<'a> Maintenance<'a> {
         added: &FxHashSet<u32>,
     ) -> Result<(), Error> {
         self.begin_with(stated);
+        // Relations are visited in a fixed order, so that equal histories give equal results.
         let mut ids: Vec<RelationId> = heads.iter().copied().collect();
         ids.sort_unstable();
         for id in ids {
             let Engine { store, records, .. } = &mut *self.engine;
             let relation = store.get_mut(id);
-            let concluded = |&row: &Row| removed.contains(&relation.record(row).rule);
-            for row in relation.scan().filter(concluded).collect::<Vec<_>>() {
+            let is_from_removed_rule = |&row: &Row| removed.contains(&relation.record(row).rule);
+            for row in relation.scan().filter(is_from_removed_rule).collect::<Vec<_>>() {
                 if relation.state(row) & state::ASSERTED == 0 {
                     relation.set(row, state::DOOMED);
                     self.doomed.push((id, row));
@@ -175,7 +182,7 @@ impl<'a> Maintenance<'a> {
         Ok(())
     }
 
-    /// Runs plans from nothing or from all rows of a relation that hold.
+    /// Runs plans from the empty match, or from all visible rows of a relation.
     fn begin(&mut self, plans: &[(Option<RelationId>, PlanId)]) -> Result<(), Error> {
         for (relation, plan) in plans {
             if let Some(id) = *relation {
@@ -190,7 +197,7 @@ impl<'a> Maintenance<'a> {
         Ok(())
     }
 
-    /// Removes what is doomed and reports the net change.
+    /// Removes the doomed rows and returns the net change.
     pub fn finish(self) -> Delta {
         let Engine { store, records, .. } = self.engine;
         let mut delta = Delta::default();
@@ -216,37 +223,41 @@ impl<'a> Maintenance<'a> {
         touch(&mut self.touched, &self.network, relation);
     }
 
+    /// Dooms the rows whose recorded derivation lost an atom.
     fn over_delete(&mut self, stratum: &Stratum) -> Result<(), Error> {
+        // A new row invalidates derivations that depend on its absence.
         let appeared = self.added.clone();
         self.run(&appeared, |relation| stratum.negative.get(&relation).map(Vec::as_slice), true)?;
         self.run_groups(stratum, true)?;
-        let mut done = 0;
-        while done < self.doomed.len() {
-            let front = self.doomed[done..].to_vec();
-            done = self.doomed.len();
+        let mut processed = 0;
+        while processed < self.doomed.len() {
+            let front = self.doomed[processed..].to_vec();
+            processed = self.doomed.len();
             self.run(&front, |relation| stratum.positive.get(&relation).map(Vec::as_slice), true)?;
         }
         Ok(())
     }
 
-    /// Runs the plans of aggregates, once for each group that has changed.
+    /// Runs the plans of aggregates, once for each group with a change.
     fn run_groups(&mut self, stratum: &Stratum, retracting: bool) -> Result<(), Error> {
         if stratum.aggregated.is_empty() {
             return Ok(());
         }
-        let mut seen: FxHashSet<(RelationId, Arguments)> = FxHashSet::default();
+        let mut groups: FxHashSet<(RelationId, Arguments)> = FxHashSet::default();
+        // The plans need only the group of a row, so the first changed row of each group suffices.
         let is_first = |&(id, row): &(RelationId, Row)| {
             let Some(&plan) = stratum.aggregated.get(&id).and_then(|plans| plans.first()) else {
                 return false;
             };
             let seed = &self.network.plans[plan as usize].seed;
             let group = seed.binds.len() + seed.checks.len();
-            seen.insert((id, SmallVec::from_slice(&self.engine.store.get(id).row(row)[..group])))
+            groups.insert((id, SmallVec::from_slice(&self.engine.store.get(id).row(row)[..group])))
         };
         let changed: Rows = self.added.iter().chain(&self.doomed).copied().filter(is_first).collect();
         self.run(&changed, |relation| stratum.aggregated.get(&relation).map(Vec::as_slice), retracting)
     }
 
+    /// Runs the rules backwards from doomed heads, to find other derivations.
     fn rederive(&mut self, stratum: &Stratum) -> Result<(), Error> {
         let doomed = self.still_doomed();
         self.run(&doomed, |relation| stratum.rederive.get(&relation).map(Vec::as_slice), false)
@@ -258,6 +269,7 @@ impl<'a> Maintenance<'a> {
         self.doomed.iter().filter(is_doomed).copied().collect()
     }
 
+    /// Derives the consequences of rows that are new, rederived, or absent since this update.
     fn insert(&mut self, stratum: &Stratum) -> Result<(), Error> {
         let disappeared = self.still_doomed();
         let relevant = |&&(id, row): &&(RelationId, Row)| {
@@ -266,6 +278,7 @@ impl<'a> Maintenance<'a> {
         };
         let front: Rows = self.added.iter().filter(relevant).copied().collect();
         let revived = std::mem::take(&mut self.pending);
+        // Rederived rows become visible only now, so that rederivation uses no row of its own round.
         self.promote(&revived);
         let front = [front, revived].concat();
         self.mark(&front, true);
@@ -276,7 +289,7 @@ impl<'a> Maintenance<'a> {
         self.saturate(stratum)
     }
 
-    /// Semi-naive rounds until nothing new follows.
+    /// Runs semi-naive rounds until no new row is derived.
     fn saturate(&mut self, stratum: &Stratum) -> Result<(), Error> {
         self.budget.recursive.set(true);
         while !self.pending.is_empty() {
@@ -290,13 +303,14 @@ impl<'a> Maintenance<'a> {
         Ok(())
     }
 
-    /// Makes concluded rows visible.
+    /// Makes derived rows visible.
     fn promote(&mut self, rows: &Rows) {
         for &(relation, row) in rows {
             self.engine.store.get_mut(relation).clear(row, state::PENDING);
         }
     }
 
+    /// Marks rows as fresh (the delta of a semi-naive round), or removes the mark.
     fn mark(&mut self, rows: &Rows, fresh: bool) {
         for &(relation, row) in rows {
             let relation = self.engine.store.get_mut(relation);
@@ -304,7 +318,7 @@ impl<'a> Maintenance<'a> {
         }
     }
 
-    /// Runs the plans that rows start, by chunks.
+    /// Runs the plans that rows start, in chunks of [`CHUNK`] starts.
     fn run<'p>(
         &mut self,
         rows: &[(RelationId, Row)],
@@ -314,10 +328,11 @@ impl<'a> Maintenance<'a> {
         let mut starts: Vec<(PlanId, RelationId, Row)> = Vec::new();
         for &(relation, row) in rows {
             let values = self.engine.store.get(relation).row(row);
-            let started = plans(relation).unwrap_or(&[]).iter().copied();
-            let started = started.filter(|&plan| self.network.plans[plan as usize].seed.may_fit(values));
-            starts.extend(started.map(|plan| (plan, relation, row)));
+            let plan_ids = plans(relation).unwrap_or(&[]).iter().copied();
+            let plan_ids = plan_ids.filter(|&plan| self.network.plans[plan as usize].seed.may_fit(values));
+            starts.extend(plan_ids.map(|plan| (plan, relation, row)));
         }
+        // Starts of one plan become adjacent, and form one seed per chunk.
         starts.sort_by_key(|&(plan, ..)| plan);
         for chunk in starts.chunks(CHUNK) {
             let rows: Vec<Row> = chunk.iter().map(|&(.., row)| row).collect();
@@ -339,7 +354,7 @@ impl<'a> Maintenance<'a> {
         Ok(())
     }
 
-    /// Runs seeds, then, last first, what was put off to bound memory.
+    /// Runs seeds, and then the deferred matches. Depth-first order (last in, first out) bounds the memory.
     fn run_chunk(&mut self, seeds: &[Seed], rows: &[Row], retracting: bool) -> Result<(), Error> {
         let mut deferred = self.run_once(seeds, rows, retracting)?;
         while let Some(seed) = deferred.pop() {
@@ -348,7 +363,7 @@ impl<'a> Maintenance<'a> {
         Ok(())
     }
 
-    /// Runs seeds and acts on the complete matches; returns what was put off.
+    /// Runs seeds and processes the complete matches. Returns the deferred matches.
     fn run_once(&mut self, seeds: &[Seed], rows: &[Row], retracting: bool) -> Result<Vec<Seed>, Error> {
         let round = Round {
             store: &self.engine.store,
@@ -374,7 +389,7 @@ impl<'a> Maintenance<'a> {
         Ok(deferred)
     }
 
-    /// Adds the heads of complete matches that do not hold yet.
+    /// Inserts or rederives the heads of complete matches, unless they hold already.
     fn conclude(&mut self, matches: &Matches) {
         let network = Arc::clone(&self.network);
         let number = network.plans[matches.plan as usize].rule;
@@ -385,7 +400,7 @@ impl<'a> Maintenance<'a> {
             for head in &rule.heads {
                 arguments.clear();
                 arguments.extend(head.arguments.iter().map(|&source| resolve(source, bound)));
-                if Some(head.relation) == network.same
+                if Some(head.relation) == network.same_as
                     && (arguments[0] == arguments[1] || !joins(&mut self.joined, symbols, &arguments))
                 {
                     continue;
@@ -413,7 +428,7 @@ impl<'a> Maintenance<'a> {
         }
     }
 
-    /// Dooms the heads whose recorded derivation is one of these matches.
+    /// Dooms heads whose recorded derivation is one of these matches.
     fn retract(&mut self, matches: &Matches) {
         let network = Arc::clone(&self.network);
         let number = network.plans[matches.plan as usize].rule;
@@ -444,15 +459,15 @@ impl<'a> Maintenance<'a> {
     }
 }
 
-/// Notes the strata that a change of a relation concerns.
+/// Marks the strata that read a relation.
 fn touch(touched: &mut [bool], network: &Network, relation: RelationId) {
     for &stratum in network.readers.get(relation.0 as usize).into_iter().flatten() {
         touched[stratum as usize] = true;
     }
 }
 
-/// Whether a pair of equal names connects what was not connected before in this update; a pair with a literal always does,
-/// because it is a contradiction.
+/// Returns `true` if a pair of equal names connects two names that this update has not connected yet. A
+/// pair with a literal always counts as new, because it is a contradiction that must be reported.
 fn joins(joined: &mut Forest, symbols: &Symbols, pair: &[Symbol]) -> bool {
     pair.iter().any(|&symbol| symbols.as_literal(symbol).is_some()) || joined.connect(pair[0], pair[1])
 }

@@ -1,5 +1,5 @@
-//! Turns a program into what the engine runs: lowered rules, their plans, and strata that say which plan a change of
-//! which relation starts.
+//! Compiles a program into a network: lowered rules, their plans, and strata that map a changed relation to
+//! the plans to run.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -16,41 +16,42 @@ use crate::strata::components;
 use crate::symbol::Symbols;
 use crate::vocabulary::SAME_AS;
 
-/// A compiled program. Its parts refer to each other and to the store's relations by number.
+/// A compiled program. Its parts refer to each other, and to the relations of the store, by number.
 #[derive(Clone, Default, Debug)]
 pub(crate) struct Network {
     pub rules: Vec<Lowered>,
     pub widths: Vec<usize>,
     pub plans: Vec<Plan>,
     pub strata: Vec<Stratum>,
-    /// The stratum of each relation, dependencies first; strata without rules are not in `strata`.
+    /// Stratum of each relation, dependencies first. Strata without rules are not in `strata`.
     stratum_of: Vec<usize>,
-    /// The relation of equality, where equality is more than a relation.
-    pub same: Option<RelationId>,
-    /// How many facts there were when the plans were made.
+    /// Relation of `owl:sameAs`, if it is interpreted as equality.
+    pub same_as: Option<RelationId>,
+    /// Number of facts at the time of planning.
     pub planned_for: usize,
-    /// By relation: the strata that a change of it concerns.
+    /// By relation: the strata that read it.
     pub readers: Vec<Vec<u32>>,
-    /// The relation of each integrity constraint's matches, with its position in the program.
+    /// Relation of the matches of each integrity constraint, with the position of the constraint in the
+    /// program.
     pub constraints: Vec<(RelationId, usize)>,
 }
 
-/// Relations that are derived together, and the plans that derive them.
+/// Mutually dependent relations, and the plans that derive them.
 #[derive(Clone, Default, Debug)]
 pub(crate) struct Stratum {
-    /// Plans from nothing or from all rows of a relation, for the first evaluation.
+    /// Plans from the empty match or from all rows of a relation, for the first evaluation.
     pub initial: Vec<(Option<RelationId>, PlanId)>,
-    /// Plans from the rows of a relation that came or went.
+    /// Plans from inserted or deleted rows of a relation.
     pub positive: FxHashMap<RelationId, Vec<PlanId>>,
-    /// Plans from the rows of a negated relation that went or came.
+    /// Plans from deleted or inserted rows of a negated relation.
     pub negative: FxHashMap<RelationId, Vec<PlanId>>,
-    /// Plans from a row of what an aggregate runs over, to its group.
+    /// Plans from a row of an aggregated relation, to the group of the row.
     pub aggregated: FxHashMap<RelationId, Vec<PlanId>>,
     /// Plans from a row that lost its support.
     pub rederive: FxHashMap<RelationId, Vec<PlanId>>,
 }
 
-/// Compiles a program, or reports what is wrong with every rule.
+/// Compiles a program. On failure, returns the errors of all rules.
 pub(crate) fn compile(
     program: &Program,
     symbols: &mut Symbols,
@@ -63,35 +64,36 @@ pub(crate) fn compile(
     if !errors.is_empty() {
         return Err(errors.into());
     }
-    let same = program.equality.then(|| store.relation(symbols.name(SAME_AS), 2));
-    let mut network = Network { same, ..Network::default() };
-    let mut seen = FxHashSet::default();
+    let same_as = program.equality.then(|| store.relation(symbols.name(SAME_AS), 2));
+    let mut network = Network { same_as, ..Network::default() };
+    // Rules with equal content are compiled once.
+    let mut contents = FxHashSet::default();
     let mut lowering = Lowering::new(symbols, store, &mut network.constraints, FxHashSet::default());
     for (position, rule) in program.rules.iter().enumerate() {
-        if seen.insert(content(rule)) {
+        if contents.insert(content(rule)) {
             lowering.rule(position, rule);
         }
     }
     let lowered = lowering.lowered;
-    network.stratum_of = stratify(program, symbols, store, &lowered, network.same)?;
+    network.stratum_of = stratify(program, symbols, store, &lowered, network.same_as)?;
     network.rules = split_by_stratum(lowered, &network.stratum_of);
     network.widths = network.rules.iter().map(|rule| rule.width).collect();
     network.plan(store, false, (program, limits)).map_err(|error| vec![error])?;
     Ok(network)
 }
 
-/// What a change of rules did to a network.
+/// Result of a change of rules.
 pub(crate) struct Revision {
     pub network: Network,
-    /// Compiled rules that are no more; their numbers stay unused until the next revision.
+    /// Numbers of removed compiled rules, unused until the next revision.
     pub removed: FxHashSet<u32>,
-    /// Compiled rules that are new.
+    /// Numbers of new compiled rules.
     pub added: FxHashSet<u32>,
 }
 
-/// Compiles the rules in which a program differs from the one that the network was compiled from; the others keep
-/// their numbers, to which recorded derivations refer. `None` where that is not possible, because a rule whose heads
-/// lay in one stratum would have to be split.
+/// Compiles the difference between a program and the program of a network. Unchanged rules keep their
+/// numbers, to which recorded derivations refer. Returns `None` if a compiled rule would have to be split,
+/// because its heads no longer lie in one stratum.
 pub(crate) fn revise(
     network: &Network,
     old: &Program,
@@ -111,17 +113,19 @@ pub(crate) fn revise(
         positions.entry(content(rule)).or_insert(position);
     }
     let mut revised = Network { constraints: Vec::new(), ..network.clone() };
-    let position_of = |position: usize| positions.get(&content(&old.rules[position])).copied();
-    let kept = network.constraints.iter();
-    revised.constraints = kept.filter_map(|&(id, rule)| Some((id, position_of(rule)?))).collect();
-    let (mut removed, mut unused, mut compiled) = (FxHashSet::default(), Vec::new(), FxHashSet::default());
+    let new_position = |position: usize| positions.get(&content(&old.rules[position])).copied();
+    let old_constraints = network.constraints.iter();
+    revised.constraints = old_constraints.filter_map(|&(id, rule)| Some((id, new_position(rule)?))).collect();
+    let (mut removed, mut free_numbers, mut compiled) =
+        (FxHashSet::default(), Vec::new(), FxHashSet::default());
     for (number, rule) in revised.rules.iter_mut().enumerate() {
         if rule.heads.is_empty() {
-            unused.push(number);
-        } else if let Some(position) = position_of(rule.rule) {
+            free_numbers.push(number);
+        } else if let Some(position) = new_position(rule.rule) {
             rule.rule = position;
             compiled.insert(position);
         } else {
+            // An empty rule keeps its number free; numbers of other rules do not shift.
             let (heads, body) = (Vec::new(), Vec::new());
             *rule = Lowered { rule: 0, width: rule.width, heads, body, is_closure: false };
             removed.insert(number as u32);
@@ -132,18 +136,18 @@ pub(crate) fn revise(
     let heads = revised.rules.iter().flat_map(|rule| &rule.heads);
     let taken = heads.map(|head| head.relation).collect();
     let mut lowering = Lowering::new(symbols, store, &mut revised.constraints, taken);
-    for at in missing {
-        lowering.rule(at, &new.rules[at]);
+    for position in missing {
+        lowering.rule(position, &new.rules[position]);
     }
     let lowered = lowering.lowered;
-    let all: Vec<Lowered> = revised.rules.iter().chain(&lowered).cloned().collect();
-    revised.stratum_of = stratify(new, symbols, store, &all, revised.same)?;
+    let all_rules: Vec<Lowered> = revised.rules.iter().chain(&lowered).cloned().collect();
+    revised.stratum_of = stratify(new, symbols, store, &all_rules, revised.same_as)?;
     if split_by_stratum(revised.rules.clone(), &revised.stratum_of).len() != revised.live_rules() {
         return Ok(None);
     }
     let mut added = FxHashSet::default();
     for rule in split_by_stratum(lowered, &revised.stratum_of) {
-        let number = unused.pop().unwrap_or(revised.rules.len());
+        let number = free_numbers.pop().unwrap_or(revised.rules.len());
         if number == revised.rules.len() {
             revised.rules.push(rule);
         } else {
@@ -156,11 +160,13 @@ pub(crate) fn revise(
     Ok(Some(Revision { network: revised, removed, added }))
 }
 
-/// Rules with the same content are one. What an integrity constraint concludes is that it is violated, it and no other.
+/// Key by which equal rules are merged. Integrity constraints differ by identity, because each reports its
+/// own violations.
 fn content(rule: &Rule) -> (&[Atom], &[Atom], Option<&RuleIdentity>) {
     (&rule.head, &rule.body, rule.head.is_empty().then_some(&rule.identity))
 }
 
+/// Returns an error if a rule contains a symbol that is not interned.
 fn unknown_symbols(rule: &Rule, symbols: &Symbols) -> Option<Error> {
     let atoms = || rule.head.iter().chain(&rule.body).flat_map(|atom| atom.parts().iter().chain([atom]));
     let predicates = atoms().filter_map(|atom| match atom {
@@ -175,12 +181,13 @@ fn unknown_symbols(rule: &Rule, symbols: &Symbols) -> Option<Error> {
     Some(Error::UnknownSymbol { index: unknown.index() })
 }
 
-/// A constant regular expression that cannot be used: its built-in would never hold.
+/// Returns an error if a rule contains an invalid constant regular expression, whose built-in would never
+/// hold.
 fn bad_pattern(rule: &Rule, symbols: &Symbols) -> Option<Error> {
     let atoms = rule.head.iter().chain(&rule.body).flat_map(|atom| atom.parts().iter().chain([atom]));
     atoms.into_iter().find_map(|atom| {
         let Atom::BuiltIn { built_in, arguments } = atom else { return None };
-        let literal = |at: usize| match arguments.get(at)? {
+        let literal = |position: usize| match arguments.get(position)? {
             Term::Constant(symbol) => symbols.as_literal(*symbol),
             Term::Variable(_) => None,
         };
@@ -189,14 +196,14 @@ fn bad_pattern(rule: &Rule, symbols: &Symbols) -> Option<Error> {
     })
 }
 
-/// The stratum of each relation. Every relation depends on equality, but needs no stratum after it, since rows are
-/// rewritten where equality changes.
+/// Computes the stratum of each relation. Every relation depends on equality, but needs no later stratum
+/// for this reason, since the rows are rewritten when equality changes.
 fn stratify(
     program: &Program,
     symbols: &Symbols,
     store: &Store,
     rules: &[Lowered],
-    same: Option<RelationId>,
+    same_as: Option<RelationId>,
 ) -> Result<Vec<usize>, Errors> {
     let mut successors = vec![Vec::new(); store.relations.len()];
     for rule in rules {
@@ -208,10 +215,11 @@ fn stratify(
         }
     }
     let mut strata = components(&successors);
-    let own = strata.clone();
-    if let Some(same) = same {
+    let own_strata = strata.clone();
+    // Negation through equality is an error even though equality adds no strata.
+    if let Some(same_as) = same_as {
         let named = |relation: &usize| store.relations[*relation].predicate.is_some();
-        successors[same.0 as usize].extend((0..store.relations.len()).filter(named));
+        successors[same_as.0 as usize].extend((0..store.relations.len()).filter(named));
         strata = components(&successors);
     }
     let mut errors = Vec::new();
@@ -234,18 +242,18 @@ fn stratify(
             });
         }
     }
-    if errors.is_empty() { Ok(own) } else { Err(errors.into()) }
+    if errors.is_empty() { Ok(own_strata) } else { Err(errors.into()) }
 }
 
-/// A rule whose heads lie in several strata becomes one rule per stratum.
+/// Splits a rule whose heads lie in several strata into one rule per stratum.
 fn split_by_stratum(rules: Vec<Lowered>, strata: &[usize]) -> Vec<Lowered> {
     let mut split = Vec::with_capacity(rules.len());
     for rule in rules {
         let stratum_of = |head: &Template| strata[head.relation.0 as usize];
-        let mut wanted: Vec<usize> = rule.heads.iter().map(stratum_of).collect();
-        wanted.sort_unstable();
-        wanted.dedup();
-        for stratum in wanted {
+        let mut strata_of_heads: Vec<usize> = rule.heads.iter().map(stratum_of).collect();
+        strata_of_heads.sort_unstable();
+        strata_of_heads.dedup();
+        for stratum in strata_of_heads {
             let heads = rule.heads.iter().filter(|head| stratum_of(head) == stratum).cloned().collect();
             split.push(Lowered { heads, ..rule.clone() });
         }
@@ -258,10 +266,11 @@ impl Network {
         self.rules.iter().filter(|rule| !rule.heads.is_empty()).count()
     }
 
-    /// Plans all rules anew by the sizes that relations have now. `complete` says that the rules have been evaluated.
+    /// Plans all rules again, by the current sizes of the relations. `complete` is `true` if the rules have
+    /// been evaluated.
     ///
     /// # Errors
-    /// R304 where planning was interrupted; the plans are then as they were before.
+    /// Returns R304 if planning was interrupted. The previous plans then remain.
     pub fn plan(
         &mut self,
         store: &mut Store,
@@ -283,12 +292,13 @@ impl Network {
             }
         }
         self.plans = plans;
+        // Every rule has a plan for rederivation, so other strata have no rules.
         strata.retain(|stratum| !stratum.rederive.is_empty());
         self.readers = vec![Vec::new(); self.stratum_of.len()];
         for (number, stratum) in strata.iter().enumerate() {
-            let used = stratum.positive.keys().chain(stratum.negative.keys());
-            let used = used.chain(stratum.aggregated.keys()).chain(stratum.rederive.keys());
-            for relation in used.collect::<FxHashSet<_>>() {
+            let relations = stratum.positive.keys().chain(stratum.negative.keys());
+            let relations = relations.chain(stratum.aggregated.keys()).chain(stratum.rederive.keys());
+            for relation in relations.collect::<FxHashSet<_>>() {
                 self.readers[relation.0 as usize].push(number as u32);
             }
         }
@@ -298,6 +308,7 @@ impl Network {
     }
 }
 
+/// Creates the plans of a rule: one per condition, one per head, and one for the first evaluation.
 fn plan_rule(mut planner: Planner, plans: &mut Vec<Plan>, stratum: &mut Stratum) {
     let lowered = planner.lowered;
     let mut add = |plan: Option<Plan>| {
@@ -319,6 +330,7 @@ fn plan_rule(mut planner: Planner, plans: &mut Vec<Plan>, stratum: &mut Stratum)
     for (position, head) in lowered.heads.iter().enumerate() {
         stratum.rederive.entry(head.relation).or_default().extend(add(planner.start_at_head(position)));
     }
+    // The first evaluation starts from the smallest relation.
     let smallest = lowered.body.iter().enumerate().filter_map(|(position, condition)| match condition {
         Condition::Relation(relation, _) => Some((planner.costs.rows(*relation), position, *relation)),
         _ => None,

@@ -1,4 +1,5 @@
-//! Bindings of recorded derivations: per compiled rule one vector of slots, reused when a row goes.
+//! Bindings of recorded derivations: one vector of slots per compiled rule, with slots reused after
+//! deletion.
 
 use std::sync::Arc;
 
@@ -6,7 +7,7 @@ use crate::network::Network;
 use crate::store::Record;
 use crate::symbol::Symbol;
 
-/// The recorded bindings of all derived rows.
+/// Recorded bindings of all derived rows.
 #[derive(Clone, Default, Debug)]
 pub(crate) struct Records {
     rules: Vec<Arc<Slots>>,
@@ -25,19 +26,20 @@ impl Records {
         Self { rules: network.widths.iter().map(slots).collect() }
     }
 
-    /// Makes room for the rules of a revised network; the bindings of rules that are no more are forgotten.
+    /// Adapts the table to the rules of a revised network, and drops the bindings of removed rules.
     pub fn revise(&mut self, network: &Network, is_removed: impl Fn(u32) -> bool) {
-        let old = std::mem::take(self);
+        let previous = std::mem::take(self);
         *self = Self::new(network);
-        for (number, (slots, kept)) in self.rules.iter_mut().zip(old.rules).enumerate() {
-            if !is_removed(number as u32) && slots.width == kept.width {
-                *slots = kept;
+        for (number, (slots, previous_slots)) in self.rules.iter_mut().zip(previous.rules).enumerate() {
+            if !is_removed(number as u32) && slots.width == previous_slots.width {
+                *slots = previous_slots;
             }
         }
     }
 
     pub fn add(&mut self, rule: u32, bindings: &[Symbol]) -> Record {
         let slots = Arc::make_mut(&mut self.rules[rule as usize]);
+        // Slots have a fixed width, so a freed slot fits any later match of the rule.
         let slot = if let Some(slot) = slots.free.pop() {
             let start = slot as usize * slots.width;
             slots.bindings[start..start + slots.width].copy_from_slice(bindings);
@@ -55,7 +57,7 @@ impl Records {
         }
     }
 
-    /// The bindings of a record, none for [`Record::NONE`].
+    /// Bindings of a record; empty for [`Record::NONE`].
     pub fn get(&self, record: Record) -> &[Symbol] {
         self.rules.get(record.rule as usize).map_or(&[], |slots| {
             let start = record.slot as usize * slots.width;

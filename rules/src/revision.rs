@@ -1,9 +1,10 @@
-//! Rules that come and go while the engine runs: from a change of the program to the change of what holds.
+//! Revision of the rules of a running engine: computes the change of all facts from a change of the
+//! program.
 //!
-//! The rules that stay keep their recorded derivations. What a removed rule concluded loses its support, as if a fact
-//! of its body had gone, and is rederived where another rule concludes it too; a new rule is evaluated once over
-//! everything that holds. Everything is derived again only
-//! where the strata of the rules that stay fall apart, or where equality is switched off.
+//! Unchanged rules keep their recorded derivations. The conclusions of a removed rule lose their support,
+//! as if a fact of its body was deleted, and are rederived if another rule derives them. A new rule is
+//! evaluated once over all facts. Only two changes derive all facts again: strata of unchanged rules that
+//! split, and equality that is switched off.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -23,11 +24,11 @@ use crate::store::{RelationId, Store, state};
 use crate::vocabulary::SAME_AS;
 
 impl Engine {
-    /// Replaces the rules and returns the net change of all facts that hold, sorted. The cost depends on the rules in
-    /// which the programs differ and on what follows from them.
+    /// Replaces the rules and returns the net change of all facts that hold, sorted. The cost depends on
+    /// the difference between the programs and its consequences.
     ///
     /// # Errors
-    /// As [`Engine::new`]; the engine is then as it was before.
+    /// Returns the errors of [`Engine::new`]. After an error, the engine is in its previous state.
     pub fn set_program(&mut self, program: Program) -> Result<Delta, Errors> {
         if self.equality.is_some() && program.equality {
             return self.change(Delta::default(), program);
@@ -39,20 +40,22 @@ impl Engine {
         let revision =
             revise(&self.network, &self.program, &program, symbols, &mut self.store, &self.limits)?;
         let Some(revision) = revision else { return self.rebuild(program) };
-        let old = (Arc::clone(&self.network), Arc::clone(&self.program));
+        let previous = (Arc::clone(&self.network), Arc::clone(&self.program));
         self.program = Arc::new(program);
         self.revise(revision, Delta::default()).map_err(|error| {
-            (self.network, self.program) = old;
+            (self.network, self.program) = previous;
             self.restore(&Delta::default());
             error.into()
         })
     }
 
-    /// Changes the stated facts and the rules in one step, and returns the net change of all facts that hold, sorted. Where the
-    /// program treats `owl:sameAs` as equality and the engine's did not, equality is switched on; it stays on.
+    /// Changes the stated facts and the rules in one step, and returns the net change of all facts that
+    /// hold, sorted. If the program has equality and the engine does not, equality is switched on. It then
+    /// remains on.
     ///
     /// # Errors
-    /// As [`Engine::new`] and [`Engine::apply`]; the engine is then as it was before.
+    /// Returns the errors of [`Engine::new`] and [`Engine::apply`]. After an error, the engine is in its
+    /// previous state.
     pub fn change(&mut self, delta: Delta, program: Program) -> Result<Delta, Errors> {
         for fact in delta.insert.iter().chain(&delta.delete) {
             check_fact(fact, &self.symbols)?;
@@ -69,16 +72,17 @@ impl Engine {
         change
     }
 
-    /// Deletes first, so that a rule that comes does not see what goes.
+    /// Deletes first, so that new rules do not match deleted facts.
     fn change_plainly(&mut self, delta: Delta, program: Program) -> Result<Delta, Errors> {
-        let kept: FxHashSet<&Fact> = delta.insert.iter().collect();
-        let delete = delta.delete.iter().filter(|fact| !kept.contains(fact)).cloned().collect();
-        let gone = self.apply(Delta { insert: Vec::new(), delete })?;
+        let inserted: FxHashSet<&Fact> = delta.insert.iter().collect();
+        let delete = delta.delete.iter().filter(|fact| !inserted.contains(fact)).cloned().collect();
+        let deletions = self.apply(Delta { insert: Vec::new(), delete })?;
         let changed = self.set_program(program)?;
-        let come = self.apply(Delta { insert: delta.insert, delete: Vec::new() })?;
-        Ok(net([gone, changed, come]))
+        let insertions = self.apply(Delta { insert: delta.insert, delete: Vec::new() })?;
+        Ok(net([deletions, changed, insertions]))
     }
 
+    /// Changes facts and rules of an engine under equality, or switches equality on first.
     fn change_equally(&mut self, mut delta: Delta, mut program: Program) -> Result<Delta, Errors> {
         program.equality = true;
         let switched = if self.equality.is_none() { self.switch_on(&mut delta)? } else { Delta::default() };
@@ -87,26 +91,29 @@ impl Engine {
         Ok(net([switched, change]))
     }
 
-    /// Makes `owl:sameAs` equality, of which no rule concludes a pair: stated pairs become part of the change.
+    /// Switches equality on, if no rule derives a pair. The stated pairs are retracted, and added to the
+    /// change.
     fn switch_on(&mut self, delta: &mut Delta) -> Result<Delta, Error> {
-        let same = self.symbols_mut().name(SAME_AS);
-        let equality = Equality::new(same, &self.program);
-        let gone: FxHashSet<&Fact> = delta.delete.iter().collect();
-        let pairs = self.matching_rows(same, &[None, None]).map(|row| Fact::new(same, row.iter().copied()));
+        let same_as = self.symbols_mut().name(SAME_AS);
+        let equality = Equality::new(same_as, &self.program);
+        let deleted: FxHashSet<&Fact> = delta.delete.iter().collect();
+        let pairs =
+            self.matching_rows(same_as, &[None, None]).map(|row| Fact::new(same_as, row.iter().copied()));
         let stated: Vec<Fact> = pairs.filter(|pair| self.is_asserted(pair)).collect();
-        let kept: Vec<Fact> = stated.iter().filter(|pair| !gone.contains(pair)).cloned().collect();
-        delta.insert.extend(kept);
-        let taken = self.apply(Delta { insert: Vec::new(), delete: stated })?;
-        let relation = self.store.relation(same, 2);
-        Arc::make_mut(&mut self.network).same = Some(relation);
+        let remaining_pairs: Vec<Fact> =
+            stated.iter().filter(|pair| !deleted.contains(pair)).cloned().collect();
+        delta.insert.extend(remaining_pairs);
+        let retracted = self.apply(Delta { insert: Vec::new(), delete: stated })?;
+        let relation = self.store.relation(same_as, 2);
+        Arc::make_mut(&mut self.network).same_as = Some(relation);
         self.equality = Some(Arc::new(equality));
-        Ok(taken)
+        Ok(retracted)
     }
 
     /// Adds rules and returns the net change of all facts that hold, sorted.
     ///
     /// # Errors
-    /// As [`Engine::new`]; the engine is then as it was before.
+    /// Returns the errors of [`Engine::new`]. After an error, the engine is in its previous state.
     pub fn add_rules(&mut self, rules: impl IntoIterator<Item = Rule>) -> Result<Delta, Errors> {
         let mut program = Program::clone(&self.program);
         program.rules.extend(rules);
@@ -116,18 +123,20 @@ impl Engine {
     /// Removes every rule with this identity and returns the net change of all facts that hold, sorted.
     ///
     /// # Errors
-    /// R301 where what remains does not follow within the step budget; the engine is then as it was before.
+    /// Returns R301 if the derivation exceeds the step budget. After an error, the engine is in its
+    /// previous state.
     pub fn remove_rule(&mut self, identity: &RuleIdentity) -> Result<Delta, Errors> {
         let mut program = Program::clone(&self.program);
         program.rules.retain(|rule| rule.identity != *identity);
         self.set_program(program)
     }
 
-    /// Changes the stated rows and the rules over representatives, and returns the net change of rows. After an error the
-    /// engine is in no defined state.
+    /// Changes the stated rows and the rules over representatives, and returns the net change of rows.
+    /// After an error, the engine is in an undefined state.
     ///
-    /// All conclusions are deleted that lose their support before anything is concluded: of pairs that make one class of
-    /// names, only as many are stored as connect it, so none of these may be deleted after the others are found.
+    /// All unsupported conclusions are deleted before any rule derives new ones. Of the pairs of an
+    /// equality class only a spanning tree is stored, so none of these may be deleted after the other pairs
+    /// have been derived and dropped.
     pub(crate) fn replace_rules(
         &mut self,
         delta: Delta,
@@ -162,7 +171,7 @@ impl Engine {
             .flat_map(|&number| &self.network.rules[number as usize].heads)
             .map(|head| head.relation)
             .collect();
-        // The bindings of removed rules are needed until what they concluded is gone.
+        // The bindings of removed rules are needed until their conclusions are deleted.
         self.records.revise(&network, |_| false);
         self.network = Arc::new(network);
         let stated = state_change(self, delta);
@@ -174,7 +183,9 @@ impl Engine {
         Ok(change)
     }
 
+    /// Derives all facts again with another program.
     fn rebuild(&mut self, program: Program) -> Result<Delta, Errors> {
+        // Sorted, so that the order does not depend on the history.
         let mut stated = self.stated();
         stated.sort_unstable();
         let engine = Self::with_limits(self.symbols().clone(), program, stated, self.limits.clone())?;
@@ -185,7 +196,7 @@ impl Engine {
     }
 }
 
-/// Changes one after another as one, sorted.
+/// Composes consecutive changes into one, sorted.
 fn net(changes: impl IntoIterator<Item = Delta>) -> Delta {
     let mut signs: BTreeMap<Fact, i8> = BTreeMap::new();
     for Delta { insert, delete } in changes {
@@ -206,7 +217,8 @@ fn net(changes: impl IntoIterator<Item = Delta>) -> Delta {
     net
 }
 
-/// Rules that were compiled before give at most the error that they no longer fit together.
+/// First of several errors. Rules that were compiled before can fail only because they have no common
+/// stratification.
 fn first(errors: Errors) -> Error {
     errors.into_iter().next().unwrap_or(Error::UnknownSymbol { index: 0 })
 }

@@ -1,4 +1,4 @@
-//! Rules as data: what the engine evaluates, whatever syntax it came from.
+//! Abstract syntax of rules, independent of the text syntax.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -39,21 +39,21 @@ pub enum Atom {
     },
     /// A comparison or computation on literals, in bodies only.
     BuiltIn {
-        /// Which.
+        /// The built-in.
         built_in: BuiltIn,
         /// The result comes first, as in `swrlb`.
         arguments: Vec<Term>,
     },
-    /// The result is what the aggregate makes of all matches of a conjunction of its own, in bodies only.
+    /// `result` is the aggregate of all matches of a nested conjunction, in bodies only.
     ///
-    /// Variables that atoms outside the aggregate bind have their values there: they make the group. Without any, all
-    /// matches are one group. The others are local to the aggregate.
+    /// Variables that atoms outside the aggregate bind form the group: each group has its own value.
+    /// Without such variables, all matches form one group. All other variables are local to the aggregate.
     Aggregate {
-        /// Which.
+        /// The aggregate.
         aggregate: Aggregate,
-        /// What the aggregate of the group has to equal, or a variable that it binds.
+        /// Required value of the aggregate, or a variable that it binds.
         result: Term,
-        /// Any atoms but aggregates.
+        /// Conjunction without aggregates.
         body: Vec<Atom>,
     },
     /// Both terms denote the same individual.
@@ -62,22 +62,23 @@ pub enum Atom {
     Different(Term, Term),
 }
 
-/// What is made of the matches of a conjunction, each a distinct binding of all variables in it.
+/// Aggregate function over the matches of a conjunction. Each match is a distinct binding of all its
+/// variables.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Debug)]
 pub enum Aggregate {
-    /// How many matches there are; 0 where there are none.
+    /// Number of matches, possibly 0.
     Count,
-    /// The sum of a term over all matches, exact for decimals, else in the widest floating-point type among them; 0
-    /// where there are none. No value where one is not a number.
+    /// Sum of a term over all matches; 0 without matches. It is exact for decimals. Otherwise it has the
+    /// widest floating-point type among the values. It has no value if one of them is not a number.
     Sum(Term),
-    /// The least value of a term. No value where there is no match, or where two values do not compare.
+    /// Minimum of a term. It has no value without matches, or if two values are incomparable.
     Min(Term),
-    /// The greatest value of a term, as for the least.
+    /// Maximum of a term, with the conditions of the minimum.
     Max(Term),
 }
 
 impl Aggregate {
-    /// The word for it in rule text.
+    /// Keyword of the aggregate in rule text.
     pub fn name(self) -> &'static str {
         match self {
             Self::Count => "count",
@@ -87,7 +88,7 @@ impl Aggregate {
         }
     }
 
-    /// The aggregate of another term.
+    /// Applies a function to the aggregated term.
     pub(crate) fn map(self, term: &impl Fn(Term) -> Term) -> Self {
         match self {
             Self::Count => Self::Count,
@@ -97,7 +98,7 @@ impl Aggregate {
         }
     }
 
-    /// What is summed or compared.
+    /// Returns the aggregated term; `None` for `count`.
     pub fn value(self) -> Option<Term> {
         match self {
             Self::Count => None,
@@ -106,25 +107,26 @@ impl Aggregate {
     }
 }
 
-/// Which rule it is. Labels repeat in real knowledge bases; the position does not.
+/// Identity of a rule. Labels are often ambiguous in real knowledge bases; the position is unique within
+/// the source.
 #[derive(Clone, PartialEq, Eq, Hash, PartialOrd, Ord, Debug)]
 pub struct RuleIdentity {
-    /// The IRI of the ontology, or the file.
+    /// IRI of the ontology, or name of the file.
     pub source: Arc<str>,
-    /// What its author called it.
+    /// Label given by the author.
     pub label: Option<Arc<str>>,
-    /// The position in the source, counted from 0.
+    /// Position in the source, counted from 0.
     pub position: u32,
 }
 
 impl RuleIdentity {
-    /// An identity without a label.
+    /// Creates an identity without a label.
     pub fn new(source: impl Into<Arc<str>>, position: u32) -> Self {
         Self { source: source.into(), label: None, position }
     }
 }
 
-/// `source#position` and the label, if any.
+/// Formats the identity as `source#position`, followed by the label, if any.
 impl fmt::Display for RuleIdentity {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}#{}", self.source, self.position)?;
@@ -135,32 +137,34 @@ impl fmt::Display for RuleIdentity {
     }
 }
 
-/// If the body holds, every head atom holds. An empty head is an integrity constraint, an empty body states facts.
+/// A rule: if the body holds, every head atom holds. A rule with an empty head is an integrity constraint.
+/// A rule with an empty body states facts.
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 pub struct Rule {
-    /// Which rule it is.
+    /// Identity of the rule.
     pub identity: RuleIdentity,
     /// Conclusions.
     pub head: Vec<Atom>,
     /// Conditions.
     pub body: Vec<Atom>,
-    /// The name of each variable, without question mark, for printing; may be shorter than the variables used.
+    /// Names of the variables, without question mark, for output. The list may be shorter than the number
+    /// of variables.
     pub variables: Vec<Box<str>>,
 }
 
 impl Rule {
-    /// A rule whose variables have no names of their own.
+    /// Creates a rule whose variables have no names.
     pub fn new(identity: RuleIdentity, head: Vec<Atom>, body: Vec<Atom>) -> Self {
         Self { identity, head, body, variables: Vec::new() }
     }
 
-    /// How many variables the rule uses: one more than the largest number in it.
+    /// Number of variables: one more than the largest variable number in the rule.
     pub fn variable_count(&self) -> usize {
         let terms = self.head.iter().chain(&self.body).flat_map(Atom::terms);
         terms.filter_map(Term::as_variable).map(|v| usize::from(v.0) + 1).max().unwrap_or(0)
     }
 
-    /// The name of a variable, without question mark.
+    /// Returns the name of a variable, without question mark.
     pub fn variable_name(&self, variable: Variable) -> String {
         self.variables
             .get(usize::from(variable.0))
@@ -168,30 +172,31 @@ impl Rule {
     }
 }
 
-/// Rules that are evaluated together.
+/// A set of rules that are evaluated together.
 #[derive(Clone, PartialEq, Eq, Default, Debug)]
 pub struct Program {
-    /// In any order.
+    /// Rules in any order.
     pub rules: Vec<Rule>,
-    /// Whether `owl:sameAs` is equality, see [`Program::with_equality`]: what holds of an individual holds
-    /// of all its names. Otherwise it is a relation like any other, and every name stands for an individual of its own.
+    /// `true` if `owl:sameAs` is equality, see [`Program::with_equality`]: all names of an individual then
+    /// share its facts. Otherwise it is an ordinary relation, and different names denote different
+    /// individuals.
     pub equality: bool,
 }
 
 impl Program {
-    /// The relations that heads conclude, with the number of their arguments.
+    /// Relations in rule heads, with their numbers of arguments.
     pub(crate) fn concluded(&self, symbols: &Symbols) -> BTreeSet<(String, usize)> {
         relations(self.rules.iter().flat_map(|rule| &rule.head), symbols)
     }
 
-    /// The relations that bodies ask for, with the number of their arguments.
-    pub(crate) fn asked(&self, symbols: &Symbols) -> BTreeSet<(String, usize)> {
+    /// Relations in rule bodies, with their numbers of arguments.
+    pub(crate) fn queried(&self, symbols: &Symbols) -> BTreeSet<(String, usize)> {
         let bodies = self.rules.iter().flat_map(|rule| &rule.body);
         relations(bodies.flat_map(|atom| std::iter::once(atom).chain(atom.parts())), symbols)
     }
 }
 
-/// The relations of some atoms.
+/// Names and arities of the relations in atoms.
 fn relations<'a>(atoms: impl Iterator<Item = &'a Atom>, symbols: &Symbols) -> BTreeSet<(String, usize)> {
     let relation = |atom: &Atom| match atom {
         Atom::Relation { predicate, arguments } | Atom::Not { predicate, arguments } => {
@@ -203,7 +208,7 @@ fn relations<'a>(atoms: impl Iterator<Item = &'a Atom>, symbols: &Symbols) -> BT
 }
 
 impl Term {
-    /// The variable, where the term is one.
+    /// Returns the variable if the term is a variable.
     pub fn as_variable(self) -> Option<Variable> {
         match self {
             Self::Variable(variable) => Some(variable),
@@ -225,12 +230,12 @@ impl From<Symbol> for Term {
 }
 
 impl Atom {
-    /// `predicate(arguments)`.
+    /// Creates the atom `predicate(arguments)`.
     pub fn relation(predicate: Symbol, arguments: impl IntoIterator<Item = Term>) -> Self {
         Self::Relation { predicate, arguments: arguments.into_iter().collect() }
     }
 
-    /// The atoms within an aggregate, none of any other atom.
+    /// Atoms within an aggregate; empty for any other atom.
     pub fn parts(&self) -> &[Self] {
         match self {
             Self::Aggregate { body, .. } => body,
@@ -238,12 +243,12 @@ impl Atom {
         }
     }
 
-    /// The arguments, in order; of an aggregate, its result, its value and the arguments of its atoms.
+    /// Arguments in order. For an aggregate: its result, its value and the arguments of its atoms.
     pub fn terms(&self) -> Vec<Term> {
         match self {
             Self::Aggregate { aggregate, result, body } => {
-                let own = std::iter::once(*result).chain(aggregate.value());
-                own.chain(body.iter().flat_map(Self::terms)).collect()
+                let terms = std::iter::once(*result).chain(aggregate.value());
+                terms.chain(body.iter().flat_map(Self::terms)).collect()
             }
             Self::Relation { arguments, .. }
             | Self::Not { arguments, .. }

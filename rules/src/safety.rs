@@ -1,8 +1,8 @@
-//! What is wrong with a rule by itself: arities, head atoms, variables that nothing binds; and which variables and
-//! atoms an aggregate takes from outside.
+//! Safety checks of single rules: arities, head atoms and unbound variables. Also determines the variables
+//! and atoms that an aggregate shares with the rest of the body.
 //!
-//! Relation atoms bind their variables; an equality, a built-in function or an aggregate binds one more once the others
-//! are bound. Aggregates are put into an order in which each has its group before it.
+//! Relation atoms bind their variables. An equality, a built-in function or an aggregate binds another
+//! variable once its inputs are bound. Aggregates are ordered such that the group of each is bound before.
 
 use std::collections::BTreeSet;
 
@@ -11,23 +11,23 @@ use crate::plan::Bound;
 use crate::rule::{Atom, Rule, Term};
 use crate::source::Source;
 
-/// What an aggregate takes from outside and what is its own.
+/// Variables and atoms that an aggregate shares with its rule.
 #[derive(Clone, Debug)]
 pub(crate) struct Scope {
-    /// Its position in the body.
-    pub at: usize,
-    /// Variables that atoms outside bind, ascending.
+    /// Position of the aggregate in the body.
+    pub position: usize,
+    /// Variables that atoms outside the aggregate bind, in ascending order.
     pub group: Vec<u16>,
-    /// Its other variables, ascending.
+    /// Other variables of the aggregate, in ascending order.
     pub locals: Vec<u16>,
-    /// Positions of the atoms outside that have to bind the group because the aggregate's own do not; empty otherwise.
+    /// Positions of the outer atoms that bind group variables if the aggregate's own atoms do not.
     pub context: Vec<usize>,
 }
 
-/// How the variables of a body come to their values.
+/// Variables bound by a body, and the evaluation order of its aggregates.
 pub(crate) struct Binding {
     bound: Bound,
-    /// The aggregates, each after those whose results it takes.
+    /// Aggregates in an order in which each comes after the aggregates whose results it needs.
     pub scopes: Vec<Scope>,
 }
 
@@ -35,7 +35,7 @@ fn sources(terms: &[Term]) -> Vec<Source> {
     terms.iter().copied().map(Source::from).collect()
 }
 
-/// The variables in terms, ascending.
+/// Variables among terms, in ascending order.
 fn variables(terms: &[Term]) -> Vec<u16> {
     let mut numbers: Vec<u16> = terms.iter().filter_map(|term| Some(term.as_variable()?.0)).collect();
     numbers.sort_unstable();
@@ -43,7 +43,7 @@ fn variables(terms: &[Term]) -> Vec<u16> {
     numbers
 }
 
-/// The variables within an aggregate, its result left out.
+/// Variables within an aggregate, except its result.
 fn inner_variables(atom: &Atom) -> Vec<u16> {
     match atom {
         Atom::Aggregate { .. } => variables(&atom.terms()[1..]),
@@ -51,7 +51,8 @@ fn inner_variables(atom: &Atom) -> Vec<u16> {
     }
 }
 
-/// Binds what atoms other than aggregates bind, until nothing changes; `optimistic` has aggregates bind their results.
+/// Computes the closure of the bound variables under the atoms. Aggregates bind their results only if
+/// `optimistic`.
 fn close(atoms: &[Atom], bound: &mut Bound, optimistic: bool) {
     loop {
         let before = bound.clone();
@@ -59,8 +60,8 @@ fn close(atoms: &[Atom], bound: &mut Bound, optimistic: bool) {
             let terms = sources(&atom.terms());
             let binds: &[Source] = match atom {
                 Atom::Relation { .. } => &terms,
-                Atom::Same(..) if terms.iter().any(|&term| bound.knows(term)) => &terms,
-                Atom::BuiltIn { built_in, .. } if built_in.binds(&bound.known(&terms)) => &terms,
+                Atom::Same(..) if terms.iter().any(|&term| bound.is_bound(term)) => &terms,
+                Atom::BuiltIn { built_in, .. } if built_in.binds(&bound.bound_flags(&terms)) => &terms,
                 Atom::Aggregate { .. } if optimistic => &terms[..1],
                 _ => &[],
             };
@@ -76,45 +77,48 @@ fn close(atoms: &[Atom], bound: &mut Bound, optimistic: bool) {
     }
 }
 
-/// How the variables of a rule's body come to their values.
+/// Analyses which variables the body of a rule binds, and in which order its aggregates are evaluated.
 pub(crate) fn binding(rule: &Rule) -> Binding {
-    let none = Bound(vec![false; rule.variable_count()]);
-    let mut bound = none.clone();
+    let initial = Bound(vec![false; rule.variable_count()]);
+    let mut bound = initial.clone();
     if !rule.body.iter().any(|atom| matches!(atom, Atom::Aggregate { .. })) {
         close(&rule.body, &mut bound, false);
         return Binding { bound, scopes: Vec::new() };
     }
-    let mut outside = none.clone();
-    close(&rule.body, &mut outside, true);
+    // Variables bound outside of aggregates, if every aggregate yields its result.
+    let mut outer = initial.clone();
+    close(&rule.body, &mut outer, true);
     let mut scopes: Vec<Scope> = Vec::new();
     loop {
         close(&rule.body, &mut bound, false);
-        let is_next = |&at: &usize| {
-            let Atom::Aggregate { .. } = &rule.body[at] else { return false };
-            let group = inner_variables(&rule.body[at]);
-            let mut group = group.iter().map(|&number| usize::from(number)).filter(|&n| outside.0[n]);
-            group.all(|number| bound.0[number]) && scopes.iter().all(|scope| scope.at != at)
+        let is_next = |&position: &usize| {
+            let Atom::Aggregate { .. } = &rule.body[position] else { return false };
+            let group = inner_variables(&rule.body[position]);
+            let mut group = group.iter().map(|&number| usize::from(number)).filter(|&n| outer.0[n]);
+            group.all(|number| bound.0[number]) && scopes.iter().all(|scope| scope.position != position)
         };
-        let Some(at) = (0..rule.body.len()).find(is_next) else { return Binding { bound, scopes } };
-        scopes.push(scope(rule, at, &bound, &scopes));
-        if let Some(&Source::Variable(result)) = sources(&rule.body[at].terms()).first() {
+        let Some(position) = (0..rule.body.len()).find(is_next) else { return Binding { bound, scopes } };
+        scopes.push(scope(rule, position, &bound, &scopes));
+        if let Some(&Source::Variable(result)) = sources(&rule.body[position].terms()).first() {
             bound.bind(result);
         }
     }
 }
 
-fn scope(rule: &Rule, at: usize, bound: &Bound, earlier: &[Scope]) -> Scope {
-    let inner = inner_variables(&rule.body[at]);
+fn scope(rule: &Rule, position: usize, bound: &Bound, earlier: &[Scope]) -> Scope {
+    let inner = inner_variables(&rule.body[position]);
     let (group, locals): (Vec<u16>, Vec<u16>) = inner.iter().partition(|&&n| bound.0[usize::from(n)]);
-    let mut alone = Bound(vec![false; rule.variable_count()]);
-    close(rule.body[at].parts(), &mut alone, false);
-    let open: Vec<u16> = group.iter().copied().filter(|&number| !alone.0[usize::from(number)]).collect();
+    let mut inner_bound = Bound(vec![false; rule.variable_count()]);
+    close(rule.body[position].parts(), &mut inner_bound, false);
+    let open: Vec<u16> =
+        group.iter().copied().filter(|&number| !inner_bound.0[usize::from(number)]).collect();
     let context = context(rule, &open, bound, earlier);
-    Scope { at, group, locals, context }
+    Scope { position, group, locals, context }
 }
 
-/// Positions of atoms that bind variables for an aggregate: one relation for each where that is enough, so that the
-/// aggregate depends on as little as possible, else all that can be evaluated.
+/// Positions of atoms that bind variables for an aggregate. Prefers one relation atom per variable, so that
+/// the aggregate depends on few relations. If some variable occurs in no relation atom, returns all atoms
+/// that can be evaluated.
 fn context(rule: &Rule, variables: &[u16], bound: &Bound, earlier: &[Scope]) -> Vec<usize> {
     let relation_with = |&number: &u16| {
         rule.body.iter().position(|atom| {
@@ -124,8 +128,8 @@ fn context(rule: &Rule, variables: &[u16], bound: &Bound, earlier: &[Scope]) -> 
     };
     let relations: Option<BTreeSet<usize>> = variables.iter().map(relation_with).collect();
     let usable = |&other: &usize| match &rule.body[other] {
-        Atom::Aggregate { .. } => earlier.iter().any(|scope| scope.at == other),
-        atom => bound.knows_all(&sources(&atom.terms())),
+        Atom::Aggregate { .. } => earlier.iter().any(|scope| scope.position == other),
+        atom => bound.are_bound(&sources(&atom.terms())),
     };
     match relations {
         Some(relations) => relations.into_iter().collect(),
@@ -133,12 +137,12 @@ fn context(rule: &Rule, variables: &[u16], bound: &Bound, earlier: &[Scope]) -> 
     }
 }
 
-/// Which variables the atoms of the body bind, those of aggregates' own left out.
+/// By variable: `true` if the body binds it. Variables local to aggregates are not bound.
 pub(crate) fn bound_variables(rule: &Rule) -> Vec<bool> {
     binding(rule).bound.0
 }
 
-/// The errors of one rule: built-in arities, forbidden head atoms, variables that nothing binds.
+/// Returns the errors of one rule: arities of atoms, forbidden head atoms, unbound variables.
 pub(crate) fn check(rule: &Rule) -> Vec<Error> {
     let mut errors = Vec::new();
     let identity = || rule.identity.clone();
@@ -182,15 +186,15 @@ fn unbound(rule: &Rule) -> Vec<Error> {
     let Binding { bound, scopes } = binding(rule);
     let mut missing: Vec<(bool, u16)> = Vec::new();
     let is_bound = |number: &u16| bound.0[usize::from(*number)];
-    for (at, atom) in rule.body.iter().enumerate() {
+    for (position, atom) in rule.body.iter().enumerate() {
         let Atom::Aggregate { body, .. } = atom else {
             missing.extend(variables(&atom.terms()).into_iter().filter(|n| !is_bound(n)).map(|n| (false, n)));
             continue;
         };
-        let own = variables(&atom.terms()[..1]);
-        missing.extend(own.into_iter().filter(|n| !is_bound(n)).map(|n| (false, n)));
-        // One that has no place in the order waits for a result that is reported by itself.
-        let Some(scope) = scopes.iter().find(|scope| scope.at == at) else { continue };
+        let result_variables = variables(&atom.terms()[..1]);
+        missing.extend(result_variables.into_iter().filter(|n| !is_bound(n)).map(|n| (false, n)));
+        // An aggregate without a scope waits for the result of another aggregate, which is reported itself.
+        let Some(scope) = scopes.iter().find(|scope| scope.position == position) else { continue };
         let mut inner = Bound(vec![false; bound.0.len()]);
         scope.group.iter().for_each(|&number| inner.bind(number));
         close(body, &mut inner, false);

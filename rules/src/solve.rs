@@ -1,4 +1,4 @@
-//! The step of a join that gives values to the arguments of a built-in that have none, in all ways in which it holds.
+//! Join step for a built-in with unbound arguments: enumerates the values for which the built-in holds.
 
 use crate::builtin::BuiltIn;
 use crate::fixpoint::{Round, intern, resolve};
@@ -7,23 +7,23 @@ use crate::source::Source;
 use crate::symbol::Symbol;
 
 impl Round<'_> {
-    /// Extends matches by all values that a built-in gives to the arguments that are not known.
+    /// Extends matches by all values that a built-in admits for its unbound arguments.
     pub fn solve(
         &self,
         block: &[Symbol],
         width: usize,
         rule: u32,
         built_in: BuiltIn,
-        (arguments, known): (&[Source], &[bool]),
+        (arguments, is_known): (&[Source], &[bool]),
     ) -> Vec<Symbol> {
         let mut symbols = self.symbols.borrow_mut();
-        let mut longer = Vec::new();
+        let mut extended = Vec::new();
         for bound in block.chunks_exact(width) {
-            let literal = |(&source, known): (&Source, &bool)| {
-                if *known { symbols.as_literal(resolve(source, bound)).map(Some) } else { Some(None) }
+            let literal = |(&source, is_known): (&Source, &bool)| {
+                if *is_known { symbols.as_literal(resolve(source, bound)).map(Some) } else { Some(None) }
             };
-            let given: Option<Vec<Option<&Literal>>> = arguments.iter().zip(known).map(literal).collect();
-            for values in given.map(|given| built_in.solve(&given)).unwrap_or_default() {
+            let inputs: Option<Vec<Option<&Literal>>> = arguments.iter().zip(is_known).map(literal).collect();
+            for values in inputs.map(|inputs| built_in.solve(&inputs)).unwrap_or_default() {
                 let before = symbols.len();
                 let values: Vec<Symbol> =
                     values.into_iter().map(|value| intern(&mut symbols, value)).collect();
@@ -33,28 +33,28 @@ impl Round<'_> {
                 if !self.budget.spend(1, rule) || (is_new && !self.budget.spend_on_value(largest, rule)) {
                     return Vec::new();
                 }
-                longer.extend(bind_open(bound, (arguments, known), &values).unwrap_or_default());
+                extended.extend(bind_open(bound, (arguments, is_known), &values).unwrap_or_default());
             }
         }
-        longer
+        extended
     }
 }
 
-/// A match with values for the arguments that were not known; none where one variable would have two.
+/// Extends a match by values for the unbound arguments. `None` if a variable would have two values.
 fn bind_open(
     bound: &[Symbol],
-    (arguments, known): (&[Source], &[bool]),
+    (arguments, is_known): (&[Source], &[bool]),
     values: &[Symbol],
 ) -> Option<Vec<Symbol>> {
-    let (mut longer, mut seen) = (bound.to_vec(), Vec::new());
-    let open = arguments.iter().zip(known).filter(|(_, known)| !**known);
+    let (mut extended, mut assigned) = (bound.to_vec(), Vec::new());
+    let open = arguments.iter().zip(is_known).filter(|(_, is_known)| !**is_known);
     for ((source, _), &value) in open.zip(values) {
         let Source::Variable(number) = *source else { continue };
-        if seen.contains(&number) && longer[usize::from(number)] != value {
+        if assigned.contains(&number) && extended[usize::from(number)] != value {
             return None;
         }
-        seen.push(number);
-        longer[usize::from(number)] = value;
+        assigned.push(number);
+        extended[usize::from(number)] = value;
     }
-    Some(longer)
+    Some(extended)
 }

@@ -1,9 +1,9 @@
-//! Where the steps of a plan take their values from.
+//! Operands of the steps of a plan.
 
 use crate::rule::{Term, Variable};
 use crate::symbol::Symbol;
 
-/// Where a step takes a value from.
+/// Operand of a step: a variable of the current match or a constant.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Source {
     Variable(u16),

@@ -1,8 +1,9 @@
-//! The facts that hold, as columns of symbols with hash indexes on exactly the columns that rules look up.
+//! Store of the facts that hold: rows of symbols, with hash indexes on exactly the columns that rules look
+//! up.
 //!
-//! A relation holds the facts of one predicate and arity. A row is a number; its arguments lie side by side in one
-//! vector, its state in a byte. An index threads the rows with equal key columns into a doubly linked list, so that
-//! insertion and deletion cost O(indexes) and allocate nothing per row.
+//! A relation holds the facts of one predicate and arity. A row is a number. Its arguments are contiguous
+//! in one vector, and its state is one byte. An index links the rows with equal key columns into a doubly
+//! linked list, so that insertion and deletion take O(indexes) time and allocate nothing per row.
 
 use hashbrown::HashTable;
 use rustc_hash::{FxBuildHasher, FxHashMap};
@@ -12,32 +13,34 @@ use std::sync::Arc;
 use crate::fact::{Arguments, Fact};
 use crate::symbol::Symbol;
 
-/// A position in [`Store::relations`].
+/// Index into [`Store::relations`].
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Debug)]
 pub(crate) struct RelationId(pub u32);
 
-/// A row of a relation.
+/// Number of a row in a relation.
 pub(crate) type Row = u32;
 
-const NONE: Row = Row::MAX;
+/// End of a linked list of rows.
+const NO_ROW: Row = Row::MAX;
 
 /// State bits of a row.
 pub(crate) mod state {
     /// The row is unused.
     pub const FREE: u8 = 1;
-    /// Part of the change that the current round starts from.
+    /// The row is in the delta of the current round.
     pub const FRESH: u8 = 2;
-    /// Concluded in the current round, invisible until the next.
+    /// The row was derived in the current round, and is invisible until the next.
     pub const PENDING: u8 = 4;
-    /// Lost its support in this update; removed at its end unless revived.
+    /// The row lost its support in this update. It is removed at the end of the update unless it is
+    /// rederived.
     pub const DOOMED: u8 = 8;
-    /// Stated, not only derived.
+    /// The row is stated, not only derived.
     pub const ASSERTED: u8 = 16;
-    /// Did not hold before this update.
+    /// The row did not hold before this update.
     pub const NEW: u8 = 32;
 }
 
-/// Why a row was derived: which compiled rule, and which of its recorded bindings.
+/// Recorded derivation of a row: the compiled rule, and the slot of its bindings.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Record {
     pub rule: u32,
@@ -45,11 +48,11 @@ pub(crate) struct Record {
 }
 
 impl Record {
-    /// No derivation is recorded.
+    /// No recorded derivation.
     pub const NONE: Self = Self { rule: u32::MAX, slot: 0 };
 }
 
-/// All relations. A clone shares each until one of the two changes it.
+/// All relations. A clone shares each relation until one of the two changes it.
 #[derive(Clone, Default, Debug)]
 pub(crate) struct Store {
     pub relations: Vec<Arc<Relation>>,
@@ -61,7 +64,7 @@ impl Store {
         self.by_predicate.get(&(predicate, arity as u32)).copied()
     }
 
-    /// The relation of a predicate, created on first use.
+    /// Relation of a predicate, created on first use.
     pub fn relation(&mut self, predicate: Symbol, arity: usize) -> RelationId {
         if let Some(id) = self.find(predicate, arity) {
             return id;
@@ -71,7 +74,7 @@ impl Store {
         id
     }
 
-    /// Adds rows that are stated, where they are not there yet.
+    /// Inserts stated rows, unless they exist.
     pub fn state(&mut self, facts: Vec<Fact>) {
         for fact in facts {
             let relation = self.relation(fact.predicate, fact.arguments.len());
@@ -82,14 +85,19 @@ impl Store {
         }
     }
 
-    /// A relation that belongs to no predicate: the matches of an integrity constraint or of an aggregate. One that is
-    /// empty and not taken is used again, if its number is not below `first`.
-    pub fn anonymous(&mut self, arity: usize, first: u32, taken: impl Fn(RelationId) -> bool) -> RelationId {
+    /// Relation without a predicate, for the matches of an integrity constraint or of an aggregate. Reuses
+    /// an empty unused relation with a number of at least `first`, if there is one.
+    pub fn anonymous(
+        &mut self,
+        arity: usize,
+        first: u32,
+        is_used: impl Fn(RelationId) -> bool,
+    ) -> RelationId {
         let fits = |relation: &Relation| {
             relation.predicate.is_none() && relation.arity == arity && relation.len() == 0
         };
         let mut ids = (first..self.relations.len() as u32).map(RelationId);
-        let unused = ids.find(|&id| fits(self.get(id)) && !taken(id));
+        let unused = ids.find(|&id| fits(self.get(id)) && !is_used(id));
         unused.unwrap_or_else(|| self.push(Relation::new(None, arity)))
     }
 
@@ -99,7 +107,7 @@ impl Store {
         id
     }
 
-    /// How many facts are stored, matches of constraints included.
+    /// Number of stored facts, including matches of constraints.
     pub fn len(&self) -> usize {
         self.relations.iter().map(|relation| relation.len()).sum()
     }
@@ -113,7 +121,7 @@ impl Store {
     }
 }
 
-/// The facts of one predicate and arity.
+/// Facts of one predicate and arity.
 #[derive(Clone, Debug)]
 pub(crate) struct Relation {
     /// `None` for the matches of a constraint or an aggregate.
@@ -127,27 +135,28 @@ pub(crate) struct Relation {
     free: Vec<Row>,
 }
 
-/// Rows by the values of some columns.
+/// Hash index: rows by the values of some columns.
 #[derive(Clone, Debug)]
 struct Index {
     columns: u32,
-    /// The rule whose conclusions are left out.
-    without: Option<u32>,
+    /// Rule whose derived rows are not in the index.
+    excluded_rule: Option<u32>,
     heads: HashTable<Row>,
     next: Vec<Row>,
     previous: Vec<Row>,
 }
 
-/// The columns of a bit mask, in ascending order.
+/// Columns of a bit mask, in ascending order.
 pub(crate) fn columns(mask: u32) -> impl Iterator<Item = usize> {
-    let mut rest = mask;
+    let mut remaining = mask;
     std::iter::from_fn(move || {
-        let column = rest.trailing_zeros() as usize;
-        rest &= rest.wrapping_sub(1);
+        let column = remaining.trailing_zeros() as usize;
+        remaining &= remaining.wrapping_sub(1);
         (column < 32).then_some(column)
     })
 }
 
+// Combines the symbols first, so that the hasher runs once per key.
 fn hash(key: impl Iterator<Item = Symbol>) -> u64 {
     let mut hash = 0_u64;
     for symbol in key {
@@ -170,17 +179,17 @@ impl Relation {
         }
     }
 
-    /// How many facts are stored, whatever their state.
+    /// Number of stored facts in any state.
     pub fn len(&self) -> usize {
         self.rows.len()
     }
 
-    /// Arguments per fact.
+    /// Number of arguments per fact.
     pub fn arity(&self) -> usize {
         self.arity
     }
 
-    /// One more than the largest row in use.
+    /// Upper bound (exclusive) on the numbers of rows in use.
     pub fn bound(&self) -> Row {
         self.states.len() as Row
     }
@@ -190,17 +199,17 @@ impl Relation {
         &self.arguments[start..start + self.arity]
     }
 
-    /// The row as a fact; `None` for the matches of a constraint.
+    /// Returns the row as a fact; `None` for the matches of a constraint.
     pub fn fact(&self, row: Row) -> Option<Fact> {
         Some(Fact { predicate: self.predicate?, arguments: Arguments::from_slice(self.row(row)) })
     }
 
-    /// Removes every row; keeps the indexes.
+    /// Removes all rows and keeps the indexes.
     pub fn clear_all(&mut self) {
         let indexes = std::mem::take(&mut self.indexes);
         *self = Self::new(self.predicate, self.arity);
         for index in indexes {
-            self.index_without(index.columns, index.without);
+            self.index_without(index.columns, index.excluded_rule);
         }
     }
 
@@ -221,11 +230,12 @@ impl Relation {
     }
 
     pub fn set_record(&mut self, row: Row, record: Record) {
-        let before = std::mem::replace(&mut self.records[row as usize], record);
-        let (all, arity) = (&self.arguments, self.arity);
-        let row_of = |row: Row| &all[row as usize * arity..(row as usize + 1) * arity];
+        let old_record = std::mem::replace(&mut self.records[row as usize], record);
+        let (values, arity) = (&self.arguments, self.arity);
+        let row_of = |row: Row| &values[row as usize * arity..(row as usize + 1) * arity];
+        // Indexes with an excluded rule depend on the record of a row.
         for index in &mut self.indexes {
-            match (index.has(before), index.has(record)) {
+            match (index.has(old_record), index.has(record)) {
                 (true, false) => index.remove(row, row_of),
                 (false, true) => index.insert(row, row_of),
                 _ => {}
@@ -237,7 +247,7 @@ impl Relation {
         self.rows.find(hash(arguments.iter().copied()), |&row| self.row(row) == arguments).copied()
     }
 
-    /// Adds a row that is not there yet.
+    /// Inserts a row that does not exist yet.
     pub fn insert(&mut self, arguments: &[Symbol], state: u8, record: Record) -> Row {
         let row = if let Some(row) = self.free.pop() {
             let start = row as usize * self.arity;
@@ -251,8 +261,8 @@ impl Relation {
             self.records.push(record);
             self.states.len() as Row - 1
         };
-        let (all, arity) = (&self.arguments, self.arity);
-        let row_of = |row: Row| &all[row as usize * arity..(row as usize + 1) * arity];
+        let (values, arity) = (&self.arguments, self.arity);
+        let row_of = |row: Row| &values[row as usize * arity..(row as usize + 1) * arity];
         self.rows
             .insert_unique(hash(arguments.iter().copied()), row, |&row| hash(row_of(row).iter().copied()));
         for index in self.indexes.iter_mut().filter(|index| index.has(record)) {
@@ -261,10 +271,10 @@ impl Relation {
         row
     }
 
-    /// Removes a row for good; its number may be used again.
+    /// Removes a row. Its number may be reused.
     pub fn remove(&mut self, row: Row) {
-        let (all, arity) = (&self.arguments, self.arity);
-        let row_of = |row: Row| &all[row as usize * arity..(row as usize + 1) * arity];
+        let (values, arity) = (&self.arguments, self.arity);
+        let row_of = |row: Row| &values[row as usize * arity..(row as usize + 1) * arity];
         if let Ok(entry) = self.rows.find_entry(hash(row_of(row).iter().copied()), |&other| other == row) {
             entry.remove();
         }
@@ -278,56 +288,59 @@ impl Relation {
     }
 
     pub fn has_index(&self, columns: u32) -> bool {
-        self.indexes.iter().any(|index| index.columns == columns && index.without.is_none())
+        self.indexes.iter().any(|index| index.columns == columns && index.excluded_rule.is_none())
     }
 
-    /// The number of the index on these columns, built on first use.
+    /// Number of the index on these columns, which is built on first use.
     pub fn index(&mut self, columns: u32) -> usize {
         self.index_without(columns, None)
     }
 
-    /// The number of the index on these columns of all rows but those that a rule has concluded, built on first use.
-    pub fn index_without(&mut self, columns: u32, without: Option<u32>) -> usize {
-        let same = |index: &Index| index.columns == columns && index.without == without;
-        if let Some(position) = self.indexes.iter().position(same) {
+    /// Number of the index on these columns of all rows except those derived by a rule. It is built on
+    /// first use.
+    pub fn index_without(&mut self, columns: u32, excluded_rule: Option<u32>) -> usize {
+        let is_same = |index: &Index| index.columns == columns && index.excluded_rule == excluded_rule;
+        if let Some(position) = self.indexes.iter().position(is_same) {
             return position;
         }
         let (heads, next, previous) = (HashTable::new(), Vec::new(), Vec::new());
-        let mut index = Index { columns, without, heads, next, previous };
-        let (all, arity) = (&self.arguments, self.arity);
+        let mut index = Index { columns, excluded_rule, heads, next, previous };
+        let (values, arity) = (&self.arguments, self.arity);
         for row in 0..self.states.len() as Row {
             if self.states[row as usize] & state::FREE == 0 && index.has(self.records[row as usize]) {
-                index.insert(row, |row| &all[row as usize * arity..(row as usize + 1) * arity]);
+                index.insert(row, |row| &values[row as usize * arity..(row as usize + 1) * arity]);
             }
         }
         self.indexes.push(index);
         self.indexes.len() - 1
     }
 
-    /// The index on the most columns among those given, with its columns.
+    /// Index on the largest subset of the given columns, with its columns.
     pub fn best_index(&self, bound: u32) -> Option<(usize, u32)> {
-        let fits = |index: &Index| index.columns & !bound == 0 && index.without.is_none();
+        let fits = |index: &Index| index.columns & !bound == 0 && index.excluded_rule.is_none();
         let usable = self.indexes.iter().enumerate().filter(|(_, index)| fits(index));
-        usable.max_by_key(|(_, index)| index.columns.count_ones()).map(|(at, index)| (at, index.columns))
+        usable
+            .max_by_key(|(_, index)| index.columns.count_ones())
+            .map(|(position, index)| (position, index.columns))
     }
 
-    /// The rows whose indexed columns have these values, in ascending column order.
+    /// Rows whose indexed columns have the values of the key, in ascending order of the columns.
     pub fn lookup<'a>(&'a self, index: usize, key: &[Symbol]) -> Rows<'a> {
         let index = &self.indexes[index];
-        let same = |&row: &Row| {
+        let has_key = |&row: &Row| {
             columns(index.columns).zip(key).all(|(column, &value)| self.row(row)[column] == value)
         };
-        let next = index.heads.find(hash(key.iter().copied()), same).copied().unwrap_or(NONE);
+        let next = index.heads.find(hash(key.iter().copied()), has_key).copied().unwrap_or(NO_ROW);
         Rows { links: &index.next, next }
     }
 
-    /// Every row in use.
+    /// All rows in use.
     pub fn scan(&self) -> impl Iterator<Item = Row> + '_ {
         (0..self.bound()).filter(|&row| self.state(row) & state::FREE == 0)
     }
 }
 
-/// The rows of one key.
+/// Iterator over the rows of one key.
 pub(crate) struct Rows<'a> {
     links: &'a [Row],
     next: Row,
@@ -338,7 +351,7 @@ impl Iterator for Rows<'_> {
 
     fn next(&mut self) -> Option<Row> {
         let row = self.next;
-        if row == NONE {
+        if row == NO_ROW {
             return None;
         }
         self.next = self.links[row as usize];
@@ -347,9 +360,9 @@ impl Iterator for Rows<'_> {
 }
 
 impl Index {
-    /// Whether rows with this record are in it.
+    /// Returns `true` if rows with this record are in the index.
     fn has(&self, record: Record) -> bool {
-        self.without.is_none_or(|rule| rule != record.rule)
+        self.excluded_rule.is_none_or(|rule| rule != record.rule)
     }
 
     fn key(mask: u32, row: &[Symbol]) -> impl Iterator<Item = Symbol> + '_ {
@@ -357,37 +370,37 @@ impl Index {
     }
 
     fn insert<'a>(&mut self, row: Row, row_of: impl Fn(Row) -> &'a [Symbol]) {
-        let needed = row as usize + 1;
-        if self.next.len() < needed {
-            self.next.resize(needed, NONE);
-            self.previous.resize(needed, NONE);
+        let length = row as usize + 1;
+        if self.next.len() < length {
+            self.next.resize(length, NO_ROW);
+            self.previous.resize(length, NO_ROW);
         }
         let mask = self.columns;
         let hash_of = |row: Row| hash(Self::key(mask, row_of(row)));
-        let same = |&head: &Row| Self::key(mask, row_of(head)).eq(Self::key(mask, row_of(row)));
-        self.previous[row as usize] = NONE;
-        if let Some(head) = self.heads.find_mut(hash_of(row), same) {
+        let has_key = |&head: &Row| Self::key(mask, row_of(head)).eq(Self::key(mask, row_of(row)));
+        self.previous[row as usize] = NO_ROW;
+        if let Some(head) = self.heads.find_mut(hash_of(row), has_key) {
             self.next[row as usize] = *head;
             self.previous[*head as usize] = row;
             *head = row;
         } else {
-            self.next[row as usize] = NONE;
+            self.next[row as usize] = NO_ROW;
             self.heads.insert_unique(hash_of(row), row, |&row| hash_of(row));
         }
     }
 
     fn remove<'a>(&mut self, row: Row, row_of: impl Fn(Row) -> &'a [Symbol]) {
         let (next, previous) = (self.next[row as usize], self.previous[row as usize]);
-        if next != NONE {
+        if next != NO_ROW {
             self.previous[next as usize] = previous;
         }
-        if previous != NONE {
+        if previous != NO_ROW {
             self.next[previous as usize] = next;
             return;
         }
         let hash = hash(Self::key(self.columns, row_of(row)));
         if let Ok(mut entry) = self.heads.find_entry(hash, |&head| head == row) {
-            if next == NONE {
+            if next == NO_ROW {
                 entry.remove();
             } else {
                 *entry.get_mut() = next;

@@ -1,12 +1,12 @@
-//! Orders relations so that each is complete before anything negates it: strongly connected components of "is used
-//! to derive", dependencies first ([1]).
+//! Stratification: orders relations such that each is complete before a rule negates it. The strata are the
+//! strongly connected components of the relation "is used to derive", dependencies first ([1]).
 //!
-//! One stratum per component, not per negation: what over-deletion removes in a component is rederived before the
-//! next one looks at it.
+//! Every component is a stratum, even without negation. Thus rows that are over-deleted in a component are
+//! rederived before later components see them.
 //!
 //! [1] Tarjan, "Depth-first search and linear graph algorithms", SIAM Journal on Computing 1(2), 1972.
 
-/// The component of each node, numbered so that every edge leads to the same or a larger number.
+/// Component of each node, numbered such that every edge leads to the same or a larger number.
 pub(crate) fn components(successors: &[Vec<usize>]) -> Vec<usize> {
     let mut search = Search {
         successors,
@@ -15,15 +15,15 @@ pub(crate) fn components(successors: &[Vec<usize>]) -> Vec<usize> {
         component: vec![None; successors.len()],
         stack: Vec::new(),
         visited: 0,
-        closed: 0,
+        component_count: 0,
     };
     for node in 0..successors.len() {
         if search.order[node].is_none() {
             search.visit(node);
         }
     }
-    // Tarjan closes sinks first; the numbers are turned round.
-    search.component.iter().map(|number| search.closed - 1 - number.unwrap_or(0)).collect()
+    // Tarjan's algorithm finds sinks first, so the numbers are reversed.
+    search.component.iter().map(|number| search.component_count - 1 - number.unwrap_or(0)).collect()
 }
 
 struct Search<'a> {
@@ -33,16 +33,17 @@ struct Search<'a> {
     component: Vec<Option<usize>>,
     stack: Vec<usize>,
     visited: usize,
-    closed: usize,
+    component_count: usize,
 }
 
 impl Search<'_> {
-    /// Depth-first search with its own stack, so that long chains of rules cannot overflow the thread's.
+    /// Depth-first search with an explicit stack, so that long chains of rules cannot overflow the thread's
+    /// stack.
     fn visit(&mut self, root: usize) {
         let mut path = vec![(root, 0)];
         self.open(root);
         while let Some((node, position)) = path.pop() {
-            let Some(&next) = self.successors[node].get(position) else {
+            let Some(&successor) = self.successors[node].get(position) else {
                 self.close(node);
                 if let Some(&(parent, _)) = path.last() {
                     self.low[parent] = self.low[parent].min(self.low[node]);
@@ -50,10 +51,10 @@ impl Search<'_> {
                 continue;
             };
             path.push((node, position + 1));
-            match self.order[next] {
+            match self.order[successor] {
                 None => {
-                    self.open(next);
-                    path.push((next, 0));
+                    self.open(successor);
+                    path.push((successor, 0));
                 }
                 Some(order) if self.component[next].is_none() => self.low[node] = self.low[node].min(order),
                 Some(_) => {}
@@ -73,11 +74,11 @@ impl Search<'_> {
             return;
         }
         while let Some(member) = self.stack.pop() {
-            self.component[member] = Some(self.closed);
+            self.component[member] = Some(self.component_count);
             if member == node {
                 break;
             }
         }
-        self.closed += 1;
+        self.component_count += 1;
     }
 }

@@ -1,6 +1,6 @@
-//! Turns names and literal values into dense numbers, so that joins compare integers.
+//! Interner: maps names and literal values to dense numbers, so that joins compare integers.
 //!
-//! Two literals with the same value share one symbol (see [`Literal`]), which is what makes `1.50` join `1.5`.
+//! Two literals with the same value share one symbol (see [`Literal`]); therefore `1.50` joins `1.5`.
 
 use std::borrow::Borrow;
 use std::fmt;
@@ -14,23 +14,23 @@ use crate::literal::Literal;
 pub struct Symbol(pub(crate) u32);
 
 impl Symbol {
-    /// The position of the symbol in its interner, counted from 0.
+    /// Position of the symbol in its interner, counted from 0.
     pub fn index(self) -> usize {
         self.0 as usize
     }
 }
 
-/// What a symbol stands for.
+/// Meaning of a symbol.
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 pub enum Value {
-    /// An individual, class or property: usually an IRI, any text in plain Datalog.
+    /// An individual, class or property: usually an IRI, and any text in plain Datalog.
     Name(Box<str>),
     /// A data value.
     Literal(Literal),
 }
 
 impl Value {
-    /// The literal, where the value is one.
+    /// Returns the literal if the value is a literal.
     pub fn as_literal(&self) -> Option<&Literal> {
         match self {
             Self::Literal(literal) => Some(literal),
@@ -38,7 +38,7 @@ impl Value {
         }
     }
 
-    /// The name, where the value is one.
+    /// Returns the name if the value is a name.
     pub fn as_name(&self) -> Option<&str> {
         match self {
             Self::Name(name) => Some(name),
@@ -47,7 +47,7 @@ impl Value {
     }
 }
 
-/// N-Triples form: `<name>` or the literal's canonical form.
+/// Formats a value in N-Triples form: `<name>` or the literal's canonical form.
 impl fmt::Display for Value {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -57,7 +57,7 @@ impl fmt::Display for Value {
     }
 }
 
-/// The key of a name in the look-up table; borrows as `str`, so that a look-up allocates nothing.
+/// Key of a name in the look-up table. It borrows as `str`, so that a look-up allocates nothing.
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 struct NameKey(Box<str>);
 
@@ -67,7 +67,7 @@ impl Borrow<str> for NameKey {
     }
 }
 
-/// The interner: symbols to values and back.
+/// Interner with both directions: symbols to values, and values to symbols.
 #[derive(Clone, Default, Debug)]
 pub struct Symbols {
     values: Vec<Value>,
@@ -77,12 +77,12 @@ pub struct Symbols {
 }
 
 impl Symbols {
-    /// An empty interner.
+    /// Creates an empty interner.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// The symbol of a name, interned on first use.
+    /// Returns the symbol of a name, which is interned on first use.
     pub fn name(&mut self, name: &str) -> Symbol {
         if let Some(&symbol) = self.names.get(name) {
             return symbol;
@@ -92,7 +92,7 @@ impl Symbols {
         symbol
     }
 
-    /// The symbol of a literal, interned by value on first use.
+    /// Returns the symbol of a literal, which is interned by value on first use.
     pub fn literal(&mut self, literal: Literal) -> Symbol {
         if let Some(&symbol) = self.literals.get(&literal) {
             return symbol;
@@ -109,36 +109,36 @@ impl Symbols {
         symbol
     }
 
-    /// What a symbol stands for.
+    /// Returns the meaning of a symbol.
     ///
     /// # Panics
-    /// When the symbol comes from another, longer interner.
+    /// If the symbol belongs to another, longer interner.
     pub fn value(&self, symbol: Symbol) -> &Value {
         &self.values[symbol.index()]
     }
 
-    /// The symbol of a name, if it was interned.
+    /// Returns the symbol of a name if it is interned.
     pub fn find_name(&self, name: &str) -> Option<Symbol> {
         self.names.get(name).copied()
     }
 
-    /// The symbol of a literal's value, if it was interned.
+    /// Returns the symbol of a literal's value if it is interned.
     pub fn find_literal(&self, literal: &Literal) -> Option<Symbol> {
         self.literals.get(literal).copied()
     }
 
-    /// How many symbols there are; every smaller [`Symbol::index`] is in use.
+    /// Number of symbols. Every smaller [`Symbol::index`] is in use.
     pub fn len(&self) -> usize {
         self.values.len()
     }
 
-    /// Whether nothing was interned yet.
+    /// Returns `true` if nothing is interned.
     pub fn is_empty(&self) -> bool {
         self.values.is_empty()
     }
 
-    /// Whether two symbols certainly stand for two things, where names stand for individuals of their own: not of two
-    /// literals of which that is undecided.
+    /// Returns `true` if two symbols certainly have different meanings, under the unique name assumption.
+    /// Returns `false` for two literals whose difference is undecided.
     pub(crate) fn differ(&self, left: Symbol, right: Symbol) -> bool {
         left != right
             && match (self.as_literal(left), self.as_literal(right)) {
@@ -147,12 +147,12 @@ impl Symbols {
             }
     }
 
-    /// Whether any literal was interned whose lexical form its datatype forbids.
+    /// Returns `true` if a literal with a lexical form outside its datatype is interned.
     pub(crate) fn any_ill_typed(&self) -> bool {
         self.ill_typed > 0
     }
 
-    /// The literal of a symbol that stands for one.
+    /// Returns the literal of a symbol, or `None` for a name.
     pub(crate) fn as_literal(&self, symbol: Symbol) -> Option<&Literal> {
         self.values.get(symbol.index()).and_then(Value::as_literal)
     }

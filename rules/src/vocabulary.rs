@@ -1,6 +1,6 @@
-//! The names of OWL that mean something to the engine.
+//! IRIs of OWL with a fixed meaning for the engine.
 
-/// The relation in which equal individuals are concluded.
+/// Relation of equal individuals.
 pub(crate) const SAME_AS: &str = "http://www.w3.org/2002/07/owl#sameAs";
-/// The relation in which different individuals are concluded.
+/// Relation of different individuals.
 pub(crate) const DIFFERENT_FROM: &str = "http://www.w3.org/2002/07/owl#differentFrom";

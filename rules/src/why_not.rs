@@ -1,8 +1,9 @@
-//! Why a fact does not hold: for each rule that could conclude it, the nearest its body comes to being satisfied.
+//! Why-not explanations: for each rule that could derive a fact, the binding of its body with the fewest
+//! unsatisfied atoms.
 //!
-//! A body is searched depth first for the binding that leaves the fewest atoms unsatisfied (missing facts weigh more
-//! than failed tests), and among those the one whose failing comparisons miss by the least; the search gives up on
-//! improving after a fixed number of nodes.
+//! A depth-first branch-and-bound search finds the binding with the lowest weight of unsatisfied atoms (a
+//! missing fact weighs more than a failed test). Ties are broken by the total gap of failed numeric
+//! comparisons. The search stops improving after a fixed number of nodes.
 
 use std::fmt;
 
@@ -20,70 +21,70 @@ use crate::source::Source;
 use crate::store::RelationId;
 use crate::symbol::{Symbol, Symbols};
 
-/// Nodes visited per rule before the best binding so far is taken.
+/// Maximum number of nodes visited per rule. The search then returns the best binding so far.
 const SEARCH_LIMIT: usize = 20_000;
 
-/// A rule that could conclude a fact, and what is in its way.
+/// A rule that could derive a fact, with the unsatisfied part of its body.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct NearMiss {
-    /// Which rule.
+    /// Identity of the rule.
     pub identity: RuleIdentity,
-    /// The rule's variables, named without question mark, and the values that satisfy most; `None` where an obstacle
-    /// leaves a variable open.
+    /// Variables of the rule, named without question mark, with their values in the best binding. `None` if
+    /// an obstacle leaves a variable unbound.
     pub bindings: Vec<(String, Option<Symbol>)>,
-    /// The facts that satisfy part of the body.
+    /// Facts that satisfy a part of the body.
     pub supports: Vec<Fact>,
-    /// The atoms that are not satisfied. Tests whose variables are open are left out.
+    /// Unsatisfied atoms, without tests that have unbound variables.
     pub obstacles: Vec<Obstacle>,
 }
 
-/// A body atom that is not satisfied.
+/// An unsatisfied body atom.
 #[derive(Clone, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum Obstacle {
-    /// No such fact holds.
+    /// A required fact does not hold.
     Missing {
         /// Class, property or relation.
         predicate: Symbol,
-        /// `None` where any value would do.
+        /// `None` for an argument with any value.
         arguments: Vec<Option<Symbol>>,
     },
-    /// A fact holds that must not.
+    /// A negated fact holds.
     Present(Fact),
     /// A built-in is false.
     False {
-        /// Which.
+        /// The built-in.
         built_in: BuiltIn,
-        /// Its arguments; the result of a function comes first, `None` where it is undefined
-        /// or a value that occurs nowhere.
+        /// Its arguments. The result of a function is the first one. It is `None` if it is undefined, or a
+        /// value that is not interned.
         arguments: Vec<Option<Symbol>>,
-        /// How far two numbers that are compared lie apart, exactly.
+        /// Exact difference of two compared numbers.
         gap: Option<BigRational>,
     },
-    /// An aggregate has another value, or none.
+    /// An aggregate has a different value, or no value.
     Aggregate {
-        /// Which.
+        /// The aggregate.
         aggregate: Aggregate,
-        /// The value that it would have to have; `None` where any would do.
+        /// Required value; `None` for any value.
         wanted: Option<Symbol>,
-        /// The value that it has.
+        /// Actual value.
         found: Option<Literal>,
-        /// How far two numbers lie apart, exactly.
+        /// Exact difference of the two numbers.
         gap: Option<BigRational>,
     },
-    /// Two terms are, or are not, the same although they must not, or must.
+    /// Two terms are equal but must differ, or differ but must be equal.
     Equality {
-        /// The first.
+        /// First term.
         left: Symbol,
-        /// The second.
+        /// Second term.
         right: Symbol,
-        /// Whether they would have to be the same.
+        /// `true` if the terms must be equal.
         wanted: bool,
     },
 }
 
 impl Obstacle {
-    /// Prints what is missing or wrong, in a line without its end.
+    /// Formats the obstacle as one line, without a line break.
     pub fn display<'a>(&'a self, symbols: &'a Symbols) -> impl fmt::Display + 'a {
         DisplayObstacle { obstacle: self, symbols }
     }
@@ -140,8 +141,8 @@ impl fmt::Display for DisplayObstacle<'_> {
 }
 
 impl Engine {
-    /// For each rule head that could be this fact, in the order of rules, how near its body comes to being satisfied.
-    /// Empty where the fact holds, or where no rule could conclude it.
+    /// Returns, for each rule head that unifies with the fact, the nearest miss of its body, in the order
+    /// of rules. Empty if the fact holds, or if no rule could derive it.
     pub fn why_not(&self, fact: &Fact) -> Vec<NearMiss> {
         let relation = self.store.find(fact.predicate, fact.arguments.len());
         let Some(relation) = relation.filter(|_| !self.holds(fact)) else { return Vec::new() };
@@ -161,7 +162,7 @@ impl Engine {
 
     fn near_miss(&self, lowered: &Lowered, bound: Vec<Option<Symbol>>) -> Option<NearMiss> {
         let mut search = Search { engine: self, lowered, visited: 0, best: None };
-        search.visit(State { bound, rest: (0..lowered.body.len()).collect(), ..State::default() });
+        search.visit(State { bound, open_conditions: (0..lowered.body.len()).collect(), ..State::default() });
         let best = search.best?;
         let rule = &self.program.rules[lowered.rule];
         let variables = (0..rule.variable_count()).map(|number| Variable(number as u16));
@@ -171,11 +172,11 @@ impl Engine {
     }
 }
 
-/// A partial binding and what it leaves unsatisfied.
+/// Search node: a partial binding with its satisfied and unsatisfied atoms.
 #[derive(Clone, Default)]
 struct State {
     bound: Vec<Option<Symbol>>,
-    rest: Vec<usize>,
+    open_conditions: Vec<usize>,
     supports: Vec<Fact>,
     obstacles: Vec<Obstacle>,
     distance: f64,
@@ -186,7 +187,7 @@ impl State {
         (self.weight(), self.distance) < (other.weight(), other.distance)
     }
 
-    /// A missing fact weighs as much as two failed tests, because it hides the tests on what it would bind.
+    /// Weighs a missing fact as two failed tests, because it hides the tests of its unbound variables.
     fn weight(&self) -> usize {
         let weigh = |obstacle: &Obstacle| if matches!(obstacle, Obstacle::Missing { .. }) { 2 } else { 1 };
         self.obstacles.iter().map(weigh).sum()
@@ -203,15 +204,15 @@ struct Search<'a> {
 impl Search<'_> {
     fn visit(&mut self, mut state: State) {
         self.visited += 1;
-        let hopeless = self.best.as_ref().is_some_and(|best| !state.is_better_than(best));
-        if hopeless || self.is_over() {
+        let cannot_improve = self.best.as_ref().is_some_and(|best| !state.is_better_than(best));
+        if cannot_improve || self.is_over() {
             return;
         }
         let Some(at) = self.next(&state) else {
             self.best = Some(state);
             return;
         };
-        let position = state.rest.remove(at);
+        let position = state.open_conditions.remove(at);
         match &self.lowered.body[position] {
             Condition::Relation(relation, sources) => self.branch(&state, *relation, sources),
             other => {
@@ -225,49 +226,51 @@ impl Search<'_> {
         self.best.is_some() && self.visited > SEARCH_LIMIT
     }
 
-    /// The next condition: a test whose values are known, then the relation with the most columns known, then what is
-    /// left.
+    /// Index of the next condition: a test with bound arguments, then the relation with the most bound
+    /// columns, then any other condition.
     fn next(&self, state: &State) -> Option<usize> {
         let score = |position: usize| {
-            let known =
+            let bound_count =
                 |sources: &[Source]| sources.iter().filter(|&&s| value(s, &state.bound).is_some()).count();
             match &self.lowered.body[position] {
-                Condition::Relation(_, sources) => 1 + known(sources),
-                Condition::Not(_, sources) if known(sources) == sources.len() => 100,
+                Condition::Relation(_, sources) => 1 + bound_count(sources),
+                Condition::Not(_, sources) if bound_count(sources) == sources.len() => 100,
                 Condition::BuiltIn(built_in, sources) => {
-                    let known: Vec<bool> =
+                    let bound_flags: Vec<bool> =
                         sources.iter().map(|&s| value(s, &state.bound).is_some()).collect();
-                    if built_in.binds(&known) { 100 } else { 0 }
+                    if built_in.binds(&bound_flags) { 100 } else { 0 }
                 }
-                Condition::Aggregate { group, .. } if known(group) == group.len() => 100,
-                Condition::Same(a, b) if known(&[*a, *b]) > 0 => 100,
-                Condition::Different(a, b) if known(&[*a, *b]) == 2 => 100,
+                Condition::Aggregate { group, .. } if bound_count(group) == group.len() => 100,
+                Condition::Same(a, b) if bound_count(&[*a, *b]) > 0 => 100,
+                Condition::Different(a, b) if bound_count(&[*a, *b]) == 2 => 100,
                 _ => 0,
             }
         };
-        (0..state.rest.len()).rev().max_by_key(|&at| score(state.rest[at]))
+        // Of equal scores the last in iteration wins, which is the first condition because of `rev`.
+        (0..state.open_conditions.len()).rev().max_by_key(|&at| score(state.open_conditions[at]))
     }
 
-    /// Tries every row that fits, then none.
+    /// Tries every fitting row, and finally the branch in which the fact is missing.
     fn branch(&mut self, state: &State, relation: RelationId, sources: &[Source]) {
         let Some(predicate) = self.engine.store.get(relation).predicate else { return };
         let arguments: Vec<Option<Symbol>> =
             sources.iter().map(|&source| value(source, &state.bound)).collect();
         let mut rows: Vec<&[Symbol]> = self.engine.matching_rows(predicate, &arguments).collect();
+        // A fixed order makes the explanation reproducible.
         rows.sort_unstable();
         for row in rows {
             if self.is_over() {
                 break;
             }
-            let mut longer = state.clone();
-            if unify(sources, row, &mut longer.bound) {
-                longer.supports.push(Fact::new(predicate, row.iter().copied()));
-                self.visit(longer);
+            let mut extended = state.clone();
+            if unify(sources, row, &mut extended.bound) {
+                extended.supports.push(Fact::new(predicate, row.iter().copied()));
+                self.visit(extended);
             }
         }
-        let mut without = state.clone();
-        without.obstacles.push(Obstacle::Missing { predicate, arguments });
-        self.visit(without);
+        let mut unmatched = state.clone();
+        unmatched.obstacles.push(Obstacle::Missing { predicate, arguments });
+        self.visit(unmatched);
     }
 
     fn test(&self, condition: &Condition, state: &mut State) {
@@ -288,8 +291,8 @@ impl Search<'_> {
                 (Some(left), Some(right)) if left != right => {
                     state.obstacles.push(Obstacle::Equality { left, right, wanted: true });
                 }
-                (Some(known), None) => bind(*right, known, &mut state.bound),
-                (None, Some(known)) => bind(*left, known, &mut state.bound),
+                (Some(symbol), None) => bind(*right, symbol, &mut state.bound),
+                (None, Some(symbol)) => bind(*left, symbol, &mut state.bound),
                 _ => {}
             },
             Condition::Different(left, right) => {
@@ -320,10 +323,10 @@ impl Search<'_> {
         let symbols = &self.engine.symbols;
         let found = function.of(self.engine.group(matches, group).map(|(_, row)| row), symbols);
         let wanted = value(result, &state.bound);
-        let known = found.as_ref().and_then(|found| symbols.find_literal(found));
-        match (wanted, known) {
-            (None, Some(known)) => bind(result, known, &mut state.bound),
-            (Some(wanted), Some(known)) if wanted == known => {}
+        let interned = found.as_ref().and_then(|found| symbols.find_literal(found));
+        match (wanted, interned) {
+            (None, Some(interned)) => bind(result, interned, &mut state.bound),
+            (Some(wanted), Some(interned)) if wanted == interned => {}
             _ => {
                 let number = |literal: &Literal| literal.as_rational();
                 let wanted_number = wanted.and_then(|wanted| symbols.as_literal(wanted)).and_then(number);
@@ -342,19 +345,23 @@ impl Search<'_> {
         if !built_in.binds(&arguments.iter().map(Option::is_some).collect::<Vec<_>>()) {
             return;
         }
-        let known = |symbol: &Option<Symbol>| match symbol {
+        let as_input = |symbol: &Option<Symbol>| match symbol {
             Some(_) => literal(symbol).map(Some),
             None => Some(None),
         };
-        let values: Option<Vec<Option<&Literal>>> = arguments.iter().map(known).collect();
-        let open: Vec<Source> =
-            sources.iter().zip(&arguments).filter(|(_, known)| known.is_none()).map(|(&s, _)| s).collect();
-        // Of several ways the first that the knowledge has values for.
+        let values: Option<Vec<Option<&Literal>>> = arguments.iter().map(as_input).collect();
+        let open: Vec<Source> = sources
+            .iter()
+            .zip(&arguments)
+            .filter(|(_, argument)| argument.is_none())
+            .map(|(&s, _)| s)
+            .collect();
+        // Uses the first solution whose values are interned, because only such values can occur in facts.
         for solution in values.iter().flat_map(|values| built_in.solve(values)) {
-            let found: Option<Vec<Symbol>> =
+            let interned: Option<Vec<Symbol>> =
                 solution.iter().map(|value| symbols.find_literal(value)).collect();
             let mut bound = state.bound.clone();
-            if found.is_some_and(|found| unify(&open, &found, &mut bound)) {
+            if interned.is_some_and(|interned| unify(&open, &interned, &mut bound)) {
                 state.bound = bound;
                 return;
             }
@@ -383,11 +390,11 @@ fn bind(source: Source, symbol: Symbol, bound: &mut [Option<Symbol>]) {
     }
 }
 
-/// Binds the variables of terms to a row's values; `false` where they do not fit.
+/// Binds the variables of operands to a row's values. Returns `false` if a value does not match.
 fn unify(sources: &[Source], row: &[Symbol], bound: &mut [Option<Symbol>]) -> bool {
     sources.iter().zip(row).all(|(&source, &symbol)| {
-        let known = value(source, bound);
+        let previous = value(source, bound);
         bind(source, symbol, bound);
-        known.is_none_or(|known| known == symbol)
+        previous.is_none_or(|previous| previous == symbol)
     })
 }

@@ -1,4 +1,4 @@
-//! Built-ins that a program's author adds to those of SWRL.
+//! Custom built-ins, in addition to those of SWRL.
 
 use std::cmp::Ordering;
 use std::fmt;
@@ -6,27 +6,27 @@ use std::hash::{Hash, Hasher};
 
 use crate::literal::Literal;
 
-/// A built-in of one's own: a test on literals, or a function of literals. It must be pure, since the engine calls it in
-/// any order and takes for granted that what it concluded once it would conclude again.
+/// Definition of a custom built-in: a test on literals, or a function of literals. It must be pure. The
+/// engine calls it in any order, and assumes that its results never change.
 pub trait Definition: Send + Sync {
-    /// Its name in rules, in full; it identifies the built-in.
+    /// IRI of the built-in in rules. It identifies the built-in.
     fn iri(&self) -> &'static str;
 
-    /// Whether it can take this many arguments; a function's result counts.
+    /// Returns `true` if the built-in accepts this number of arguments, including the result of a function.
     fn accepts(&self, count: usize) -> bool;
 
-    /// Whether the first argument is computed from the others and so may be unbound.
+    /// Returns `true` if the first argument is computed from the others, so that it may be unbound.
     fn is_function(&self) -> bool {
         false
     }
 
-    /// Whether a test holds of its arguments. Not asked of functions.
+    /// Returns `true` if a test holds. Never called for functions.
     fn holds(&self, arguments: &[&Literal]) -> bool {
         let _ = arguments;
         false
     }
 
-    /// The result of a function on its arguments (without the first); `None` where it is undefined.
+    /// Returns the result of a function for its arguments (without the first). `None` if it is undefined.
     fn compute(&self, arguments: &[&Literal]) -> Option<Literal> {
         let _ = arguments;
         None

@@ -1,4 +1,4 @@
-//! The values of built-ins: whether they hold of arguments, and what they compute.
+//! Evaluation of built-ins: tests of arguments, and computed values.
 
 use std::cmp::Ordering;
 
@@ -7,7 +7,8 @@ use super::{library, math, pattern, temporal, text, uri};
 use crate::literal::Literal;
 
 impl BuiltIn {
-    /// The built-in of an IRI: of `swrlb`, or of the libraries `swrlm` and `temporal` of `SWRLTab` in any of their versions.
+    /// Returns the built-in of an IRI in `swrlb`, or in a version of the libraries `swrlm` and `temporal`
+    /// of `SWRLTab`.
     pub fn from_iri(iri: &str) -> Option<Self> {
         match iri.strip_prefix(SWRLB) {
             Some(local) => Self::from_name(local),
@@ -15,19 +16,19 @@ impl BuiltIn {
         }
     }
 
-    /// All ways in which a built-in holds: for each, the values of the arguments that are not known, in their order. Empty
-    /// unless it [binds](Self::binds) them.
+    /// Returns all solutions of a built-in. Each solution contains the values of the unknown arguments, in
+    /// order. Empty unless the built-in [binds](Self::binds) these arguments.
     pub fn solve(self, arguments: &[Option<&Literal>]) -> Vec<Vec<Literal>> {
-        let known: Option<Vec<&Literal>> = arguments.iter().copied().collect();
-        if let Some(known) = known {
-            return if self.holds(&known) { vec![Vec::new()] } else { Vec::new() };
+        let bound_arguments: Option<Vec<&Literal>> = arguments.iter().copied().collect();
+        if let Some(bound_arguments) = bound_arguments {
+            return if self.holds(&bound_arguments) { vec![Vec::new()] } else { Vec::new() };
         }
-        let rest: Option<Vec<&Literal>> = arguments.iter().skip(1).copied().collect();
-        match (arguments.first(), rest, self.shape()) {
-            (Some(None), Some(rest), Some((.., Kind::Choice))) => {
-                pattern::tokens(&rest).into_iter().map(|token| vec![token]).collect()
+        let inputs: Option<Vec<&Literal>> = arguments.iter().skip(1).copied().collect();
+        match (arguments.first(), inputs, self.shape()) {
+            (Some(None), Some(inputs), Some((.., Kind::Choice))) => {
+                pattern::tokens(&inputs).into_iter().map(|token| vec![token]).collect()
             }
-            (Some(None), Some(rest), _) => self.compute(&rest).map(|value| vec![value]).into_iter().collect(),
+            (Some(None), Some(inputs), _) => self.compute(&inputs).map(|v| vec![v]).into_iter().collect(),
             (Some(Some(whole)), None, Some((.., Kind::Parts))) => {
                 self.parts(whole, &arguments[1..]).into_iter().collect()
             }
@@ -35,7 +36,7 @@ impl BuiltIn {
         }
     }
 
-    /// Whether a test holds of its arguments; for a function, whether the first argument is its result.
+    /// Returns `true` if a test holds. For a function, returns `true` if the first argument is its result.
     pub fn holds(self, arguments: &[&Literal]) -> bool {
         match (self, arguments) {
             (Self::Tokenize, [token, rest @ ..]) => pattern::tokens(rest).iter().any(|other| other == *token),
@@ -57,7 +58,8 @@ impl BuiltIn {
                 matches!(right, Literal::Uri(datatype) if left.membership(datatype) == Some(false))
             }
             Self::Equal => order() == Some(Ordering::Equal),
-            // SWRL defines it as the negation of `equal`; what has no value satisfies neither.
+            // SWRL defines `notEqual` as the negation of `equal`. An ill-typed literal has no value, and
+            // satisfies neither.
             Self::NotEqual => {
                 !left.is_ill_typed() && !right.is_ill_typed() && order() != Some(Ordering::Equal)
             }
@@ -69,7 +71,7 @@ impl BuiltIn {
         }
     }
 
-    /// The pattern among the arguments that are known, and what is wrong with it, if anything.
+    /// Returns a constant pattern of the built-in with its error, if the pattern is invalid.
     pub(crate) fn bad_pattern<'l>(
         self,
         argument: &impl Fn(usize) -> Option<&'l Literal>,
@@ -86,7 +88,7 @@ impl BuiltIn {
         Some((pattern.to_owned(), fault))
     }
 
-    /// The result of a function on its arguments (without the first); `None` where it is undefined.
+    /// Returns the result of a function for its arguments (without the first). `None` if it is undefined.
     pub fn compute(self, arguments: &[&Literal]) -> Option<Literal> {
         if !self.is_function() || !self.accepts(arguments.len() + 1) {
             return None;

@@ -1,4 +1,5 @@
-//! Numeric and boolean functions, exact on decimals, in the wider floating-point type otherwise.
+//! Numeric and boolean functions: exact on decimals, and otherwise in the widest floating-point type of the
+//! arguments.
 
 use num_bigint::BigInt;
 use num_rational::BigRational;
@@ -7,17 +8,17 @@ use num_traits::{Signed, ToPrimitive, Zero};
 use super::signature::BuiltIn;
 use crate::literal::{Decimal, Literal, ten_to};
 
-/// The largest exponent of an exact power, and the most digits of rounding.
+/// Maximum exponent of an exact power, and maximum number of digits for rounding.
 const MAX_EXPONENT: u32 = 1000;
 
-/// Numbers promoted to their common type.
+/// Numbers promoted to a common type.
 enum Numbers {
     Exact(Vec<BigRational>),
     Float(Vec<f64>),
     Double(Vec<f64>),
 }
 
-/// The value of a numeric or boolean function; `None` for other functions and unsuitable arguments.
+/// Value of a numeric or boolean function; `None` for other functions and unsuitable arguments.
 pub(super) fn compute(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Literal> {
     if let (BuiltIn::BooleanNot, [Literal::Boolean(value)]) = (built_in, arguments) {
         return Some(Literal::Boolean(!value));
@@ -69,6 +70,7 @@ fn exact(built_in: BuiltIn, values: &[BigRational]) -> Option<Literal> {
 fn integer_power(base: &BigRational, exponent: &BigRational) -> Option<BigRational> {
     let exponent = exponent.to_integer().to_i32().filter(|e| e.unsigned_abs() <= MAX_EXPONENT)?;
     let bits = base.numer().bits().max(base.denom().bits());
+    // Limits the result to 65,536 bits.
     let affordable = bits.saturating_mul(u64::from(exponent.unsigned_abs())) <= 1 << 16;
     (affordable && (exponent >= 0 || !base.is_zero())).then(|| base.pow(exponent))
 }
@@ -78,9 +80,9 @@ fn round_half_to_even(value: &BigRational, digits: i32) -> BigRational {
     let scaled = if digits >= 0 { value * &unit } else { value / &unit };
     let floor = scaled.floor().to_integer();
     let half = BigRational::new(1.into(), 2.into());
-    let above = &scaled - BigRational::from_integer(floor.clone());
-    let up = above > half || (above == half && floor.bit(0));
-    let rounded = BigRational::from_integer(floor + BigInt::from(i32::from(up)));
+    let fraction = &scaled - BigRational::from_integer(floor.clone());
+    let rounds_up = fraction > half || (fraction == half && floor.bit(0));
+    let rounded = BigRational::from_integer(floor + BigInt::from(i32::from(rounds_up)));
     if digits >= 0 { rounded / unit } else { rounded * unit }
 }
 

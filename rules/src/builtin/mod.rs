@@ -1,10 +1,12 @@
-//! The built-ins of SWRL (`swrlb`), by the value spaces of XSD and the functions of `XPath` ([1], section 8).
+//! Built-ins of SWRL (`swrlb`) on the value spaces of XSD, with the functions of `XPath` ([1], section 8).
 //!
-//! Arguments of an unsuitable kind make a built-in false, never an error. A computed result is compared with a bound
-//! first argument by value *identity* (interned value), so that the outcome does not depend on evaluation order.
+//! Arguments of an unsuitable kind make a built-in false, and never cause an error. A computed result is
+//! compared with a bound first argument by *identity* of interned values, so that the outcome does not
+//! depend on the evaluation order.
 //!
-//! A built-in that makes a value of its parts (a date of year, month and day) works backwards, too: the parts of a known
-//! value are those from which it would be made. What SWRL has a sequence for (`tokenize`) holds of each of its members.
+//! A built-in that composes a value of parts (a date of year, month and day) also works backwards: it
+//! splits a known value into its parts. A built-in with a sequence as result in SWRL (`tokenize`) holds for
+//! each member of the sequence.
 //!
 //! [1] W3C Member Submission: SWRL, 2004.
 //! [2] W3C `XQuery` 1.0 and `XPath` 2.0 Functions and Operators, 2007.

@@ -1,17 +1,18 @@
-//! Values taken apart: the parts from which a built-in of SWRL ([1], sections 8.5 and 8.6) would make a value.
+//! Inverse of the constructor built-ins of SWRL ([1], sections 8.5 and 8.6): splits a value into its parts.
 //!
-//! Of a date, time or moment without a time zone, the time zone is the empty text. Parts of a negative duration are negative
-//! or zero, as those that `XPath` gives. What has other parts as well (`PT90M`) is taken apart into the canonical ones, but
-//! known parts may be any that make the value.
+//! Without a time zone, the time zone part is the empty text. Parts of a negative duration are negative or
+//! zero, as in `XPath`. A value with several decompositions (`PT90M`) is split canonically, but the known
+//! parts may belong to any decomposition.
 
 use super::signature::BuiltIn;
 use super::uri;
 use crate::literal::{Decimal, Duration, Literal, Moment, MomentKind};
 
 impl BuiltIn {
-    /// The values of the parts that are not known, where the whole is made of them and those that are.
+    /// Returns the values of the unknown parts. `None` if the whole cannot be composed of these and the
+    /// known parts.
     pub(super) fn parts(self, whole: &Literal, parts: &[Option<&Literal>]) -> Option<Vec<Literal>> {
-        let own = match (self, whole) {
+        let canonical = match (self, whole) {
             (Self::AnyUri, Literal::Uri(text) | Literal::String(text)) => uri::parts(text)?,
             (Self::YearMonthDuration | Self::DayTimeDuration, Literal::Duration(duration)) => {
                 self.of_duration(duration)?
@@ -19,13 +20,15 @@ impl BuiltIn {
             (Self::Date | Self::Time | Self::DateTime, Literal::Moment(moment)) => self.of_moment(moment)?,
             _ => return None,
         };
-        if own.len() < parts.len() {
+        if canonical.len() < parts.len() {
             return None;
         }
-        let all: Vec<&Literal> = parts.iter().zip(&own).map(|(known, own)| known.unwrap_or(own)).collect();
-        let is_made_of = self.compute(&all).is_some_and(|made| made == *whole);
-        let unknown = parts.iter().zip(&own).filter(|(known, _)| known.is_none());
-        is_made_of.then(|| unknown.map(|(_, own)| own.clone()).collect())
+        let all_parts: Vec<&Literal> =
+            parts.iter().zip(&canonical).map(|(known, canonical)| known.unwrap_or(canonical)).collect();
+        // Checks the known parts by composing the value again.
+        let is_consistent = self.compute(&all_parts).is_some_and(|value| value == *whole);
+        let unknown = parts.iter().zip(&canonical).filter(|(known, _)| known.is_none());
+        is_consistent.then(|| unknown.map(|(_, canonical)| canonical.clone()).collect())
     }
 
     fn of_duration(self, duration: &Duration) -> Option<Vec<Literal>> {

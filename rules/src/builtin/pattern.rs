@@ -1,6 +1,6 @@
-//! Regular expressions of `XPath` in the spelling of the `regex` crate, which has no back references and no names of
-//! Unicode blocks. A constant pattern that cannot be used is an error of its rule (R210); one that a variable holds makes its
-//! built-in false.
+//! Translates regular expressions of `XPath` to the syntax of the `regex` crate, which supports neither
+//! back references nor names of Unicode blocks. An invalid constant pattern is an error of its rule (R210).
+//! An invalid pattern in a variable makes the built-in false.
 //!
 //! [2] W3C `XQuery` 1.0 and `XPath` 2.0 Functions and Operators, 2007.
 
@@ -11,10 +11,10 @@ use regex::{Regex, RegexBuilder};
 use super::text::as_text;
 use crate::literal::Literal;
 
-/// The compiled size of a pattern, in bytes, from which it is refused.
+/// Maximum compiled size of a pattern, in bytes.
 const SIZE_LIMIT: usize = 1 << 20;
 
-/// Whether the first argument contains a match of the second.
+/// Returns `true` if the first argument contains a match of the second.
 pub(super) fn matches(arguments: &[&Literal]) -> bool {
     let texts: Option<Vec<&str>> = arguments.iter().map(|argument| as_text(argument)).collect();
     match texts.as_deref() {
@@ -24,8 +24,8 @@ pub(super) fn matches(arguments: &[&Literal]) -> bool {
     }
 }
 
-/// The first argument with each match of the second replaced by the third, where `$1` is the first group. `None` for a
-/// pattern that matches the empty text, which `XPath` forbids.
+/// Replaces each match of the second argument in the first by the third, in which `$1` refers to the first
+/// group. `None` for a pattern that matches the empty text, which `XPath` forbids.
 pub(super) fn replace(arguments: &[&Literal]) -> Option<Literal> {
     let texts = arguments.iter().map(|argument| as_text(argument)).collect::<Option<Vec<&str>>>()?;
     let (text, pattern, replacement, flags) = match texts.as_slice() {
@@ -37,8 +37,8 @@ pub(super) fn replace(arguments: &[&Literal]) -> Option<Literal> {
     Some(Literal::String(regex.replace_all(text, expand(replacement)?.as_str()).into()))
 }
 
-/// The parts of the first argument between matches of the second, each once, in their order. None of the empty text, nor for
-/// a pattern that matches the empty text ([2], section 7.6.4).
+/// Distinct parts of the first argument between matches of the second, in order of occurrence. Empty for
+/// the empty text and for a pattern that matches the empty text ([2], section 7.6.4).
 pub(super) fn tokens(arguments: &[&Literal]) -> Vec<Literal> {
     let texts = arguments.iter().map(|argument| as_text(argument)).collect::<Option<Vec<&str>>>();
     let (text, pattern, flags) = match texts.as_deref() {
@@ -48,11 +48,16 @@ pub(super) fn tokens(arguments: &[&Literal]) -> Vec<Literal> {
     };
     let regex = compile(pattern, flags).filter(|regex| !regex.is_match("") && !text.is_empty());
     let Some(regex) = regex else { return Vec::new() };
-    let mut seen = HashSet::new();
-    regex.split(text).filter(|token| seen.insert(*token)).map(|token| Literal::String(token.into())).collect()
+    let mut unique = HashSet::new();
+    regex
+        .split(text)
+        .filter(|token| unique.insert(*token))
+        .map(|token| Literal::String(token.into()))
+        .collect()
 }
 
-/// What is wrong with a pattern and its flags, if anything; a pattern that is well-formed and too large matches nothing.
+/// Error of a pattern and its flags. A valid pattern above the size limit has no error, but matches
+/// nothing.
 pub(super) fn fault(pattern: &str, flags: &str) -> Option<String> {
     build(pattern, flags).err().filter(|reason| !reason.contains("size limit"))
 }
@@ -75,34 +80,35 @@ fn build(pattern: &str, flags: &str) -> Result<Regex, String> {
         };
     }
     builder.build().map_err(|error| {
+        // The last line of the multi-line message contains the reason.
         let text = error.to_string();
         text.lines().last().unwrap_or_default().trim_start_matches("error: ").to_owned()
     })
 }
 
-/// The characters with which a name of XML may start, as members of a class (XML 1.0, fifth edition, production 4).
-const INITIAL: &str = ":A-Z_a-z\\x{C0}-\\x{D6}\\x{D8}-\\x{F6}\\x{F8}-\\x{2FF}\\x{370}-\\x{37D}\\x{37F}-\\x{1FFF}\\x{200C}-\\x{200D}\\x{2070}-\\x{218F}\\x{2C00}-\\x{2FEF}\\x{3001}-\\x{D7FF}\\x{F900}-\\x{FDCF}\\x{FDF0}-\\x{FFFD}\\x{10000}-\\x{EFFFF}";
+/// Characters at the start of an XML name, as members of a class (XML 1.0, fifth edition, production 4).
+const NAME_START: &str = ":A-Z_a-z\\x{C0}-\\x{D6}\\x{D8}-\\x{F6}\\x{F8}-\\x{2FF}\\x{370}-\\x{37D}\\x{37F}-\\x{1FFF}\\x{200C}-\\x{200D}\\x{2070}-\\x{218F}\\x{2C00}-\\x{2FEF}\\x{3001}-\\x{D7FF}\\x{F900}-\\x{FDCF}\\x{FDF0}-\\x{FFFD}\\x{10000}-\\x{EFFFF}";
 
-/// Those that may follow, besides.
-const FURTHER: &str = "\\-.0-9\\x{B7}\\x{300}-\\x{36F}\\x{203F}-\\x{2040}";
+/// Additional characters within an XML name.
+const NAME_CONTINUE: &str = "\\-.0-9\\x{B7}\\x{300}-\\x{36F}\\x{203F}-\\x{2040}";
 
-/// A pattern of `XPath` in the spelling of the `regex` crate: classes subtract with `--` there, and `\i` and `\c` are
-/// spelled out.
+/// Translates a pattern of `XPath` to the syntax of the `regex` crate. Subtraction of classes is written
+/// `--`, and `\i` and `\c` are expanded.
 fn translate(pattern: &str) -> Result<String, String> {
     let mut translated = String::new();
-    // The depth of classes, and whether the innermost one has members yet.
+    // Nesting depth of classes, and a flag for an innermost class without members.
     let (mut depth, mut is_empty) = (0, false);
-    let mut rest = pattern.chars().peekable();
-    while let Some(character) = rest.next() {
+    let mut characters = pattern.chars().peekable();
+    while let Some(character) = characters.next() {
         let was_empty = std::mem::replace(&mut is_empty, false);
         match character {
             '\\' => {
-                let escaped = rest.next().ok_or("it ends with a backslash")?;
+                let escaped = characters.next().ok_or("it ends with a backslash")?;
                 match escaped {
-                    'i' => translated.extend(["[", INITIAL, "]"]),
-                    'c' => translated.extend(["[", INITIAL, FURTHER, "]"]),
-                    'I' => translated.extend(["[^", INITIAL, "]"]),
-                    'C' => translated.extend(["[^", INITIAL, FURTHER, "]"]),
+                    'i' => translated.extend(["[", NAME_START, "]"]),
+                    'c' => translated.extend(["[", NAME_START, NAME_CONTINUE, "]"]),
+                    'I' => translated.extend(["[^", NAME_START, "]"]),
+                    'C' => translated.extend(["[^", NAME_START, NAME_CONTINUE, "]"]),
                     '1'..='9' if depth == 0 => {
                         return Err(format!("the back reference \\{escaped} is not supported"));
                     }
@@ -112,16 +118,16 @@ fn translate(pattern: &str) -> Result<String, String> {
             '[' if depth == 0 => {
                 (depth, is_empty) = (1, true);
                 translated.push('[');
-                if rest.next_if_eq(&'^').is_some() {
+                if characters.next_if_eq(&'^').is_some() {
                     translated.push('^');
                 }
             }
-            '-' if depth > 0 && rest.peek() == Some(&'[') && !was_empty => {
-                rest.next();
+            '-' if depth > 0 && characters.peek() == Some(&'[') && !was_empty => {
+                characters.next();
                 depth += 1;
                 is_empty = true;
                 translated += "--[";
-                if rest.next_if_eq(&'^').is_some() {
+                if characters.next_if_eq(&'^').is_some() {
                     translated.push('^');
                 }
             }
@@ -132,6 +138,7 @@ fn translate(pattern: &str) -> Result<String, String> {
             '[' => {
                 return Err("a class within a class is written `-[…]`, or `\\[` for the character".to_owned());
             }
+            // `&&` and `~~` are set operations of the `regex` crate, but ordinary characters in `XPath`.
             '&' | '~' if depth > 0 => translated.extend(['\\', character]),
             other => translated.push(other),
         }
@@ -139,19 +146,19 @@ fn translate(pattern: &str) -> Result<String, String> {
     Ok(translated)
 }
 
-/// The replacement text of `XPath` in the spelling of the `regex` crate; `None` where it is not one.
+/// Translates a replacement text of `XPath` to the syntax of the `regex` crate; `None` if it is invalid.
 fn expand(replacement: &str) -> Option<String> {
     let mut expanded = String::new();
-    let mut rest = replacement.chars();
-    while let Some(character) = rest.next() {
+    let mut characters = replacement.chars();
+    while let Some(character) = characters.next() {
         match character {
-            '\\' => match rest.next()? {
+            '\\' => match characters.next()? {
                 '$' => expanded.push_str("$$"),
                 '\\' => expanded.push('\\'),
                 _ => return None,
             },
             '$' => {
-                let digit = rest.next().filter(char::is_ascii_digit)?;
+                let digit = characters.next().filter(char::is_ascii_digit)?;
                 expanded.push_str("${");
                 expanded.push(digit);
                 expanded.push('}');

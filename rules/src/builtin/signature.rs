@@ -1,10 +1,10 @@
-//! The built-ins, with how many arguments they take and which of these they compute.
+//! Signatures of the built-ins: names, numbers of arguments, and computed arguments.
 //!
 //! [3] RFC 3986: Uniform Resource Identifier, 2005.
 
 use super::custom::{CustomBuiltIn, Definition};
 
-/// The namespace of SWRL's built-ins.
+/// Namespace of SWRL's built-ins.
 pub const SWRLB: &str = "http://www.w3.org/2003/11/swrlb#";
 
 macro_rules! built_ins {
@@ -14,15 +14,15 @@ macro_rules! built_ins {
         #[non_exhaustive]
         pub enum BuiltIn {
             $($(#[$doc])* $variant,)*
-            /// One that is not SWRL's, see [`BuiltIn::custom`].
+            /// A built-in outside SWRL, see [`BuiltIn::custom`].
             Custom(CustomBuiltIn),
         }
 
         impl BuiltIn {
-            /// Every built-in of the engine itself.
+            /// All built-ins of SWRL and its data range atoms.
             pub const ALL: &'static [Self] = &[$(Self::$variant,)*];
 
-            /// The local name in the `swrlb` namespace; the IRI of a custom built-in.
+            /// Returns the local name in the `swrlb` namespace, or the IRI of a custom built-in.
             pub fn name(self) -> &'static str {
                 match self {
                     $(Self::$variant => $name,)*
@@ -30,7 +30,7 @@ macro_rules! built_ins {
                 }
             }
 
-            /// The least and greatest number of arguments, and how they come to their values; none of a custom built-in.
+            /// Minimum and maximum number of arguments, and the kind. `None` for a custom built-in.
             pub(super) fn shape(self) -> Option<(usize, usize, Kind)> {
                 match self {
                     $(Self::$variant => Some(($minimum, $maximum, Kind::$kind)),)*
@@ -41,29 +41,32 @@ macro_rules! built_ins {
     };
 }
 
-/// How arguments come to their values.
+/// Direction in which a built-in computes its arguments.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
-    /// All have to be known.
+    /// All arguments must be bound.
     Test,
-    /// The first is computed from the others.
+    /// The first argument is computed from the others.
     Function,
-    /// The first is computed from the others, or the others from it: its parts.
+    /// The first argument is computed from the others, which are its parts; or the parts are computed from
+    /// the first.
     Parts,
-    /// The first is any one of several values that the others give.
+    /// The first argument is one of several values, which are computed from the others.
     Choice,
 }
 
 built_ins! {
-    /// The first lies in the value space of the datatype whose IRI the second (an `xsd:anyURI`) is: SWRL's data range
-    /// atom, not a member of `swrlb`. Rule text writes it `xsd:decimal(?x)`.
+    /// Tests that the first argument lies in the value space of a datatype. The second argument, an
+    /// `xsd:anyURI`, is the IRI of the datatype. This is SWRL's data range atom, not a member of `swrlb`.
+    /// Rule text: `xsd:decimal(?x)`.
     DataRange "dataRange" 2..=2 Test,
-    /// The first is a literal that certainly lies outside the datatype's value space: the complement of a data range, which
-    /// OWL has and SWRL has not. Rule text writes it `not xsd:decimal(?x)`.
+    /// Tests that the first argument is a literal that certainly lies outside the value space of a
+    /// datatype. This is the complement of a data range, which exists in OWL but not in SWRL. Rule text:
+    /// `not xsd:decimal(?x)`.
     OutsideDataRange "outsideDataRange" 2..=2 Test,
-    /// The values are equal.
+    /// Equal values.
     Equal "equal" 2..=2 Test,
-    /// The values are comparable and not equal.
+    /// Not equal values. Ill-typed literals are not tested.
     NotEqual "notEqual" 2..=2 Test,
     /// First < second.
     LessThan "lessThan" 2..=2 Test,
@@ -85,7 +88,7 @@ built_ins! {
     IntegerDivide "integerDivide" 3..=3 Function,
     /// Remainder of the truncating division.
     Mod "mod" 3..=3 Function,
-    /// Second to the power of third.
+    /// Second to the power of the third.
     Pow "pow" 3..=3 Function,
     /// The second, unchanged.
     UnaryPlus "unaryPlus" 2..=2 Function,
@@ -99,7 +102,7 @@ built_ins! {
     Floor "floor" 2..=2 Function,
     /// Nearest integer, halves towards positive infinity.
     Round "round" 2..=2 Function,
-    /// Nearest value with the third argument's number of fractional digits (0 if absent), halves to even.
+    /// Nearest value with as many fractional digits as the third argument (by default 0), halves to even.
     RoundHalfToEven "roundHalfToEven" 2..=3 Function,
     /// Sine of radians.
     Sin "sin" 2..=2 Function,
@@ -109,94 +112,98 @@ built_ins! {
     Tan "tan" 2..=2 Function,
     /// Negation.
     BooleanNot "booleanNot" 2..=2 Function,
-    /// Equal strings, case ignored.
+    /// Equal strings, ignoring case.
     StringEqualIgnoreCase "stringEqualIgnoreCase" 2..=2 Test,
     /// Concatenation of the second and all further arguments.
     StringConcat "stringConcat" 2..=32 Function,
-    /// Characters of the second from the third (counted from 1), as many as the fourth says.
+    /// Substring of the second, from the position in the third (counted from 1), with the length in the
+    /// fourth.
     Substring "substring" 3..=4 Function,
     /// Number of characters.
     StringLength "stringLength" 2..=2 Function,
-    /// White space at the ends removed, inside collapsed.
+    /// Removes white space at the ends and collapses it inside.
     NormalizeSpace "normalizeSpace" 2..=2 Function,
-    /// In upper case.
+    /// Conversion to upper case.
     UpperCase "upperCase" 2..=2 Function,
-    /// In lower case.
+    /// Conversion to lower case.
     LowerCase "lowerCase" 2..=2 Function,
-    /// Characters of the third replaced by those at the same place in the fourth, or removed.
+    /// Replaces each character of the third by the character at the same position in the fourth, or removes
+    /// it.
     Translate "translate" 4..=4 Function,
     /// The first contains the second.
     Contains "contains" 2..=2 Test,
-    /// The first contains the second, case ignored.
+    /// The first contains the second, ignoring case.
     ContainsIgnoreCase "containsIgnoreCase" 2..=2 Test,
     /// The first starts with the second.
     StartsWith "startsWith" 2..=2 Test,
     /// The first ends with the second.
     EndsWith "endsWith" 2..=2 Test,
-    /// The part of the second before the third, empty if it does not occur.
+    /// Part of the second before the third; empty if the third does not occur.
     SubstringBefore "substringBefore" 3..=3 Function,
-    /// The part of the second after the third, empty if it does not occur.
+    /// Part of the second after the third; empty if the third does not occur.
     SubstringAfter "substringAfter" 3..=3 Function,
-    /// The first matches the regular expression of the second; the third, if any, holds `XPath` flags.
+    /// The first contains a match of the regular expression in the second. The optional third contains
+    /// `XPath` flags.
     Matches "matches" 2..=3 Test,
-    /// The second, each match of the third's regular expression replaced by the fourth; flags may follow.
+    /// Replaces each match of the third, a regular expression, in the second by the fourth. Flags are
+    /// optional.
     Replace "replace" 4..=5 Function,
-    /// One of the substrings of the second between matches of the third's regular expression; flags may follow. SWRL has a
-    /// sequence of them, for which the engine has no value.
+    /// One of the substrings of the second between matches of the third, a regular expression. Flags are
+    /// optional. In SWRL the result is a sequence, for which the engine has no value.
     Tokenize "tokenize" 3..=4 Choice,
-    /// URI of scheme, host, port, path, query and fragment, each empty where there is none.
+    /// URI from scheme, host, port, path, query and fragment. Absent parts are empty.
     AnyUri "anyURI" 7..=7 Parts,
-    /// The reference in the second relative to the base in the third (\[3\], section 5.2).
+    /// Resolves the reference in the second against the base in the third (\[3\], section 5.2).
     ResolveUri "resolveURI" 3..=3 Function,
-    /// Duration of so many years and months.
+    /// Duration from years and months.
     YearMonthDuration "yearMonthDuration" 3..=3 Parts,
-    /// Duration of so many days, hours, minutes and seconds.
+    /// Duration from days, hours, minutes and seconds.
     DayTimeDuration "dayTimeDuration" 5..=5 Parts,
-    /// Moment from year, month, day, hour, minute, second and, if given, time zone (`Z`, `+02:00`).
+    /// Date and time from year, month, day, hour, minute, second and an optional time zone (`Z`, `+02:00`).
     DateTime "dateTime" 7..=8 Parts,
-    /// Date from year, month, day and, if given, time zone.
+    /// Date from year, month, day and an optional time zone.
     Date "date" 4..=5 Parts,
-    /// Time from hour, minute, second and, if given, time zone.
+    /// Time from hour, minute, second and an optional time zone.
     Time "time" 4..=5 Parts,
     /// Sum of two durations in months.
     AddYearMonthDurations "addYearMonthDurations" 3..=3 Function,
     /// Difference of two durations in months.
     SubtractYearMonthDurations "subtractYearMonthDurations" 3..=3 Function,
-    /// A duration in months times a number, rounded to months.
+    /// Product of a duration in months and a number, rounded to months.
     MultiplyYearMonthDuration "multiplyYearMonthDuration" 3..=3 Function,
-    /// A duration in months divided by a number, rounded to months.
+    /// Quotient of a duration in months and a number, rounded to months.
     DivideYearMonthDuration "divideYearMonthDurations" 3..=3 Function,
     /// Sum of two durations in seconds.
     AddDayTimeDurations "addDayTimeDurations" 3..=3 Function,
     /// Difference of two durations in seconds.
     SubtractDayTimeDurations "subtractDayTimeDurations" 3..=3 Function,
-    /// A duration in seconds times a number.
+    /// Product of a duration in seconds and a number.
     MultiplyDayTimeDuration "multiplyDayTimeDurations" 3..=3 Function,
-    /// A duration in seconds divided by a number.
+    /// Quotient of a duration in seconds and a number.
     DivideDayTimeDuration "divideDayTimeDuration" 3..=3 Function,
-    /// From the third date to the second.
+    /// Duration from the third date to the second.
     SubtractDates "subtractDates" 3..=3 Function,
-    /// From the third time to the second.
+    /// Duration from the third time to the second.
     SubtractTimes "subtractTimes" 3..=3 Function,
-    /// A moment so many months later.
+    /// Date and time plus a duration in months.
     AddYearMonthDurationToDateTime "addYearMonthDurationToDateTime" 3..=3 Function,
-    /// A moment so many seconds later.
+    /// Date and time plus a duration in seconds.
     AddDayTimeDurationToDateTime "addDayTimeDurationToDateTime" 3..=3 Function,
-    /// A moment so many months earlier.
+    /// Date and time minus a duration in months.
     SubtractYearMonthDurationFromDateTime "subtractYearMonthDurationFromDateTime" 3..=3 Function,
-    /// A moment so many seconds earlier.
+    /// Date and time minus a duration in seconds.
     SubtractDayTimeDurationFromDateTime "subtractDayTimeDurationFromDateTime" 3..=3 Function,
-    /// A date so many months later.
+    /// Date plus a duration in months.
     AddYearMonthDurationToDate "addYearMonthDurationToDate" 3..=3 Function,
-    /// A date so much later, in whole days.
+    /// Date plus a duration in seconds, in whole days.
     AddDayTimeDurationToDate "addDayTimeDurationToDate" 3..=3 Function,
-    /// A date so many months earlier.
+    /// Date minus a duration in months.
     SubtractYearMonthDurationFromDate "subtractYearMonthDurationFromDate" 3..=3 Function,
-    /// A date so much earlier, in whole days.
+    /// Date minus a duration in seconds, in whole days.
     SubtractDayTimeDurationFromDate "subtractDayTimeDurationFromDate" 3..=3 Function,
-    /// A time so much later, around midnight.
+    /// Time plus a duration in seconds, modulo one day.
     AddDayTimeDurationToTime "addDayTimeDurationToTime" 3..=3 Function,
-    /// A time so much earlier, around midnight.
+    /// Time minus a duration in seconds, modulo one day.
     SubtractDayTimeDurationFromTime "subtractDayTimeDurationFromTime" 3..=3 Function,
     /// Whole months from the third moment to the second.
     SubtractDateTimesYieldingYearMonthDuration "subtractDateTimesYieldingYearMonthDuration" 3..=3 Function,
@@ -204,8 +211,8 @@ built_ins! {
     SubtractDateTimesYieldingDayTimeDuration "subtractDateTimesYieldingDayTimeDuration" 3..=3 Function,
 }
 
-/// Members of `swrlb` whose arguments or results are lists.
-const REFUSED: [&str; 9] = [
+/// Members of `swrlb` on lists.
+const LIST_BUILT_INS: [&str; 9] = [
     "empty",
     "first",
     "length",
@@ -217,25 +224,25 @@ const REFUSED: [&str; 9] = [
     "sublist",
 ];
 
-/// Whether a local name is SWRL's but works on lists, which the engine has no values for.
+/// Returns `true` for a local name of a SWRL built-in on lists, for which the engine has no values.
 pub(crate) fn is_refused(local: &str) -> bool {
-    REFUSED.contains(&local)
+    LIST_BUILT_INS.contains(&local)
 }
 
 impl BuiltIn {
-    /// Makes a built-in of a definition, for rules built as data or for [`crate::Syntax::built_ins`]. Definitions live
-    /// as long as the process: a `static`, or a box that is leaked.
+    /// Creates a built-in from a definition, for rules as data or for [`crate::Syntax::built_ins`]. A
+    /// definition lives until the end of the process: it is a `static` or a leaked box.
     pub fn custom(definition: &'static dyn Definition) -> Self {
         Self::Custom(CustomBuiltIn(definition))
     }
 
-    /// The built-in of `swrlb` with this local name.
+    /// Returns the built-in of `swrlb` with this local name.
     pub fn from_name(local: &str) -> Option<Self> {
-        let is_swrls = |built_in: &Self| !matches!(built_in, Self::DataRange | Self::OutsideDataRange);
-        Self::ALL.iter().copied().find(|built_in| built_in.name() == local && is_swrls(built_in))
+        let is_swrl = |built_in: &Self| !matches!(built_in, Self::DataRange | Self::OutsideDataRange);
+        Self::ALL.iter().copied().find(|built_in| built_in.name() == local && is_swrl(built_in))
     }
 
-    /// Whether it can take this many arguments.
+    /// Returns `true` if the built-in accepts this number of arguments.
     pub fn accepts(self, count: usize) -> bool {
         match (self, self.shape()) {
             (Self::Custom(custom), _) => count > 0 && custom.definition().accepts(count),
@@ -244,7 +251,7 @@ impl BuiltIn {
         }
     }
 
-    /// Whether the first argument is computed from the others and so may be unbound.
+    /// Returns `true` if the first argument is computed from the others, so that it may be unbound.
     pub fn is_function(self) -> bool {
         match self {
             Self::Custom(custom) => custom.definition().is_function(),
@@ -252,13 +259,13 @@ impl BuiltIn {
         }
     }
 
-    /// Whether the arguments that are known give the values of those that are not.
+    /// Returns `true` if the known arguments determine the values of the others.
     pub fn binds(self, known: &[bool]) -> bool {
         let kind = self.shape().map(|(.., kind)| kind);
-        let rest = known.get(1..).is_some_and(|rest| rest.iter().all(|known| *known));
+        let inputs_known = known.get(1..).is_some_and(|inputs_known| inputs_known.iter().all(|known| *known));
         match known.first() {
             _ if known.iter().all(|known| *known) => true,
-            Some(false) => rest && (self.is_function() || kind == Some(Kind::Choice)),
+            Some(false) => inputs_known && (self.is_function() || kind == Some(Kind::Choice)),
             _ => kind == Some(Kind::Parts),
         }
     }

@@ -1,26 +1,30 @@
-//! The built-in that somebody may have meant by a name that none has.
+//! Spelling suggestions for unknown built-ins.
 
 use super::library;
 use super::signature::{BuiltIn, SWRLB};
 
 impl BuiltIn {
-    /// The name of the built-in whose IRI is most like `iri`, if one of the same library is like it at all: at most a third of the
-    /// letters differ, and three. Of SWRL's own the local name, of others the IRI.
+    /// Returns the name of the built-in of the same library with the most similar name, if at most a third
+    /// of the letters and at most three letters differ. The result is the local name of a SWRL built-in, or
+    /// the IRI of another built-in.
     pub fn similar(iri: &str) -> Option<&'static str> {
         let local = |iri: &str| iri.rsplit_once('#').map_or(iri, |(_, local)| local).to_ascii_lowercase();
         let written = local(iri);
         let length = written.chars().count();
-        let known: Vec<&'static str> = if iri.starts_with(SWRLB) {
+        let candidates: Vec<&'static str> = if iri.starts_with(SWRLB) {
             Self::ALL
                 .iter()
-                .filter(|known| Self::from_name(known.name()).is_some())
-                .map(|known| known.name())
+                .filter(|candidates| Self::from_name(candidates.name()).is_some())
+                .map(|candidates| candidates.name())
                 .collect()
         } else {
-            library::names_beside(iri)
+            library::names_in_library(iri)
         };
-        let near = known.into_iter().map(|name| (strsim::osa_distance(&written, &local(name)), name));
-        let near = near.filter(|(distance, _)| length > 1 && *distance <= (length / 3).clamp(1, 3));
-        near.min_by_key(|(distance, _)| *distance).map(|(_, name)| name)
+        // Optimal string alignment distance: transposed neighbours count as one difference.
+        let similar_names =
+            candidates.into_iter().map(|name| (strsim::osa_distance(&written, &local(name)), name));
+        let similar_names =
+            similar_names.filter(|(distance, _)| length > 1 && *distance <= (length / 3).clamp(1, 3));
+        similar_names.min_by_key(|(distance, _)| *distance).map(|(_, name)| name)
     }
 }

@@ -1,4 +1,4 @@
-//! Date, time and duration functions of SWRL ([1], section 8.5).
+//! Functions of SWRL on dates, times and durations ([1], section 8.5).
 //!
 //! [1] W3C Member Submission: SWRL, 2004.
 
@@ -8,7 +8,7 @@ use num_traits::{ToPrimitive, Zero};
 use super::signature::BuiltIn;
 use crate::literal::{Decimal, Duration, Literal, Moment, MomentKind, XSD};
 
-/// The value of a temporal function; `None` for other functions and unsuitable arguments.
+/// Value of a temporal function; `None` for other functions and unsuitable arguments.
 pub(super) fn compute(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Literal> {
     use BuiltIn as B;
     match built_in {
@@ -18,20 +18,20 @@ pub(super) fn compute(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Liter
         _ => match arguments {
             [Literal::Duration(left), Literal::Duration(right)] => durations(built_in, left, right),
             [Literal::Duration(left), right] => scaled(built_in, left, &right.as_rational()?),
-            [Literal::Moment(left), Literal::Duration(right)] => moved(built_in, left, right),
-            [Literal::Moment(left), Literal::Moment(right)] => between(built_in, left, right),
+            [Literal::Moment(left), Literal::Duration(right)] => shifted(built_in, left, right),
+            [Literal::Moment(left), Literal::Moment(right)] => difference(built_in, left, right),
             _ => None,
         },
     }
 }
 
-/// A value from its parts, by way of its lexical form.
+/// Composes a value of its parts, by parsing a lexical form.
 fn construct(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Literal> {
     let mut texts: Vec<String> = arguments.iter().map(|argument| argument.lexical()).collect();
     let is_duration = matches!(built_in, BuiltIn::YearMonthDuration | BuiltIn::DayTimeDuration);
     let sign = if is_duration { common_sign(arguments, &mut texts)? } else { "" };
     let is_whole = |at: usize| texts[at].bytes().all(|b| b.is_ascii_digit());
-    let two = |at: usize| is_whole(at).then(|| format!("{:0>2}", texts[at]));
+    let two_digits = |at: usize| is_whole(at).then(|| format!("{:0>2}", texts[at]));
     let seconds = |at: usize| {
         let whole = texts[at].split('.').next().unwrap_or_default().len();
         format!("{}{}", "0".repeat(2_usize.saturating_sub(whole)), texts[at])
@@ -40,8 +40,8 @@ fn construct(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Literal> {
         Some(year) => format!("-{year:0>4}"),
         None => format!("{:0>4}", texts[0]),
     };
-    let date = || Some(format!("{}-{}-{}", year(), two(1)?, two(2)?));
-    let clock = |at: usize| Some(format!("{}:{}:{}", two(at)?, two(at + 1)?, seconds(at + 2)));
+    let date = || Some(format!("{}-{}-{}", year(), two_digits(1)?, two_digits(2)?));
+    let clock = |at: usize| Some(format!("{}:{}:{}", two_digits(at)?, two_digits(at + 1)?, seconds(at + 2)));
     let zone = |at: usize| texts.get(at).map(String::as_str).unwrap_or_default();
     let (lexical, local) = match (built_in, texts.as_slice()) {
         (BuiltIn::YearMonthDuration, [years, months]) => {
@@ -58,7 +58,8 @@ fn construct(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Literal> {
     (!literal.is_ill_typed()).then_some(literal)
 }
 
-/// The sign that all parts of a duration have, which is taken off their texts; `None` where they differ in it.
+/// Returns the common sign of all parts of a duration, and removes it from their texts. `None` if the signs
+/// differ.
 fn common_sign(arguments: &[&Literal], texts: &mut [String]) -> Option<&'static str> {
     let zero = BigRational::zero();
     let numbers = arguments.iter().map(|argument| argument.as_rational()).collect::<Option<Vec<_>>>()?;
@@ -79,6 +80,7 @@ fn is_seconds(duration: &Duration) -> bool {
     duration.months() == 0
 }
 
+/// Sum or difference of two durations, both in months or both in seconds.
 fn durations(built_in: BuiltIn, left: &Duration, right: &Duration) -> Option<Literal> {
     use BuiltIn as B;
     let months = is_months(left) && is_months(right);
@@ -95,7 +97,7 @@ fn durations(built_in: BuiltIn, left: &Duration, right: &Duration) -> Option<Lit
     Some(Literal::Duration(Duration::new(months, Decimal::from_rational(&sum))))
 }
 
-/// A duration times or divided by a number; months are rounded, halves up.
+/// Product or quotient of a duration and a number. Months are rounded, halves up.
 fn scaled(built_in: BuiltIn, duration: &Duration, factor: &BigRational) -> Option<Literal> {
     use BuiltIn as B;
     let divides = matches!(built_in, B::DivideYearMonthDuration | B::DivideDayTimeDuration);
@@ -117,7 +119,8 @@ fn scaled(built_in: BuiltIn, duration: &Duration, factor: &BigRational) -> Optio
     Some(Literal::Duration(duration))
 }
 
-fn moved(built_in: BuiltIn, moment: &Moment, duration: &Duration) -> Option<Literal> {
+/// Moment plus or minus a duration.
+fn shifted(built_in: BuiltIn, moment: &Moment, duration: &Duration) -> Option<Literal> {
     use BuiltIn as B;
     let (kind, months, forward) = match built_in {
         B::AddYearMonthDurationToDateTime => (MomentKind::DateTime, true, true),
@@ -140,7 +143,8 @@ fn moved(built_in: BuiltIn, moment: &Moment, duration: &Duration) -> Option<Lite
     moment.later(&duration).map(Literal::Moment)
 }
 
-fn between(built_in: BuiltIn, left: &Moment, right: &Moment) -> Option<Literal> {
+/// Duration between two moments.
+fn difference(built_in: BuiltIn, left: &Moment, right: &Moment) -> Option<Literal> {
     use BuiltIn as B;
     let (kind, months) = match built_in {
         B::SubtractDates => (MomentKind::Date, false),

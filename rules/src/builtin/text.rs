@@ -1,9 +1,9 @@
-//! String tests and functions, by characters (not bytes), as `XPath` defines them.
+//! String tests and functions on characters (not bytes), as defined by `XPath`.
 
 use super::signature::BuiltIn;
 use crate::literal::Literal;
 
-/// Whether a string test holds.
+/// Returns `true` if a string test holds.
 pub(super) fn test(built_in: BuiltIn, left: &Literal, right: &Literal) -> bool {
     let (Some(left), Some(right)) = (as_text(left), as_text(right)) else { return false };
     match built_in {
@@ -16,7 +16,7 @@ pub(super) fn test(built_in: BuiltIn, left: &Literal, right: &Literal) -> bool {
     }
 }
 
-/// The value of a string function; `None` for other functions and unsuitable arguments.
+/// Value of a string function; `None` for other functions and unsuitable arguments.
 pub(super) fn compute(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Literal> {
     if built_in == BuiltIn::StringConcat {
         return Some(Literal::String(arguments.iter().map(|a| a.lexical()).collect::<String>().into()));
@@ -25,8 +25,8 @@ pub(super) fn compute(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Liter
     if built_in == BuiltIn::Substring {
         return substring(first, &arguments[1..]).map(|text| Literal::String(text.into()));
     }
-    let rest = arguments[1..].iter().map(|a| as_text(a)).collect::<Option<Vec<_>>>()?;
-    let text = match (built_in, rest.as_slice()) {
+    let other_texts = arguments[1..].iter().map(|a| as_text(a)).collect::<Option<Vec<_>>>()?;
+    let text = match (built_in, other_texts.as_slice()) {
         (BuiltIn::StringLength, []) => return Some(Literal::integer(first.chars().count() as i64)),
         (BuiltIn::NormalizeSpace, []) => first.split_ascii_whitespace().collect::<Vec<_>>().join(" "),
         (BuiltIn::UpperCase, []) => first.to_uppercase(),
@@ -50,7 +50,8 @@ pub(super) fn as_text(literal: &Literal) -> Option<&str> {
     }
 }
 
-/// `XPath`'s `fn:substring`: positions count from 1 and are rounded; what lies outside is cut off.
+/// Computes `XPath`'s `fn:substring`. Positions are counted from 1 and rounded, and positions outside the
+/// text are ignored.
 fn substring(text: &str, bounds: &[&Literal]) -> Option<String> {
     let round = |literal: &Literal| literal.as_f64().map(|value| (value + 0.5).floor());
     let start = round(bounds.first()?)?;

@@ -1,4 +1,4 @@
-//! The URI functions of SWRL ([1], section 8.6), by the generic syntax of RFC 3986.
+//! URI functions of SWRL ([1], section 8.6), by the generic syntax of RFC 3986.
 //!
 //! [1] W3C Member Submission: SWRL, 2004.
 
@@ -8,7 +8,7 @@ use super::signature::BuiltIn;
 use super::text::as_text;
 use crate::literal::Literal;
 
-/// The value of a URI function; `None` for other functions and for what is not a URI.
+/// Value of a URI function; `None` for other functions and invalid URIs.
 pub(super) fn compute(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Literal> {
     let text = match (built_in, arguments) {
         (BuiltIn::ResolveUri, [reference, base]) => {
@@ -16,27 +16,28 @@ pub(super) fn compute(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Liter
         }
         (BuiltIn::AnyUri, parts) => {
             let parts: Vec<String> = parts.iter().map(|part| part.lexical()).collect();
-            made_of(&parts)?
+            compose(&parts)?
         }
         _ => return None,
     };
     Some(Literal::Uri(text.into()))
 }
 
-/// The reference that has these parts; `None` where their text would be read as others.
-fn made_of(given: &[String]) -> Option<String> {
-    let [scheme, host, port, path, query, fragment] = given else { return None };
+/// Composes a reference of its parts. `None` if the text would be parsed to other parts.
+fn compose(components: &[String]) -> Option<String> {
+    let [scheme, host, port, path, query, fragment] = components else { return None };
     let mark = |before: &str, part: &str, after: &str| {
         if part.is_empty() { String::new() } else { format!("{before}{part}{after}") }
     };
     let authority = mark("//", &format!("{host}{}", mark(":", port, "")), "");
     let (scheme, query, fragment) = (mark("", scheme, ":"), mark("?", query, ""), mark("#", fragment, ""));
     let text = format!("{scheme}{authority}{path}{query}{fragment}");
-    let read = parts(&text)?;
-    read.iter().zip(given).all(|(read, given)| read.lexical() == *given).then_some(text)
+    let parsed = parts(&text)?;
+    parsed.iter().zip(components).all(|(parsed, components)| parsed.lexical() == *components).then_some(text)
 }
 
-/// Scheme, host, port, path, query and fragment of a reference. `None` where it has other parts (a user), or none.
+/// Splits a reference into scheme, host, port, path, query and fragment. `None` for an invalid reference,
+/// and for one with a user name, for which there is no part.
 pub(super) fn parts(text: &str) -> Option<Vec<Literal>> {
     let iri = IriRef::parse(text).ok()?;
     let authority = iri.authority().unwrap_or_default();

@@ -1,15 +1,18 @@
 //! Equality of individuals by representatives: facts are stored once for each class of equal names ([1]).
 //!
-//! The engine's store, rules and recorded derivations speak of representatives only; this module translates. A pair that
-//! is stated or concluded joins two classes: the facts about one representative are restated about the other, and the
-//! rules' constants follow. What an equality rested on when it came about, down to stated facts and earlier equalities,
-//! is kept ([`classes`]). When one of these facts or a rule of the derivation is deleted, so are the equalities that rest on it; their classes are taken
-//! apart, what was stated about their names is restated, and whatever equality still follows is found again. This
-//! differs from [2], which over-deletes along all derivations and needs no record of equalities.
+//! The engine's store, rules and recorded derivations mention representatives only. This module translates
+//! between names and representatives. A stated or derived pair merges two classes: the facts about one
+//! representative are restated about the other, and so are the constants of the rules. Each equality
+//! records its premises at the time of derivation: stated facts and earlier equalities ([`classes`]). If
+//! one of these facts or a rule of the derivation is deleted, the equalities that depend on it are deleted,
+//! too. Their classes are split, the stated facts about their names are restated, and all equalities that
+//! still follow are derived again.
+//! This differs from [2], which over-deletes along all derivations and needs no record of equalities.
 //!
-//! From outside every name of an individual has all its facts. Literals are never one with anything else: a pair with a
-//! literal joins nothing and is reported as a violation. Pairs of a name with itself are shown only where they are stated;
-//! in bodies an individual that has several names is the same as itself.
+//! To a client, every name of an individual has all facts of the individual. A literal is never equal to a
+//! name or to another literal: a pair with a literal merges nothing and is reported as a violation. A pair
+//! of a name with itself is reported only if it is stated. In rule bodies, an individual with several names
+//! is equal to itself.
 //!
 //! [1] Motik, Nenov, Piro, Horrocks, "Handling owl:sameAs via rewriting", AAAI 2015.
 //! [2] Motik, Nenov, Piro, Horrocks, "Combining rewriting and incremental materialisation maintenance for Datalog
@@ -33,15 +36,17 @@ use crate::vocabulary::{DIFFERENT_FROM, SAME_AS};
 use classes::Classes;
 
 impl Program {
-    /// Returns the program under OWL's reading of names: `owl:sameAs` is equality, and `differentFrom` in bodies matches
-    /// stated and concluded facts of `owl:differentFrom`; without equality it compares names.
+    /// Returns the program under OWL's semantics of names: `owl:sameAs` is equality, and `differentFrom` in
+    /// rule bodies matches stated and derived facts of `owl:differentFrom`. Without equality,
+    /// `differentFrom` compares names.
     ///
-    /// `sameAs` in a body compares individuals where one of its terms is a variable that another atom binds. Between two
-    /// constants, or two variables that no other atom binds, it matches pairs of names of individuals that have several
-    /// names; an individual with one name then equals itself only where that is stated.
+    /// `sameAs` in a body compares individuals if one of its terms is a variable that another atom binds.
+    /// Otherwise (two constants, or variables that no other atom binds) it matches pairs of names of
+    /// individuals with several names. An individual with one name then equals itself only if that is
+    /// stated.
     #[must_use]
     pub fn with_equality(&self, symbols: &mut Symbols) -> Self {
-        let (same, different) = (symbols.name(SAME_AS), symbols.name(DIFFERENT_FROM));
+        let (same_as, different) = (symbols.name(SAME_AS), symbols.name(DIFFERENT_FROM));
         let mut program = Self { equality: true, ..self.clone() };
         for rule in &mut program.rules {
             let bound = bound_variables(rule);
@@ -49,7 +54,7 @@ impl Program {
             for atom in &mut rule.body {
                 match *atom {
                     Atom::Same(left, right) if left != right && !is_bound(left) && !is_bound(right) => {
-                        *atom = Atom::relation(same, [left, right]);
+                        *atom = Atom::relation(same_as, [left, right]);
                     }
                     Atom::Different(left, right) => *atom = Atom::relation(different, [left, right]),
                     _ => {}
@@ -58,6 +63,7 @@ impl Program {
         }
         let [x, y] = [0, 1].map(|number| Term::from(Variable(number)));
         let differ = |left, right| vec![Atom::relation(different, [left, right])];
+        // Rules eq-diff-sym and eq-diff1 of OWL 2 RL: `differentFrom` is symmetric and irreflexive.
         for (label, head, body) in
             [("eq-diff-sym", differ(y, x), differ(x, y)), ("eq-diff1", Vec::new(), differ(x, x))]
         {
@@ -69,37 +75,37 @@ impl Program {
     }
 }
 
-/// Which names are one, and what is stated about them.
+/// Equality classes of names, and the stated facts about the names.
 #[derive(Clone, Debug)]
 pub(crate) struct Equality {
-    /// The relation that equality is stated and concluded in.
-    same: Symbol,
+    /// Symbol of `owl:sameAs`, the relation of stated and derived equalities.
+    same_as: Symbol,
     classes: Classes,
-    /// By row about representatives: the stated facts that it stands for, where that is not the row alone.
+    /// Stated facts of each row, for rows whose stated facts are not just the row itself.
     originals: FxHashMap<Fact, BTreeSet<Fact>>,
-    /// By name: the pairs of names that are stated with it.
+    /// Stated pairs by name.
     pairs: FxHashMap<Symbol, BTreeSet<Fact>>,
-    /// The rules over representatives, in the order of the engine's.
+    /// Rules with representatives as constants, in the order of the engine's rules.
     pub program: Arc<Program>,
-    /// What the rules mention.
+    /// Constants of the rules.
     constants: FxHashSet<Symbol>,
 }
 
 impl Equality {
-    pub fn new(same: Symbol, program: &Arc<Program>) -> Self {
+    pub fn new(same_as: Symbol, program: &Arc<Program>) -> Self {
         let (classes, originals, pairs) = (Classes::default(), FxHashMap::default(), FxHashMap::default());
         let constants = constants(program).collect();
-        Self { same, classes, originals, pairs, program: Arc::clone(program), constants }
+        Self { same_as, classes, originals, pairs, program: Arc::clone(program), constants }
     }
 
-    /// The same without any facts.
+    /// Returns an equality without facts.
     pub fn emptied(&self, program: &Arc<Program>) -> Self {
-        Self::new(self.same, program)
+        Self::new(self.same_as, program)
     }
 
-    /// Whether a fact relates two names by equality, or anything to itself.
+    /// Returns `true` if a fact relates two names by equality, or anything to itself.
     fn is_pair(&self, fact: &Fact, symbols: &Symbols) -> bool {
-        fact.predicate == self.same
+        fact.predicate == self.same_as
             && fact.arguments.len() == 2
             && (fact.arguments[0] == fact.arguments[1]
                 || fact.arguments.iter().all(|&symbol| symbols.as_literal(symbol).is_none()))
@@ -109,22 +115,23 @@ impl Equality {
         self.pairs.get(&fact.arguments[0]).is_some_and(|pairs| pairs.contains(fact))
     }
 
-    /// Whether a row about representatives says that an individual is itself, for rules that ask.
+    /// Returns `true` if a row about representatives equates an individual with itself. Rule bodies match
+    /// such rows.
     fn is_reflexive(&self, row: &Fact) -> bool {
-        row.predicate == self.same && row.arguments.len() == 2 && row.arguments[0] == row.arguments[1]
+        row.predicate == self.same_as && row.arguments.len() == 2 && row.arguments[0] == row.arguments[1]
     }
 
-    /// The fact about representatives.
+    /// Replaces all names of a fact by their representatives.
     pub fn normal(&self, fact: &Fact) -> Fact {
         self.classes.normal(fact)
     }
 
-    /// The names of a representative's class, where there are several.
+    /// Names of a representative's class; `None` for a class of one name.
     fn names(&self, representative: Symbol) -> Option<&[Symbol]> {
         self.classes.members(representative).map(|members| &**members)
     }
 
-    /// The program over representatives.
+    /// Replaces all constants of a program by their representatives.
     pub fn normal_program(&self, program: &Program) -> Program {
         let term = |term: Term| match term {
             Term::Constant(symbol) => Term::Constant(self.classes.find(symbol)),
@@ -139,7 +146,7 @@ impl Equality {
     }
 }
 
-/// The names and values that rules mention.
+/// Names and literals that the rules mention.
 fn constants(program: &Program) -> impl Iterator<Item = Symbol> {
     let atoms = program.rules.iter().flat_map(|rule| rule.head.iter().chain(&rule.body));
     atoms.flat_map(Atom::terms).filter_map(|term| match term {
@@ -149,18 +156,18 @@ fn constants(program: &Program) -> impl Iterator<Item = Symbol> {
 }
 
 impl Atom {
-    /// The atom with other terms.
+    /// Applies a function to all terms.
     fn map(&self, term: &impl Fn(Term) -> Term) -> Self {
-        let all = |terms: &[Term]| terms.iter().copied().map(term).collect();
+        let map_terms = |terms: &[Term]| terms.iter().copied().map(term).collect();
         match self {
             Self::Relation { predicate, arguments } => {
-                Self::Relation { predicate: *predicate, arguments: all(arguments) }
+                Self::Relation { predicate: *predicate, arguments: map_terms(arguments) }
             }
             Self::Not { predicate, arguments } => {
-                Self::Not { predicate: *predicate, arguments: all(arguments) }
+                Self::Not { predicate: *predicate, arguments: map_terms(arguments) }
             }
             Self::BuiltIn { built_in, arguments } => {
-                Self::BuiltIn { built_in: *built_in, arguments: all(arguments) }
+                Self::BuiltIn { built_in: *built_in, arguments: map_terms(arguments) }
             }
             Self::Same(left, right) => Self::Same(term(*left), term(*right)),
             Self::Different(left, right) => Self::Different(term(*left), term(*right)),

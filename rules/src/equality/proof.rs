@@ -1,8 +1,9 @@
-//! Why a fact about names holds, and why two names are one.
+//! Explanations of facts about names, and of equalities between names.
 //!
-//! A derivation that the engine recorded speaks of representatives, which are names, too; a fact about other names of the
-//! same individuals follows from it by equality. Each equality keeps the derivation by which it came about, which uses
-//! earlier ones only. Where a fact occurs in several derivations, the earliest explains it, so that none supports itself.
+//! A recorded derivation mentions representatives, which are themselves names. A fact about other names of
+//! the individuals follows from it by equality. Each equality keeps its own derivation, which uses only
+//! earlier equalities. If a fact occurs in several derivations, the earliest one explains it, so that no
+//! fact supports itself.
 
 use std::collections::BTreeMap;
 
@@ -19,20 +20,21 @@ use crate::safety::bound_variables;
 use crate::store::{Record, state};
 use crate::symbol::Symbol;
 
-/// The edge of a concluded pair.
+/// Creates the edge of a derived pair, with its proof and premises.
 pub(super) fn edge_of(engine: &Engine, equality: &Equality, pair: &Fact) -> Edge {
     let proof = Builder::new(engine, equality).prove_derived(pair);
     let leaves = proof.iter().filter(|step| step.reason == Reason::Asserted).map(|step| &step.fact);
     let (pairs, facts): (Vec<&Fact>, Vec<&Fact>) = leaves
         .partition(|fact| equality.is_pair(fact, &engine.symbols) && fact.arguments[0] != fact.arguments[1]);
     let classes = &equality.classes;
-    let edges =
-        pairs.iter().flat_map(|pair| classes.path(pair.arguments[0], pair.arguments[1], classes.now()));
+    let edges = pairs
+        .iter()
+        .flat_map(|pair| classes.path(pair.arguments[0], pair.arguments[1], classes.next_edge_id()));
     let facts = facts.into_iter().cloned().collect();
     Edge { left: pair.arguments[0], right: pair.arguments[1], facts, edges: edges.collect(), proof }
 }
 
-/// A fact's reason by facts.
+/// Reason of a fact, with the steps to which the indices of its supports refer.
 #[derive(Clone)]
 struct Ground<'a> {
     reason: &'a Reason,
@@ -40,19 +42,20 @@ struct Ground<'a> {
 }
 
 impl Equality {
-    /// Why a fact holds that does.
+    /// Derivation of a fact that holds.
     pub fn why(&self, engine: &Engine, fact: &Fact) -> Derivation {
-        let own = Builder::new(engine, self).prove(fact);
-        let edges = self.edges_in(engine, &own);
+        let derivation = Builder::new(engine, self).prove(fact);
+        let edges = self.edges_in(engine, &derivation);
         if edges.is_empty() {
-            return Derivation { steps: own };
+            return Derivation { steps: derivation };
         }
         let mut grounds: FxHashMap<Fact, Ground> = FxHashMap::default();
         let stated = Reason::Asserted;
         let is_edge = |step: &Step| step.reason == Reason::Asserted && self.is_edge(engine, &step.fact);
+        // In the order of edges: a fact keeps the reason of the earliest derivation in which it occurs.
         for edge in edges.values() {
             if edge.proof.is_empty() {
-                let pair = Fact::new(self.same, [edge.left, edge.right]);
+                let pair = Fact::new(self.same_as, [edge.left, edge.right]);
                 grounds.entry(pair).or_insert(Ground { reason: &stated, steps: &[] });
             }
             for step in edge.proof.iter().filter(|step| !is_edge(step)) {
@@ -60,8 +63,8 @@ impl Equality {
                 grounds.entry(step.fact.clone()).or_insert(ground);
             }
         }
-        for step in own.iter().filter(|step| !is_edge(step)) {
-            grounds.entry(step.fact.clone()).or_insert(Ground { reason: &step.reason, steps: &own });
+        for step in derivation.iter().filter(|step| !is_edge(step)) {
+            grounds.entry(step.fact.clone()).or_insert(Ground { reason: &step.reason, steps: &derivation });
         }
         let mut queue = vec![fact.clone()];
         let mut positions = FxHashMap::from_iter([(fact.clone(), 0)]);
@@ -81,38 +84,38 @@ impl Equality {
         Derivation { steps }
     }
 
-    /// The pairs by which names became one, each after those that it rests on.
+    /// Pairs of all edges, each after the pairs on which it depends.
     pub fn pairs_in_order(&self) -> Vec<Fact> {
         let edges: BTreeMap<EdgeId, &Edge> =
             self.classes.edges.iter().map(|(id, edge)| (*id, edge)).collect();
-        edges.into_values().map(|edge| Fact::new(self.same, [edge.left, edge.right])).collect()
+        edges.into_values().map(|edge| Fact::new(self.same_as, [edge.left, edge.right])).collect()
     }
 
     fn is_edge(&self, engine: &Engine, fact: &Fact) -> bool {
         self.is_pair(fact, &engine.symbols) && fact.arguments[0] != fact.arguments[1]
     }
 
-    /// The edges that steps and the derivations of these edges use.
+    /// Edges that the steps use, and the edges that their derivations use, transitively.
     fn edges_in(&self, engine: &Engine, steps: &[Step]) -> BTreeMap<EdgeId, &Edge> {
-        let mut found: BTreeMap<EdgeId, &Edge> = BTreeMap::new();
-        let mut open: Vec<EdgeId> = Vec::new();
+        let mut used_edges: BTreeMap<EdgeId, &Edge> = BTreeMap::new();
+        let mut stack: Vec<EdgeId> = Vec::new();
         for step in
             steps.iter().filter(|step| step.reason == Reason::Asserted && self.is_edge(engine, &step.fact))
         {
             let (left, right) = (step.fact.arguments[0], step.fact.arguments[1]);
-            open.extend(self.classes.path(left, right, self.classes.now()));
+            stack.extend(self.classes.path(left, right, self.classes.next_edge_id()));
         }
-        while let Some(id) = open.pop() {
+        while let Some(id) = stack.pop() {
             if let Some(edge) = self.classes.edges.get(&id)
-                && found.insert(id, edge).is_none()
+                && used_edges.insert(id, edge).is_none()
             {
-                open.extend(&edge.edges);
+                stack.extend(&edge.edges);
             }
         }
-        found
+        used_edges
     }
 
-    /// A stated fact that a row stands for, if the row is stated.
+    /// A stated fact that a row represents; `None` if the row is not stated.
     pub fn witness(&self, engine: &Engine, row: &Fact) -> Option<Fact> {
         match self.originals.get(row) {
             Some(facts) => facts.first().cloned(),
@@ -120,55 +123,56 @@ impl Equality {
         }
     }
 
-    /// Rows that a violation rests on, as facts about names: stated ones where there are any, with the equalities that
-    /// make them one.
+    /// Facts about names for the rows of a violation, preferably stated facts, together with the equalities
+    /// between different names of one individual.
     pub fn witnesses(&self, engine: &Engine, rows: Vec<Fact>) -> Vec<Fact> {
         let mut facts = Vec::new();
         for row in rows {
             let fact = if self.is_reflexive(&row) {
                 let class = self.classes.class(row.arguments[0]);
-                let other = class.get(1).copied().unwrap_or(row.arguments[0]);
-                Fact::new(self.same, [class[0], other])
+                let second = class.get(1).copied().unwrap_or(row.arguments[0]);
+                Fact::new(self.same_as, [class[0], second])
             } else {
                 self.witness(engine, &row).unwrap_or_else(|| row.clone())
             };
             for (at, &name) in fact.arguments.iter().enumerate() {
-                let others = fact.arguments[at + 1..].iter().filter(|&&other| other != name);
-                let equal = others.filter(|&&other| self.classes.find(other) == self.classes.find(name));
-                facts.extend(equal.map(|&other| Fact::new(self.same, [name, other])));
+                let later = fact.arguments[at + 1..].iter().filter(|&&other| other != name);
+                let aliases = later.filter(|&&other| self.classes.find(other) == self.classes.find(name));
+                facts.extend(aliases.map(|&other| Fact::new(self.same_as, [name, other])));
             }
             facts.push(fact);
         }
-        let mut seen = rustc_hash::FxHashSet::default();
-        facts.retain(|fact| seen.insert(fact.clone()));
+        // Keeps the first occurrence of each fact.
+        let mut unique = rustc_hash::FxHashSet::default();
+        facts.retain(|fact| unique.insert(fact.clone()));
         facts
     }
 }
 
-/// A reason whose supports are numbered anew.
+/// Renumbers the supports of a reason.
 fn rebased(ground: &Ground, mut position: impl FnMut(&Fact) -> usize) -> Reason {
-    let mut moved =
+    let mut renumber =
         |supports: &[usize]| supports.iter().map(|&at| position(&ground.steps[at].fact)).collect::<Vec<_>>();
     match ground.reason {
         Reason::Asserted => Reason::Asserted,
-        Reason::Equality { supports } => Reason::Equality { supports: moved(supports) },
+        Reason::Equality { supports } => Reason::Equality { supports: renumber(supports) },
         Reason::Rule { identity, bindings, supports, absent, aggregates } => Reason::Rule {
             identity: identity.clone(),
             bindings: bindings.clone(),
-            supports: moved(supports),
+            supports: renumber(supports),
             absent: absent.clone(),
             aggregates: aggregates
                 .iter()
                 .map(|aggregated| Aggregated {
                     result: aggregated.result,
-                    matches: aggregated.matches.iter().map(|found| moved(found)).collect(),
+                    matches: aggregated.matches.iter().map(|supports| renumber(supports)).collect(),
                 })
                 .collect(),
         },
     }
 }
 
-/// Builds a derivation from what is recorded now.
+/// Builds a derivation from the current records.
 struct Builder<'a> {
     engine: &'a Engine,
     equality: &'a Equality,
@@ -181,6 +185,7 @@ impl<'a> Builder<'a> {
         Self { engine, equality, positions: FxHashMap::default(), queue: Vec::new() }
     }
 
+    /// Position of a fact among the steps. Queues the fact on its first occurrence.
     fn position(&mut self, fact: &Fact) -> usize {
         let queue = &mut self.queue;
         *self.positions.entry(fact.clone()).or_insert_with(|| {
@@ -194,9 +199,10 @@ impl<'a> Builder<'a> {
         self.finish(Vec::new())
     }
 
-    /// The derivation of a pair whose names are not one yet.
+    /// Derives a pair whose names are not yet equal.
     fn prove_derived(mut self, pair: &Fact) -> Vec<Step> {
         self.position(pair);
+        // The pair itself is not stated, so its derivation starts with the recorded rule.
         let reason = self.derived(pair, pair).unwrap_or(Reason::Asserted);
         self.finish(vec![DerivationStep { fact: pair.clone(), reason }])
     }
@@ -224,19 +230,19 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// A pair by the edges between its names.
+    /// Explains a pair by a path of edges between its names.
     fn pair(&mut self, pair: &Fact) -> Reason {
-        let (classes, same) = (&self.equality.classes, self.equality.same);
+        let (classes, same_as) = (&self.equality.classes, self.equality.same_as);
         let (from, mut to) = (pair.arguments[0], pair.arguments[1]);
         if from == to {
-            // An individual of several names is itself because it has another name.
+            // An individual with several names is equal to itself because of another name.
             to = classes.class(from).iter().copied().find(|&name| name != from).unwrap_or(to);
         }
-        let path = classes.path(from, to, classes.now());
+        let path = classes.path(from, to, classes.next_edge_id());
         let pairs: Vec<Fact> = path
             .iter()
             .filter_map(|edge| classes.edges.get(edge))
-            .map(|edge| Fact::new(same, [edge.left, edge.right]))
+            .map(|edge| Fact::new(same_as, [edge.left, edge.right]))
             .collect();
         if pairs.as_slice() == std::slice::from_ref(pair) {
             return Reason::Asserted;
@@ -244,21 +250,21 @@ impl<'a> Builder<'a> {
         Reason::Equality { supports: pairs.iter().map(|pair| self.position(pair)).collect() }
     }
 
-    /// A fact by the same fact about other names.
+    /// Explains a fact by the corresponding fact about other names and the equalities between the names.
     fn renamed(&mut self, fact: &Fact, other: &Fact) -> Reason {
         let mut supports = vec![self.position(other)];
         for (&name, &other) in fact.arguments.iter().zip(&other.arguments) {
             if name != other {
-                let at = self.position(&Fact::new(self.equality.same, [name, other]));
-                if !supports.contains(&at) {
-                    supports.push(at);
+                let position = self.position(&Fact::new(self.equality.same_as, [name, other]));
+                if !supports.contains(&position) {
+                    supports.push(position);
                 }
             }
         }
         Reason::Equality { supports }
     }
 
-    /// A fact by the rule that is recorded for its row.
+    /// Explains a fact by the rule recorded for its row.
     fn derived(&mut self, fact: &Fact, row: &Fact) -> Option<Reason> {
         let engine = self.engine;
         let relation = engine.store.get(engine.store.find(row.predicate, row.arguments.len())?);
@@ -270,9 +276,9 @@ impl<'a> Builder<'a> {
         if concluded != *fact {
             return Some(self.renamed(fact, &concluded));
         }
-        let used =
+        let variables =
             (0..).zip(bound_variables(rule)).filter(|&(_, is_bound)| is_bound).map(|(v, _)| Variable(v));
-        let bindings = used.map(|v| (rule.variable_name(v), bound[usize::from(v.0)])).collect();
+        let bindings = variables.map(|v| (rule.variable_name(v), bound[usize::from(v.0)])).collect();
         let atoms = |negated: bool| {
             let ground = rule.body.iter().filter_map(move |atom| match atom {
                 Atom::Relation { predicate, arguments } if !negated => Some((*predicate, arguments)),
@@ -293,8 +299,9 @@ impl<'a> Builder<'a> {
         })
     }
 
-    /// What a rule's variables stand for, where the rule compares one with a name by that name: what was recorded is its
-    /// representative, which it is only because of an equality that no atom of the rule asks for.
+    /// Values of a rule's variables, as the rule mentions them. If the rule compares a variable with a
+    /// constant, the recorded value is the constant's representative. It is replaced by the constant,
+    /// because no atom of the rule supports the equality between the two.
     fn as_written(&self, rule: &Rule, bound: &[Symbol]) -> Vec<Symbol> {
         let mut values = bound.to_vec();
         for atom in &rule.body {
@@ -317,11 +324,11 @@ impl<'a> Builder<'a> {
         for (relation, key, result) in engine.aggregates(record) {
             let mut rows: Vec<_> = engine.group(relation, &key).map(|(row, _)| row).collect();
             rows.sort_unstable();
-            let found = rows.into_iter().map(|row| {
+            let matches = rows.into_iter().map(|row| {
                 let facts = engine.body_facts(engine.store.get(relation).record(row), false);
                 facts.iter().map(|fact| self.position(fact)).collect()
             });
-            aggregates.push(Aggregated { result, matches: found.collect() });
+            aggregates.push(Aggregated { result, matches: matches.collect() });
         }
         aggregates
     }

@@ -1,4 +1,5 @@
-//! A change of what is stated to the change of what holds, where classes of names join and come apart on the way.
+//! Translates a change of the stated facts into a change of the facts that hold, while equality classes
+//! merge and split.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -21,24 +22,26 @@ struct Update<'e> {
     engine: &'e mut Engine,
     equality: Equality,
     /// Rows whose stated facts have changed since the last [`Update::flush`], with these facts.
-    open: BTreeMap<Fact, BTreeSet<Fact>>,
-    /// Whether rules mention a name whose representative has changed.
+    pending_rows: BTreeMap<Fact, BTreeSet<Fact>>,
+    /// `true` if a rule mentions a name whose representative has changed.
     rules_changed: bool,
-    /// Rows that came (1) or went (-1) in this update.
-    net: FxHashMap<Fact, i8>,
-    /// Names whose class has changed, with the class that they had.
-    moved: FxHashMap<Symbol, Arc<[Symbol]>>,
-    /// Facts that held before, among those that may not any more; not noted where nobody asks for the change.
-    before: FxHashSet<Fact>,
+    /// Net change of each row in this update: inserted (1), removed (-1), or both (0).
+    net_change: FxHashMap<Fact, i8>,
+    /// Names whose class has changed, with their class before the update.
+    old_classes: FxHashMap<Symbol, Arc<[Symbol]>>,
+    /// Facts that held before the update and may have ceased to hold. Not collected if `silent`.
+    previous_facts: FxHashSet<Fact>,
+    /// Suppresses the report, during the first evaluation.
     silent: bool,
-    /// Concluded pairs that join classes.
-    joining: Vec<Fact>,
-    /// The rules that replace the engine's with the next [`Update::flush`].
+    /// Derived pairs whose classes are still to be merged.
+    pairs_to_join: Vec<Fact>,
+    /// New rules, which the next [`Update::flush`] installs in the engine.
     program: Option<Program>,
 }
 
 impl Engine {
-    /// As [`Engine::apply`], under equality; on an error also what takes the change back.
+    /// Applies a change like [`Engine::apply`], under equality. An error comes with the change that
+    /// restores the stated facts.
     pub(crate) fn apply_equally(
         &mut self,
         equality: Arc<Equality>,
@@ -53,43 +56,44 @@ impl Engine {
         result
     }
 
-    /// Joins the classes that the first evaluation asks for; nothing is reported.
+    /// Merges the classes of all pairs derived by the first evaluation, and reports nothing.
     pub(crate) fn settle(&mut self) -> Result<(), Error> {
         let Some(equality) = self.equality.take() else { return Ok(()) };
-        let same = equality.same;
+        let same_as = equality.same_as;
         let mut update = Update::new(self, equality);
         update.silent = true;
-        let concluded = update.engine.matching_rows(same, &[None, None]);
-        update.joining = concluded.map(|row| Fact::new(same, row.iter().copied())).collect();
+        let concluded = update.engine.matching_rows(same_as, &[None, None]);
+        update.pairs_to_join = concluded.map(|row| Fact::new(same_as, row.iter().copied())).collect();
         let result = update.join_concluded();
         let equality = update.equality;
         self.equality = Some(Arc::new(equality));
         result
     }
 
-    /// States facts and joins the classes that are stated, before anything is derived.
+    /// States facts and merges the classes of the stated pairs, before the first evaluation.
     pub(crate) fn begin(&mut self, facts: Vec<Fact>) {
         let Some(equality) = self.equality.take() else { return };
         let mut update = Update::new(self, equality);
         let facts: BTreeSet<Fact> = facts.into_iter().collect();
-        let (pairs, others): (Vec<Fact>, Vec<Fact>) =
+        let (pairs, other_facts): (Vec<Fact>, Vec<Fact>) =
             facts.into_iter().partition(|fact| update.equality.is_pair(fact, &update.engine.symbols));
         for pair in &pairs {
             update.state(pair);
         }
         update.join_stated(&pairs);
-        let (plain, renamed): (Vec<Fact>, Vec<Fact>) =
-            others.into_iter().partition(|fact| update.equality.classes.normal(fact) == *fact);
-        for fact in plain {
+        let (normal_facts, aliased_facts): (Vec<Fact>, Vec<Fact>) =
+            other_facts.into_iter().partition(|fact| update.equality.classes.normal(fact) == *fact);
+        // Without an entry in `originals`, an asserted row represents exactly its own fact.
+        for fact in normal_facts {
             let relation = update.engine.store.relation(fact.predicate, fact.arguments.len());
             update.engine.store.get_mut(relation).insert(&fact.arguments, state::ASSERTED, Record::NONE);
         }
-        for fact in &renamed {
+        for fact in &aliased_facts {
             update.state(fact);
         }
-        let open = std::mem::take(&mut update.open);
-        for (row, facts) in open {
-            if update.keep(&row, facts) {
+        let pending_rows = std::mem::take(&mut update.pending_rows);
+        for (row, facts) in pending_rows {
+            if update.update_originals(&row, facts) {
                 let relation = update.engine.store.relation(row.predicate, row.arguments.len());
                 let relation = update.engine.store.get_mut(relation);
                 if relation.find(&row.arguments).is_none() {
@@ -105,19 +109,33 @@ impl Engine {
 impl<'e> Update<'e> {
     fn new(engine: &'e mut Engine, equality: Arc<Equality>) -> Self {
         let equality = Arc::unwrap_or_clone(equality);
-        let (open, net, moved) = (BTreeMap::new(), FxHashMap::default(), FxHashMap::default());
-        let (before, joining) = (FxHashSet::default(), Vec::new());
+        let (pending_rows, net_change, old_classes) =
+            (BTreeMap::new(), FxHashMap::default(), FxHashMap::default());
+        let (previous_facts, pairs_to_join) = (FxHashSet::default(), Vec::new());
         let (rules_changed, silent, program) = (false, false, None);
-        Self { engine, equality, open, rules_changed, net, moved, before, silent, joining, program }
+        Self {
+            engine,
+            equality,
+            pending_rows,
+            rules_changed,
+            net_change,
+            old_classes,
+            previous_facts,
+            silent,
+            pairs_to_join,
+            program,
+        }
     }
 
-    /// The change of what holds; on an error, what takes the change back.
+    /// Returns the net change of the facts that hold. An error comes with the change that restores the
+    /// stated facts.
     fn apply(&mut self, delta: &Delta) -> Result<Delta, (Error, Delta)> {
-        let kept: FxHashSet<&Fact> = delta.insert.iter().collect();
+        // A fact in both lists remains stated.
+        let inserted: FxHashSet<&Fact> = delta.insert.iter().collect();
         let (mut added, mut removed) = (Vec::new(), Vec::new());
-        for fact in delta.delete.iter().filter(|fact| !kept.contains(fact)) {
+        for fact in delta.delete.iter().filter(|fact| !inserted.contains(fact)) {
             if self.is_stated(fact) {
-                self.unstate(fact);
+                self.retract(fact);
                 removed.push(fact.clone());
             }
         }
@@ -134,24 +152,28 @@ impl<'e> Update<'e> {
         }
     }
 
+    /// Splits the classes whose equalities are no longer supported, merges the stated pairs, and updates
+    /// the store.
     fn change_classes(&mut self, added: &[Fact], removed: &[Fact]) -> Result<(), Error> {
-        let old = Arc::clone(&self.engine.program);
-        let mut gone = FxHashSet::default();
+        let old_program = Arc::clone(&self.engine.program);
+        let mut removed_rules = FxHashSet::default();
         if let Some(program) = &self.program {
             self.equality.constants.extend(constants(program));
-            let kept: FxHashSet<&Rule> = program.rules.iter().collect();
-            gone.extend(old.rules.iter().filter(|rule| !kept.contains(rule)).map(|rule| &rule.identity));
+            let new_rules: FxHashSet<&Rule> = program.rules.iter().collect();
+            removed_rules.extend(
+                old_program.rules.iter().filter(|rule| !new_rules.contains(rule)).map(|rule| &rule.identity),
+            );
         }
-        let invalid = self.equality.classes.resting_on(removed.iter(), &gone);
-        self.take_apart(&invalid, added);
+        let invalid = self.equality.classes.depending_on(removed.iter(), &removed_rules);
+        self.split_classes(&invalid, added);
         self.join_stated(added);
         self.flush()
     }
 
-    /// The facts that a row stands for.
+    /// Stated facts that a row represents, marked as changed.
     fn originals(&mut self, row: &Fact) -> &mut BTreeSet<Fact> {
-        let Self { engine, equality, open, .. } = self;
-        open.entry(row.clone()).or_insert_with(|| match equality.originals.get(row) {
+        let Self { engine, equality, pending_rows, .. } = self;
+        pending_rows.entry(row.clone()).or_insert_with(|| match equality.originals.get(row) {
             Some(facts) => facts.clone(),
             None if equality.is_reflexive(row) => BTreeSet::new(),
             None if engine.row_state(row).is_some_and(|bits| bits & state::ASSERTED != 0) => {
@@ -183,7 +205,7 @@ impl<'e> Update<'e> {
         }
     }
 
-    fn unstate(&mut self, fact: &Fact) {
+    fn retract(&mut self, fact: &Fact) {
         let row = self.equality.classes.normal(fact);
         if self.equality.is_pair(fact, &self.engine.symbols) {
             for name in &fact.arguments {
@@ -200,7 +222,7 @@ impl<'e> Update<'e> {
         }
     }
 
-    /// The rows that mention a representative, in the store.
+    /// Rows of the store with a representative among their arguments.
     fn mentions(&mut self, name: Symbol) -> Vec<Fact> {
         let mut rows = Vec::new();
         for relation in &mut self.engine.store.relations {
@@ -212,6 +234,7 @@ impl<'e> Update<'e> {
                 let index = relation.best_index(1 << column).map(|(index, _)| index);
                 for row in index.into_iter().flat_map(|index| relation.lookup(index, &[name])) {
                     let row = relation.row(row);
+                    // A row with the name in several columns is reported for the first of them only.
                     if !row[..column].contains(&name) {
                         rows.push(Fact::new(predicate, row.iter().copied()));
                     }
@@ -221,30 +244,33 @@ impl<'e> Update<'e> {
         rows
     }
 
-    /// Notes the class of a representative and what held of it, before either changes.
-    fn note_class(&mut self, representative: Symbol) {
+    /// Records a class and the facts about its names, before either changes.
+    fn record_class(&mut self, representative: Symbol) {
         let class = self.equality.classes.class(representative);
         self.rules_changed |= class.iter().any(|name| self.equality.constants.contains(name));
-        if self.moved.contains_key(&representative) {
+        if self.old_classes.contains_key(&representative) {
             return;
         }
         if !self.silent {
             let mut rows = self.mentions(representative);
-            rows.retain(|row| self.net.get(row) != Some(&1));
-            let is_gone = |&(row, &net): &(&Fact, &i8)| net == -1 && row.arguments.contains(&representative);
-            rows.extend(self.net.iter().filter(is_gone).map(|(row, _)| row.clone()));
+            // Rows that this update inserted did not hold before it.
+            rows.retain(|row| self.net_change.get(row) != Some(&1));
+            let was_removed =
+                |&(row, &sign): &(&Fact, &i8)| sign == -1 && row.arguments.contains(&representative);
+            rows.extend(self.net_change.iter().filter(was_removed).map(|(row, _)| row.clone()));
             for row in rows {
                 let facts = self.facts_before(&row);
-                self.before.extend(facts);
+                self.previous_facts.extend(facts);
             }
         }
         for &name in class.iter() {
-            self.moved.entry(name).or_insert_with(|| Arc::clone(&class));
+            self.old_classes.entry(name).or_insert_with(|| Arc::clone(&class));
         }
     }
 
+    /// Facts that a row represented before this update.
     fn facts_before(&self, row: &Fact) -> Vec<Fact> {
-        let names = |symbol| match self.moved.get(&symbol) {
+        let names = |symbol| match self.old_classes.get(&symbol) {
             Some(class) if class.len() > 1 => Some(&**class),
             Some(_) => None,
             None => self.equality.names(symbol),
@@ -252,11 +278,12 @@ impl<'e> Update<'e> {
         self.equality.facts_of(row, &names)
     }
 
-    /// Takes the stated facts off all rows that mention any of these names.
-    fn collect(&mut self, names: &BTreeSet<Symbol>) -> Vec<Fact> {
+    /// Takes the stated facts out of all rows that mention any of these names.
+    fn take_originals(&mut self, names: &BTreeSet<Symbol>) -> Vec<Fact> {
         let mut rows: Vec<Fact> = names.iter().flat_map(|&name| self.mentions(name)).collect();
-        let open = self.open.keys().filter(|row| row.arguments.iter().any(|name| names.contains(name)));
-        rows.extend(open.cloned());
+        let pending_rows =
+            self.pending_rows.keys().filter(|row| row.arguments.iter().any(|name| names.contains(name)));
+        rows.extend(pending_rows.cloned());
         let mut facts = Vec::new();
         for row in rows {
             facts.extend(std::mem::take(self.originals(&row)));
@@ -264,9 +291,10 @@ impl<'e> Update<'e> {
         facts
     }
 
-    /// Removes edges and takes their classes apart into what the others and stated pairs connect, but for the pairs that
-    /// are `added` by this update: [`Update::join_stated`] joins these, and restates the facts of both classes.
-    fn take_apart(&mut self, invalid: &BTreeSet<EdgeId>, added: &[Fact]) {
+    /// Removes edges and splits their classes into the components that the remaining edges and stated pairs
+    /// connect. Ignores the stated pairs in `added`: [`Update::join_stated`] merges their classes and
+    /// restates the facts of both.
+    fn split_classes(&mut self, invalid: &BTreeSet<EdgeId>, added: &[Fact]) {
         let added: FxHashSet<&Fact> = added.iter().collect();
         let classes = &self.equality.classes;
         let broken: BTreeSet<Symbol> = invalid
@@ -275,9 +303,9 @@ impl<'e> Update<'e> {
             .map(|edge| classes.find(edge.left))
             .collect();
         for &representative in &broken {
-            self.note_class(representative);
+            self.record_class(representative);
         }
-        let facts = self.collect(&broken);
+        let facts = self.take_originals(&broken);
         self.equality.classes.disconnect(invalid);
         for &representative in &broken {
             let class = self.equality.classes.class(representative);
@@ -297,8 +325,9 @@ impl<'e> Update<'e> {
         }
     }
 
+    /// Marks the pair of a name with itself as changed.
     fn touch_reflexive(&mut self, name: Symbol) {
-        let row = Fact::new(self.equality.same, [name, name]);
+        let row = Fact::new(self.equality.same_as, [name, name]);
         self.originals(&row);
     }
 
@@ -316,33 +345,35 @@ impl<'e> Update<'e> {
         );
     }
 
-    /// Joins the classes of pairs as `connect` does it.
+    /// Merges the classes of pairs. `connect` adds the edges.
     fn join(&mut self, pairs: &[(Symbol, Symbol)], connect: impl FnOnce(&mut Classes)) {
         let classes = &self.equality.classes;
-        let found = pairs.iter().map(|&(left, right)| (classes.find(left), classes.find(right)));
-        let apart = found.filter(|(left, right)| left != right);
-        let old: BTreeSet<Symbol> = apart.flat_map(|(left, right)| [left, right]).collect();
-        for &representative in &old {
-            self.note_class(representative);
+        let representatives = pairs.iter().map(|&(left, right)| (classes.find(left), classes.find(right)));
+        let distinct = representatives.filter(|(left, right)| left != right);
+        let merged: BTreeSet<Symbol> = distinct.flat_map(|(left, right)| [left, right]).collect();
+        for &representative in &merged {
+            self.record_class(representative);
         }
         connect(&mut self.equality.classes);
-        let lost: BTreeSet<Symbol> =
-            old.iter().copied().filter(|&name| self.equality.classes.find(name) != name).collect();
-        for fact in self.collect(&lost) {
+        // Facts move only from classes that lost their representative to a larger class.
+        let superseded: BTreeSet<Symbol> =
+            merged.iter().copied().filter(|&name| self.equality.classes.find(name) != name).collect();
+        for fact in self.take_originals(&superseded) {
             let row = self.equality.classes.normal(&fact);
             self.originals(&row).insert(fact);
         }
-        for name in old {
+        for name in merged {
             self.touch_reflexive(name);
         }
     }
 
-    /// Joins what is concluded to be one, until nothing more is.
+    /// Merges the classes of derived pairs until the rules derive no further pair.
     fn join_concluded(&mut self) -> Result<(), Error> {
         loop {
             let mut connected = Forest::default();
             let mut edges: Vec<Edge> = Vec::new();
-            for pair in std::mem::take(&mut self.joining) {
+            // One spanning tree of edges per class suffices.
+            for pair in std::mem::take(&mut self.pairs_to_join) {
                 let (left, right) = (pair.arguments[0], pair.arguments[1]);
                 if left != right
                     && self.equality.is_pair(&pair, &self.engine.symbols)
@@ -367,12 +398,13 @@ impl<'e> Update<'e> {
         }
     }
 
-    /// Keeps what a row stands for; whether the row is stated.
-    fn keep(&mut self, row: &Fact, facts: BTreeSet<Fact>) -> bool {
+    /// Stores the original facts of a row. Returns `true` if the row is stated.
+    fn update_originals(&mut self, row: &Fact, facts: BTreeSet<Fact>) -> bool {
         let equality = &mut self.equality;
         if equality.is_reflexive(row) && equality.is_pair(row, &self.engine.symbols) {
             let class = equality.classes.class(row.arguments[0]);
-            let is_stated = |&name: &Symbol| equality.is_stated_pair(&Fact::new(equality.same, [name, name]));
+            let is_stated =
+                |&name: &Symbol| equality.is_stated_pair(&Fact::new(equality.same_as, [name, name]));
             return equality.classes.find(row.arguments[0]) == row.arguments[0]
                 && (class.len() > 1 || class.iter().any(is_stated));
         }
@@ -385,12 +417,12 @@ impl<'e> Update<'e> {
         is_stated
     }
 
-    /// Brings the store and the rules up to the stated facts and classes.
+    /// Updates the store and the rules to the stated facts and classes.
     fn flush(&mut self) -> Result<(), Error> {
         let mut delta = Delta::default();
-        for (row, facts) in std::mem::take(&mut self.open) {
-            let was = self.engine.row_state(&row).is_some_and(|bits| bits & state::ASSERTED != 0);
-            match (was, self.keep(&row, facts)) {
+        for (row, facts) in std::mem::take(&mut self.pending_rows) {
+            let was_stated = self.engine.row_state(&row).is_some_and(|bits| bits & state::ASSERTED != 0);
+            match (was_stated, self.update_originals(&row, facts)) {
                 (false, true) => delta.insert.push(row),
                 (true, false) => delta.delete.push(row),
                 _ => {}
@@ -411,35 +443,36 @@ impl<'e> Update<'e> {
             }
             None => self.engine.apply_rows(delta)?,
         };
-        self.note(change);
+        self.record_change(change);
         Ok(())
     }
 
-    fn note(&mut self, change: Delta) {
+    /// Adds a change of rows to the net change, and queues the new pairs.
+    fn record_change(&mut self, change: Delta) {
         for (rows, sign) in [(change.insert, 1), (change.delete, -1)] {
             for row in rows {
-                if sign == 1 && row.predicate == self.equality.same && row.arguments.len() == 2 {
-                    self.joining.push(row.clone());
+                if sign == 1 && row.predicate == self.equality.same_as && row.arguments.len() == 2 {
+                    self.pairs_to_join.push(row.clone());
                 }
-                let net = self.net.entry(row).or_default();
-                *net += sign;
+                let net_change = self.net_change.entry(row).or_default();
+                *net_change += sign;
             }
         }
     }
 
-    /// The change of facts about names, sorted.
+    /// Returns the change of the facts about names, sorted.
     fn report(&mut self, added: &[Fact], removed: &[Fact]) -> Delta {
         let mut after: FxHashSet<Fact> = FxHashSet::default();
-        let moved: BTreeSet<Symbol> =
-            self.moved.keys().map(|&name| self.equality.classes.find(name)).collect();
-        let mut rows: Vec<Fact> = moved.into_iter().flat_map(|name| self.mentions(name)).collect();
-        let net = std::mem::take(&mut self.net);
-        for (row, net) in net {
-            match net {
+        let representatives: BTreeSet<Symbol> =
+            self.old_classes.keys().map(|&name| self.equality.classes.find(name)).collect();
+        let mut rows: Vec<Fact> = representatives.into_iter().flat_map(|name| self.mentions(name)).collect();
+        let net_change = std::mem::take(&mut self.net_change);
+        for (row, net_change) in net_change {
+            match net_change {
                 1 => rows.push(row),
                 -1 => {
                     let facts = self.facts_before(&row);
-                    self.before.extend(facts);
+                    self.previous_facts.extend(facts);
                 }
                 _ => {}
             }
@@ -447,22 +480,25 @@ impl<'e> Update<'e> {
         for row in rows {
             after.extend(self.equality.facts_of(&row, &|symbol| self.equality.names(symbol)));
         }
+        // Pairs of a name with itself hold exactly if they are stated, so their change is that of the
+        // input.
         let reflexive = |facts: &[Fact]| -> Vec<Fact> {
             let is_reflexive = |fact: &&Fact| {
                 self.equality.is_pair(fact, &self.engine.symbols) && self.equality.is_reflexive(fact)
             };
             facts.iter().filter(is_reflexive).cloned().collect()
         };
-        let mut insert: Vec<Fact> = after.difference(&self.before).cloned().chain(reflexive(added)).collect();
+        let mut insert: Vec<Fact> =
+            after.difference(&self.previous_facts).cloned().chain(reflexive(added)).collect();
         let mut delete: Vec<Fact> =
-            self.before.difference(&after).cloned().chain(reflexive(removed)).collect();
+            self.previous_facts.difference(&after).cloned().chain(reflexive(removed)).collect();
         insert.sort_unstable();
         delete.sort_unstable();
         Delta { insert, delete }
     }
 }
 
-/// Joins the two names of a stated pair, unless they are one already.
+/// Merges the classes of the two names of a stated pair, unless they are already equal.
 fn connect_stated(classes: &mut Classes, pair: &Fact) {
     let (left, right) = (pair.arguments[0], pair.arguments[1]);
     if classes.find(left) != classes.find(right) {

@@ -1,4 +1,4 @@
-//! What holds, for each name of each individual.
+//! Facts that hold about all names of each individual.
 
 use smallvec::SmallVec;
 
@@ -10,7 +10,7 @@ use crate::store::state;
 use crate::symbol::Symbol;
 
 impl Equality {
-    /// Whether a fact about names holds.
+    /// Returns `true` if a fact about names holds.
     pub fn holds(&self, engine: &Engine, fact: &Fact) -> bool {
         let row = self.classes.normal(fact);
         match self.is_pair(fact, &engine.symbols) && self.is_reflexive(&row) {
@@ -20,7 +20,7 @@ impl Equality {
         }
     }
 
-    /// Whether a fact about names is stated.
+    /// Returns `true` if a fact about names is stated.
     pub fn is_stated(&self, engine: &Engine, fact: &Fact) -> bool {
         if self.is_pair(fact, &engine.symbols) {
             return self.is_stated_pair(fact);
@@ -32,8 +32,9 @@ impl Equality {
         }
     }
 
-    /// Everything that is stated.
+    /// All stated facts.
     pub fn stated(&self, engine: &Engine) -> Vec<Fact> {
+        // A pair is filed under both of its names; the filter takes it once.
         let pairs = self
             .pairs
             .iter()
@@ -49,7 +50,7 @@ impl Equality {
         facts
     }
 
-    /// The facts about names that a row stands for; of pairs of equal names those that differ.
+    /// Facts about names that a row represents. Of an equality row, only the pairs of different names.
     pub(super) fn facts_of<'n>(
         &'n self,
         row: &Fact,
@@ -61,14 +62,15 @@ impl Equality {
         rows.map(|arguments| Fact { predicate, arguments }).collect()
     }
 
-    /// Everything that holds, in no order; of a class of more than `most` names, only the pairs with the first.
-    pub fn facts(&self, engine: &Engine, most: usize) -> Vec<Fact> {
+    /// All facts that hold, in no particular order. For a class of more than `max_names` names, only the
+    /// equalities with its first name.
+    pub fn facts(&self, engine: &Engine, max_names: usize) -> Vec<Fact> {
         let names = |symbol| self.names(symbol);
         let mut facts: Vec<Fact> = Vec::new();
         for row in engine.rows_with(0) {
             match row.arguments.first().and_then(|&name| self.names(name)) {
-                Some(class) if class.len() > most && self.is_reflexive(&row) => {
-                    facts.extend(class[1..].iter().map(|&name| Fact::new(self.same, [class[0], name])));
+                Some(class) if class.len() > max_names && self.is_reflexive(&row) => {
+                    facts.extend(class[1..].iter().map(|&name| Fact::new(self.same_as, [class[0], name])));
                 }
                 None if row.arguments.iter().all(|&name| self.names(name).is_none())
                     && !self.is_reflexive(&row) =>
@@ -78,44 +80,44 @@ impl Equality {
                 _ => facts.extend(self.facts_of(&row, &names)),
             }
         }
-        facts.extend(self.reflexive_pairs(None).map(|arguments| Fact { predicate: self.same, arguments }));
+        facts.extend(self.reflexive_pairs(None).map(|arguments| Fact { predicate: self.same_as, arguments }));
         facts
     }
 
-    /// The stated pairs of a name with itself.
+    /// Stated pairs of a name with itself.
     fn reflexive_pairs(&self, name: Option<Symbol>) -> impl Iterator<Item = Arguments> {
         let fits = move |at: Symbol| name.is_none_or(|name| name == at);
         let pairs = self.pairs.values().flatten().filter(|pair| pair.arguments[0] == pair.arguments[1]);
         pairs.map(|pair| pair.arguments.clone()).filter(move |pair| fits(pair[0]))
     }
 
-    /// The arguments of the facts of a predicate that agree with a pattern.
+    /// Arguments of the facts of a predicate that agree with a pattern.
     pub fn matching(&self, engine: &Engine, predicate: Symbol, pattern: &[Option<Symbol>]) -> Vec<Arguments> {
         let normal: SmallVec<[Option<Symbol>; 4]> =
             pattern.iter().map(|wanted| wanted.map(|name| self.classes.find(name))).collect();
         let fits =
             |row: &Arguments| row.iter().zip(pattern).all(|(&v, wanted)| wanted.is_none_or(|w| w == v));
-        let mut found = Vec::new();
+        let mut results = Vec::new();
         for row in engine.matching_rows(predicate, &normal) {
-            if predicate != self.same && row.iter().all(|&symbol| self.names(symbol).is_none()) {
+            if predicate != self.same_as && row.iter().all(|&symbol| self.names(symbol).is_none()) {
                 let row = Arguments::from_slice(row);
-                found.extend(Some(row).filter(&fits));
+                results.extend(Some(row).filter(&fits));
                 continue;
             }
             let row = Fact::new(predicate, row.iter().copied());
             let facts = self.facts_of(&row, &|symbol| self.names(symbol));
-            found.extend(facts.into_iter().map(|fact| fact.arguments).filter(&fits));
+            results.extend(facts.into_iter().map(|fact| fact.arguments).filter(&fits));
         }
-        if predicate == self.same && pattern.len() == 2 {
-            found.extend(self.reflexive_pairs(pattern[0]).filter(fits));
+        if predicate == self.same_as && pattern.len() == 2 {
+            results.extend(self.reflexive_pairs(pattern[0]).filter(fits));
         }
-        found
+        results
     }
 
-    /// Pairs with a literal that is not the other side.
+    /// Pairs of a literal with something different.
     pub fn clashes(&self, engine: &Engine) -> Vec<Fact> {
-        let rows = engine.matching_rows(self.same, &[None, None]);
+        let rows = engine.matching_rows(self.same_as, &[None, None]);
         let clashes = rows.filter(|row| engine.symbols.differ(row[0], row[1]));
-        clashes.map(|row| Fact::new(self.same, row.iter().copied())).collect()
+        clashes.map(|row| Fact::new(self.same_as, row.iter().copied())).collect()
     }
 }

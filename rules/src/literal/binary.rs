@@ -1,9 +1,8 @@
-//! `xsd:hexBinary`, `xsd:base64Binary` and the recurring dates (`xsd:gYear` and its kin) as values: sequences of bytes, and
-//! canonical forms.
+//! Values of `xsd:hexBinary`, `xsd:base64Binary` and the recurring dates (`xsd:gYear` and related types).
 
 use super::temporal::{split_zone, zone_text};
 
-/// The bytes of pairs of hexadecimal digits.
+/// Decodes pairs of hexadecimal digits.
 pub(super) fn parse_hexadecimal(text: &str) -> Option<Box<[u8]>> {
     let digit = |byte: u8| char::from(byte).to_digit(16);
     let pairs = text.as_bytes().chunks(2);
@@ -14,7 +13,7 @@ pub(super) fn parse_hexadecimal(text: &str) -> Option<Box<[u8]>> {
     pairs.map(byte).collect()
 }
 
-/// The canonical form: upper case.
+/// Encodes bytes in the canonical form: upper case.
 pub(super) fn hexadecimal(bytes: &[u8]) -> String {
     let digit = |half: u8| char::from(b"0123456789ABCDEF"[usize::from(half)]);
     bytes.iter().flat_map(|byte| [digit(byte >> 4), digit(byte & 15)]).collect()
@@ -22,7 +21,7 @@ pub(super) fn hexadecimal(bytes: &[u8]) -> String {
 
 const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
-/// The bytes of groups of four digits; white space between digits counts for nothing.
+/// Decodes groups of four base64 digits. White space is ignored.
 pub(super) fn parse_base64(text: &str) -> Option<Box<[u8]>> {
     let digits: Vec<u8> = text.bytes().filter(|byte| !byte.is_ascii_whitespace()).collect();
     let padding = digits.iter().rev().take_while(|&&byte| byte == b'=').count();
@@ -30,32 +29,34 @@ pub(super) fn parse_base64(text: &str) -> Option<Box<[u8]>> {
         return None;
     }
     let value = |byte: &u8| ALPHABET.iter().position(|digit| digit == byte);
+    // Six bits per digit, with zero bits for the padding.
     let mut bits: Vec<usize> = digits[..digits.len() - padding].iter().map(value).collect::<Option<_>>()?;
     bits.resize(digits.len(), 0);
     let group = |four: &[usize]| {
-        let all = four.iter().fold(0, |all, six| all << 6 | six);
-        [(all >> 16) as u8, (all >> 8) as u8, all as u8]
+        let word = four.iter().fold(0, |word, six| word << 6 | six);
+        [(word >> 16) as u8, (word >> 8) as u8, word as u8]
     };
     let mut bytes: Vec<u8> = bits.chunks(4).flat_map(group).collect();
     let unused = bytes.split_off(bytes.len() - padding);
-    // What the padding stands for has to be zero.
+    // The bits that the padding replaces have to be zero.
     unused.iter().all(|byte| *byte == 0).then(|| bytes.into())
 }
 
-/// The canonical form: no white space.
+/// Encodes bytes in the canonical form: no white space.
 pub(super) fn base64(bytes: &[u8]) -> String {
     let mut text = String::new();
     for three in bytes.chunks(3) {
-        let all = (0..3).fold(0, |all, at| all << 8 | usize::from(three.get(at).copied().unwrap_or(0)));
+        let word = (0..3).fold(0, |word, at| word << 8 | usize::from(three.get(at).copied().unwrap_or(0)));
         for at in 0..4 {
-            let digit = char::from(ALPHABET[all >> (18 - 6 * at) & 63]);
+            let digit = char::from(ALPHABET[word >> (18 - 6 * at) & 63]);
             text.push(if at > three.len() { '=' } else { digit });
         }
     }
     text
 }
 
-/// A recurring date, which is known by its canonical form, with the local name of its datatype.
+/// Parses a recurring date. Returns its canonical form, which identifies the value, and the local name of
+/// its datatype.
 pub(super) fn recurring(text: &str, local: &str) -> Option<(Box<str>, &'static str)> {
     let (body, zone) = split_zone(text)?;
     let number = |part: &str, range: std::ops::RangeInclusive<u32>| {
@@ -70,6 +71,7 @@ pub(super) fn recurring(text: &str, local: &str) -> Option<(Box<str>, &'static s
             && (digits.len() == 4 || !digits.starts_with('0'))
     };
     let days = |month: &str| match month {
+        // Without a year, February may have 29 days.
         "02" => 29,
         "04" | "06" | "09" | "11" => 30,
         _ => 31,
@@ -91,7 +93,7 @@ pub(super) fn recurring(text: &str, local: &str) -> Option<(Box<str>, &'static s
     valid.then(|| (format!("{body}{zone}").into(), local))
 }
 
-/// The IRI of a datatype of recurring dates.
+/// IRI of a datatype of recurring dates.
 pub(super) fn recurring_datatype(local: &str) -> &'static str {
     match local {
         "gYear" => "http://www.w3.org/2001/XMLSchema#gYear",

@@ -1,4 +1,4 @@
-//! The datatypes of XSD, RDF, RDFS and OWL: their IRIs, and the bounds of the integer types.
+//! IRIs of the datatypes of XSD, RDF, RDFS and OWL, and the bounds of the integer types.
 
 /// Namespace of the XML Schema datatypes.
 pub(crate) const XSD: &str = "http://www.w3.org/2001/XMLSchema#";
@@ -7,7 +7,7 @@ pub(super) const OWL_REAL: &str = "http://www.w3.org/2002/07/owl#real";
 pub(super) const OWL_RATIONAL: &str = "http://www.w3.org/2002/07/owl#rational";
 pub(super) const RDF: &str = "http://www.w3.org/1999/02/22-rdf-syntax-ns#";
 
-/// Whether an IRI names a datatype of XSD, RDF, RDFS or OWL.
+/// Returns `true` if an IRI denotes a datatype of XSD, RDF, RDFS or OWL.
 pub(crate) fn is_datatype(iri: &str) -> bool {
     let rdf = |iri: &str| {
         iri.strip_prefix(RDF).is_some_and(|local| ["PlainLiteral", "langString"].contains(&local))
@@ -15,7 +15,7 @@ pub(crate) fn is_datatype(iri: &str) -> bool {
     iri.starts_with(XSD) || [RDFS_LITERAL, OWL_REAL, OWL_RATIONAL].contains(&iri) || rdf(iri)
 }
 
-/// The inclusive bounds of the integer types of XSD.
+/// Inclusive bounds of the integer types of XSD.
 pub(super) fn integer_range(local: &str) -> Option<(Option<i128>, Option<i128>)> {
     Some(match local {
         "integer" => (None, None),

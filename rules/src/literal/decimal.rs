@@ -1,7 +1,7 @@
-//! The value space of `xsd:decimal` and all its integer types: exact, of any size.
+//! Value space of `xsd:decimal` and its integer types: exact numbers of any size.
 //!
-//! Values that fit 64 bits and 18 fractional digits compare without allocating; that is every value of real
-//! knowledge bases.
+//! Values within 64 bits and 18 fractional digits are compared without allocation. Larger values hardly
+//! occur in knowledge bases.
 
 use std::cmp::Ordering;
 use std::fmt;
@@ -10,14 +10,16 @@ use num_bigint::BigInt;
 use num_rational::BigRational;
 use num_traits::{One, Signed, ToPrimitive, Zero};
 
-/// The largest exponent accepted in a lexical form; keeps hostile input such as `1e999999999` from filling memory.
+/// Largest accepted exponent in a lexical form. It prevents hostile input such as `1e999999999` from
+/// filling the memory.
 const MAX_EXPONENT: i64 = 1000;
-/// The largest scale of the small representation.
+/// Largest scale of the small representation. `10^18` is the largest power of ten within 64 bits.
 const SMALL_SCALE: u32 = 18;
-/// Fractional digits kept by a division.
+/// Number of fractional digits of a rounded quotient.
 const DIVISION_DIGITS: u32 = 34;
 
-/// A decimal number `unscaled / 10^scale`, kept with the smallest scale, so that equal values are equal structs.
+/// A decimal number `unscaled / 10^scale`. The scale is the smallest possible, so that equal values are
+/// equal structs.
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 pub struct Decimal(Repr);
 
@@ -28,7 +30,7 @@ enum Repr {
 }
 
 impl Decimal {
-    /// The number of bytes of the digits, where a machine integer does not hold them.
+    /// Number of bytes of the digits; 0 for the small representation.
     pub(super) fn size(&self) -> usize {
         match &self.0 {
             Repr::Small { .. } => 0,
@@ -36,10 +38,10 @@ impl Decimal {
         }
     }
 
-    /// Reads `-12.50`, and `1e-05` as Python writes decimals. `None` where the form is not a decimal.
+    /// Parses `-12.50`, or `1e-05` in the form of Python's decimals. Returns `None` for an invalid form.
     pub fn parse(lexical: &str) -> Option<Self> {
         let (mantissa, exponent) = match lexical.find(['e', 'E']) {
-            Some(at) => (&lexical[..at], lexical[at + 1..].parse::<i64>().ok()?),
+            Some(position) => (&lexical[..position], lexical[position + 1..].parse::<i64>().ok()?),
             None => (lexical, 0),
         };
         let (negative, digits) = match mantissa.as_bytes().first()? {
@@ -48,11 +50,14 @@ impl Decimal {
             _ => (false, mantissa),
         };
         let (whole, fraction) = digits.split_once('.').unwrap_or((digits, ""));
-        let all = format!("{whole}{fraction}");
-        if all.is_empty() || !all.bytes().all(|b| b.is_ascii_digit()) || exponent.abs() > MAX_EXPONENT {
+        let all_digits = format!("{whole}{fraction}");
+        if all_digits.is_empty()
+            || !all_digits.bytes().all(|b| b.is_ascii_digit())
+            || exponent.abs() > MAX_EXPONENT
+        {
             return None;
         }
-        let magnitude: BigInt = all.parse().ok()?;
+        let magnitude: BigInt = all_digits.parse().ok()?;
         let unscaled = if negative { -magnitude } else { magnitude };
         Some(Self::from_exponent(unscaled, exponent - i64::try_from(fraction.len()).ok()?))
     }
@@ -64,7 +69,7 @@ impl Decimal {
         }
     }
 
-    /// `unscaled / 10^scale`.
+    /// Creates the number `unscaled / 10^scale`.
     pub fn new(unscaled: BigInt, scale: u32) -> Self {
         let (mut unscaled, mut scale) = (unscaled, scale);
         if let Some(small) = unscaled.to_i64() {
@@ -86,7 +91,7 @@ impl Decimal {
         }
     }
 
-    /// Unscaled value and scale.
+    /// Returns unscaled value and scale.
     pub fn parts(&self) -> (BigInt, u32) {
         match &self.0 {
             Repr::Small { unscaled, scale } => (BigInt::from(*unscaled), *scale),
@@ -94,18 +99,19 @@ impl Decimal {
         }
     }
 
-    /// Whether the value is an integer.
+    /// Returns `true` if the value is an integer.
     pub fn is_integer(&self) -> bool {
         matches!(self.0, Repr::Small { scale: 0, .. } | Repr::Large { scale: 0, .. })
     }
 
-    /// The exact value.
+    /// Returns the exact value.
     pub fn to_rational(&self) -> BigRational {
         let (unscaled, scale) = self.parts();
         BigRational::new(unscaled, power_of_ten(scale))
     }
 
-    /// The nearest decimal with at most 34 fractional digits, rounded half away from zero.
+    /// Converts a rational number to the nearest decimal with at most 34 fractional digits. Halves are
+    /// rounded away from zero.
     pub fn from_rational(value: &BigRational) -> Self {
         if let Some(short) = Self::short(value) {
             return short;
@@ -114,7 +120,8 @@ impl Decimal {
         Self::new(scaled.round().to_integer(), DIVISION_DIGITS)
     }
 
-    /// The exact decimal, where a few digits are enough: no long product is made and stripped then.
+    /// Converts a rational number exactly if few digits suffice. This path avoids a long product with
+    /// trailing zeros.
     fn short(value: &BigRational) -> Option<Self> {
         let (numerator, denominator) = (value.numer().to_i64()?, value.denom().to_u64()?);
         let scale = (0..=SMALL_SCALE).find(|&scale| 10_u64.pow(scale).is_multiple_of(denominator))?;
@@ -122,28 +129,29 @@ impl Decimal {
         Some(Self(Repr::Small { unscaled: numerator.checked_mul(factor)?, scale }))
     }
 
-    /// The nearest double.
+    /// Returns the nearest double.
     pub fn to_f64(&self) -> f64 {
+        // The parser of the standard library rounds correctly.
         self.to_string().parse().unwrap_or(f64::NAN)
     }
 
-    /// The nearest float.
+    /// Returns the nearest float.
     pub fn to_f32(&self) -> f32 {
         self.to_string().parse().unwrap_or(f32::NAN)
     }
 }
 
-/// The exact sum.
+/// Computes the exact sum.
 impl<'a> std::iter::Sum<&'a Decimal> for Decimal {
     fn sum<I: Iterator<Item = &'a Self>>(values: I) -> Self {
         let (mut sum, mut scale) = (BigInt::zero(), 0);
         for value in values {
-            let (unscaled, own) = value.parts();
-            if own > scale {
-                sum *= power_of_ten(own - scale);
-                scale = own;
+            let (unscaled, value_scale) = value.parts();
+            if value_scale > scale {
+                sum *= power_of_ten(value_scale - scale);
+                scale = value_scale;
             }
-            sum += unscaled * power_of_ten(scale - own);
+            sum += unscaled * power_of_ten(scale - value_scale);
         }
         Self::new(sum, scale)
     }
@@ -176,6 +184,7 @@ impl Ord for Decimal {
             (&self.0, &other.0)
         {
             let scale = *s.max(t);
+            // |unscaled| < 2^63 and 10^18 < 2^60, so that the product fits 128 bits.
             let widen = |unscaled: i64, from: u32| i128::from(unscaled) * 10_i128.pow(scale - from);
             return widen(*a, *s).cmp(&widen(*b, *t));
         }
@@ -191,7 +200,7 @@ impl PartialOrd for Decimal {
     }
 }
 
-/// The shortest form: `-0.5`, `12`.
+/// Formats the shortest form: `-0.5`, `12`.
 impl fmt::Display for Decimal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (unscaled, scale) = self.parts();
@@ -205,13 +214,13 @@ impl fmt::Display for Decimal {
     }
 }
 
-/// Whether a value lies between two optional powers of two: `-(2^below)` to `2^above - 1`.
+/// Returns `true` if an integer lies within optional inclusive bounds. The value must have scale 0.
 pub(super) fn in_range(value: &Decimal, minimum: Option<i128>, maximum: Option<i128>) -> bool {
     let (unscaled, _) = value.parts();
     minimum.is_none_or(|m| unscaled >= BigInt::from(m)) && maximum.is_none_or(|m| unscaled <= BigInt::from(m))
 }
 
-/// `10^exponent` as a decimal, for rounding.
+/// Returns `10^exponent`.
 pub(crate) fn ten_to(exponent: u32) -> BigInt {
     if exponent == 0 { BigInt::one() } else { power_of_ten(exponent) }
 }
@@ -220,20 +229,21 @@ pub(crate) fn ten_to(exponent: u32) -> BigInt {
 mod tests {
     use super::{BigInt, BigRational, DIVISION_DIGITS, Decimal, power_of_ten};
 
-    /// The short way comes to what the long way comes to, representation included.
+    /// The fast path gives the same representation as the general path.
     #[test]
     fn few_digits_are_the_nearest_decimal() {
         let mut values = vec![(i64::MAX, 1), (i64::MIN, 1), (i64::MAX, 10), (1, i64::MAX), (0, 7), (100, 1)];
         values
             .extend((-60..60).flat_map(|numerator| (1..70).map(move |denominator| (numerator, denominator))));
-        values
-            .extend((0..19_u32).flat_map(|power| [1, 7, -25, i64::MAX].map(|own| (own, 10_i64.pow(power)))));
+        values.extend(
+            (0..19_u32).flat_map(|power| [1, 7, -25, i64::MAX].map(|unscaled| (unscaled, 10_i64.pow(power)))),
+        );
         for (numerator, denominator) in values {
             let value = BigRational::new(numerator.into(), denominator.into());
             let scaled = &value * BigRational::from_integer(power_of_ten(DIVISION_DIGITS));
             let nearest: BigInt = scaled.round().to_integer();
-            let (found, expected) = (Decimal::from_rational(&value), Decimal::new(nearest, DIVISION_DIGITS));
-            assert_eq!(format!("{found:?}"), format!("{expected:?}"), "{numerator}/{denominator}");
+            let (result, expected) = (Decimal::from_rational(&value), Decimal::new(nearest, DIVISION_DIGITS));
+            assert_eq!(format!("{result:?}"), format!("{expected:?}"), "{numerator}/{denominator}");
         }
     }
 }

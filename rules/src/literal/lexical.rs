@@ -1,4 +1,4 @@
-//! Lexical forms to values.
+//! Parsers of the lexical forms of XSD, RDF and OWL datatypes.
 
 use num_bigint::BigInt;
 use num_rational::BigRational;
@@ -11,9 +11,11 @@ use super::value::Literal;
 use super::{binary, text};
 
 impl Literal {
-    /// Reads a literal; never fails, see [`Literal::IllTyped`]. A language makes the datatype irrelevant.
+    /// Parses a literal. Never fails: an invalid form gives [`Literal::IllTyped`]. With a language, the
+    /// datatype is ignored.
     ///
-    /// `"1e-05"^^xsd:decimal`, which Python programs write, is read as a decimal although XSD forbids exponents.
+    /// `"1e-05"^^xsd:decimal`, the output of Python programs, is accepted as a decimal, although XSD
+    /// forbids exponents.
     pub fn parse(lexical: &str, datatype_iri: Option<&str>, language: Option<&str>) -> Self {
         if let Some(tag) = language.filter(|tag| !tag.is_empty()) {
             return Self::Language { text: lexical.into(), tag: tag.to_ascii_lowercase().into() };
@@ -34,17 +36,17 @@ impl Literal {
     }
 }
 
-/// What a lexical form stands for.
+/// Result of parsing a lexical form.
 pub(super) enum Parsed {
-    /// This value.
+    /// A valid form.
     Value(Literal),
-    /// None: its datatype forbids it.
+    /// A form outside its datatype.
     IllTyped,
-    /// Nothing is known of its datatype.
+    /// The datatype is unsupported.
     Unknown,
 }
 
-/// `text@tag` of `rdf:PlainLiteral`; the last at-sign separates.
+/// Parses `text@tag` of `rdf:PlainLiteral`. The last at-sign separates the tag.
 fn parse_plain_literal(lexical: &str) -> Literal {
     match lexical.rsplit_once('@') {
         Some((text, "")) => Literal::String(text.into()),
@@ -53,7 +55,7 @@ fn parse_plain_literal(lexical: &str) -> Literal {
     }
 }
 
-/// What a lexical form of a datatype of XSD stands for; the datatype is given by its local name.
+/// Parses a lexical form of an XSD datatype, given by its local name.
 pub(super) fn parse_xsd(lexical: &str, local: &str) -> Parsed {
     let collapsed = lexical.trim_matches([' ', '\t', '\n', '\r']);
     let value = match local {
@@ -97,7 +99,7 @@ fn parse_integer(lexical: &str, minimum: Option<i128>, maximum: Option<i128>) ->
     decimal::in_range(&value, minimum, maximum).then_some(Literal::Decimal(value))
 }
 
-/// XSD's spelling of floats: `INF`, `-INF`, `NaN`, and no `infinity` as Rust would accept.
+/// Parses a float of XSD: `INF`, `-INF` and `NaN`, but not `infinity`, which Rust accepts.
 fn parse_float<F: std::str::FromStr>(lexical: &str) -> Option<F> {
     let normal = match lexical {
         "INF" | "+INF" => "inf",
@@ -109,7 +111,8 @@ fn parse_float<F: std::str::FromStr>(lexical: &str) -> Option<F> {
     normal.parse().ok()
 }
 
-/// `numerator / denominator` of `owl:rational`; a decimal where it is one.
+/// Parses `numerator / denominator` of `owl:rational`. The result is a decimal if the value has a finite
+/// decimal expansion of at most 34 digits.
 fn parse_rational(lexical: &str) -> Parsed {
     let text = lexical.trim_matches([' ', '\t', '\n', '\r']);
     let (numerator, denominator) = text.split_once('/').unwrap_or((text, "1"));

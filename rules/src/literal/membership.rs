@@ -1,4 +1,5 @@
-//! Whether two literals are two values, and whether a value lies in a datatype: yes, no, or undecided.
+//! Three-valued tests (yes, no, undecided): if two literals have different values, and if a value lies in a
+//! datatype.
 
 use super::datatype::{OWL_RATIONAL, OWL_REAL, RDF, RDFS_LITERAL, XSD};
 use super::lexical::{Parsed, parse_xsd};
@@ -6,28 +7,30 @@ use super::value::Literal;
 
 const XML_LITERAL: &str = "http://www.w3.org/1999/02/22-rdf-syntax-ns#XMLLiteral";
 
-/// What is known of a literal's value.
+/// Knowledge about the value of a literal.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
-    /// The value itself.
+    /// The value is known.
     Known,
     /// A rational number that is not a decimal.
     Rational,
-    /// That it is a piece of XML; two spellings can be one.
+    /// XML content. Two different spellings can denote the same value.
     Xml,
-    /// That it is none of the values that anybody names, see [`Literal::fresh`].
+    /// A fresh value: it differs from other fresh values, and nothing else is known. See [`Literal::fresh`].
     Fresh,
-    /// Nothing.
+    /// The datatype is unsupported.
     Unknown,
 }
 
 impl Literal {
-    /// A value of which nothing is known but that it differs from those of other numbers: for conclusions about any value.
+    /// Creates a fresh value, for conclusions about an arbitrary value. It differs from fresh values with other
+    /// numbers; nothing else is known of it.
     pub fn fresh(number: usize) -> Self {
         Self::Opaque { lexical: number.to_string().into(), datatype: FRESH.into() }
     }
 
-    /// Whether two literals are certainly two values. `false` where they are one, and where that is undecided.
+    /// Returns `true` if two literals certainly have different values. Returns `false` if they are equal,
+    /// or if that is undecided.
     pub fn differs(&self, other: &Self) -> bool {
         if self == other {
             return false;
@@ -51,14 +54,14 @@ impl Literal {
         }
     }
 
-    /// Whether the value certainly lies in the value space of a datatype: `5` is in `xsd:byte` and `xsd:decimal`, `1.5` in
-    /// `xsd:decimal` only, no float in `xsd:decimal`.
+    /// Returns `true` if the value certainly lies in the value space of a datatype. For example, `5` lies
+    /// in `xsd:byte` and `xsd:decimal`, `1.5` only in `xsd:decimal`, and no float in `xsd:decimal`.
     pub fn is_in(&self, datatype_iri: &str) -> bool {
         self.membership(datatype_iri) == Some(true)
     }
 
-    /// Whether the value lies in the value space of a datatype; `None` where that is undecided, because the literal or
-    /// the datatype has no meaning here.
+    /// Tests if the value lies in the value space of a datatype. Returns `None` if that is undecided,
+    /// because the datatype of the literal or the other datatype is unsupported.
     pub fn membership(&self, datatype_iri: &str) -> Option<bool> {
         if self.is_ill_typed() {
             return Some(false);
@@ -80,7 +83,8 @@ impl Literal {
 
     fn is_in_known(&self, datatype_iri: &str) -> bool {
         match (self, datatype_iri.strip_prefix(RDF)) {
-            // Zero has one spelling and lies in both kinds.
+            // The zero duration lies in both derived types, although its canonical form belongs to one of
+            // them.
             (Self::Duration(duration), _) => duration.is_in(datatype_iri),
             (Self::Language { .. }, Some("langString" | "PlainLiteral"))
             | (Self::String(_), Some("PlainLiteral")) => true,
@@ -90,10 +94,10 @@ impl Literal {
     }
 }
 
-/// The datatype of [`Literal::fresh`].
+/// Datatype of the values of [`Literal::fresh`].
 const FRESH: &str = "urn:metaplan:fresh";
 
-/// Whether the value space of a datatype is known.
+/// Returns `true` for a supported datatype.
 fn is_known(iri: &str) -> bool {
     match (iri.strip_prefix(XSD), iri.strip_prefix(RDF)) {
         (Some(local), _) => !matches!(parse_xsd("", local), Parsed::Unknown),
@@ -119,7 +123,7 @@ mod tests {
 
     #[test]
     fn two_values_or_one_or_undecided() {
-        // 1: one value; 2: two; 0: undecided.
+        // 1: equal; 2: different; 0: undecided.
         for (left, right, expected) in [
             ("1.0^decimal", "1^integer", 1),
             ("1^decimal", "1^float", 2),
@@ -142,13 +146,13 @@ mod tests {
             ("1^own", "1^own", 1),
         ] {
             let (left, right) = (read(left), read(right));
-            let found = match (left == right, left.differs(&right)) {
+            let relation = match (left == right, left.differs(&right)) {
                 (true, false) => 1,
                 (false, true) => 2,
                 (false, false) => 0,
                 (true, true) => 3,
             };
-            assert_eq!(found, expected, "{left} {right}");
+            assert_eq!(relation, expected, "{left} {right}");
             assert_eq!(left.differs(&right), right.differs(&left), "{left} {right}");
         }
         assert!(Literal::fresh(1).differs(&Literal::fresh(2)) && !Literal::fresh(1).differs(&read("1")));

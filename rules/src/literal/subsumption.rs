@@ -1,9 +1,10 @@
-//! Whether all values that lie in several datatypes lie in another one, by the hierarchy of XML Schema ([1], section 3) and the
-//! bounds of its integer types.
+//! Subsumption of datatypes: decides if the intersection of several datatypes is contained in another one.
+//! Uses the type hierarchy of XML Schema ([1], section 3) and the bounds of its integer types.
 
 use super::datatype::{OWL_RATIONAL, OWL_REAL, RDF, RDFS_LITERAL, XSD, integer_range};
 
-/// Datatypes below others, by local name; integer types are told by their bounds.
+/// Derived datatypes with their base types, by local name. Integer types are compared by their bounds
+/// instead.
 const BELOW: [(&str, &str); 9] = [
     ("normalizedString", "string"),
     ("token", "normalizedString"),
@@ -16,7 +17,7 @@ const BELOW: [(&str, &str); 9] = [
     ("yearMonthDuration", "duration"),
 ];
 
-/// Datatypes without values in common, unless one is below the other.
+/// Datatypes with disjoint value spaces, except `integer`, which is contained in `decimal`.
 const DISJOINT: [&str; 18] = [
     "string",
     "boolean",
@@ -38,7 +39,8 @@ const DISJOINT: [&str; 18] = [
     "integer",
 ];
 
-/// The local name of a datatype of XML Schema; those of OWL that contain all decimals have names of their own.
+/// Local name of a supported datatype. The two OWL datatypes that contain all decimals have the names
+/// `real` and `rational`.
 fn local(iri: &str) -> Option<&str> {
     match iri {
         OWL_REAL => Some("real"),
@@ -47,56 +49,61 @@ fn local(iri: &str) -> Option<&str> {
     }
 }
 
-/// The datatype and those above it.
+/// A datatype with its ancestors.
 fn upwards(local: &str) -> Vec<&str> {
-    let mut all = vec![local];
-    while let Some((_, above)) = all.last().and_then(|last| BELOW.iter().find(|(below, _)| below == last)) {
-        all.push(above);
+    let mut ancestors = vec![local];
+    while let Some((_, parent)) =
+        ancestors.last().and_then(|last| BELOW.iter().find(|(below, _)| below == last))
+    {
+        ancestors.push(parent);
     }
     if integer_range(local).is_some() {
-        all.push("integer");
+        ancestors.push("integer");
     }
-    if all.contains(&"integer") || all.contains(&"decimal") {
-        all.extend(["decimal", "rational", "real"]);
+    if ancestors.contains(&"integer") || ancestors.contains(&"decimal") {
+        ancestors.extend(["decimal", "rational", "real"]);
     }
-    if all.contains(&"rational") {
-        all.push("real");
+    if ancestors.contains(&"rational") {
+        ancestors.push("real");
     }
-    if all.contains(&"string") {
-        all.push("PlainLiteral");
+    if ancestors.contains(&"string") {
+        ancestors.push("PlainLiteral");
     }
-    all
+    ancestors
 }
 
-/// The datatype without values in common with others in which a datatype lies.
+/// The primitive datatype that contains a datatype.
 fn primitive(local: &str) -> Option<&'static str> {
-    let above = upwards(local);
-    let found = |name: &&&str| above.contains(name) && **name != "integer";
-    DISJOINT.iter().find(found).copied()
+    let ancestors = upwards(local);
+    let is_ancestor = |name: &&&str| ancestors.contains(name) && **name != "integer";
+    DISJOINT.iter().find(is_ancestor).copied()
 }
 
-/// Whether each value that lies in all of some datatypes lies in another one. `false` also where that is not known.
+/// Returns `true` if every value in the intersection of some datatypes lies in another datatype. Returns
+/// `false` if that is undecided.
 pub fn is_subsumed(datatypes: &[&str], by: &str) -> bool {
     if by == RDFS_LITERAL || datatypes.contains(&by) {
         return true;
     }
     let Some(by) = local(by) else { return false };
-    let known: Vec<&str> = datatypes.iter().filter_map(|datatype| local(datatype)).collect();
-    let mut primitives: Vec<&str> = known.iter().filter_map(|datatype| primitive(datatype)).collect();
+    let local_names: Vec<&str> = datatypes.iter().filter_map(|datatype| local(datatype)).collect();
+    let mut primitives: Vec<&str> = local_names.iter().filter_map(|datatype| primitive(datatype)).collect();
     primitives.sort_unstable();
     primitives.dedup();
-    if primitives.len() > 1 || known.iter().any(|datatype| upwards(datatype).contains(&by)) {
+    // Different primitive types are disjoint, and the empty intersection lies in every datatype.
+    if primitives.len() > 1 || local_names.iter().any(|datatype| upwards(datatype).contains(&by)) {
         return true;
     }
-    let ranges: Vec<_> = known.iter().filter_map(|datatype| integer_range(datatype)).collect();
+    let ranges: Vec<_> = local_names.iter().filter_map(|datatype| integer_range(datatype)).collect();
     let low = ranges.iter().filter_map(|(low, _)| *low).max();
     let high = ranges.iter().filter_map(|(_, high)| *high).min();
+    // The integer types have no value in common.
     if low.zip(high).is_some_and(|(low, high)| low > high) {
         return true;
     }
-    let (Some((least, most)), false) = (integer_range(by), ranges.is_empty()) else { return false };
-    let is_above = least.is_none_or(|least| low.is_some_and(|low| low >= least));
-    is_above && most.is_none_or(|most| high.is_some_and(|high| high <= most))
+    let (Some((minimum, maximum)), false) = (integer_range(by), ranges.is_empty()) else { return false };
+    let is_above = minimum.is_none_or(|minimum| low.is_some_and(|low| low >= minimum));
+    is_above && maximum.is_none_or(|maximum| high.is_some_and(|high| high <= maximum))
 }
 
 #[cfg(test)]

@@ -1,8 +1,10 @@
-//! `xsd:dateTime`, `xsd:date`, `xsd:time` and `xsd:duration`: lexical forms to seconds and months, partially ordered.
+//! `xsd:dateTime`, `xsd:date`, `xsd:time` and `xsd:duration` as numbers of seconds and months, partially
+//! ordered.
 //!
-//! A moment is seconds since 1970-01-01T00:00:00 in the proleptic Gregorian calendar, with its time zone subtracted
-//! if it has one. A moment without time zone compares with one that has only where every zone gives the same order. One
-//! instant in two time zones is equal in that order, and two values.
+//! A moment is a number of seconds since 1970-01-01T00:00:00 in the proleptic Gregorian calendar, converted
+//! to UTC if it has a time zone. A moment without a time zone is comparable with a moment with one only if
+//! every time zone gives the same order. One instant in two time zones is equal in this order, but is two
+//! values.
 
 use std::cmp::Ordering;
 use std::fmt;
@@ -12,11 +14,11 @@ use super::decimal::{Decimal, ten_to};
 use num_bigint::BigInt;
 use num_traits::Zero;
 
-const DAY: i64 = 86_400;
-/// The widest time zone, in seconds.
+const SECONDS_PER_DAY: i64 = 86_400;
+/// Largest offset of a time zone from UTC, in seconds.
 const ZONE_LIMIT: i64 = 14 * 3600;
 
-/// Which of the three datatypes a [`Moment`] belongs to.
+/// Datatype of a [`Moment`].
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub enum MomentKind {
     /// `xsd:dateTime`.
@@ -31,13 +33,13 @@ pub enum MomentKind {
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 pub struct Moment {
     kind: MomentKind,
-    /// Seconds since 1970-01-01T00:00:00, in UTC where there is a time zone, else local.
+    /// Seconds since 1970-01-01T00:00:00, in UTC if there is a time zone, and otherwise in local time.
     seconds: Decimal,
-    /// The time zone, in seconds east of UTC.
+    /// Offset of the time zone in seconds east of UTC.
     zone: Option<i64>,
 }
 
-/// An `xsd:duration`: months and seconds do not convert into each other.
+/// An `xsd:duration`. Months and seconds are not convertible into each other.
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 pub struct Duration {
     months: i64,
@@ -45,7 +47,7 @@ pub struct Duration {
 }
 
 impl Moment {
-    /// Reads the lexical form of `dateTime`, `dateTimeStamp`, `date` or `time`.
+    /// Parses the lexical form of `dateTime`, `dateTimeStamp`, `date` or `time`.
     pub(super) fn parse(lexical: &str, local: &str) -> Option<Self> {
         let (body, zone) = split_zone(lexical)?;
         let (kind, days, time) = match local {
@@ -60,28 +62,32 @@ impl Moment {
             return None;
         }
         let mut clock = time.map_or(Some(Decimal::from(0)), parse_clock)?;
-        // A time of day has one midnight: 24:00:00 is 00:00:00 (XML Schema 1.1, part 2, section 3.3.8).
-        if kind == MomentKind::Time && clock == Decimal::from(DAY) {
+        // A time of day has only one midnight: 24:00:00 is 00:00:00 (XML Schema 1.1, part 2, section
+        // 3.3.8).
+        if kind == MomentKind::Time && clock == Decimal::from(SECONDS_PER_DAY) {
             clock = Decimal::from(0);
         }
-        let offset = days.checked_mul(DAY)?.checked_sub(zone.unwrap_or(0))?;
+        let offset = days.checked_mul(SECONDS_PER_DAY)?.checked_sub(zone.unwrap_or(0))?;
         Some(Self { kind, seconds: add_seconds(&clock, offset), zone })
     }
 
-    /// Seconds since 1970-01-01T00:00:00, in UTC where the moment has a time zone, else local.
+    /// Returns the seconds since 1970-01-01T00:00:00, in UTC if the moment has a time zone, and otherwise
+    /// in local time.
     pub fn seconds(&self) -> &Decimal {
         &self.seconds
     }
 
-    /// Later by a duration: months first, where a day that the month does not have becomes its last, then seconds. A
-    /// time of day wraps around midnight; a date takes whole days, rounded down. `None` for months on a time. The time
-    /// zone stays, and is where months and days begin.
+    /// Adds a duration. Months are added first; a day that does not exist in the new month becomes its last
+    /// day. Then seconds are added. A time of day wraps around at midnight. A date is rounded down to whole
+    /// days. Months cannot be added to a time (`None`). The calculation is in local time, and the result
+    /// has the same time zone.
     pub(crate) fn later(&self, duration: &Duration) -> Option<Self> {
         let local = self.local();
         let (day, _) = split_day(&local);
         let (year, month, date) = civil_from_days(day);
-        let moved = (year.checked_mul(12)?.checked_add(month - 1)?).checked_add(duration.months)?;
-        let (year, month) = (moved.div_euclid(12), moved.rem_euclid(12) + 1);
+        let total_months = (year.checked_mul(12)?.checked_add(month - 1)?).checked_add(duration.months)?;
+        let (year, month) = (total_months.div_euclid(12), total_months.rem_euclid(12) + 1);
+        // Keeps the calendar arithmetic far from the range of `i64`.
         if year.abs() > 1_000_000_000 || (self.kind == MomentKind::Time && duration.months != 0) {
             return None;
         }
@@ -91,29 +97,31 @@ impl Moment {
         };
         let date = (1..=date).rev().find(fits)?;
         let shift = days_from_civil(year, month, date) - day;
-        let seconds = add(&add_seconds(&local, shift.checked_mul(DAY)?), &duration.seconds);
+        let seconds = add(&add_seconds(&local, shift.checked_mul(SECONDS_PER_DAY)?), &duration.seconds);
         let (day, _) = split_day(&seconds);
         let seconds = match self.kind {
             MomentKind::DateTime => seconds,
-            MomentKind::Date => Decimal::from(day * DAY),
-            MomentKind::Time => add_seconds(&seconds, -day * DAY),
+            MomentKind::Date => Decimal::from(day * SECONDS_PER_DAY),
+            MomentKind::Time => add_seconds(&seconds, -day * SECONDS_PER_DAY),
         };
         let seconds = add_seconds(&seconds, -self.zone.unwrap_or(0));
         Some(Self { kind: self.kind, seconds, zone: self.zone })
     }
 
-    /// Seconds since 1970-01-01T00:00:00 on a clock of its time zone.
+    /// Seconds since 1970-01-01T00:00:00 in local time.
     fn local(&self) -> Decimal {
         add_seconds(&self.seconds, self.zone.unwrap_or(0))
     }
 
-    /// The seconds from another moment of the same kind to this one; `None` where only one has a time zone.
+    /// Returns the duration from another moment of the same kind, in seconds. `None` if only one has a time
+    /// zone.
     pub(crate) fn since(&self, other: &Self) -> Option<Duration> {
         let comparable = self.kind == other.kind && self.zone.is_some() == other.zone.is_some();
         comparable.then(|| Duration { months: 0, seconds: add(&self.seconds, &negate(&other.seconds)) })
     }
 
-    /// The whole months from another moment to this one, truncated; `None` as for [`Moment::since`].
+    /// Returns the duration from another moment in whole months, truncated. `None` under the conditions of
+    /// [`Moment::since`].
     pub(crate) fn months_since(&self, other: &Self) -> Option<Duration> {
         let negative = self.since(other)?.seconds < Decimal::from(0);
         let (late, early) = if negative { (other, self) } else { (self, other) };
@@ -122,6 +130,7 @@ impl Moment {
             let (year, month, _) = civil_from_days(day);
             year * 12 + month
         };
+        // The difference of the calendar months is one too many if the last month is incomplete.
         let mut months = parts(late) - parts(early);
         let reached = early.later(&Duration { months, seconds: Decimal::from(0) })?;
         if reached.seconds > late.seconds {
@@ -130,7 +139,7 @@ impl Moment {
         Some(Duration { months: if negative { -months } else { months }, seconds: Decimal::from(0) })
     }
 
-    /// Year, month and day, and hours, minutes and seconds, in its time zone.
+    /// Returns year, month and day, and hours, minutes and seconds, in local time.
     pub(crate) fn calendar(&self) -> ([i64; 3], (i64, i64, Decimal)) {
         let (day, clock) = split_day(&self.local());
         let (year, month, date) = civil_from_days(day);
@@ -139,22 +148,22 @@ impl Moment {
         ([year, month, date], (hours, minutes, seconds))
     }
 
-    /// The same instant in UTC; as it is without a time zone.
+    /// Returns the same instant in UTC. A moment without a time zone is unchanged.
     pub(crate) fn in_utc(&self) -> Self {
         Self { zone: self.zone.map(|_| 0), ..self.clone() }
     }
 
-    /// The beginning of a date.
+    /// Converts a date to its first instant.
     pub(crate) fn as_date_time(&self) -> Self {
         Self { kind: MomentKind::DateTime, ..self.clone() }
     }
 
-    /// The time zone as text; empty where there is none.
+    /// Returns the time zone as text; empty without a time zone.
     pub(crate) fn zone_text(&self) -> String {
         self.zone.map(zone_text).unwrap_or_default()
     }
 
-    /// Which datatype.
+    /// Returns the datatype.
     pub fn kind(&self) -> MomentKind {
         self.kind
     }
@@ -176,13 +185,14 @@ impl PartialOrd for Moment {
         if self.zone.is_some() == other.zone.is_some() {
             return Some(self.seconds.cmp(&other.seconds));
         }
+        // A moment without a time zone lies within ±14 hours of the same local time in UTC.
         let earliest = add_seconds(&self.seconds, -ZONE_LIMIT).cmp(&other.seconds);
         let latest = add_seconds(&self.seconds, ZONE_LIMIT).cmp(&other.seconds);
         (earliest == latest && earliest != Ordering::Equal).then_some(earliest)
     }
 }
 
-/// Canonical form.
+/// Formats the canonical form.
 impl fmt::Display for Moment {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (day, clock) = split_day(&self.local());
@@ -199,12 +209,12 @@ impl fmt::Display for Moment {
 }
 
 impl Duration {
-    /// Reads `P1Y2M3DT4H5M6.7S` with optional minus.
+    /// Parses `P1Y2M3DT4H5M6.7S`, with an optional minus sign.
     pub(super) fn parse(lexical: &str, local: &str) -> Option<Self> {
-        let (negative, rest) = lexical.strip_prefix('-').map_or((false, lexical), |rest| (true, rest));
-        let rest = rest.strip_prefix('P')?;
-        let (date, time) = rest.split_once('T').map_or((rest, None), |(date, time)| (date, Some(time)));
-        if rest.is_empty() || time == Some("") {
+        let (negative, body) = lexical.strip_prefix('-').map_or((false, lexical), |body| (true, body));
+        let body = body.strip_prefix('P')?;
+        let (date, time) = body.split_once('T').map_or((body, None), |(date, time)| (date, Some(time)));
+        if body.is_empty() || time == Some("") {
             return None;
         }
         let (years, date) = take_field(date, 'Y')?;
@@ -222,13 +232,13 @@ impl Duration {
         }
         let months = years.checked_mul(12)?.checked_add(months)?;
         let whole = days
-            .checked_mul(DAY)?
+            .checked_mul(SECONDS_PER_DAY)?
             .checked_add(hours.checked_mul(3600)?)?
             .checked_add(minutes.checked_mul(60)?)?;
         let seconds = add_seconds(&seconds, whole);
         let forbidden = match local {
             "dayTimeDuration" => months != 0,
-            "yearMonthDuration" => rest.contains(['D', 'T']),
+            "yearMonthDuration" => body.contains(['D', 'T']),
             _ => false,
         };
         (!forbidden).then(|| {
@@ -240,31 +250,37 @@ impl Duration {
         })
     }
 
-    /// So many months and seconds.
+    /// Creates a duration from months and seconds.
     pub(crate) fn new(months: i64, seconds: Decimal) -> Self {
         Self { months, seconds }
     }
 
-    /// The part in months.
+    /// Returns the part in months.
     pub fn months(&self) -> i64 {
         self.months
     }
 
-    /// The part in seconds.
+    /// Returns the part in seconds.
     pub fn seconds(&self) -> &Decimal {
         &self.seconds
     }
 
-    /// Its seconds as days, hours, minutes and seconds, all of one sign; `None` beyond the range of days.
+    /// Splits the seconds into days, hours, minutes and seconds, all of one sign. `None` if the days exceed
+    /// the range of `i64`.
     pub(crate) fn clock(&self) -> Option<(i64, i64, i64, Decimal)> {
         let (unscaled, scale) = self.seconds.parts();
         let unit = ten_to(scale);
         let whole = i64::try_from(&unscaled / &unit).ok()?;
-        let rest = Decimal::new(unscaled % unit, scale);
-        Some((whole / DAY, whole % DAY / 3600, whole % 3600 / 60, add_seconds(&rest, whole % 60)))
+        let fraction = Decimal::new(unscaled % unit, scale);
+        Some((
+            whole / SECONDS_PER_DAY,
+            whole % SECONDS_PER_DAY / 3600,
+            whole % 3600 / 60,
+            add_seconds(&fraction, whole % 60),
+        ))
     }
 
-    /// As long, in the other direction.
+    /// Returns the duration with the opposite sign. `None` on overflow.
     pub(crate) fn negated(&self) -> Option<Self> {
         Some(Self { months: self.months.checked_neg()?, seconds: negate(&self.seconds) })
     }
@@ -291,6 +307,7 @@ impl Duration {
 
 impl PartialOrd for Duration {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        // Months and seconds are compared separately, since a month has no fixed length.
         let (months, seconds) = (self.months.cmp(&other.months), self.seconds.cmp(&other.seconds));
         match (months, seconds) {
             (Ordering::Equal, order) | (order, Ordering::Equal) => Some(order),
@@ -316,11 +333,12 @@ impl fmt::Display for Duration {
     }
 }
 
-/// `12H…` with unit `H` gives 12 and the rest; no field gives 0 and the whole.
+/// Parses a field such as `12H` for the unit `H`. Returns its number and the remaining text, or 0 and the
+/// whole text without such a field.
 fn take_field(text: &str, unit: char) -> Option<(i64, &str)> {
     let digits = text.bytes().take_while(u8::is_ascii_digit).count();
     match text[digits..].strip_prefix(unit) {
-        Some(rest) if digits > 0 => Some((text[..digits].parse().ok()?, rest)),
+        Some(remainder) if digits > 0 => Some((text[..digits].parse().ok()?, remainder)),
         Some(_) => None,
         None => Some((0, text)),
     }
@@ -340,21 +358,22 @@ fn add_seconds(value: &Decimal, whole: i64) -> Decimal {
     Decimal::new(unscaled + BigInt::from(whole) * ten_to(scale), scale)
 }
 
-/// A time zone, in seconds east of UTC, as text.
+/// Formats a time zone, given in seconds east of UTC.
 pub(super) fn zone_text(zone: i64) -> String {
     let (sign, minutes) = (if zone < 0 { '-' } else { '+' }, zone.abs() / 60);
     if zone == 0 { "Z".into() } else { format!("{sign}{:02}:{:02}", minutes / 60, minutes % 60) }
 }
 
-/// The text before the time zone, and the zone in seconds east of UTC.
+/// Splits a lexical form into the text before the time zone, and the time zone in seconds east of UTC.
 pub(super) fn split_zone(lexical: &str) -> Option<(&str, Option<i64>)> {
     if let Some(body) = lexical.strip_suffix('Z') {
         return Some((body, Some(0)));
     }
-    let Some(at) = lexical.len().checked_sub(6).filter(|&at| lexical.is_char_boundary(at)) else {
+    let Some(start) = lexical.len().checked_sub(6).filter(|&start| lexical.is_char_boundary(start)) else {
         return Some((lexical, None));
     };
-    let (body, zone) = lexical.split_at(at);
+    let (body, zone) = lexical.split_at(start);
+    // The last six characters of a date may have the form `-mm-dd`.
     let sign = match zone.as_bytes()[0] {
         b'+' => 1,
         b'-' if zone.as_bytes()[3] == b':' => -1,
@@ -366,12 +385,12 @@ pub(super) fn split_zone(lexical: &str) -> Option<(&str, Option<i64>)> {
     (seconds <= ZONE_LIMIT).then_some((body, Some(sign * seconds)))
 }
 
-/// A number of exactly `width` digits.
+/// Parses a number of exactly `width` digits.
 fn number(text: &str, width: usize) -> Option<i64> {
     (text.len() == width && text.bytes().all(|b| b.is_ascii_digit())).then(|| text.parse().ok())?
 }
 
-/// `hh:mm:ss.fff` in seconds; `24:00:00` is allowed.
+/// Parses `hh:mm:ss.fff` to seconds. `24:00:00` is valid.
 fn parse_clock(text: &str) -> Option<Decimal> {
     let mut parts = text.splitn(3, ':');
     let (hours, minutes, seconds) = (number(parts.next()?, 2)?, number(parts.next()?, 2)?, parts.next()?);
@@ -381,22 +400,24 @@ fn parse_clock(text: &str) -> Option<Decimal> {
         return None;
     }
     let value = add_seconds(&Decimal::parse(seconds)?, hours * 3600 + minutes * 60);
-    (value <= Decimal::from(DAY) && (hours < 24 || value == Decimal::from(DAY))).then_some(value)
+    (value <= Decimal::from(SECONDS_PER_DAY) && (hours < 24 || value == Decimal::from(SECONDS_PER_DAY)))
+        .then_some(value)
 }
 
-/// `-?yyyy-mm-dd` as days since 1970-01-01.
+/// Parses `-?yyyy-mm-dd` to days since 1970-01-01.
 fn parse_date(text: &str) -> Option<i64> {
-    let (negative, rest) = text.strip_prefix('-').map_or((false, text), |rest| (true, rest));
-    let mut parts = rest.splitn(3, '-');
+    let (negative, unsigned) = text.strip_prefix('-').map_or((false, text), |unsigned| (true, unsigned));
+    let mut parts = unsigned.splitn(3, '-');
     let (year, month, day) = (parts.next()?, number(parts.next()?, 2)?, number(parts.next()?, 2)?);
     let plain = (4..=9).contains(&year.len()) && (year.len() == 4 || !year.starts_with('0'));
     let year = number(year, year.len()).filter(|_| plain)?;
     let year = if negative { -year } else { year };
     let days = days_from_civil(year, month, day);
+    // A date that does not exist, such as 02-30, is normalised to another date.
     (civil_from_days(days) == (year, month, day)).then_some(days)
 }
 
-/// Howard Hinnant's calendar arithmetic: a date to days since 1970-01-01.
+/// Converts a date to days since 1970-01-01, by Howard Hinnant's algorithm `days_from_civil`.
 fn days_from_civil(year: i64, month: i64, day: i64) -> i64 {
     let year = if month <= 2 { year - 1 } else { year };
     let era = year.div_euclid(400);
@@ -405,7 +426,7 @@ fn days_from_civil(year: i64, month: i64, day: i64) -> i64 {
     era * 146_097 + year_of_era * 365 + year_of_era / 4 - year_of_era / 100 + day_of_year - 719_468
 }
 
-/// The inverse: days since 1970-01-01 to year, month and day.
+/// Converts days since 1970-01-01 to year, month and day (`civil_from_days`).
 fn civil_from_days(days: i64) -> (i64, i64, i64) {
     let days = days + 719_468;
     let (era, day_of_era) = (days.div_euclid(146_097), days.rem_euclid(146_097));
@@ -417,7 +438,7 @@ fn civil_from_days(days: i64) -> (i64, i64, i64) {
     (year, month, day_of_year - (153 * shifted + 2) / 5 + 1)
 }
 
-/// Whole days, and the clock time `hh:mm:ss.fff` of the rest.
+/// Splits seconds into whole days and the clock time `hh:mm:ss.fff`.
 fn split_day(seconds: &Decimal) -> (i64, String) {
     let (unscaled, scale) = seconds.parts();
     let unit = ten_to(scale);
@@ -427,12 +448,12 @@ fn split_day(seconds: &Decimal) -> (i64, String) {
         fraction += &unit;
     }
     let whole = i64::try_from(whole).unwrap_or(0);
-    let clock = whole.rem_euclid(DAY);
+    let clock = whole.rem_euclid(SECONDS_PER_DAY);
     let tail = if scale == 0 {
         String::new()
     } else {
         format!(".{:0>width$}", fraction.to_string(), width = scale as usize)
     };
     let text = format!("{:02}:{:02}:{:02}{tail}", clock / 3600, clock / 60 % 60, clock % 60);
-    (whole.div_euclid(DAY), text)
+    (whole.div_euclid(SECONDS_PER_DAY), text)
 }

@@ -1,6 +1,7 @@
-//! The datatypes derived from `xsd:string`: white space, and which strings they contain (XML Schema Part 2, section 3.4).
+//! Datatypes derived from `xsd:string`: treatment of white space, and valid forms (XML Schema Part 2,
+//! section 3.4).
 
-/// The string that a lexical form of a derived datatype stands for; none if it stands for none.
+/// Parses a lexical form of a derived datatype; `None` if it is invalid.
 pub(super) fn parse(lexical: &str, local: &str) -> Option<String> {
     if local == "normalizedString" {
         return Some(lexical.replace(['\t', '\n', '\r'], " "));
@@ -31,7 +32,7 @@ fn is_name(text: &str) -> bool {
     text.chars().next().is_some_and(start) && text.chars().all(is_name_character)
 }
 
-/// `NameChar` of XML 1.0, fifth edition; combining marks count as letters.
+/// Returns `true` for a `NameChar` of XML 1.0, fifth edition, extended by combining marks.
 fn is_name_character(c: char) -> bool {
     matches!(c, ':' | '_' | '-' | '.' | '0'..='9' | 'A'..='Z' | 'a'..='z' | '\u{B7}' | '\u{C0}'..='\u{D6}'
         | '\u{D8}'..='\u{F6}' | '\u{F8}'..='\u{37D}' | '\u{37F}'..='\u{1FFF}' | '\u{200C}' | '\u{200D}'

@@ -1,4 +1,4 @@
-//! Values, their order and their canonical forms.
+//! Literals, their order and their canonical forms.
 
 use std::cmp::Ordering;
 use std::fmt;
@@ -9,32 +9,32 @@ use super::binary;
 use super::decimal::Decimal;
 use super::temporal::{Duration, Moment};
 
-/// A data value. `Eq` and `Hash` are those of the value, not of the spelling.
+/// A literal. `Eq` and `Hash` compare values, not lexical forms.
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 #[non_exhaustive]
 pub enum Literal {
-    /// `xsd:string`, its derived types, plain literals, `rdf:PlainLiteral` without language.
+    /// `xsd:string` and its derived types, plain literals, and `rdf:PlainLiteral` without language.
     String(Box<str>),
-    /// A language-tagged string; the tag is in lower case.
+    /// A language-tagged string. The tag is in lower case.
     Language {
         /// The text.
         text: Box<str>,
-        /// For example `en-gb`.
+        /// Language tag, for example `en-gb`.
         tag: Box<str>,
     },
     /// `xsd:boolean`.
     Boolean(bool),
     /// `xsd:decimal` and its integer types.
     Decimal(Decimal),
-    /// `xsd:float`, by bits (one NaN).
+    /// `xsd:float` as bits. There is only one NaN.
     Float(u32),
-    /// `xsd:double`, by bits (one NaN).
+    /// `xsd:double` as bits. There is only one NaN.
     Double(u64),
     /// `xsd:dateTime`, `xsd:date` or `xsd:time`.
     Moment(Moment),
     /// `xsd:duration` and its two derived types.
     Duration(Duration),
-    /// `xsd:gYear`, `gYearMonth`, `gMonth`, `gMonthDay` or `gDay`: canonical form and local name.
+    /// Canonical form and local name of `xsd:gYear`, `gYearMonth`, `gMonth`, `gMonthDay` or `gDay`.
     Recurring(Box<str>, &'static str),
     /// `xsd:hexBinary`.
     Hexadecimal(Box<[u8]>),
@@ -42,18 +42,19 @@ pub enum Literal {
     Base64(Box<[u8]>),
     /// `xsd:anyURI`.
     Uri(Box<str>),
-    /// A datatype that has no meaning here, a rational number that is not a decimal (in lowest terms), or an XML literal.
+    /// A literal of an unsupported datatype, a rational number that is not a decimal (in lowest terms), or
+    /// an XML literal.
     Opaque {
-        /// As written.
+        /// Lexical form as written.
         lexical: Box<str>,
-        /// Its IRI.
+        /// IRI of the datatype.
         datatype: Box<str>,
     },
-    /// A lexical form that its datatype forbids, which makes a knowledge base inconsistent.
+    /// A lexical form outside its datatype. It makes a knowledge base inconsistent.
     IllTyped {
-        /// As written.
+        /// Lexical form as written.
         lexical: Box<str>,
-        /// The datatype's IRI.
+        /// IRI of the datatype.
         datatype: Box<str>,
     },
 }
@@ -77,32 +78,33 @@ impl From<&str> for Literal {
 }
 
 impl Literal {
-    /// An `xsd:string`.
+    /// Creates an `xsd:string`.
     pub fn string(text: &str) -> Self {
         Self::String(text.into())
     }
 
-    /// An `xsd:integer`.
+    /// Creates an `xsd:integer`.
     pub fn integer(value: i64) -> Self {
         Self::Decimal(value.into())
     }
 
-    /// An `xsd:double`; every NaN is the same, and zero has a sign.
+    /// Creates an `xsd:double`. All NaNs are identical, and the two zeros are different.
     pub fn double(value: f64) -> Self {
         Self::Double(if value.is_nan() { f64::NAN.to_bits() } else { value.to_bits() })
     }
 
-    /// An `xsd:float`; every NaN is the same, and zero has a sign.
+    /// Creates an `xsd:float`. All NaNs are identical, and the two zeros are different.
     pub fn float(value: f32) -> Self {
         Self::Float(if value.is_nan() { f32::NAN.to_bits() } else { value.to_bits() })
     }
 
-    /// Whether the lexical form is forbidden by its datatype.
+    /// Returns `true` if the lexical form is outside the datatype.
     pub fn is_ill_typed(&self) -> bool {
         matches!(self, Self::IllTyped { .. })
     }
 
-    /// The IRI of the most specific datatype of the canonical form; `rdf:langString` for tagged strings.
+    /// Returns the IRI of the most specific datatype of the canonical form; `rdf:langString` for tagged
+    /// strings.
     pub fn datatype(&self) -> &str {
         match self {
             Self::String(_) => "http://www.w3.org/2001/XMLSchema#string",
@@ -122,7 +124,7 @@ impl Literal {
         }
     }
 
-    /// The canonical lexical form.
+    /// Returns the canonical lexical form.
     pub fn lexical(&self) -> String {
         match self {
             Self::String(text) | Self::Uri(text) | Self::Language { text, .. } | Self::Recurring(text, _) => {
@@ -140,7 +142,7 @@ impl Literal {
         }
     }
 
-    /// The number of bytes that a value takes, besides a constant.
+    /// Number of bytes of a value, up to a constant.
     pub(crate) fn size(&self) -> u64 {
         let size = match self {
             Self::String(text) | Self::Uri(text) | Self::Language { text, .. } | Self::Recurring(text, _) => {
@@ -154,8 +156,8 @@ impl Literal {
         size as u64
     }
 
-    /// The order of two values, with numeric promotion. `None` where they are incomparable: different kinds, NaN,
-    /// moments with and without time zone that are closer than a time zone can tell apart.
+    /// Compares two values, with numeric promotion. Returns `None` if they are incomparable: values of
+    /// different kinds, NaN, or moments with and without a time zone whose order depends on the time zone.
     pub fn compare(&self, other: &Self) -> Option<Ordering> {
         match (self, other) {
             (Self::Decimal(a), Self::Decimal(b)) => Some(a.cmp(b)),
@@ -173,12 +175,12 @@ impl Literal {
         }
     }
 
-    /// Whether the value is a number.
+    /// Returns `true` if the value is a number.
     pub fn is_numeric(&self) -> bool {
         matches!(self, Self::Decimal(_) | Self::Float(_) | Self::Double(_))
     }
 
-    /// The exact value of a finite number.
+    /// Returns the exact value of a finite number.
     pub fn as_rational(&self) -> Option<BigRational> {
         match self {
             Self::Decimal(value) => Some(value.to_rational()),
@@ -188,7 +190,7 @@ impl Literal {
         }
     }
 
-    /// The nearest double of a number.
+    /// Returns the nearest double of a number.
     pub fn as_f64(&self) -> Option<f64> {
         match self {
             Self::Decimal(value) => Some(value.to_f64()),
@@ -207,7 +209,8 @@ impl Literal {
     }
 }
 
-/// N-Triples: `"1.5"^^<http://www.w3.org/2001/XMLSchema#decimal>`, strings without datatype.
+/// Formats the literal in N-Triples, for example `"1.5"^^<http://www.w3.org/2001/XMLSchema#decimal>`;
+/// strings have no datatype.
 impl fmt::Display for Literal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("\"")?;
@@ -230,7 +233,7 @@ impl fmt::Display for Literal {
     }
 }
 
-/// XSD's canonical form of a float: `1.5E0`, `INF`, `NaN`.
+/// Converts a float to the canonical form of XSD: `1.5E0`, `INF`, `NaN`.
 fn canonical_float<F: fmt::LowerExp>(value: F) -> String {
     let text = format!("{value:e}");
     match text.as_str() {

@@ -1,47 +1,47 @@
-//! A set of facts, and which of them have a symbol at a place.
+//! An immutable set of facts with an index on each argument.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::fact::Fact;
 use crate::symbol::Symbol;
 
-/// A predicate and how many arguments it has.
+/// A predicate with its number of arguments.
 type Relation = (Symbol, usize);
 
-/// Facts that do not change any more.
+/// An immutable, indexed set of facts.
 pub(super) struct Facts {
-    all: FxHashSet<Fact>,
+    facts: FxHashSet<Fact>,
     by_relation: FxHashMap<Relation, Vec<Fact>>,
-    /// Positions in `by_relation`, by the symbol at a place.
+    /// Positions in `by_relation`, by argument position and symbol.
     by_place: FxHashMap<(Relation, usize, Symbol), Vec<usize>>,
 }
 
 impl Facts {
     pub fn new(facts: impl Iterator<Item = Fact>) -> Self {
-        let mut known = Self {
-            all: FxHashSet::default(),
+        let mut index = Self {
+            facts: FxHashSet::default(),
             by_relation: FxHashMap::default(),
             by_place: FxHashMap::default(),
         };
         for fact in facts {
-            if !known.all.insert(fact.clone()) {
+            if !index.facts.insert(fact.clone()) {
                 continue;
             }
             let relation = (fact.predicate, fact.arguments.len());
-            let rows = known.by_relation.entry(relation).or_default();
+            let rows = index.by_relation.entry(relation).or_default();
             for (place, symbol) in fact.arguments.iter().enumerate() {
-                known.by_place.entry((relation, place, *symbol)).or_default().push(rows.len());
+                index.by_place.entry((relation, place, *symbol)).or_default().push(rows.len());
             }
             rows.push(fact);
         }
-        known
+        index
     }
 
     pub fn contains(&self, fact: &Fact) -> bool {
-        self.all.contains(fact)
+        self.facts.contains(fact)
     }
 
-    /// The facts of a relation with a symbol at a place, or all of them.
+    /// Facts of a relation with a symbol at an argument position, or all facts of the relation.
     pub fn rows(&self, relation: Relation, place: Option<(usize, Symbol)>) -> Vec<&Fact> {
         let Some(rows) = self.by_relation.get(&relation) else { return Vec::new() };
         match place {
@@ -53,7 +53,7 @@ impl Facts {
         }
     }
 
-    /// How many there are of them.
+    /// Number of these facts.
     pub fn count(&self, relation: Relation, place: Option<(usize, Symbol)>) -> usize {
         match place {
             None => self.by_relation.get(&relation).map_or(0, Vec::len),

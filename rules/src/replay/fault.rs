@@ -1,42 +1,42 @@
-//! What can be wrong with derivations.
+//! Faults of derivations.
 
 use crate::rule::RuleIdentity;
 
-/// Why derivations are not accepted: the first thing that is wrong. Facts are given as text.
+/// Reason for which a derivation is rejected: its first fault. Facts are given as text.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Fault {
-    /// A rule negates, or aggregates over, what depends on its own conclusion.
+    /// A rule negates or aggregates a relation that depends on its own conclusion.
     #[error("the rules are not stratified at rule {0}")]
     Unstratified(RuleIdentity),
-    /// A step does not follow from those before it.
+    /// A step does not follow from earlier steps.
     #[error("step {step}, {fact}: {reason}")]
     Step {
-        /// Its position, counted from 0.
+        /// Position of the step, counted from 0.
         step: usize,
-        /// What it concludes.
+        /// Fact of the step.
         fact: String,
-        /// What is wrong with it.
+        /// Description of the fault.
         reason: String,
     },
-    /// Something is stated, and no step says so.
+    /// A stated fact has no step.
     #[error("{0} is stated, and missing")]
     MissingStatement(String),
-    /// A rule concludes something that no step says.
+    /// A conclusion of a rule has no step.
     #[error("{fact} follows by rule {rule}, and is missing")]
     MissingConclusion {
-        /// What follows.
+        /// Missing fact.
         fact: String,
-        /// By which rule.
+        /// Rule that derives it.
         rule: RuleIdentity,
     },
-    /// Names that may be one are compared by a rule, not by what is known to differ.
+    /// A rule tests that two names differ, although they may be equal.
     #[error("a rule asks whether names differ that may be one")]
     Difference,
-    /// A rule, or an aggregate in it, has more matches than are gone through.
+    /// A rule, or an aggregate in it, has too many matches to enumerate.
     #[error("rule {0} has too many matches")]
     TooMany(RuleIdentity),
-    /// The facts contradict each other.
+    /// The facts are contradictory.
     #[error("the knowledge is inconsistent: {0}")]
     Inconsistent(String),
 }

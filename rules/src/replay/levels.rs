@@ -1,6 +1,6 @@
-//! Whether rules are stratified: whether relations have levels such that a rule concludes nothing below what it uses, and
-//! only above what it negates or aggregates over. Levels are raised until nothing changes, or until there are more
-//! levels than relations.
+//! Stratification check: relations have levels such that the heads of a rule are not below its positive
+//! atoms, and are above its negated and aggregated atoms. Levels are raised to a fixpoint. If a level
+//! exceeds the number of relations, the rules are not stratified.
 
 use rustc_hash::FxHashMap;
 
@@ -10,37 +10,42 @@ use crate::symbol::Symbol;
 
 type Relation = (Symbol, usize);
 
-/// What a rule concludes, and what it uses: each with 1 where the conclusion has to be above it.
+/// Head relations and body relations of a rule. A body relation has the number 1 if the heads have to be
+/// above it.
 struct Uses {
     heads: Vec<Relation>,
     body: Vec<(Relation, usize)>,
 }
 
-pub(super) fn check(program: &Program, same: Symbol, different: Symbol) -> Result<(), Fault> {
-    let all: Vec<Uses> =
-        program.rules.iter().map(|rule| uses(rule, program.equality, same, different)).collect();
+/// Checks that a program is stratified.
+pub(super) fn check(program: &Program, same_as: Symbol, different: Symbol) -> Result<(), Fault> {
+    let rule_uses: Vec<Uses> =
+        program.rules.iter().map(|rule| uses(rule, program.equality, same_as, different)).collect();
     let mut levels: FxHashMap<Relation, usize> = FxHashMap::default();
-    for relation in all.iter().flat_map(|uses| uses.heads.iter().chain(uses.body.iter().map(|(own, _)| own)))
+    for relation in rule_uses
+        .iter()
+        .flat_map(|uses| uses.heads.iter().chain(uses.body.iter().map(|(relation, _)| relation)))
     {
         levels.insert(*relation, 0);
     }
-    let most = levels.len();
+    let max_level = levels.len();
     loop {
         let mut changed = false;
-        for (uses, rule) in all.iter().zip(&program.rules) {
-            let least = uses.body.iter().map(|(own, above)| levels[own] + above).max().unwrap_or(0);
-            if least > most {
+        for (uses, rule) in rule_uses.iter().zip(&program.rules) {
+            let required =
+                uses.body.iter().map(|(relation, above)| levels[relation] + above).max().unwrap_or(0);
+            if required > max_level {
                 return Err(Fault::Unstratified(rule.identity.clone()));
             }
             for head in &uses.heads {
-                if levels[head] < least {
-                    levels.insert(*head, least);
+                if levels[head] < required {
+                    levels.insert(*head, required);
                     changed = true;
                 }
             }
         }
-        // What holds of one name holds of the others, so that every relation depends on equality.
-        let floor = levels.get(&(same, 2)).copied().filter(|_| program.equality).unwrap_or(0);
+        // A fact about one name holds about all equal names, so every relation depends on equality.
+        let floor = levels.get(&(same_as, 2)).copied().filter(|_| program.equality).unwrap_or(0);
         for level in levels.values_mut().filter(|level| **level < floor) {
             *level = floor;
             changed = true;
@@ -51,25 +56,26 @@ pub(super) fn check(program: &Program, same: Symbol, different: Symbol) -> Resul
     }
 }
 
-fn uses(rule: &Rule, equality: bool, same: Symbol, different: Symbol) -> Uses {
+fn uses(rule: &Rule, equality: bool, same_as: Symbol, different: Symbol) -> Uses {
     let relation = |atom: &Atom| match atom {
         Atom::Relation { predicate, arguments } | Atom::Not { predicate, arguments } => {
             Some((*predicate, arguments.len()))
         }
-        Atom::Same(..) => Some((same, 2)),
+        Atom::Same(..) => Some((same_as, 2)),
         Atom::Different(..) => Some((different, 2)),
         Atom::BuiltIn { .. } | Atom::Aggregate { .. } => None,
     };
     let mut body = Vec::new();
     for atom in &rule.body {
         match atom {
-            Atom::Relation { .. } => body.extend(relation(atom).map(|own| (own, 0))),
-            Atom::Not { .. } => body.extend(relation(atom).map(|own| (own, 1))),
+            Atom::Relation { .. } => body.extend(relation(atom).map(|used| (used, 0))),
+            Atom::Not { .. } => body.extend(relation(atom).map(|used| (used, 1))),
             Atom::Aggregate { body: inner, .. } => {
-                body.extend(inner.iter().filter_map(relation).map(|own| (own, 1)));
+                body.extend(inner.iter().filter_map(relation).map(|used| (used, 1)));
             }
-            Atom::Same(..) if equality => body.push(((same, 2), 0)),
-            // Under equality, what differs are literals only, which are never made one.
+            Atom::Same(..) if equality => body.push(((same_as, 2), 0)),
+            // Under equality, only literals differ by this atom, and literals are never equal to anything
+            // else.
             Atom::Same(..) | Atom::Different(..) | Atom::BuiltIn { .. } => {}
         }
     }

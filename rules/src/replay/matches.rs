@@ -1,5 +1,5 @@
-//! Matches of a rule's body among facts that do not change: atom by atom, the one with the fewest rows next, the others as
-//! soon as their variables have values.
+//! Matches of a rule's body in an immutable set of facts: nested-loop joins. The atom with the fewest
+//! candidate rows comes first; other atoms are tested as soon as their variables are bound.
 
 use std::collections::BTreeSet;
 use std::rc::Rc;
@@ -14,10 +14,10 @@ use crate::rule::{Aggregate, Atom, Rule, Term, Variable};
 use crate::source::Source;
 use crate::symbol::{Symbol, Symbols};
 
-/// With more matches of one body, none is looked at.
+/// Maximum number of matches of one body.
 const MATCH_LIMIT: usize = 1 << 21;
 
-/// The value of each variable of a rule, where it has one.
+/// Values of the variables of a rule; `None` for an unbound variable.
 pub(super) type Values = Vec<Option<Symbol>>;
 
 pub(super) fn value(term: Term, values: &Values) -> Option<Symbol> {
@@ -27,7 +27,7 @@ pub(super) fn value(term: Term, values: &Values) -> Option<Symbol> {
     }
 }
 
-/// A relation under values of all its variables.
+/// Instance of a relation atom; `None` if a variable is unbound.
 pub(super) fn instance(predicate: Symbol, terms: &[Term], values: &Values) -> Option<Fact> {
     let arguments: Option<Vec<Symbol>> = terms.iter().map(|term| value(*term, values)).collect();
     Some(Fact::new(predicate, arguments?))
@@ -35,137 +35,139 @@ pub(super) fn instance(predicate: Symbol, terms: &[Term], values: &Values) -> Op
 
 pub(super) struct Matcher<'m> {
     pub symbols: &'m mut Symbols,
-    /// About the first name of each individual.
+    /// Facts about the first name of each individual.
     pub facts: &'m Facts,
     pub names: &'m Names,
-    /// Whether names may be one.
+    /// `true` if names may be equal.
     pub equality: bool,
-    /// Whether names that may be one were asked to differ: then there is no telling by what holds alone.
-    pub names_differ: bool,
-    /// Whether a body has more matches than there is room for.
+    /// `true` if a rule compared two names that may be equal. The given facts alone then do not determine
+    /// the result.
+    pub compares_names: bool,
+    /// `true` if a body has more than [`MATCH_LIMIT`] matches.
     pub too_many: bool,
 }
 
-/// The variables that an aggregate takes from the other atoms of a body.
-fn group(body: &[Atom], at: usize) -> Vec<Term> {
-    let others = body.iter().enumerate().filter(|(other, _)| *other != at);
-    let outside: BTreeSet<Term> = others
+/// Variables that an aggregate shares with the other atoms of the body.
+fn group(body: &[Atom], position: usize) -> Vec<Term> {
+    let outer_atoms = body.iter().enumerate().filter(|(other, _)| *other != position);
+    let outer_terms: BTreeSet<Term> = outer_atoms
         .flat_map(|(_, other)| match other {
             Atom::Aggregate { result, .. } => vec![*result],
             other => other.terms(),
         })
         .collect();
-    let own = body[at].terms().into_iter().skip(1);
-    own.filter(|term| term.as_variable().is_some() && outside.contains(term)).collect()
+    let inner_terms = body[position].terms().into_iter().skip(1);
+    inner_terms.filter(|term| term.as_variable().is_some() && outer_terms.contains(term)).collect()
 }
 
 impl Matcher<'_> {
-    /// All matches of a rule's body, in first names.
-    pub fn all(&mut self, rule: &Rule) -> Vec<Values> {
-        let mut found = Vec::new();
+    /// All matches of a rule's body, with first names as values.
+    pub fn matches_of(&mut self, rule: &Rule) -> Vec<Values> {
+        let mut matches = Vec::new();
         let open: Vec<usize> = (0..rule.body.len()).collect();
-        self.extend(&rule.body, &open, vec![None; rule.variable_count()], &mut found);
-        found
+        self.extend(&rule.body, &open, vec![None; rule.variable_count()], &mut matches);
+        matches
     }
 
-    /// Adds all matches of the open atoms of a body that extend some values, in the order of a search in depth.
-    fn extend(&mut self, body: &[Atom], open: &[usize], values: Values, found: &mut Vec<Values>) {
+    /// Extends values by all matches of the open atoms of a body, in depth-first order.
+    fn extend(&mut self, body: &[Atom], open: &[usize], values: Values, matches: &mut Vec<Values>) {
         let mut states: Vec<(Rc<[usize]>, Values)> = vec![(open.into(), values)];
         while let Some((open, values)) = states.pop() {
-            self.too_many |= found.len() >= MATCH_LIMIT;
+            self.too_many |= matches.len() >= MATCH_LIMIT;
             if self.too_many {
                 return;
             }
             if open.is_empty() {
-                found.push(values);
+                matches.push(values);
                 continue;
             }
-            let (at, next) = self.step(body, &open, values);
-            let rest: Rc<[usize]> = open.iter().copied().filter(|other| Some(*other) != at).collect();
-            states.extend(next.into_iter().rev().map(|longer| (Rc::clone(&rest), longer)));
+            let (position, next) = self.step(body, &open, values);
+            let remaining: Rc<[usize]> =
+                open.iter().copied().filter(|other| Some(*other) != position).collect();
+            states.extend(next.into_iter().rev().map(|extended| (Rc::clone(&remaining), extended)));
         }
     }
 
-    /// The open atom that is matched next, and the values that it leads to.
+    /// Chooses the next open atom, and returns its position with the extended values.
     fn step(&mut self, body: &[Atom], open: &[usize], values: Values) -> (Option<usize>, Vec<Values>) {
-        if let Some(at) = open.iter().copied().find(|at| is_ready(body, *at, &values)) {
-            let next = match &body[at] {
+        if let Some(position) = open.iter().copied().find(|position| is_ready(body, *position, &values)) {
+            let next = match &body[position] {
                 Atom::BuiltIn { built_in, arguments } => self.solve(*built_in, arguments, &values),
-                _ => self.filter(body, at, values).into_iter().collect(),
+                _ => self.filter(body, position, values).into_iter().collect(),
             };
-            return (Some(at), next);
+            return (Some(position), next);
         }
-        let relations = open.iter().copied().filter_map(|at| match &body[at] {
-            Atom::Relation { predicate, arguments } => Some((at, *predicate, arguments)),
+        let relations = open.iter().copied().filter_map(|position| match &body[position] {
+            Atom::Relation { predicate, arguments } => Some((position, *predicate, arguments)),
             _ => None,
         });
-        let places = relations.map(|(at, predicate, arguments)| {
+        let places = relations.map(|(position, predicate, arguments)| {
             let relation = (predicate, arguments.len());
-            let known =
+            let bound_place =
                 |(place, term): (usize, &Term)| Some((place, self.names.find(value(*term, &values)?)));
-            let places = arguments.iter().enumerate().filter_map(known).map(Some).chain([None]);
+            let places = arguments.iter().enumerate().filter_map(bound_place).map(Some).chain([None]);
             let least = places.min_by_key(|place| self.facts.count(relation, *place));
-            (at, relation, arguments, least.flatten())
+            (position, relation, arguments, least.flatten())
         });
         let best = places.min_by_key(|(_, relation, _, place)| self.facts.count(*relation, *place));
-        let Some((at, relation, arguments, place)) = best else { return (None, Vec::new()) };
+        let Some((position, relation, arguments, place)) = best else { return (None, Vec::new()) };
         let rows = self.facts.rows(relation, place);
-        (Some(at), rows.into_iter().filter_map(|row| self.agree(arguments, row, &values)).collect())
+        (Some(position), rows.into_iter().filter_map(|row| self.agree(arguments, row, &values)).collect())
     }
 
-    /// The values with which a relation's terms are those of a row.
+    /// Unifies the terms of a relation atom with a row.
     fn agree(&self, terms: &[Term], row: &Fact, values: &Values) -> Option<Values> {
-        let mut longer = values.clone();
+        let mut extended = values.clone();
         for (term, symbol) in terms.iter().zip(&row.arguments) {
-            match (value(*term, &longer), term) {
-                (Some(known), _) if self.names.find(known) == *symbol => {}
-                (None, Term::Variable(Variable(number))) => longer[usize::from(*number)] = Some(*symbol),
+            match (value(*term, &extended), term) {
+                (Some(assigned), _) if self.names.find(assigned) == *symbol => {}
+                (None, Term::Variable(Variable(number))) => extended[usize::from(*number)] = Some(*symbol),
                 _ => return None,
             }
         }
-        Some(longer)
+        Some(extended)
     }
 
-    /// The values with all that a built-in gives to those of its arguments that have none.
+    /// Extends values by all values that a built-in admits for its unbound arguments.
     fn solve(&mut self, built_in: BuiltIn, arguments: &[Term], values: &Values) -> Vec<Values> {
         let literal = |term: &Term| match value(*term, values) {
             Some(symbol) => self.symbols.value(symbol).as_literal().map(Some),
             None => Some(None),
         };
-        let Some(given) = arguments.iter().map(literal).collect::<Option<Vec<_>>>() else {
+        let Some(inputs) = arguments.iter().map(literal).collect::<Option<Vec<_>>>() else {
             return Vec::new();
         };
         let open = arguments.iter().filter(|term| value(**term, values).is_none());
         let open: Vec<Variable> = open.filter_map(|term| term.as_variable()).collect();
-        let mut all = Vec::new();
-        for solution in built_in.solve(&given) {
-            let mut longer = values.clone();
+        let mut solutions = Vec::new();
+        for solution in built_in.solve(&inputs) {
+            let mut extended = values.clone();
             let agrees = open.iter().zip(solution).all(|(variable, literal)| {
                 let symbol = self.symbols.literal(literal);
-                *longer[usize::from(variable.0)].get_or_insert(symbol) == symbol
+                *extended[usize::from(variable.0)].get_or_insert(symbol) == symbol
             });
-            all.extend(agrees.then_some(longer));
+            solutions.extend(agrees.then_some(extended));
         }
-        all
+        solutions
     }
 
-    /// The values with what an atom that is not a relation adds to them; none where it does not hold.
-    fn filter(&mut self, body: &[Atom], at: usize, mut values: Values) -> Option<Values> {
-        let bound = match &body[at] {
+    /// Extends values by an atom that is not a relation atom. `None` if the atom does not hold.
+    fn filter(&mut self, body: &[Atom], position: usize, mut values: Values) -> Option<Values> {
+        let bound = match &body[position] {
             Atom::Same(left, right) => match (value(*left, &values), value(*right, &values)) {
                 (Some(left), Some(right)) => {
                     return (self.names.find(left) == self.names.find(right)).then_some(values);
                 }
-                (Some(known), None) => Some((*right, known)),
-                (None, known) => known.map(|known| (*left, known)),
+                (Some(assigned), None) => Some((*right, assigned)),
+                (None, assigned) => assigned.map(|assigned| (*left, assigned)),
             },
             Atom::Aggregate { result, .. } if value(*result, &values).is_none() => {
-                let outcome = self.aggregate(body, at, &values)?;
+                let outcome = self.aggregate(body, position, &values)?;
                 Some((*result, self.symbols.literal(outcome)))
             }
             _ => {
                 let names = self.names;
-                return self.holds_at(body, at, &values, names).then_some(values);
+                return self.holds_at(body, position, &values, names).then_some(values);
             }
         };
         let (term, symbol) = bound?;
@@ -174,23 +176,24 @@ impl Matcher<'_> {
         Some(values)
     }
 
-    /// Whether an atom of a rule's body that is not a relation holds; `names` are those that are known to be one.
+    /// Returns `true` if an atom that is not a relation atom holds. `names` contains the equalities of
+    /// earlier steps.
     pub fn holds(&mut self, atom: &Atom, rule: &Rule, values: &Values, names: &Names) -> bool {
-        let at = rule.body.iter().position(|other| std::ptr::eq(other, atom));
-        at.is_some_and(|at| self.holds_at(&rule.body, at, values, names))
+        let position = rule.body.iter().position(|other| std::ptr::eq(other, atom));
+        position.is_some_and(|position| self.holds_at(&rule.body, position, values, names))
     }
 
-    fn holds_at(&mut self, body: &[Atom], at: usize, values: &Values, names: &Names) -> bool {
+    fn holds_at(&mut self, body: &[Atom], position: usize, values: &Values, names: &Names) -> bool {
         let find = |names: &Names, term: &Term| value(*term, values).map(|symbol| names.find(symbol));
-        match &body[at] {
+        match &body[position] {
             Atom::Not { predicate, arguments } => instance(*predicate, arguments, values)
                 .is_some_and(|fact| !self.facts.contains(&self.names.normal(&fact))),
             Atom::Same(left, right) => find(names, left).is_some() && find(names, left) == find(names, right),
-            // What is different has to stay so.
+            // Uses all equalities, also later ones, since the difference must hold in the whole model.
             Atom::Different(left, right) => match (find(self.names, left), find(self.names, right)) {
                 (Some(left), Some(right)) => {
                     let is_name = |symbol| self.symbols.value(symbol).as_name().is_some();
-                    self.names_differ |= self.equality && is_name(left) && is_name(right);
+                    self.compares_names |= self.equality && is_name(left) && is_name(right);
                     self.symbols.differ(left, right)
                 }
                 _ => false,
@@ -199,7 +202,7 @@ impl Matcher<'_> {
                 .literals(arguments, values)
                 .is_some_and(|literals| built_in.holds(&literals.iter().collect::<Vec<_>>())),
             Atom::Aggregate { result, .. } => {
-                let outcome = self.aggregate(body, at, values);
+                let outcome = self.aggregate(body, position, values);
                 outcome.is_some()
                     && outcome.as_ref() == self.literals(&[*result], values).as_deref().and_then(<[_]>::first)
             }
@@ -212,17 +215,18 @@ impl Matcher<'_> {
         terms.iter().map(literal).collect()
     }
 
-    /// What an aggregate comes to: over each distinct match of its own atoms that agrees with its group.
-    fn aggregate(&mut self, body: &[Atom], at: usize, values: &Values) -> Option<Literal> {
-        let Atom::Aggregate { aggregate, body: inner, .. } = &body[at] else { return None };
-        let mut own: Values = vec![None; values.len()];
-        for Variable(number) in group(body, at).iter().filter_map(|term| term.as_variable()) {
-            own[usize::from(number)] = Some(self.names.find(values[usize::from(number)]?));
+    /// Value of an aggregate over the distinct matches of its atoms within the group.
+    fn aggregate(&mut self, body: &[Atom], position: usize, values: &Values) -> Option<Literal> {
+        let Atom::Aggregate { aggregate, body: inner, .. } = &body[position] else { return None };
+        // Only the group is shared with the rule, so all other variables start unbound.
+        let mut inner_values: Values = vec![None; values.len()];
+        for Variable(number) in group(body, position).iter().filter_map(|term| term.as_variable()) {
+            inner_values[usize::from(number)] = Some(self.names.find(values[usize::from(number)]?));
         }
-        let mut found = Vec::new();
+        let mut matches = Vec::new();
         let open: Vec<usize> = (0..inner.len()).collect();
-        self.extend(inner, &open, own, &mut found);
-        let distinct: BTreeSet<Values> = found.into_iter().collect();
+        self.extend(inner, &open, inner_values, &mut matches);
+        let distinct: BTreeSet<Values> = matches.into_iter().collect();
         let row = |values: &Values| match aggregate.value() {
             None => values.first().copied().flatten().or(Some(Symbol(0))),
             Some(term) => value(term, values),
@@ -233,22 +237,22 @@ impl Matcher<'_> {
     }
 }
 
-/// The aggregate of the only column of rows.
+/// Aggregate of the single column of the rows.
 fn column(aggregate: Aggregate) -> Aggregate {
     aggregate.map(&|_| Term::Variable(Variable(0)))
 }
 
-/// Whether an atom that is not a relation has values enough.
-fn is_ready(body: &[Atom], at: usize, values: &Values) -> bool {
-    let known = |term: &Term| value(*term, values).is_some();
-    match &body[at] {
+/// Returns `true` if an atom that is not a relation atom can be evaluated.
+fn is_ready(body: &[Atom], position: usize, values: &Values) -> bool {
+    let is_bound = |term: &Term| value(*term, values).is_some();
+    match &body[position] {
         Atom::Relation { .. } => false,
-        Atom::Not { arguments, .. } => arguments.iter().all(known),
-        Atom::Same(left, right) => known(left) || known(right),
-        Atom::Different(left, right) => known(left) && known(right),
+        Atom::Not { arguments, .. } => arguments.iter().all(is_bound),
+        Atom::Same(left, right) => is_bound(left) || is_bound(right),
+        Atom::Different(left, right) => is_bound(left) && is_bound(right),
         Atom::BuiltIn { built_in, arguments } => {
-            built_in.binds(&arguments.iter().map(known).collect::<Vec<_>>())
+            built_in.binds(&arguments.iter().map(is_bound).collect::<Vec<_>>())
         }
-        Atom::Aggregate { .. } => group(body, at).iter().all(known),
+        Atom::Aggregate { .. } => group(body, position).iter().all(is_bound),
     }
 }

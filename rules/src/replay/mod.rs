@@ -1,16 +1,18 @@
-//! Derivations of everything that holds, checked without the engine: by looking at each step by itself, and by plain joins.
+//! Independent checker of derivations: checks each step by itself, and completeness by plain joins, without
+//! the engine.
 //!
-//! What holds is the perfect model of a stratified program \[1\]. It is the only set of facts that is *founded* (each fact is
-//! stated, or concluded by a rule from facts that come before it, while what the rule negates is not in the set) and
-//! *closed* (it has what is stated, and whatever a rule concludes from it), because stratified programs have no other stable
-//! model \[2\]. So [`replay`] checks three things: that the rules are stratified, that every step is founded, and that
-//! nothing is missing. The last matters as much as the others: a fact that is left out may be what another rule negates.
+//! The facts that hold are the perfect model of a stratified program \[1\]. It is the only set of facts
+//! that is *founded* (each fact is stated, or derived by a rule from earlier facts while the negated atoms
+//! of the rule are not in the set) and *closed* (it contains all stated facts, and all facts that rules
+//! derive from the set), because a stratified program has exactly one stable model \[2\]. Therefore
+//! [`replay`] checks three properties: the rules are stratified, every step is founded, and no fact is
+//! missing. The last check is essential, since a rule may negate a missing fact.
 //!
-//! With equality, facts are compared by the first name of each class of names that are one. A step may use the
-//! equalities before it only.
+//! With equality, facts are compared by the first name of each class of equal names. A step may use only
+//! equalities of earlier steps.
 //!
-//! Nothing of the engine's store, plans, strata or records is used: only rules as data, and the meaning of single built-ins
-//! and aggregates.
+//! The checker uses nothing of the engine's store, plans, strata or records. It uses only the rules as
+//! data, and the evaluation of single built-ins and aggregates.
 //!
 //! \[1\] Przymusinski, "On the declarative semantics of deductive databases and logic programs", 1988.
 //! \[2\] Gelfond, Lifschitz, "The stable model semantics for logic programming", ICLP 1988.
@@ -35,39 +37,39 @@ use names::Names;
 
 pub use fault::Fault;
 
-/// The relation of equal names.
+/// Relation of equal names.
 const SAME_AS: &str = "http://www.w3.org/2002/07/owl#sameAs";
-/// The relation of different individuals.
+/// Relation of different individuals.
 const DIFFERENT_FROM: &str = "http://www.w3.org/2002/07/owl#differentFrom";
 
-/// What [`replay`] has gone through.
+/// Statistics of a successful [`replay`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Replayed {
-    /// Facts that hold.
+    /// Number of facts that hold.
     pub facts: usize,
-    /// Those of them that a rule concludes.
+    /// Number of these facts that a rule derives.
     pub derived: usize,
-    /// Matches of rules that were looked at to see that nothing is missing.
+    /// Number of rule matches that the completeness check enumerated.
     pub matches: usize,
 }
 
-/// Checks that the steps of a derivation, each after what it rests on, are exactly what holds by a program and stated facts.
-/// Values that rules compute are interned in `symbols`.
+/// Checks that the steps of a derivation are exactly the facts that hold for a program and stated facts.
+/// Each step must come after its supports. Values that rules compute are interned in `symbols`.
 ///
 /// # Errors
-/// The first thing that is wrong: a step that does not follow, something that is missing, or a contradiction.
+/// Returns the first fault: a step that does not follow, a missing fact, or a contradiction.
 pub fn replay(
     program: &Program,
     symbols: &mut Symbols,
     stated: &[Fact],
     derivation: &Derivation,
 ) -> Result<Replayed, Fault> {
-    let (same, different) = (symbols.name(SAME_AS), symbols.name(DIFFERENT_FROM));
+    let (same_as, different) = (symbols.name(SAME_AS), symbols.name(DIFFERENT_FROM));
     let program = &without_guards(program);
-    levels::check(program, same, different)?;
+    levels::check(program, same_as, different)?;
     let mut names = Names::default();
     for step in &derivation.steps {
-        if program.equality && step.fact.predicate == same && step.fact.arguments.len() == 2 {
+        if program.equality && step.fact.predicate == same_as && step.fact.arguments.len() == 2 {
             names.join(step.fact.arguments[0], step.fact.arguments[1]);
         }
     }
@@ -77,14 +79,14 @@ pub fn replay(
         facts: &facts,
         names: &names,
         equality: program.equality,
-        names_differ: false,
+        compares_names: false,
         too_many: false,
     };
-    let mut replayer = Replayer { program, same, different, matcher };
+    let mut replayer = Replayer { program, same_as, different, matcher };
     replayer.consistent(derivation)?;
     replayer.founded(stated, derivation)?;
     let matches = replayer.closed(stated)?;
-    if replayer.matcher.names_differ {
+    if replayer.matcher.compares_names {
         return Err(Fault::Difference);
     }
     let is_derived = |step: &&DerivationStep| matches!(step.reason, Reason::Rule { .. });
@@ -97,7 +99,7 @@ pub fn replay(
 
 struct Replayer<'r> {
     program: &'r Program,
-    same: Symbol,
+    same_as: Symbol,
     different: Symbol,
     matcher: Matcher<'r>,
 }
@@ -107,33 +109,34 @@ impl Replayer<'_> {
         fact.display(self.matcher.symbols).to_string()
     }
 
-    /// No ill-typed literals, and no literal that is something else.
+    /// Checks that no literal is ill-typed, and that no literal equals a different literal or a name.
     fn consistent(&self, derivation: &Derivation) -> Result<(), Fault> {
         let symbols = &*self.matcher.symbols;
         let literal = |symbol: Symbol| symbols.value(symbol).as_literal();
-        let wrong = derivation.steps.iter().map(|step| &step.fact).find(|fact| {
-            let [first, rest @ ..] = fact.arguments.as_slice() else { return false };
+        let inconsistent = derivation.steps.iter().map(|step| &step.fact).find(|fact| {
+            let [first, tail @ ..] = fact.arguments.as_slice() else { return false };
             let clash = self.is_pair(fact)
-                && rest[0] != *first
-                && (literal(*first).is_some() || literal(rest[0]).is_some());
-            clash || fact.arguments.iter().any(|own| literal(*own).is_some_and(Literal::is_ill_typed))
+                && tail[0] != *first
+                && (literal(*first).is_some() || literal(tail[0]).is_some());
+            clash || fact.arguments.iter().any(|symbol| literal(*symbol).is_some_and(Literal::is_ill_typed))
         });
-        wrong.map_or(Ok(()), |fact| Err(Fault::Inconsistent(self.show(fact))))
+        inconsistent.map_or(Ok(()), |fact| Err(Fault::Inconsistent(self.show(fact))))
     }
 
     fn is_pair(&self, fact: &Fact) -> bool {
-        self.program.equality && fact.predicate == self.same && fact.arguments.len() == 2
+        self.program.equality && fact.predicate == self.same_as && fact.arguments.len() == 2
     }
 
+    /// Checks that each step is stated, or follows from earlier steps.
     fn founded(&mut self, stated: &[Fact], derivation: &Derivation) -> Result<(), Fault> {
         let stated: FxHashSet<&Fact> = stated.iter().collect();
         let mut rules: FxHashMap<&RuleIdentity, Vec<&Rule>> = FxHashMap::default();
         for rule in &self.program.rules {
             rules.entry(&rule.identity).or_default().push(rule);
         }
-        // What is known before a step: the names that are one, and, where that matters, all facts.
+        // Knowledge before a step: the equal names and, under equality, the facts of all earlier steps.
         let mut names = Names::default();
-        let mut known: FxHashSet<Fact> = FxHashSet::default();
+        let mut established: FxHashSet<Fact> = FxHashSet::default();
         for (position, step) in derivation.steps.iter().enumerate() {
             let checked = match &step.reason {
                 Reason::Asserted => {
@@ -143,7 +146,7 @@ impl Replayer<'_> {
                     let is_one = self.is_pair(&step.fact)
                         && names.find(step.fact.arguments[0]) == names.find(step.fact.arguments[1]);
                     let follows =
-                        self.program.equality && (is_one || known.contains(&names.normal(&step.fact)));
+                        self.program.equality && (is_one || established.contains(&names.normal(&step.fact)));
                     follows.then_some(()).ok_or("does not follow by equality".to_owned())
                 }
                 Reason::Rule { identity, bindings, supports, .. } => {
@@ -160,16 +163,17 @@ impl Replayer<'_> {
             };
             checked.map_err(|reason| Fault::Step { step: position, fact: self.show(&step.fact), reason })?;
             if self.program.equality {
+                // A new equality changes the first names of earlier facts.
                 if self.is_pair(&step.fact) && names.join(step.fact.arguments[0], step.fact.arguments[1]) {
-                    known = known.iter().map(|fact| names.normal(fact)).collect();
+                    established = established.iter().map(|fact| names.normal(fact)).collect();
                 }
-                known.insert(names.normal(&step.fact));
+                established.insert(names.normal(&step.fact));
             }
         }
         Ok(())
     }
 
-    /// Whether a rule concludes a step from earlier ones.
+    /// Checks that a rule derives a step from earlier steps.
     fn follows(
         &mut self,
         rule: &Rule,
@@ -212,13 +216,14 @@ impl Replayer<'_> {
     fn concluded(&self, head: &Atom, values: &Values) -> Option<Fact> {
         match head {
             Atom::Relation { predicate, arguments } => instance(*predicate, arguments, values),
-            Atom::Same(left, right) => instance(self.same, &[*left, *right], values),
+            Atom::Same(left, right) => instance(self.same_as, &[*left, *right], values),
             Atom::Different(left, right) => instance(self.different, &[*left, *right], values),
             Atom::Not { .. } | Atom::BuiltIn { .. } | Atom::Aggregate { .. } => None,
         }
     }
 
-    /// Whatever is stated or concluded is there; returns how many matches were looked at.
+    /// Checks that all stated facts and all conclusions of rules are present. Returns the number of
+    /// matches.
     fn closed(&mut self, stated: &[Fact]) -> Result<usize, Fault> {
         if let Some(fact) =
             stated.iter().find(|fact| !self.matcher.facts.contains(&self.matcher.names.normal(fact)))
@@ -227,18 +232,18 @@ impl Replayer<'_> {
         }
         let mut count = 0;
         for rule in &self.program.rules {
-            let all = self.matcher.all(rule);
+            let matches = self.matcher.matches_of(rule);
             if self.matcher.too_many {
                 return Err(Fault::TooMany(rule.identity.clone()));
             }
-            count += all.len();
-            for values in all {
+            count += matches.len();
+            for values in matches {
                 if rule.head.is_empty() {
                     return Err(Fault::Inconsistent(rule.identity.to_string()));
                 }
                 for fact in rule.head.iter().filter_map(|head| self.concluded(head, &values)) {
                     let normal = self.matcher.names.normal(&fact);
-                    // A name is itself without a step that says so.
+                    // Every name equals itself, even without a step.
                     let is_trivial = self.is_pair(&normal) && normal.arguments[0] == normal.arguments[1];
                     if !is_trivial && !self.matcher.facts.contains(&normal) {
                         let fact = self.show(&fact);
@@ -251,8 +256,8 @@ impl Replayer<'_> {
     }
 }
 
-/// The program with rules that make two names one wherever their body holds, also where they are one already: a condition that
-/// they differ changes nothing.
+/// Removes conditions that the two names in the head of an equality rule differ. Without the condition, the
+/// rule derives additional pairs only of names that are already equal.
 fn without_guards(program: &Program) -> Program {
     let mut program = program.clone();
     for rule in program.rules.iter_mut().filter(|_| program.equality) {

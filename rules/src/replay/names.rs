@@ -1,16 +1,17 @@
-//! Classes of names that are one, each with its first member.
+//! Equality classes of names, represented by their first names.
 
 use rustc_hash::FxHashMap;
 
 use crate::fact::Fact;
 use crate::symbol::Symbol;
 
-/// By name, a smaller name of the same class; a name that is not there is the first of its class.
+/// Union-find: maps a name to a smaller name of its class. A name without an entry is the first of its
+/// class.
 #[derive(Default)]
 pub(super) struct Names(FxHashMap<Symbol, Symbol>);
 
 impl Names {
-    /// The first name of a class.
+    /// First name of a class.
     pub fn find(&self, mut name: Symbol) -> Symbol {
         while let Some(smaller) = self.0.get(&name) {
             name = *smaller;
@@ -18,7 +19,7 @@ impl Names {
         name
     }
 
-    /// Joins two classes; whether they were two.
+    /// Merges two classes. Returns `false` if they were already equal.
     pub fn join(&mut self, left: Symbol, right: Symbol) -> bool {
         let (left, right) = (self.find(left), self.find(right));
         if left != right {
@@ -27,7 +28,7 @@ impl Names {
         left != right
     }
 
-    /// A fact about first names.
+    /// Replaces all names of a fact by first names.
     pub fn normal(&self, fact: &Fact) -> Fact {
         if self.0.is_empty() {
             return fact.clone();

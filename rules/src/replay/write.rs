@@ -1,4 +1,4 @@
-//! Everything that an engine holds, with why, in an order in which supports come first.
+//! Exports the derivation of all facts of an engine, with supports before the facts that they support.
 
 use rustc_hash::FxHashMap;
 
@@ -7,11 +7,12 @@ use crate::engine::Engine;
 use crate::fact::Fact;
 
 impl Engine {
-    /// Derives every fact that holds: a step for each, after what it rests on, as [`crate::replay`] takes it.
+    /// Returns a step for every fact that holds, after its supports, as input of [`crate::replay`].
     pub fn everything(&self) -> Derivation {
         let mut positions: FxHashMap<Fact, usize> = FxHashMap::default();
         let mut steps = Vec::new();
-        // A rule that asks whether two of its own names are one has no support that says so.
+        // Rules that compare two of their own names have no support for the equality, so all equalities
+        // come first.
         let pairs = self.equality.as_ref().map_or_else(Vec::new, |equality| equality.pairs_in_order());
         for fact in pairs.into_iter().chain(self.facts()) {
             if !positions.contains_key(&fact)
@@ -24,7 +25,7 @@ impl Engine {
     }
 }
 
-/// The positions of what a step rests on.
+/// Positions of the supports of a step.
 fn supports(reason: &Reason) -> Vec<usize> {
     match reason {
         Reason::Asserted => Vec::new(),
@@ -36,16 +37,16 @@ fn supports(reason: &Reason) -> Vec<usize> {
     }
 }
 
-/// Appends the steps of a derivation that are not there yet, supports first.
+/// Appends the steps of a derivation that are not yet present, supports first.
 fn append(derivation: &Derivation, positions: &mut FxHashMap<Fact, usize>, steps: &mut Vec<DerivationStep>) {
     let mut stack = vec![(0, 0)];
-    while let Some((at, done)) = stack.pop() {
-        let step = &derivation.steps[at];
+    while let Some((position, visited_count)) = stack.pop() {
+        let step = &derivation.steps[position];
         if positions.contains_key(&step.fact) {
             continue;
         }
-        if let Some(support) = supports(&step.reason).get(done) {
-            stack.extend([(at, done + 1), (*support, 0)]);
+        if let Some(support) = supports(&step.reason).get(visited_count) {
+            stack.extend([(position, visited_count + 1), (*support, 0)]);
             continue;
         }
         let place = |support: &usize| positions.get(&derivation.steps[*support].fact).copied();
@@ -53,7 +54,7 @@ fn append(derivation: &Derivation, positions: &mut FxHashMap<Fact, usize>, steps
         let reason = match &step.reason {
             Reason::Asserted => Reason::Asserted,
             Reason::Equality { supports } => Reason::Equality { supports: places(supports) },
-            // What is absent and what aggregates ran over follows from the whole.
+            // Absent facts and aggregate matches follow from the complete set of facts.
             Reason::Rule { identity, bindings, supports, .. } => Reason::Rule {
                 identity: identity.clone(),
                 bindings: bindings.clone(),

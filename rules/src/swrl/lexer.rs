@@ -1,4 +1,4 @@
-//! Rule text to tokens with positions.
+//! Lexer: splits rule text into tokens with positions.
 
 /// A token of rule text.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -7,7 +7,7 @@ pub(super) enum Token {
     Prefix,
     /// `<iri>`, without the brackets.
     Iri(String),
-    /// `prefix:local`, `:local` or `local`; the prefix is `None` where there is no colon.
+    /// `prefix:local`, `:local` or `local`. The prefix is `None` without a colon.
     Name(Option<String>, String),
     /// `?name`.
     Variable(String),
@@ -22,12 +22,12 @@ pub(super) enum Token {
     Carets,
     Open,
     Close,
-    /// `{`, `|` and `}`, around the atoms of an aggregate.
+    /// `{`, `|` and `}` enclose the atoms of an aggregate.
     OpenBrace,
     Bar,
     CloseBrace,
     Equals,
-    /// `^`, `∧` or `,`: whether it can separate arguments.
+    /// `^` or `∧`. Unlike a comma, it cannot separate arguments.
     And,
     Comma,
     Arrow,
@@ -35,7 +35,7 @@ pub(super) enum Token {
     End,
 }
 
-/// A token with its position, counted from 1; columns in characters.
+/// A token with its position, counted from 1. Columns are counted in characters.
 #[derive(Clone, Debug)]
 pub(super) struct Spanned {
     pub token: Token,
@@ -43,7 +43,7 @@ pub(super) struct Spanned {
     pub column: u32,
 }
 
-/// What is wrong with the text, and where.
+/// A lexical error with its position.
 #[derive(Debug)]
 pub(super) struct Fault {
     pub message: String,
@@ -53,14 +53,14 @@ pub(super) struct Fault {
 
 struct Lexer {
     characters: Vec<char>,
-    at: usize,
+    cursor: usize,
     line: u32,
     column: u32,
 }
 
-/// The tokens of a text, closed by [`Token::End`]; unreadable characters are skipped and reported.
+/// Splits a text into tokens, terminated by [`Token::End`]. Unreadable characters are reported and skipped.
 pub(super) fn tokens(text: &str) -> (Vec<Spanned>, Vec<Fault>) {
-    let mut lexer = Lexer { characters: text.chars().collect(), at: 0, line: 1, column: 1 };
+    let mut lexer = Lexer { characters: text.chars().collect(), cursor: 0, line: 1, column: 1 };
     let (mut tokens, mut faults) = (Vec::new(), Vec::new());
     loop {
         lexer.skip_blank();
@@ -88,12 +88,12 @@ fn is_name_part(character: char) -> bool {
 
 impl Lexer {
     fn peek(&self, ahead: usize) -> Option<char> {
-        self.characters.get(self.at + ahead).copied()
+        self.characters.get(self.cursor + ahead).copied()
     }
 
     fn bump(&mut self) -> Option<char> {
         let character = self.peek(0)?;
-        self.at += 1;
+        self.cursor += 1;
         if character == '\n' {
             (self.line, self.column) = (self.line + 1, 1);
         } else {
@@ -113,6 +113,7 @@ impl Lexer {
 
     fn skip_blank(&mut self) {
         loop {
+            // `#` starts a comment that extends to the end of the line.
             self.take_while(char::is_whitespace);
             if self.peek(0) != Some('#') {
                 return;
@@ -165,7 +166,8 @@ impl Lexer {
         digit(1) || (dot == 1 && self.peek(1) == Some('.') && digit(2))
     }
 
-    /// Sign, digits, a fraction only where a digit follows the point, an exponent.
+    /// Reads a sign, digits, a fraction and an exponent. A point without a following digit ends the rule
+    /// instead.
     fn number(&mut self) -> Token {
         let mut text = String::new();
         if let Some(sign) = self.peek(0).filter(|c| "+-".contains(*c)) {
@@ -178,10 +180,11 @@ impl Lexer {
             text.push('.');
             text += &self.take_while(|c| c.is_ascii_digit());
         }
-        let signed = usize::from(self.peek(1).is_some_and(|c| "+-".contains(c)));
+        // `e` without digits belongs to the next token.
+        let sign_length = usize::from(self.peek(1).is_some_and(|c| "+-".contains(c)));
         let exponent = self.peek(0).is_some_and(|c| "eE".contains(c));
-        if exponent && self.peek(1 + signed).is_some_and(|c| c.is_ascii_digit()) {
-            for _ in 0..=signed {
+        if exponent && self.peek(1 + sign_length).is_some_and(|c| c.is_ascii_digit()) {
+            for _ in 0..=sign_length {
                 text.extend(self.bump());
             }
             text += &self.take_while(|c| c.is_ascii_digit());
@@ -199,7 +202,7 @@ impl Lexer {
         }
     }
 
-    /// A name may contain full stops inside, not at its end.
+    /// Reads a name, which may contain full stops but not end with one.
     fn word(&mut self) -> String {
         let mut word = self.take_while(is_name_part);
         while self.peek(0) == Some('.') && self.peek(1).is_some_and(is_name_part) {
@@ -211,15 +214,15 @@ impl Lexer {
     }
 
     fn name(&mut self) -> Token {
-        let first = self.word();
+        let word = self.word();
         if self.peek(0) == Some(':') {
             self.bump();
             let local = self.word();
-            return Token::Name(Some(first), local);
+            return Token::Name(Some(word), local);
         }
-        match first.as_str() {
+        match word.as_str() {
             "prefix" | "PREFIX" if self.peek(0).is_some_and(char::is_whitespace) => Token::Prefix,
-            _ => Token::Name(None, first),
+            _ => Token::Name(None, word),
         }
     }
 

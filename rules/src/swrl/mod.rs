@@ -1,4 +1,5 @@
-//! Rule text: the human-readable syntax of SWRL as Protégé writes it ([1], section 2.2), to rules and back.
+//! Parser and printer of rule text: the human-readable syntax of SWRL in the form of Protégé ([1], section
+//! 2.2).
 //!
 //! ```text
 //! @prefix t: <http://metacontrol.org/tomasys#> .
@@ -7,9 +8,10 @@
 //! [idle] t:Objective(?o) ^ not t:o_status(?o, "IN_ERROR_NFR") -> t:idle(?o, true) .
 //! ```
 //!
-//! `^`, `∧` and `,` separate atoms; `->` or `→` separates body and head; the full stop is optional before another
-//! rule that does not start with an arrow, and after an empty head required. `sameAs`, `differentFrom` and the
-//! built-ins of `swrlb:` are what they are in SWRL. `not`, our own, is negation as failure.
+//! `^`, `∧` and `,` separate atoms. `->` or `→` separates body and head. The full stop is optional before
+//! another rule that does not start with an arrow, and required after an empty head. `sameAs`,
+//! `differentFrom` and the built-ins of `swrlb:` have their SWRL meaning. `not` is negation as failure, an
+//! extension of SWRL.
 //!
 //! [1] W3C Member Submission: SWRL, 2004.
 

@@ -1,4 +1,5 @@
-//! Tokens to rules, by recursive descent; after an error it goes on with the next rule, so that all are reported.
+//! Recursive-descent parser of rule texts. After an error it continues with the next rule, so that all
+//! errors are reported.
 
 use std::sync::Arc;
 
@@ -11,21 +12,21 @@ use crate::literal::{Literal, XSD, is_datatype};
 use crate::rule::{Aggregate, Atom, Program, Rule, RuleIdentity, Term, Variable};
 use crate::symbol::{Symbol, Symbols};
 
-/// Where the built-ins of `SWRLTab` and SQWRL live.
+/// Namespaces of the built-ins of `SWRLTab` and SQWRL.
 const LIBRARIES: [&str; 2] =
     ["http://swrl.stanford.edu/ontologies/built-ins/", "http://sqwrl.stanford.edu/ontologies/built-ins/"];
 
-/// What rule text may contain.
+/// Syntax options of rule texts.
 #[derive(Clone, PartialEq, Eq, Default, Debug)]
 pub struct Syntax {
-    /// Refuse what SWRL does not have: `not` and aggregates.
+    /// Rejects extensions of SWRL: `not` and aggregates.
     pub swrl_only: bool,
-    /// Built-ins besides SWRL's, see [`BuiltIn::custom`].
+    /// Built-ins in addition to those of SWRL, see [`BuiltIn::custom`].
     pub built_ins: Vec<BuiltIn>,
 }
 
-/// Reads rules. `source` names the text in rule identities and errors; prefixes that the text declares come on top
-/// of those given.
+/// Parses rules. `source` names the text in rule identities and errors. Prefix declarations of the text are
+/// added to `prefixes`.
 ///
 /// ```
 /// use metaplan_rules::{Prefixes, Symbols, parse_rules};
@@ -35,7 +36,7 @@ pub struct Syntax {
 /// ```
 ///
 /// # Errors
-/// All errors of the text: R101, R102, R104.
+/// Returns all errors of the text: R101, R102, R104.
 pub fn parse_rules(
     text: &str,
     source: &str,
@@ -45,10 +46,10 @@ pub fn parse_rules(
     parse_rules_as(text, source, symbols, prefixes, &Syntax::default())
 }
 
-/// As [`parse_rules`], in a syntax of the caller's choice.
+/// Parses rules like [`parse_rules`], with syntax options.
 ///
 /// # Errors
-/// As [`parse_rules`], and R105.
+/// Returns the errors of [`parse_rules`], and R105.
 pub fn parse_rules_as(
     text: &str,
     source: &str,
@@ -59,12 +60,12 @@ pub fn parse_rules_as(
     parse(text, source, symbols, prefixes, syntax).map(|(program, _)| program)
 }
 
-/// Reads several rule texts, each with its source, that are about one ontology: what they ask for and none of them concludes has
-/// to be a class or a property. An atom that can be neither (three arguments, or a literal for the individual) is an
-/// unknown built-in.
+/// Parses several rule texts, each with its source, that refer to one ontology. A relation that occurs in
+/// bodies and is derived by none of the texts has to be a class or a property. An atom that can be neither
+/// (three arguments, or a literal as its individual) is an unknown built-in.
 ///
 /// # Errors
-/// As [`parse_rules_as`] for each text, and R104 for unknown built-ins of any namespace.
+/// Returns the errors of [`parse_rules_as`] for each text, and R104 for unknown built-ins of any namespace.
 pub fn parse_rules_together(
     texts: &[(&str, &str)],
     symbols: &mut Symbols,
@@ -74,13 +75,14 @@ pub fn parse_rules_together(
     let (mut program, mut foreign, mut errors) = (Program::default(), Vec::new(), Vec::new());
     for (source, text) in texts {
         match parse(text, source, symbols, prefixes, syntax) {
-            Ok((own, atoms)) => {
+            Ok((text_program, atoms)) => {
                 foreign.extend(atoms.into_iter().map(|atom| (*source, atom)));
-                program.rules.extend(own.rules);
+                program.rules.extend(text_program.rules);
             }
-            Err(more) => errors.extend(more),
+            Err(text_errors) => errors.extend(text_errors),
         }
     }
+    // Only the complete program shows which relations are derived.
     if errors.is_empty() {
         errors = unknown(foreign, &program, symbols);
     }
@@ -98,7 +100,8 @@ fn parse(
     let errors = faults.into_iter().map(|fault| fault_at(source, fault)).collect();
     let source: Arc<str> = source.into();
     let (variables, foreign, prefixes) = (Vec::new(), Vec::new(), prefixes.clone());
-    let mut parser = Parser { tokens, at: 0, source, symbols, prefixes, syntax, variables, foreign, errors };
+    let mut parser =
+        Parser { tokens, cursor: 0, source, symbols, prefixes, syntax, variables, foreign, errors };
     let program = parser.program();
     if parser.errors.is_empty() { Ok((program, parser.foreign)) } else { Err(parser.errors.into()) }
 }
@@ -109,18 +112,18 @@ fn fault_at(source: &str, fault: Fault) -> Error {
 
 struct Parser<'a> {
     tokens: Vec<Spanned>,
-    at: usize,
+    cursor: usize,
     source: Arc<str>,
     symbols: &'a mut Symbols,
     prefixes: Prefixes,
     syntax: &'a Syntax,
     variables: Vec<Box<str>>,
-    /// Relations that an ontology cannot have.
+    /// Relation atoms that cannot belong to an ontology.
     foreign: Vec<ForeignAtom>,
     errors: Vec<Error>,
 }
 
-/// The rest of a rule is skipped after an error.
+/// Result of a parsing function. After an error, the rest of the rule is skipped.
 type Parsed<T> = Result<T, Error>;
 
 impl Parser<'_> {
@@ -144,23 +147,25 @@ impl Parser<'_> {
     }
 
     fn peek(&self) -> &Token {
-        &self.tokens[self.at.min(self.tokens.len() - 1)].token
+        &self.tokens[self.cursor.min(self.tokens.len() - 1)].token
     }
 
     fn bump(&mut self) -> Token {
         let token = self.peek().clone();
-        self.at += 1;
+        self.cursor += 1;
         token
     }
 
+    /// Consumes a token if it is the next one. Returns `true` on success.
     fn accept(&mut self, token: &Token) -> bool {
-        let found = self.peek() == token;
-        self.at += usize::from(found);
-        found
+        let is_match = self.peek() == token;
+        self.cursor += usize::from(is_match);
+        is_match
     }
 
+    /// Line and column of the next token.
     fn position(&self) -> (u32, u32) {
-        let spanned = &self.tokens[self.at.min(self.tokens.len() - 1)];
+        let spanned = &self.tokens[self.cursor.min(self.tokens.len() - 1)];
         (spanned.line, spanned.column)
     }
 
@@ -174,16 +179,16 @@ impl Parser<'_> {
         if self.accept(token) { Ok(()) } else { Err(self.error(expected)) }
     }
 
-    /// Goes on after the next full stop, or before the next label or prefix.
+    /// Skips to the position after the next full stop, or before the next label or prefix.
     fn recover(&mut self) {
         loop {
             match self.peek() {
                 Token::End | Token::Label(_) | Token::Prefix => return,
                 Token::Stop => {
-                    self.at += 1;
+                    self.cursor += 1;
                     return;
                 }
-                _ => self.at += 1,
+                _ => self.cursor += 1,
             }
         }
     }
@@ -228,14 +233,17 @@ impl Parser<'_> {
     }
 
     fn atom(&mut self) -> Parsed<Atom> {
-        let is_equation = self.tokens.get(self.at + 1).is_some_and(|next| next.token == Token::Equals);
+        // Only an aggregate starts with a term: `?n = count { … }`.
+        let is_equation = self.tokens.get(self.cursor + 1).is_some_and(|next| next.token == Token::Equals);
         if is_equation || matches!(self.peek(), Token::Variable(_) | Token::Text(_) | Token::Number(_)) {
             return self.aggregate();
         }
         let is_not = matches!(self.peek(), Token::Name(None, name) if name == "not");
-        let negated = is_not && self.tokens.get(self.at + 1).is_some_and(|next| next.token != Token::Open);
-        self.at += usize::from(negated);
-        let at = self.position();
+        // `not(…)` is an ordinary atom; negation needs a predicate between `not` and the parenthesis.
+        let negated =
+            is_not && self.tokens.get(self.cursor + 1).is_some_and(|next| next.token != Token::Open);
+        self.cursor += usize::from(negated);
+        let place = self.position();
         let name = self.peek().clone();
         let predicate = self.name()?;
         self.expect(&Token::Open, "`(`")?;
@@ -247,9 +255,9 @@ impl Parser<'_> {
             }
             self.expect(&Token::Close, "`,` or `)`")?;
         }
-        self.foreign.extend(ForeignAtom::of(&predicate, &arguments, at, self.symbols));
+        self.foreign.extend(ForeignAtom::of(&predicate, &arguments, place, self.symbols));
         if negated {
-            self.refuse_in_swrl("negation as failure", at)?;
+            self.refuse_in_swrl("negation as failure", place)?;
             if let (true, [value]) = (is_datatype(&predicate), arguments.as_slice()) {
                 return Ok(self.data_range(BuiltIn::OutsideDataRange, *value, predicate));
             }
@@ -262,16 +270,17 @@ impl Parser<'_> {
         if let Some(local) = predicate.strip_prefix(SWRLB) {
             return match BuiltIn::from_name(local) {
                 Some(built_in) => Ok(Atom::BuiltIn { built_in, arguments }),
-                None => Err(self.unknown_built_in(local, at)),
+                None => Err(self.unknown_built_in(local, place)),
             };
         }
         if let Some(built_in) = BuiltIn::from_iri(&predicate) {
             self.name_expression(built_in, &mut arguments);
             return Ok(Atom::BuiltIn { built_in, arguments });
         }
-        // A predicate of a library of built-ins is none of the knowledge base, which would be empty.
+        // A predicate of a built-in library is never a relation of the knowledge base. As a relation it
+        // would be empty.
         if LIBRARIES.iter().any(|library| predicate.starts_with(library)) {
-            let (file, (line, column)) = (self.source.to_string(), at);
+            let (file, (line, column)) = (self.source.to_string(), place);
             return Err(Error::ForeignBuiltIn { file, line, column, name: predicate });
         }
         if let (true, [value]) = (is_datatype(&predicate), arguments.as_slice()) {
@@ -289,7 +298,8 @@ impl Parser<'_> {
         })
     }
 
-    /// Tells an expression the names of the variables that follow it.
+    /// Replaces the variable names in the expression of a mathematical built-in, which is its second
+    /// argument.
     fn name_expression(&mut self, built_in: BuiltIn, arguments: &mut [Term]) {
         let [_, Term::Constant(text), values @ ..] = arguments else { return };
         let Some(Literal::String(expression)) = self.symbols.value(*text).as_literal() else { return };
@@ -300,9 +310,9 @@ impl Parser<'_> {
         }
     }
 
-    /// `?n = count { atoms }`, `?n = sum { term | atoms }`, and `min` and `max` likewise.
+    /// Parses `?n = count { atoms }` or `?n = sum { term | atoms }`, and `min` and `max` likewise.
     fn aggregate(&mut self) -> Parsed<Atom> {
-        let at = self.position();
+        let place = self.position();
         let result = self.term()?;
         self.expect(&Token::Equals, "an atom, or `=` and an aggregate")?;
         let aggregate: Option<fn(Term) -> Aggregate> = match self.peek() {
@@ -327,10 +337,11 @@ impl Parser<'_> {
         };
         let body = self.atoms()?;
         self.expect(&Token::CloseBrace, "`^`, `,` or `}`")?;
-        self.refuse_in_swrl("an aggregate", at)?;
+        self.refuse_in_swrl("an aggregate", place)?;
         Ok(Atom::Aggregate { aggregate, result, body })
     }
 
+    /// Creates a built-in atom for a datatype used as a predicate.
     fn data_range(&mut self, built_in: BuiltIn, value: Term, datatype: String) -> Atom {
         let datatype = self.symbols.literal(Literal::Uri(datatype.into()));
         Atom::BuiltIn { built_in, arguments: vec![value, Term::Constant(datatype)] }
@@ -350,7 +361,7 @@ impl Parser<'_> {
         }
     }
 
-    /// A name or IRI, in full.
+    /// Parses a name or an IRI, and returns the full IRI.
     fn name(&mut self) -> Parsed<String> {
         let (line, column) = self.position();
         let name = match self.peek().clone() {
@@ -393,8 +404,8 @@ impl Parser<'_> {
     }
 
     fn variable(&mut self, name: &str) -> Parsed<Term> {
-        let known = self.variables.iter().position(|known| **known == *name);
-        let number = known.unwrap_or_else(|| {
+        let existing = self.variables.iter().position(|existing| **existing == *name);
+        let number = existing.unwrap_or_else(|| {
             self.variables.push(name.into());
             self.variables.len() - 1
         });
@@ -404,7 +415,7 @@ impl Parser<'_> {
         }
     }
 
-    /// `"text"`, `"text"@en`, `"text"^^xsd:decimal`, `5`, `0.5` or `1e3`.
+    /// Parses `"text"`, `"text"@en`, `"text"^^xsd:decimal`, `5`, `0.5` or `1e3`.
     fn literal(&mut self) -> Parsed<Symbol> {
         let literal = match self.bump() {
             Token::Number(text) => {
@@ -433,6 +444,7 @@ impl Parser<'_> {
     }
 }
 
+/// Name of a token for error messages.
 fn describe(token: &Token) -> String {
     match token {
         Token::Prefix => "`@prefix`".into(),

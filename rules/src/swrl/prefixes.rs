@@ -1,13 +1,14 @@
-//! Abbreviations of IRIs in rule text.
+//! Namespace prefixes of rule texts.
 
 use std::collections::BTreeMap;
 
 use crate::builtin::SWRLB;
 use crate::literal::XSD;
 
-/// Abbreviations of IRIs. `swrlb`, `swrlm`, `temporal`, `xsd`, `rdf`, `rdfs` and `owl` are always there unless declared otherwise.
+/// Prefixes for IRIs. `swrlb`, `swrlm`, `temporal`, `xsd`, `rdf`, `rdfs` and `owl` are predefined and may
+/// be redeclared.
 ///
-/// A name without colon takes the empty prefix where that is declared, and else stands for itself.
+/// A name without a colon has the empty prefix if that is declared. Otherwise the name is used unchanged.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Prefixes(BTreeMap<String, String>);
 
@@ -27,7 +28,7 @@ impl Default for Prefixes {
 }
 
 impl Prefixes {
-    /// The standard prefixes.
+    /// Creates the standard prefixes.
     pub fn new() -> Self {
         Self::default()
     }
@@ -37,14 +38,14 @@ impl Prefixes {
         self.0.insert(prefix.to_string(), iri.to_string());
     }
 
-    /// Declares a prefix (without colon), for chaining.
+    /// Declares a prefix (without colon) and returns the prefixes.
     #[must_use]
     pub fn with(mut self, prefix: &str, iri: &str) -> Self {
         self.insert(prefix, iri);
         self
     }
 
-    /// The IRI of a prefix.
+    /// Returns the IRI of a prefix.
     pub fn get(&self, prefix: &str) -> Option<&str> {
         self.0.get(prefix).map(String::as_str)
     }

@@ -1,5 +1,5 @@
-//! Rules to text that [`super::parse_rules`] reads back as the same rules, up to names of variables and labels that
-//! the syntax has no room for.
+//! Prints rules as text. [`super::parse_rules`] parses the text to the same rules, except for names of
+//! variables and labels that the syntax cannot express.
 
 use std::fmt::Write;
 
@@ -9,7 +9,7 @@ use crate::literal::Literal;
 use crate::rule::{Atom, Program, Rule, Term, Variable};
 use crate::symbol::{Symbol, Symbols, Value};
 
-/// Prints rules one a line, with labels and names abbreviated by the prefixes, whose declarations come first.
+/// Prints one rule per line, with labels. Names are abbreviated by the prefixes, which are declared first.
 pub fn print_rules(program: &Program, symbols: &Symbols, prefixes: &Prefixes) -> String {
     let mut text = String::new();
     for (prefix, iri) in prefixes.iter().filter(|&(prefix, iri)| Prefixes::default().get(prefix) != Some(iri))
@@ -31,6 +31,7 @@ struct Printer<'a> {
 
 impl Printer<'_> {
     fn rule(&self, rule: &Rule) -> String {
+        // `]` ends a label, and a label has no escapes.
         let clean = |label: &str| label.replace(['\n', '\r'], " ").replace(']', ")");
         let label =
             rule.identity.label.as_ref().map(|label| format!("[{}] ", clean(label))).unwrap_or_default();
@@ -99,6 +100,7 @@ impl Printer<'_> {
             characters.next().is_some_and(|c| c.is_alphabetic() || c == '_')
                 && characters.all(|c| c.is_alphanumeric() || c == '_')
         };
+        // The longest matching namespace gives the shortest name.
         let longest = self.prefixes.iter().filter(|(_, base)| iri.strip_prefix(base).is_some_and(plain));
         match longest.max_by_key(|(_, base)| base.len()) {
             Some((prefix, base)) => format!("{prefix}:{}", &iri[base.len()..]),
@@ -107,17 +109,19 @@ impl Printer<'_> {
     }
 }
 
-/// The name of a variable where it can be read back as that variable alone, else its number.
+/// Name of a variable if it can be parsed and is unique in the rule, and otherwise a name made of its
+/// number.
 fn variable_name(rule: &Rule, variable: Variable) -> String {
     let name = rule.variable_name(variable);
     let readable = !name.is_empty() && name.chars().all(|c| c.is_alphanumeric() || c == '_' || c == '-');
     let number = usize::from(variable.0);
-    let unique = !rule.variables.iter().enumerate().any(|(other, taken)| other != number && **taken == *name);
+    let unique =
+        !rule.variables.iter().enumerate().any(|(other, existing)| other != number && **existing == *name);
     if readable && unique {
         return name;
     }
     let mut spelled = format!("_{number}");
-    while rule.variables.iter().any(|taken| **taken == *spelled) {
+    while rule.variables.iter().any(|existing| **existing == *spelled) {
         spelled.push('_');
     }
     spelled

@@ -1,10 +1,11 @@
-//! Arithmetic as the Java Math Expression Parser 2.4 reads it: `+ - * / % ^`, signs, brackets, the constants `pi` and `e`,
-//! functions of one or two numbers, and multiplication that is not written (`2x`, `3(a + b)`).
+//! Parser and evaluator of arithmetic expressions in the syntax of the Java Math Expression Parser 2.4: `+
+//! - * / % ^`, signs, brackets, the constants `pi` and `e`, functions of one or two numbers, and implicit
+//! multiplication (`2x`, `3(a + b)`).
 
-/// How deep brackets, signs and powers may nest.
-const DEPTH: usize = 200;
+/// Maximum nesting depth of brackets, signs and powers. It protects the stack.
+const MAX_DEPTH: usize = 200;
 
-/// The value of an expression whose variables have these values; `None` where it is none.
+/// Value of an expression under an assignment of its variables; `None` if the expression is invalid.
 pub(super) fn value(text: &str, variables: &[(&str, f64)]) -> Option<f64> {
     let mut parser = Parser { rest: text, variables, depth: 0 };
     let value = parser.sum()?;
@@ -24,19 +25,19 @@ impl<'a> Parser<'a> {
     }
 
     fn accept(&mut self, wanted: char) -> bool {
-        let found = self.peek() == Some(wanted);
-        if found {
+        let is_next = self.peek() == Some(wanted);
+        if is_next {
             self.rest = &self.rest[wanted.len_utf8()..];
         }
-        found
+        is_next
     }
 
-    /// The longest beginning of such characters.
+    /// Consumes the longest prefix of characters with a property.
     fn take(&mut self, belongs: impl Fn(char) -> bool) -> &'a str {
         let end = self.rest.find(|c| !belongs(c)).unwrap_or(self.rest.len());
-        let (taken, rest) = self.rest.split_at(end);
-        self.rest = rest;
-        taken
+        let (prefix, remainder) = self.rest.split_at(end);
+        self.rest = remainder;
+        prefix
     }
 
     fn sum(&mut self) -> Option<f64> {
@@ -61,6 +62,7 @@ impl<'a> Parser<'a> {
                 value /= self.signed()?;
             } else if self.accept('%') {
                 value %= self.signed()?;
+            // A factor without an operator: implicit multiplication.
             } else if self.peek().is_some_and(|c| c == '(' || c == '_' || c.is_alphanumeric()) {
                 value *= self.power()?;
             } else {
@@ -71,7 +73,7 @@ impl<'a> Parser<'a> {
 
     fn signed(&mut self) -> Option<f64> {
         self.depth += 1;
-        if self.depth > DEPTH {
+        if self.depth > MAX_DEPTH {
             return None;
         }
         let value = if self.accept('-') {
@@ -87,13 +89,14 @@ impl<'a> Parser<'a> {
 
     fn power(&mut self) -> Option<f64> {
         let base = self.operand()?;
+        // `^` is right-associative, and its exponent may have a sign.
         if self.accept('^') { Some(base.powf(self.signed()?)) } else { Some(base) }
     }
 
     fn operand(&mut self) -> Option<f64> {
         if self.accept('(') {
             self.depth += 1;
-            let value = if self.depth > DEPTH { None } else { self.sum() };
+            let value = if self.depth > MAX_DEPTH { None } else { self.sum() };
             self.depth -= 1;
             return value.filter(|_| self.accept(')'));
         }
@@ -114,7 +117,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// `1`, `2.5`, `.5` or `1.5e-3`; what follows without an exponent's digits is a name.
+    /// Parses `1`, `2.5`, `.5` or `1.5e-3`. An `e` without digits starts a name instead.
     fn number(&mut self) -> Option<f64> {
         let before = self.rest;
         let digits = |parser: &mut Self| parser.take(|c| c.is_ascii_digit()).len();
@@ -145,7 +148,7 @@ impl<'a> Parser<'a> {
         self.depth += 1;
         let mut arguments = Vec::new();
         loop {
-            if self.depth > DEPTH {
+            if self.depth > MAX_DEPTH {
                 return None;
             }
             arguments.push(self.sum()?);
@@ -177,7 +180,7 @@ impl<'a> Parser<'a> {
             ("atanh", [x]) => x.atanh(),
             ("atan2", [y, x]) => y.atan2(*x),
             ("mod", [x, y]) => x % y,
-            ("sum", all) => all.iter().sum(),
+            ("sum", terms) => terms.iter().sum(),
             _ => return None,
         })
     }

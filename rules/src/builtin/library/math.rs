@@ -1,8 +1,8 @@
-//! `swrlm`: square root, natural logarithm, and the value of an expression.
+//! The `swrlm` library: square root, natural logarithm, and evaluation of expressions.
 //!
-//! An expression of `eval` names the variables of its atom (`swrlm:eval(?r, "(57 * x) / y", ?x, ?y)`). A built-in sees
-//! values, and no names, so that [`BuiltIn::with_names`] puts the names into the text when a rule is made: `"x, y: (57 * x) / y"`.
-//! Text of that form stays as it is.
+//! An expression of `eval` refers to the variables of its atom by name (`swrlm:eval(?r, "(57 * x) / y", ?x,
+//! ?y)`). A built-in receives values only. Therefore [`BuiltIn::with_names`] inserts the names into the
+//! text when a rule is parsed: `"x, y: (57 * x) / y"`. Text of that form is not changed.
 
 use super::expression;
 use crate::builtin::custom::Definition;
@@ -16,12 +16,12 @@ const LOG: &str = "http://swrl.stanford.edu/ontologies/built-ins/3.4/swrlm.owl#l
 /// A function of one number.
 struct Unary(&'static str, fn(f64) -> f64);
 
-/// The value of an expression.
+/// The function `eval`.
 struct Eval;
 
 pub(super) const ALL: [&dyn Definition; 3] = [&Unary(SQRT, f64::sqrt), &Unary(LOG, f64::ln), &Eval];
 
-/// A finite number, exact where it is whole.
+/// Result as a double; `None` if it is infinite or NaN.
 fn number(value: f64) -> Option<Literal> {
     value.is_finite().then(|| Literal::double(value))
 }
@@ -72,8 +72,8 @@ impl Definition for Eval {
 }
 
 impl BuiltIn {
-    /// The expression of a `swrlm:eval` atom with the names of the arguments that follow it; `None` where it has them, and for
-    /// other built-ins. A constant has no name.
+    /// Returns the expression of a `swrlm:eval` atom with the names of its arguments. `None` if it already
+    /// has names, and for other built-ins. A constant has no name.
     pub fn with_names(self, expression: &str, names: &[Option<&str>]) -> Option<String> {
         let is_eval = self.name() == EVAL && !expression.contains(':') && !names.is_empty();
         let local = |name: &str| name.rsplit(['#', '/', ':']).next().map(str::to_owned);

@@ -1,8 +1,8 @@
-//! The libraries `swrlm` and `temporal` of `SWRLTab` as [custom built-ins](super::Definition) ([1], [2]). Their ontologies
-//! have been published in several versions; the built-ins are those of any of them.
+//! The libraries `swrlm` and `temporal` of `SWRLTab` as [custom built-ins](super::Definition) ([1], [2]).
+//! Their ontologies were published in several versions. The IRIs of all versions are accepted.
 //!
-//! `temporal` is there in its *basic mode*, about dates and times. Its advanced mode is about individuals of the temporal
-//! ontology, and a built-in sees values only: such atoms are false.
+//! Only the *basic mode* of `temporal`, on dates and times, is supported. The advanced mode applies to
+//! individuals of the temporal ontology. Since a built-in receives literals only, such atoms are false.
 //!
 //! [1] `SWRLTab` wiki: Mathematical Built-In Library.
 //! [2] `SWRLTab` wiki: Temporal Built-In Library, Basic Mode.
@@ -16,28 +16,28 @@ use std::sync::LazyLock;
 use super::custom::Definition;
 use super::signature::BuiltIn;
 
-/// Where the libraries of `SWRLTab` live, followed by a version.
-const ROOT: &str = "http://swrl.stanford.edu/ontologies/built-ins/";
+/// Common IRI prefix of the libraries of `SWRLTab`, before the version.
+const LIBRARY_ROOT: &str = "http://swrl.stanford.edu/ontologies/built-ins/";
 
 /// All built-ins of the libraries.
 static ALL: LazyLock<Vec<&'static dyn Definition>> =
     LazyLock::new(|| math::ALL.iter().copied().chain(temporal::all()).collect());
 
-/// The built-in of an IRI, whichever version of its library the IRI names.
+/// Built-in with this IRI, in any version of its library.
 pub(super) fn find(iri: &str) -> Option<BuiltIn> {
-    let wanted = name(iri)?;
-    let found = ALL.iter().find(|definition| name(definition.iri()) == Some(wanted));
-    found.map(|definition| BuiltIn::custom(*definition))
+    let target = name(iri)?;
+    let definition = ALL.iter().find(|definition| name(definition.iri()) == Some(target));
+    definition.map(|definition| BuiltIn::custom(*definition))
 }
 
-/// The IRIs of all built-ins of the library that an IRI is in, whichever version it names.
-pub(super) fn names_beside(iri: &str) -> Vec<&'static str> {
+/// IRIs of all built-ins in the library of an IRI, in any version.
+pub(super) fn names_in_library(iri: &str) -> Vec<&'static str> {
     let library = |iri| name(iri).and_then(|name| name.split_once('#')).map(|(library, _)| library);
-    let all = ALL.iter().map(|definition| definition.iri());
-    all.filter(|known| library(iri).is_some() && library(known) == library(iri)).collect()
+    let iris = ALL.iter().map(|definition| definition.iri());
+    iris.filter(|known| library(iri).is_some() && library(known) == library(iri)).collect()
 }
 
-/// Library and local name, without the version.
+/// Library and local name of an IRI, without the version.
 fn name(iri: &str) -> Option<&str> {
-    iri.strip_prefix(ROOT)?.split_once('/').map(|(_, name)| name)
+    iri.strip_prefix(LIBRARY_ROOT)?.split_once('/').map(|(_, name)| name)
 }

@@ -1,11 +1,13 @@
-//! `temporal` in its basic mode: durations between moments, moments later, and Allen's relations between instants.
+//! The `temporal` library in its basic mode: durations, shifted moments, and Allen's relations between
+//! instants and periods.
 //!
-//! A moment is an `xsd:date`, an `xsd:dateTime`, or text of either, which may be incomplete from the month, the day, the hour,
-//! the minute or the second on (`1998-12-02T12`): what is missing is the first possible. Moments are compared by *granules*
-//! (years, months, days, hours, minutes, seconds or milliseconds since the beginning of year 1), so that the difference
-//! of 1999-12-31 and 2000-01-01 is one year at the granularity of years. With a time zone they are taken in UTC; one with
-//! and one without do not compare. `now` is not a moment, because what has been concluded would have to be concluded again.
-//! An operation on a period takes the two instants that bound it as second and third argument.
+//! A moment is an `xsd:date`, an `xsd:dateTime`, or the text of either. It may be truncated after the year,
+//! month, day, hour or minute (`1998-12-02T12`); the missing parts have their smallest values. Moments are
+//! compared by *granules*: years, months, days, hours, minutes, seconds or milliseconds. For example,
+//! 1999-12-31 and 2000-01-01 differ by one year at the granularity of years. Moments with a time zone are
+//! converted to UTC. A moment with a time zone and one without are incomparable. `now` is not supported,
+//! because conclusions from it would change without a change of facts. An operation on a period takes the
+//! two instants that bound it as second and third argument.
 
 use std::cmp::Ordering;
 
@@ -15,7 +17,7 @@ use num_traits::ToPrimitive;
 use crate::builtin::custom::Definition;
 use crate::literal::{Decimal, Duration, Literal, Moment, MomentKind, XSD};
 
-/// Units of time, the finest last.
+/// Units of time, from coarse to fine.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Granularity {
     Years,
@@ -44,7 +46,7 @@ impl Granularity {
         })
     }
 
-    /// The granule that a moment lies in, counted from any one.
+    /// Number of the granule that contains a moment, relative to a fixed origin.
     fn granule(self, moment: &Moment) -> Option<i64> {
         let ([year, month, _], _) = moment.in_utc().calendar();
         let per_second = match self {
@@ -61,7 +63,7 @@ impl Granularity {
         granules.floor().to_integer().to_i64()
     }
 
-    /// So many granules as a duration.
+    /// Duration of a number of granules.
     fn duration(self, count: i64) -> Option<Duration> {
         let seconds = |unit: i64| Some(Duration::new(0, Decimal::from(count.checked_mul(unit)?)));
         match self {
@@ -76,7 +78,7 @@ impl Granularity {
     }
 }
 
-/// The moment that an argument is, or is the text of.
+/// Moment of an argument: a date, a date with time, or the text of either.
 fn moment(literal: &Literal) -> Option<Moment> {
     let text = match literal {
         Literal::Moment(moment) if moment.kind() != MomentKind::Time => return Some(moment.clone()),
@@ -103,12 +105,12 @@ fn moment(literal: &Literal) -> Option<Moment> {
     }
 }
 
-/// Whether both have a time zone, or neither.
+/// Returns `true` if all moments have a time zone, or none has.
 fn comparable(moments: &[Moment]) -> bool {
     moments.windows(2).all(|pair| pair[0].zone_text().is_empty() == pair[1].zone_text().is_empty())
 }
 
-/// The granules between two moments.
+/// Number of granules between two moments.
 fn difference(arguments: &[&Literal]) -> Option<i64> {
     let [from, to, granularity] = arguments else { return None };
     let (granularity, moments) = (Granularity::of(granularity)?, [moment(from)?, moment(to)?]);
@@ -116,30 +118,30 @@ fn difference(arguments: &[&Literal]) -> Option<i64> {
     comparable(&moments).then(|| (to - from).abs())
 }
 
-/// `temporal:duration`: granules between two moments.
-struct Between;
+/// `temporal:duration`: number of granules between two moments.
+struct DurationFunction;
 
-/// `temporal:add`: a moment so many granules later.
-struct Later;
+/// `temporal:add`: moment plus a number of granules.
+struct AddFunction;
 
-/// `temporal:durationLessThan` and its like: how the first compares with the granules between two moments.
-struct Compared {
+/// `temporal:durationLessThan` and related tests: compares a number with the granules between two moments.
+struct DurationComparison {
     iri: &'static str,
     orders: &'static [Ordering],
     negated: bool,
 }
 
-/// Allen's relations, between instants or periods.
-struct Allen {
+/// Allen's interval relations, between instants or periods.
+struct AllenRelation {
     iri: &'static str,
     relation: fn(Period, Period) -> bool,
     negated: bool,
 }
 
-/// First and last granule.
+/// First and last granule of a period.
 type Period = (i64, i64);
 
-impl Definition for Between {
+impl Definition for DurationFunction {
     fn iri(&self) -> &'static str {
         "http://swrl.stanford.edu/ontologies/built-ins/3.3/temporal.owl#duration"
     }
@@ -157,7 +159,7 @@ impl Definition for Between {
     }
 }
 
-impl Definition for Later {
+impl Definition for AddFunction {
     fn iri(&self) -> &'static str {
         "http://swrl.stanford.edu/ontologies/built-ins/3.3/temporal.owl#add"
     }
@@ -170,7 +172,8 @@ impl Definition for Later {
         true
     }
 
-    /// An `xsd:dateTime`; of a date, an `xsd:date` where the granularity is days or coarser.
+    /// Returns an `xsd:date` for a date and a granularity of days or coarser, and an `xsd:dateTime`
+    /// otherwise.
     fn compute(&self, arguments: &[&Literal]) -> Option<Literal> {
         let [from, count, granularity] = arguments else { return None };
         let granularity = Granularity::of(granularity)?;
@@ -181,7 +184,7 @@ impl Definition for Later {
     }
 }
 
-impl Definition for Compared {
+impl Definition for DurationComparison {
     fn iri(&self) -> &'static str {
         self.iri
     }
@@ -191,13 +194,13 @@ impl Definition for Compared {
     }
 
     fn holds(&self, arguments: &[&Literal]) -> bool {
-        let [wanted, rest @ ..] = arguments else { return false };
-        let order = difference(rest).and_then(|found| wanted.compare(&Literal::integer(found)));
+        let [wanted, bounds @ ..] = arguments else { return false };
+        let order = difference(bounds).and_then(|count| wanted.compare(&Literal::integer(count)));
         order.is_some_and(|order| self.orders.contains(&order) != self.negated)
     }
 }
 
-impl Definition for Allen {
+impl Definition for AllenRelation {
     fn iri(&self) -> &'static str {
         self.iri
     }
@@ -211,10 +214,11 @@ impl Definition for Allen {
     }
 }
 
-/// An instant, then an instant or the two that bound a period, then a granularity if it is not milliseconds.
+/// Parses an instant, then an instant or the two bounds of a period, then an optional granularity (by
+/// default milliseconds).
 fn periods(arguments: &[&Literal]) -> Option<(Period, Period)> {
     let (granularity, moments) = match arguments.split_last()? {
-        (last, rest) if rest.len() >= 2 => match Granularity::of(last) {
+        (last, others) if others.len() >= 2 => match Granularity::of(last) {
             Some(granularity) => (granularity, rest),
             None => (G::Milliseconds, arguments),
         },
@@ -251,7 +255,7 @@ macro_rules! table {
     };
 }
 
-static COMPARED: &[Compared] = table!(Compared {
+static DURATION_COMPARISONS: &[DurationComparison] = table!(DurationComparison {
     "durationLessThan" false => orders: &[Ordering::Less],
     "durationLessThanOrEqualTo" false => orders: &[Ordering::Less, Ordering::Equal],
     "durationEqualTo" false => orders: &[Ordering::Equal],
@@ -264,7 +268,7 @@ static COMPARED: &[Compared] = table!(Compared {
     "notDurationGreaterThanOrEqualTo" true => orders: &[Ordering::Greater, Ordering::Equal],
 });
 
-static ALLEN: &[Allen] = table!(Allen {
+static ALLEN_RELATIONS: &[AllenRelation] = table!(AllenRelation {
     "equals" false => relation: |a, b| a == b,
     "before" false => relation: |a, b| a.1 < b.0,
     "after" false => relation: |a, b| a.0 > b.1,
@@ -297,8 +301,8 @@ static ALLEN: &[Allen] = table!(Allen {
 
 /// All built-ins of the library.
 pub(super) fn all() -> Vec<&'static dyn Definition> {
-    let mut all: Vec<&'static dyn Definition> = vec![&Between, &Later];
-    all.extend(COMPARED.iter().map(|one| one as &dyn Definition));
-    all.extend(ALLEN.iter().map(|one| one as &dyn Definition));
-    all
+    let mut definitions: Vec<&'static dyn Definition> = vec![&DurationFunction, &AddFunction];
+    definitions.extend(DURATION_COMPARISONS.iter().map(|definition| definition as &dyn Definition));
+    definitions.extend(ALLEN_RELATIONS.iter().map(|definition| definition as &dyn Definition));
+    definitions
 }
