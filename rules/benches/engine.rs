@@ -1,5 +1,6 @@
-//! From scratch: transitive closure and the relaxed reachability of a transport task. Incremental: a component that
-//! fails and recovers, and a measurement that changes, in knowledge bases of growing size.
+//! Benchmarks of the engine. From scratch: transitive closure, and relaxed reachability of a transport
+//! task. Incremental: a component that fails and recovers, and a measurement that changes, in knowledge
+//! bases of growing size.
 
 use std::hint::black_box;
 
@@ -10,7 +11,7 @@ use metaplan_rules::{
 
 const TOMASYS: &str = "http://metacontrol.org/tomasys#";
 
-/// A linear congruential generator: the same edges in every run.
+/// A linear congruential generator with a fixed seed, so that every run has the same input.
 struct Random(u64);
 
 impl Random {
@@ -32,7 +33,7 @@ fn fact(symbols: &mut Symbols, predicate: &str, arguments: &[&str]) -> Fact {
 
 type Task = (Symbols, Program, Vec<Fact>);
 
-/// 1,000 nodes and 5,000 random edges; about a million paths.
+/// Task with 1,000 nodes and 5,000 random edges; about a million paths.
 fn closure() -> Task {
     let mut symbols = Symbols::new();
     let rules = "edge(?x, ?y) -> path(?x, ?y) path(?x, ?y) ^ edge(?y, ?z) -> path(?x, ?z)";
@@ -43,7 +44,7 @@ fn closure() -> Task {
     (symbols, program, edges)
 }
 
-/// Trucks that drive between locations and carry packages: delete relaxation of an untyped transport task.
+/// Delete relaxation of an untyped transport task: trucks drive between locations and carry packages.
 fn transport() -> Task {
     let mut symbols = Symbols::new();
     let rules = "
@@ -82,7 +83,8 @@ fn transport() -> Task {
     (symbols, program, facts)
 }
 
-/// Designs that require one of many components and bound a measured attribute: about eleven facts a design.
+/// Knowledge base of designs, each with a required component and a lower bound on a measured attribute;
+/// about eleven facts per design.
 fn knowledge_base(designs: usize) -> Task {
     let mut symbols = Symbols::new();
     let program = program(COADAPTATION_RULES, &mut symbols);

@@ -1,4 +1,4 @@
-//! Rules that follow a room: what holds changes with each measurement, and every conclusion can be explained.
+//! Example: the heating of a room follows temperature measurements, and each conclusion is explained.
 //!
 //! `cargo run -p metaplan-rules --example thermostat`
 #![expect(clippy::print_stdout, reason = "an example prints")]

@@ -139,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn values_are_those_of_xsd() {
+    fn aggregates_follow_the_value_spaces_of_xsd() {
         check(Aggregate::Sum, &[], Some("0"));
         check(Aggregate::Sum, &["0.1", "0.2"], Some("0.3"));
         let long = format!("0.{}1", "0".repeat(60));

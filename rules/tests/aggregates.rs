@@ -1,4 +1,4 @@
-//! Aggregates: their values before and after changes, what they explain, and which rules with them are refused.
+//! Aggregates: values before and after changes, explanations, and rejected rules.
 
 use crate::text::{engine, fact, facts};
 use metaplan_rules::{Delta, Engine, Obstacle, Reason};
@@ -17,7 +17,7 @@ const RULES: &str = "
 const STATED: &str = "function(f), function(g), solves(a, f), solves(b, f), solves(c, g), power(a, 1.5),
     power(b, 0.1), power(c, 0.2), limit(0.15), rival(b)";
 
-/// Each script line is `+fact`, `-fact`, `?fact` (must hold) or `!fact` (must not).
+/// Runs a script of lines `+fact`, `-fact`, `?fact` (must hold) and `!fact` (must not hold).
 fn check(script: &[&str]) {
     let mut engine = engine(RULES, STATED).expect("rules");
     for line in script {
@@ -76,15 +76,16 @@ fn values_follow_changes() {
     check(&["?rank(b, 0, 0)", "?rank(a, 2, 1)", "-rival(b)", "?rank(a, 2, 0)"]);
 }
 
-/// What the group is for need not be known to bind it.
+/// The atom `p(?x)` binds the group. If the aggregate also depended on `t`, the rules would not be
+/// stratified.
 #[test]
-fn an_aggregate_depends_on_no_more_than_it_asks_for() {
+fn an_aggregate_depends_on_one_atom_per_group_variable() {
     let rules = "p(?x) ^ t(?x) ^ ?n = count { r(?y) ^ swrlb:lessThan(?y, ?x) } -> s(?x, ?n) .
         s(?x, ?n) ^ swrlb:add(?y, ?x, 1) -> t(?y) .";
     let mut engine = engine(rules, "p(1), p(2), p(3), t(1), r(0), r(1)").expect("stratified");
-    for (wanted, expected) in [("s(1, 1)", true), ("s(2, 2)", true), ("s(3, 2)", true), ("s(4, 2)", false)] {
-        let wanted = fact(&mut engine, wanted);
-        assert_eq!(engine.holds(&wanted), expected);
+    for (text, expected) in [("s(1, 1)", true), ("s(2, 2)", true), ("s(3, 2)", true), ("s(4, 2)", false)] {
+        let text = fact(&mut engine, text);
+        assert_eq!(engine.holds(&text), expected);
     }
 }
 
@@ -93,25 +94,25 @@ fn a_change_reports_only_its_group() {
     let mut engine = engine(RULES, STATED).expect("rules");
     let insert = facts(engine.symbols_mut(), "failed(c)");
     let change = engine.apply(Delta { insert, delete: vec![] }).expect("no budget needed");
-    let shown = |facts: &[metaplan_rules::Fact]| {
+    let displayed = |facts: &[metaplan_rules::Fact]| {
         facts.iter().map(|fact| fact.display(engine.symbols()).to_string()).collect::<Vec<_>>()
     };
     let integer = |number: u8| format!("\"{number}\"^^<http://www.w3.org/2001/XMLSchema#integer>");
-    assert_eq!(shown(&change.insert).len(), 2);
-    assert!(shown(&change.insert).contains(&format!("<spares>(<g>, {})", integer(0))));
-    assert!(shown(&change.delete).contains(&format!("<spares>(<g>, {})", integer(1))));
-    assert_eq!(shown(&change.delete).len(), 2, "the count and `healthy`");
+    assert_eq!(displayed(&change.insert).len(), 2);
+    assert!(displayed(&change.insert).contains(&format!("<spares>(<g>, {})", integer(0))));
+    assert!(displayed(&change.delete).contains(&format!("<spares>(<g>, {})", integer(1))));
+    assert_eq!(displayed(&change.delete).len(), 2, "the count and `healthy`");
 }
 
 #[test]
 fn derivations_list_the_matches() {
     let mut engine = engine(RULES, STATED).expect("rules");
-    let wanted = fact(&mut engine, "power_of(f, 1.6)");
-    let derivation = engine.why(&wanted).expect("it holds");
+    let power = fact(&mut engine, "power_of(f, 1.6)");
+    let derivation = engine.why(&power).expect("it holds");
     let Reason::Rule { aggregates, bindings, .. } = &derivation.steps[0].reason else { panic!("derived") };
     assert_eq!(bindings.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), ["f", "w"]);
     assert_eq!(aggregates[0].matches.len(), 2);
-    let shown = derivation.display(engine.symbols()).to_string();
+    let displayed = derivation.display(engine.symbols()).to_string();
     let decimal = |number: &str| format!("\"{number}\"^^<http://www.w3.org/2001/XMLSchema#decimal>");
     let expected = format!(
         "<power_of>(<f>, {w}) by rule test#1 (power)
@@ -126,18 +127,18 @@ fn derivations_list_the_matches() {
         a = decimal("1.5"),
         b = decimal("0.1"),
     );
-    assert_eq!(shown, expected);
+    assert_eq!(displayed, expected);
 }
 
-fn miss(engine: &mut Engine, wanted: &str) -> Vec<String> {
-    let wanted = fact(engine, wanted);
-    let misses = engine.why_not(&wanted);
+fn miss(engine: &mut Engine, text: &str) -> Vec<String> {
+    let text = fact(engine, text);
+    let misses = engine.why_not(&text);
     let show = |obstacle: &Obstacle| obstacle.display(engine.symbols()).to_string();
     misses.iter().flat_map(|miss| miss.obstacles.iter().map(show)).collect()
 }
 
 #[test]
-fn near_misses_say_by_how_much() {
+fn near_misses_report_the_gap() {
     let mut engine = engine(RULES, STATED).expect("rules");
     let number =
         |kind: &str, number: &str| format!("\"{number}\"^^<http://www.w3.org/2001/XMLSchema#{kind}>");

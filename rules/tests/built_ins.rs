@@ -1,5 +1,5 @@
-//! Built-ins in rules, by their definitions: parts of values forwards and backwards ([1], section 8.5), URIs (8.6), tokens
-//! (8.4), and the libraries `swrlm` and `temporal` ([2], [3]). What is unknown is an error.
+//! Built-ins in rules, by their definitions: composition and splitting of values ([1], section 8.5), URIs
+//! (8.6), tokens (8.4), and the libraries `swrlm` and `temporal` ([2], [3]). Unknown built-ins are errors.
 //!
 //! [1] W3C Member Submission: SWRL, 2004.
 //! [2] `SWRLTab` wiki: Mathematical Built-In Library.
@@ -17,7 +17,7 @@ fn parse(texts: &[(&str, &str)], symbols: &mut Symbols) -> Result<Program, Vec<S
         .map_err(|errors| errors.iter().map(ToString::to_string).collect())
 }
 
-/// The values that a body of built-ins gives to its variable `?r`, or to `?r` and others, as N-Triples has them.
+/// Values of variables under all matches of a body of built-ins, as N-Triples.
 fn solutions(body: &str, variables: &str) -> Vec<String> {
     let text = format!("-> start(0) . start(?start) ^ {body} -> r({variables}) .");
     let mut symbols = Symbols::new();
@@ -37,14 +37,14 @@ fn solutions(body: &str, variables: &str) -> Vec<String> {
 }
 
 #[test]
-fn values_are_taken_apart() {
+fn values_are_split_into_parts() {
     for (body, variables, expected) in [
         ("swrlb:date(\"2026-02-03\"^^xsd:date, ?y, ?m, ?d)", "?y, ?m, ?d", "2026|2|3"),
         ("swrlb:date(\"2026-02-03Z\"^^xsd:date, ?y, ?m, ?d, ?z)", "?y, ?m, ?d, ?z", "2026|2|3|Z"),
         ("swrlb:date(\"2026-02-03-05:30\"^^xsd:date, ?y, 2, ?d, ?z)", "?y, ?d, ?z", "2026|3|-05:30"),
         ("swrlb:date(\"2026-02-03\"^^xsd:date, ?y, ?m, ?d, ?z)", "?y, ?z", "2026|"),
         ("swrlb:date(\"-0044-03-15\"^^xsd:date, ?y, ?m, ?d)", "?y, ?m, ?d", "-44|3|15"),
-        // A time zone that is not asked for, another month, one variable for two parts.
+        // A time zone without a part, a wrong month, and one variable for two parts.
         ("swrlb:date(\"2026-02-03Z\"^^xsd:date, ?y, ?m, ?d)", "?y", ""),
         ("swrlb:date(\"2026-02-03\"^^xsd:date, ?y, 3, ?d)", "?y", ""),
         ("swrlb:date(\"2026-02-03\"^^xsd:date, ?y, ?m, ?m)", "?y", ""),
@@ -66,7 +66,7 @@ fn values_are_taken_apart() {
             "3|10|30|1.5",
         ),
         ("swrlb:dayTimeDuration(\"-PT90M\"^^xsd:duration, ?d, ?h, ?m, ?s)", "?d, ?h, ?m, ?s", "0|-1|-30|0"),
-        // Forwards, then backwards.
+        // Composition, then splitting.
         (
             "swrlb:dayTimeDuration(?p, 0, -1, -30, 0) ^ swrlb:dayTimeDuration(?p, ?d, ?h, ?m, ?s)",
             "?h, ?m",
@@ -79,7 +79,7 @@ fn values_are_taken_apart() {
 }
 
 #[test]
-fn uris_and_tokens() {
+fn uris_are_composed_and_split_and_tokens_enumerated() {
     let uri = "\"http://example.org:8080/a/b?q=1#top\"^^xsd:anyURI";
     for (body, variables, expected) in [
         (
@@ -89,7 +89,7 @@ fn uris_and_tokens() {
         ),
         ("swrlb:anyURI(?r, \"http\", \"example.org\", \"\", \"/\", \"\", \"\")", "?r", "http://example.org/"),
         ("swrlb:anyURI(?r, \"mailto\", \"\", \"\", \"a@b.org\", \"\", \"\")", "?r", "mailto:a@b.org"),
-        // No scheme, a part that would be read as two.
+        // An invalid scheme, and a part that would be parsed as two.
         ("swrlb:anyURI(?r, \"1\", \"e.org\", \"\", \"\", \"\", \"\")", "?r", ""),
         ("swrlb:anyURI(?r, \"http\", \"e.org\", \"\", \"/a?b\", \"\", \"\")", "?r", ""),
         (
@@ -122,7 +122,7 @@ fn uris_and_tokens() {
 }
 
 #[test]
-fn mathematical_expressions() {
+fn mathematical_expressions_are_evaluated() {
     for (body, expected) in [
         ("swrlm:sqrt(?r, 16)", "4.0E0"),
         ("swrlm:sqrt(?r, -1)", ""),
@@ -146,7 +146,7 @@ fn mathematical_expressions() {
 }
 
 #[test]
-fn temporal_values() {
+fn temporal_functions_compute_moments_and_durations() {
     for (body, expected) in [
         ("temporal:duration(?r, \"1999-11-01\", \"2000-02-01\", \"Months\")", "3"),
         ("temporal:duration(?r, \"2000-02-01\", \"1999-11-01\", \"months\")", "3"),
@@ -169,7 +169,7 @@ fn temporal_values() {
 }
 
 #[test]
-fn temporal_relations() {
+fn temporal_relations_compare_granules() {
     let holds = |body: &str| !solutions(body, "?start").is_empty();
     let [early, late, later] = ["\"2026-01-01T10:00\"", "\"2026-01-01T12:00\"", "\"2026-01-02\""];
     for (relation, arguments, expected) in [
@@ -189,7 +189,8 @@ fn temporal_relations() {
         ("finishes", format!("{later}, {early}, {later}"), true),
         ("intersects", format!("{late}, {early}, {later}"), true),
         ("notIntersects", format!("{early}, {late}, {later}"), true),
-        // A period that ends before it begins is none, and neither is what is not a moment: not even its negation holds.
+        // A period that ends before it begins is invalid. For invalid arguments, neither a relation nor its
+        // negation holds.
         ("during", format!("{late}, {later}, {early}"), false),
         ("notDuring", format!("{late}, {later}, {early}"), false),
         ("notBefore", format!("{late}, \"soon\""), false),
@@ -209,8 +210,8 @@ fn temporal_relations() {
 fn unknown_built_ins_are_errors() {
     let check = |text: &str, expected: &[&str]| {
         let texts = [("other", "p(?x) -> <urn:known>(?x, 1, 2)"), ("test", text)];
-        let found = parse(&texts, &mut Symbols::new()).err().unwrap_or_default();
-        assert_eq!(found, expected, "{text}");
+        let errors = parse(&texts, &mut Symbols::new()).err().unwrap_or_default();
+        assert_eq!(errors, expected, "{text}");
     };
     let unknown = |at: &str, name: &str, count: usize| {
         format!(
@@ -223,7 +224,7 @@ fn unknown_built_ins_are_errors() {
     check("p(?x) ^ not <urn:my#odd>(?x, ?x, ?x) -> q(?x)", &[&unknown("1:13", "urn:my#odd", 3)]);
     check("0 = count { <urn:my#odd>(?x, ?x, ?x) } -> q(?x)", &[&unknown("1:13", "urn:my#odd", 3)]);
     check("p(?x) ^ flag() -> q(?x)", &[&unknown("1:9", "flag", 0)]);
-    // A rule concludes it, here or elsewhere.
+    // A rule derives the relation, in this text or in another one.
     check("p(?x) -> t(?x, 1, 2) . t(?x, ?y, ?z) -> q(?x)", &[]);
     check("<urn:known>(?x, ?y, ?z) -> q(?x)", &[]);
     check("p(?x) ^ r(?x, 1) -> q(?x)", &[]);
@@ -236,15 +237,15 @@ fn unknown_built_ins_are_errors() {
     let message =
         format!("test:1:9: R104 built-in <{library}soon> belongs to a library that the engine does not have");
     check(&format!("p(?x) ^ <{library}soon>(?x) -> q(?x)"), &[&message]);
-    let known = "http://swrl.stanford.edu/ontologies/built-ins/3.3/temporal.owl#before";
+    let suggestion = "http://swrl.stanford.edu/ontologies/built-ins/3.3/temporal.owl#before";
     let message = format!(
-        "test:1:9: R104 built-in <{library}befor> belongs to a library that the engine does not have; did you mean `{known}`?"
+        "test:1:9: R104 built-in <{library}befor> belongs to a library that the engine does not have; did you mean `{suggestion}`?"
     );
     check(&format!("p(?x) ^ <{library}befor>(?x, ?x) -> q(?x)"), &[&message]);
 }
 
 #[test]
-fn what_is_taken_apart_comes_and_goes() {
+fn parts_and_tokens_follow_changes() {
     let rules = "said(?x, ?text) ^ swrlb:tokenize(?word, ?text, \" \") -> word(?x, ?word) .
         born(?x, ?date) ^ swrlb:date(?date, ?year, ?month, ?day) ^ swrlb:lessThan(?month, 7) -> early(?x, ?year) .";
     let mut symbols = Symbols::new();

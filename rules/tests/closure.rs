@@ -1,5 +1,6 @@
-//! A transitive relation whose pairs are stated, concluded by another rule, or both, under random changes: after each, it is the
-//! closure that Warshall's algorithm finds. What is a link of a chain one time is a conclusion of the closure the next.
+//! Transitive relation with pairs that are stated, derived by another rule, or both, under random changes.
+//! After each change, it equals the closure by Warshall's algorithm. A link of a chain can become a
+//! conclusion of the closure later.
 
 use std::collections::BTreeSet;
 
@@ -9,7 +10,7 @@ const NODES: usize = 7;
 
 type Pairs = BTreeSet<(usize, usize)>;
 
-/// Xorshift.
+/// The xorshift generator.
 struct Random(u64);
 
 impl Random {
@@ -22,17 +23,17 @@ impl Random {
 }
 
 fn closed(links: &Pairs) -> Pairs {
-    let mut all = links.clone();
+    let mut closure = links.clone();
     for middle in 0..NODES {
         for from in 0..NODES {
             for to in 0..NODES {
-                if all.contains(&(from, middle)) && all.contains(&(middle, to)) {
-                    all.insert((from, to));
+                if closure.contains(&(from, middle)) && closure.contains(&(middle, to)) {
+                    closure.insert((from, to));
                 }
             }
         }
     }
-    all
+    closure
 }
 
 fn check(seed: u64, rules: &str) {
@@ -74,7 +75,7 @@ fn check(seed: u64, rules: &str) {
 }
 
 #[test]
-fn closures_follow_changes() {
+fn a_transitive_relation_equals_its_closure_after_every_change() {
     let first = "part(?x, ?y) ^ part(?y, ?z) -> part(?x, ?z) . next(?x, ?y) -> part(?x, ?y)";
     let last = "next(?x, ?y) -> part(?x, ?y) . part(?x, ?y) ^ part(?y, ?z) -> part(?x, ?z)";
     for seed in 1..=8 {

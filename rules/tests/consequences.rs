@@ -1,4 +1,4 @@
-//! What follows from small rule texts, before and after changes.
+//! Consequences of small rule texts, before and after changes.
 
 use crate::text;
 
@@ -7,7 +7,7 @@ use metaplan_rules::{
     COADAPTATION_RULES, Delta, Engine, Interrupt, Limits, Prefixes, Symbols, TOMASYS_RULES, parse_rules,
 };
 
-/// Each script line is `+fact`, `-fact`, `?fact` (must hold) or `!fact` (must not).
+/// Runs a script of lines `+fact`, `-fact`, `?fact` (must hold) and `!fact` (must not hold).
 fn check(rules: &str, stated: &str, script: &[&str]) {
     let mut engine = engine(rules, stated).expect("rules");
     for line in script {
@@ -26,7 +26,7 @@ fn check(rules: &str, stated: &str, script: &[&str]) {
 }
 
 #[test]
-fn recursion_and_retraction() {
+fn deleting_an_edge_removes_paths_without_another_derivation() {
     let rules = "edge(?x, ?y) -> path(?x, ?y) path(?x, ?y) ^ edge(?y, ?z) -> path(?x, ?z)";
     let stated = "edge(a, b), edge(b, c), edge(c, a), edge(c, d)";
     check(
@@ -38,7 +38,7 @@ fn recursion_and_retraction() {
 }
 
 #[test]
-fn negation_and_built_ins() {
+fn negated_atoms_and_comparisons_follow_changes() {
     let rules = r#"
         design(?fd) ^ not realisable(?fd, false) -> available(?fd, true) .
         requires(?fd, ?c) ^ status(?c, "FALSE") -> realisable(?fd, false) .
@@ -105,11 +105,11 @@ fn a_violated_requirement_makes_designs_unavailable() {
     check(COADAPTATION_RULES, stated, &script);
 }
 
-/// As MROS leaves designs out: a measurement that stands to the estimation as the attribute's operator says. Other estimations and
-/// what objectives ask for are no measurements.
+/// Designs are excluded as in MROS: if a measurement compares with the estimation by the attribute's
+/// operator. Other estimations and requirements of objectives are no measurements.
 #[test]
 fn a_missed_estimation_makes_designs_unavailable() {
-    for (operator, out, still) in [
+    for (operator, missed, met) in [
         ("<", ["1.24", "-1"], ["1.25", "9"]),
         ("<=", ["1.24", "1.25"], ["1.26", "9"]),
         (">", ["1.26", "9"], ["1.250", "-1"]),
@@ -122,7 +122,7 @@ fn a_missed_estimation_makes_designs_unavailable() {
              t:hasQAestimation(other, e3), t:isQAtype(e3, heat), t:hasValue(e3, 0), t:FunctionDesign(other)"
         );
         let mut script = vec!["?t:fd_available(low, true)".to_owned()];
-        for (values, verb) in [(out, '!'), (still, '?'), (out, '!')] {
+        for (values, verb) in [(missed, '!'), (met, '?'), (missed, '!')] {
             for value in values {
                 script.push(format!("+t:hasValue(obs, {value})"));
                 script.push(format!("{verb}t:fd_available(low, true)"));
@@ -167,20 +167,21 @@ fn statuses_follow_their_causes() {
 fn constraints_and_ill_typed_literals_are_violations() {
     let rules = "[disjoint] p(?x) ^ q(?x) -> . ready(?x) -> p(?x)";
     let mut engine = engine(rules, "q(a), p(b), q(c), p(c)").expect("rules");
-    let shown = |engine: &Engine| {
+    let violations = |engine: &Engine| {
         engine.violations().iter().map(|violation| show_violation(engine, violation)).collect::<Vec<_>>()
     };
-    assert_eq!(shown(&engine), ["<p>(<c>) and <q>(<c>)"]);
+    assert_eq!(violations(&engine), ["<p>(<c>) and <q>(<c>)"]);
     let change = facts(engine.symbols_mut(), "ready(a), v(a, \"False\"^^xsd:boolean)");
     let delete = vec![fact(&mut engine, "q(c)")];
     engine.apply(Delta { insert: change, delete }).expect("no budget needed");
     let ill_typed = "<v>(<a>, \"False\"^^<http://www.w3.org/2001/XMLSchema#boolean>)";
-    assert_eq!(shown(&engine), ["<p>(<a>) and <q>(<a>)", ill_typed]);
+    assert_eq!(violations(&engine), ["<p>(<a>) and <q>(<a>)", ill_typed]);
 }
 
-/// Doubling makes values whose size grows, too: the default budget ends that in less than two seconds.
+/// Doubling also increases the size of the values. The default budget stops it within two seconds in a
+/// release build.
 #[test]
-fn growing_values_use_up_the_default_budget() {
+fn growing_values_exhaust_the_default_budget() {
     let rules = "[double] v(?x, ?n) ^ swrlb:multiply(?m, ?n, 2) -> v(?x, ?m) .";
     let mut symbols = Symbols::new();
     let program = parse_rules(rules, "test", &mut symbols, &Prefixes::new()).expect("rules");
@@ -193,12 +194,12 @@ fn growing_values_use_up_the_default_budget() {
     assert!(text.contains("(double)") && text.contains(" characters)"), "{text}");
     assert!(text.len() < 300, "{text}");
     assert_eq!(engine.facts().count(), 0);
-    // Without optimisation and on a busy machine.
+    // The limit allows for a debug build on a busy machine.
     assert!(took.as_secs() < 20, "{took:?}");
 }
 
 #[test]
-fn constant_patterns_that_cannot_be_used_are_errors() {
+fn invalid_constant_patterns_are_errors() {
     for (pattern, reason) in [("(", "unclosed group"), ("(a)\\\\1", "back reference"), ("[a-", "unclosed")] {
         let rules = format!("p(?x) ^ swrlb:matches(?x, \"{pattern}\") -> q(?x) .");
         let mut symbols = Symbols::new();
@@ -237,7 +238,7 @@ fn runaway_rules_end_in_an_error_that_names_them() {
 }
 
 #[test]
-fn values_of_recursive_rules_are_dear_and_of_others_are_not() {
+fn only_recursive_rules_are_charged_for_new_values() {
     let counted = |rules: &str, steps: u64| {
         let mut symbols = Symbols::new();
         let program = parse_rules(rules, "test", &mut symbols, &Prefixes::new()).expect("rules");
@@ -249,7 +250,8 @@ fn values_of_recursive_rules_are_dear_and_of_others_are_not() {
     assert!(!counted(recursive, 1_000_000) && counted(recursive, 2_000_000));
 }
 
-/// Interrupted at any question, the engine is as it was before, and does the same when it is asked again.
+/// The engine is interrupted at each call of the interrupt function in turn. It then equals the engine
+/// before, and a repeated update has the same result.
 #[test]
 fn evaluation_can_be_interrupted() {
     use std::sync::Arc;
@@ -291,7 +293,8 @@ fn evaluation_can_be_interrupted() {
     }
 }
 
-/// A closure over links gives what the rule says, whatever comes and goes: a chain with a detour, and an alias.
+/// A relation with a closure rule equals the result of an ordinary rule after every change: a chain with a
+/// detour and an alias.
 #[test]
 fn a_transitive_relation_is_its_closure_after_every_change() {
     let rules = "[closure] p(?x, ?y) ^ p(?y, ?z) -> p(?x, ?z) . [alias] q(?x, ?y) -> p(?x, ?y) . \
@@ -314,17 +317,17 @@ fn a_transitive_relation_is_its_closure_after_every_change() {
             Delta { insert: Vec::new(), delete: delta }
         };
         engine.apply(change).expect("no budget needed");
-        let shown = |engine: &Engine| -> Vec<String> {
+        let displayed = |engine: &Engine| -> Vec<String> {
             engine.facts().map(|fact| fact.display(engine.symbols()).to_string()).collect()
         };
-        // By a rule that is not seen to be a closure, because a third atom comes with it.
+        // A third atom prevents the recognition as a closure.
         let plain = rules.replace("-> p(?x, ?z)", "^ swrlb:equal(1, 1) -> p(?x, ?z)");
-        let all: Vec<&str> = stated.iter().copied().collect();
-        let fresh = text::engine(&plain, &all.join(", ")).expect("rules");
-        let (mut found, mut expected) = (shown(&engine), shown(&fresh));
-        found.sort();
+        let lines: Vec<&str> = stated.iter().copied().collect();
+        let fresh = text::engine(&plain, &lines.join(", ")).expect("rules");
+        let (mut actual, mut expected) = (displayed(&engine), displayed(&fresh));
+        actual.sort();
         expected.sort();
-        assert_eq!(found, expected, "{step}");
+        assert_eq!(actual, expected, "{step}");
     }
 }
 
@@ -340,7 +343,7 @@ fn a_clone_answers_what_if() {
 }
 
 #[test]
-fn joins_are_planned_anew_as_facts_grow() {
+fn joins_are_planned_again_as_facts_grow() {
     let rules = "e(?x, ?y) ^ e(?y, ?z) ^ mark(?z) -> near(?x) . near(?x) ^ not off(?x) -> on(?x)";
     let mut engine = engine(rules, "").expect("rules");
     for number in 0..300 {
@@ -354,7 +357,7 @@ fn joins_are_planned_anew_as_facts_grow() {
 }
 
 #[test]
-fn large_cartesian_products_are_evaluated_piecemeal() {
+fn large_cartesian_products_are_evaluated_in_blocks() {
     let side = 45_usize;
     let stated: Vec<String> = (0..side).map(|number| format!("p({number})")).collect();
     let rules = "p(?x) ^ p(?y) ^ p(?z) -> cube(?x, ?y, ?z)";
@@ -366,7 +369,7 @@ fn large_cartesian_products_are_evaluated_piecemeal() {
 }
 
 #[test]
-fn a_clone_and_its_original_go_separate_ways() {
+fn changes_of_a_clone_and_its_original_are_independent() {
     let rules = "p(?x) ^ swrlb:add(?y, ?x, 1) -> q(?y) . q(?x) ^ not r(?x) -> s(?x) .";
     let mut original = engine(rules, "p(1), p(2)").expect("rules");
     let before: Vec<_> = original.facts().collect();

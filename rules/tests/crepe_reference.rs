@@ -1,4 +1,4 @@
-//! The same rules compiled into a plain crepe program, from scratch each time: the engine agrees after every change.
+//! Comparison with a plain crepe program of the same rules, evaluated from scratch after every change.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -75,8 +75,8 @@ fn check(script: &[(bool, u8, u8)]) {
             let any = vec![None; if name == "source" { 1 } else { 2 }];
             let number =
                 |symbol: &Symbol| nodes.iter().position(|node| node == symbol).expect("a node") as u8;
-            let found = engine.matching(predicate, &any).map(|row| row.iter().map(number).collect());
-            assert_eq!(found.collect::<BTreeSet<Vec<u8>>>(), rows, "{name} of {edges:?}");
+            let rows_found = engine.matching(predicate, &any).map(|row| row.iter().map(number).collect());
+            assert_eq!(rows_found.collect::<BTreeSet<Vec<u8>>>(), rows, "{name} of {edges:?}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Rule text that is SWRL only, and built-ins of one's own.
+//! Plain SWRL as a dialect of rule text, and custom built-ins.
 
 use metaplan_rules::{
     BuiltIn, Definition, Engine, Fact, Literal, Prefixes, Symbols, Syntax, parse_rules_as, print_rules,
@@ -26,7 +26,8 @@ fn swrl_has_neither_negation_as_failure_nor_aggregates() {
     check(text, &swrl, &["test:1:1: R105 an aggregate is not SWRL"]);
 }
 
-/// Whether the first is a multiple of the second; the second of the double of the first.
+/// `multiple` tests that the first argument is a multiple of the second. `double` computes the double of
+/// the second.
 struct Multiple;
 struct Double;
 

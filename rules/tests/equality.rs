@@ -1,4 +1,4 @@
-//! Individuals with several names: what holds of each name, before and after changes.
+//! Individuals with several names: facts about each name, before and after changes.
 
 use std::collections::BTreeSet;
 
@@ -13,22 +13,23 @@ fn engine(rules: &str, stated: &str) -> Engine {
     Engine::new(symbols, program, facts).expect("safe rules")
 }
 
-fn shown(engine: &Engine) -> BTreeSet<String> {
+fn displayed(engine: &Engine) -> BTreeSet<String> {
     let short = |text: String| text.replace("http://www.w3.org/2002/07/owl#", "").replace(['<', '>'], "");
     engine.facts().map(|fact| short(fact.display(engine.symbols()).to_string())).collect()
 }
 
-/// Each script line is `+fact`, `-fact`, or `= facts`: all that hold besides pairs of names.
+/// Runs a script of lines `+fact`, `-fact` and `= facts`. The last form lists all facts except pairs of
+/// names.
 fn check(rules: &str, stated: &str, script: &[&str]) {
     let mut engine = engine(rules, stated);
     for line in script {
         let (verb, text) = line.split_at(1);
         if verb == "=" {
-            let mut found = shown(&engine);
-            assert!(!found.contains("sameAs(b, b)"), "{found:?}");
-            found.retain(|fact| !fact.starts_with("sameAs"));
+            let mut facts_shown = displayed(&engine);
+            assert!(!facts_shown.contains("sameAs(b, b)"), "{facts_shown:?}");
+            facts_shown.retain(|fact| !fact.starts_with("sameAs"));
             let expected: BTreeSet<String> = text.split(" ^ ").map(|fact| fact.trim().to_string()).collect();
-            assert_eq!(found, expected, "{script:?} {line}");
+            assert_eq!(facts_shown, expected, "{script:?} {line}");
             continue;
         }
         let before = engine.facts().collect::<BTreeSet<_>>();
@@ -45,7 +46,7 @@ fn check(rules: &str, stated: &str, script: &[&str]) {
 }
 
 #[test]
-fn pairs_come_and_go() {
+fn facts_follow_inserted_and_deleted_pairs() {
     let script = [
         "= p(a, b)",
         "+sameAs(b, c)",
@@ -81,26 +82,27 @@ fn equality_does_not_support_itself() {
         [ifp] p(?x, ?z) ^ p(?y, ?z) ^ differentFrom(?x, ?y) -> sameAs(?x, ?y) .";
     let mut symbols = Symbols::new();
     let program = parse_rules(rules, "test", &mut symbols, &prefixes()).expect("rules");
-    // `differentFrom` compares names here, as in the rules of OWL 2 RL for functional properties.
+    // Without `with_equality`, `differentFrom` compares names, as in the functional property rules of OWL 2
+    // RL.
     let program = Program { equality: true, ..program };
     let stated = facts(&mut symbols, "p(a, b), p(c, d), sameAs(a, c), q(a)");
     let mut engine = Engine::new(symbols, program, stated).expect("safe rules");
-    let same = fact(&mut engine, "sameAs(b, d)");
-    assert!(engine.holds(&same));
+    let same_as = fact(&mut engine, "sameAs(b, d)");
+    assert!(engine.holds(&same_as));
     let delete = vec![fact(&mut engine, "sameAs(a, c)")];
     engine.apply(Delta { insert: vec![], delete }).expect("no budget needed");
-    assert!(!engine.holds(&same));
+    assert!(!engine.holds(&same_as));
     assert_eq!(engine.facts().count(), 3);
 }
 
 #[test]
-fn violations_name_what_is_stated() {
+fn violations_list_stated_facts() {
     let mut engine = engine(
         "p(?x) ^ q(?x) -> .",
         "p(a), q(b), sameAs(a, b), differentFrom(c, d), sameAs(c, d), sameAs(a, 1)",
     );
-    let shown: Vec<String> = engine.violations().iter().map(|v| show_violation(&engine, v)).collect();
-    assert_eq!(shown.len(), 3, "{shown:?}");
+    let violations: Vec<String> = engine.violations().iter().map(|v| show_violation(&engine, v)).collect();
+    assert_eq!(violations.len(), 3, "{violations:?}");
     let lines: Vec<String> =
         engine.violations().iter().map(|v| v.display(engine.symbols()).to_string()).collect();
     assert!(lines.iter().any(|line| line.starts_with("test#0: <p>(<a>), <q>(<")), "{lines:?}");
@@ -111,9 +113,9 @@ fn violations_name_what_is_stated() {
     assert_eq!(engine.violations(), []);
 }
 
-/// Constraints about names of one individual stay two, however the names come together.
+/// Constraints about several names of one individual are reported separately, in every order of changes.
 #[test]
-fn constraints_do_not_become_one() {
+fn constraints_about_equal_names_remain_separate() {
     let (rules, all) = ("p(b) -> . p(a) -> .", "sameAs(b, a), p(b)");
     for order in [["sameAs(b, a)", "p(b)"], ["p(a)", "sameAs(b, a)"], ["sameAs(a, b)", "p(a)"]] {
         let mut engine = engine(rules, "q(c)");
@@ -131,7 +133,7 @@ fn constraints_do_not_become_one() {
 }
 
 #[test]
-fn an_update_that_is_stopped_leaves_everything_as_it_was() {
+fn a_stopped_update_leaves_the_engine_unchanged() {
     let rules = "go(?x) -> n(0) . n(?x) ^ swrlb:add(?y, ?x, 1) -> n(?y) . go(?x) -> sameAs(?x, b) .";
     let mut symbols = Symbols::new();
     let program = parse_rules(rules, "test", &mut symbols, &prefixes()).expect("rules");
@@ -150,7 +152,7 @@ fn an_update_that_is_stopped_leaves_everything_as_it_was() {
 }
 
 #[test]
-fn a_clone_goes_its_own_way() {
+fn a_clone_is_independent_of_its_original() {
     let mut original = engine("p(?x) ^ q(?x) -> r(?x) .", "p(a), q(b)");
     let mut what_if = original.clone();
     let insert = vec![fact(&mut what_if, "sameAs(a, b)")];
@@ -161,26 +163,26 @@ fn a_clone_goes_its_own_way() {
     assert_eq!(original.apply(Delta { insert, delete: vec![] }).expect("no budget needed").insert.len(), 2);
 }
 
-/// The pairs of a class grow with its square, and are not listed where nobody wants them.
+/// The number of pairs is quadratic in the size of a class, so the brief listing omits derivable pairs.
 #[test]
 fn large_classes_are_listed_in_brief() {
     let stated: Vec<String> = (1..40).map(|n| format!("is(n{n}, n0)")).collect();
     let engine = engine("is(?x, ?y) -> sameAs(?x, ?y) .", &stated.join(", "));
-    let same = |fact: &Fact| {
+    let is_same_as = |fact: &Fact| {
         engine.symbols().value(fact.predicate).as_name() == Some("http://www.w3.org/2002/07/owl#sameAs")
     };
-    assert_eq!(engine.facts().filter(same).count(), 40 * 39);
-    assert_eq!(engine.inferred_in_brief(40).into_iter().filter(same).count(), 40 * 39);
+    assert_eq!(engine.facts().filter(is_same_as).count(), 40 * 39);
+    assert_eq!(engine.inferred_in_brief(40).into_iter().filter(is_same_as).count(), 40 * 39);
     let mut brief = engine.inferred_in_brief(39);
     assert!(brief.iter().all(|fact| engine.holds(fact) && !engine.is_asserted(fact)));
-    brief.retain(same);
+    brief.retain(is_same_as);
     assert_eq!(brief.len(), 39);
     assert!(brief.iter().all(|fact| fact.arguments[0] == brief[0].arguments[0]));
 }
 
-/// Random changes in each of which one pair of names goes and another comes, with facts about all names: after each, what
-/// holds, what is stated and what has a reason is as in an engine that reads what is stated. With `exchanges_rules`, every
-/// change removes and adds rules, too.
+/// Swaps pairs of names in random scripts: each change deletes one pair and inserts another, among facts
+/// about all names. After each change, facts, statements and explanations equal those of a new engine. With
+/// `exchanges_rules`, every change also removes and adds rules.
 fn swap_pairs(scripts: u64, exchanges_rules: bool) {
     for seed in 0..scripts {
         let random = std::cell::Cell::new(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
@@ -209,19 +211,19 @@ fn swap_pairs(scripts: u64, exchanges_rules: bool) {
         let mut stated: BTreeSet<String> = [0, 0, 1, 1, 1, 2].map(fact).into_iter().collect();
         let mut incremental = engine(&text, &stated.iter().cloned().collect::<Vec<_>>().join(", "));
         for step in 0..5 {
-            let mut gone: Vec<String> =
+            let mut deleted: Vec<String> =
                 stated.iter().filter(|fact| fact.starts_with("sameAs")).take(1).cloned().collect();
-            gone.extend(stated.iter().nth(step % stated.len().max(1)).filter(|_| step % 2 == 1).cloned());
-            let come = [fact(0), fact(step % 3)];
-            gone.retain(|fact| !come.contains(fact));
-            let [insert, delete] = [&come[..], &gone].map(|facts| {
+            deleted.extend(stated.iter().nth(step % stated.len().max(1)).filter(|_| step % 2 == 1).cloned());
+            let inserted = [fact(0), fact(step % 3)];
+            deleted.retain(|fact| !inserted.contains(fact));
+            let [insert, delete] = [&inserted[..], &deleted].map(|facts| {
                 facts.iter().map(|text| crate::text::fact(&mut incremental, text)).collect::<Vec<_>>()
             });
-            for fact in &gone {
+            for fact in &deleted {
                 stated.remove(fact);
             }
             stated.extend(come);
-            let before = shown(&incremental);
+            let before = displayed(&incremental);
             let delta = Delta { insert, delete };
             let change = if exchanges_rules {
                 text = subset();
@@ -244,7 +246,7 @@ fn swap_pairs(scripts: u64, exchanges_rules: bool) {
                 facts.collect()
             };
             assert_eq!(state(&incremental), state(&scratch), "seed {seed}, step {step}: {stated:?}\n{text}");
-            let after = shown(&incremental);
+            let after = displayed(&incremental);
             assert_eq!(change.insert.len(), after.difference(&before).count(), "seed {seed}, step {step}");
             assert_eq!(change.delete.len(), before.difference(&after).count(), "seed {seed}, step {step}");
         }
@@ -252,22 +254,22 @@ fn swap_pairs(scripts: u64, exchanges_rules: bool) {
 }
 
 #[test]
-fn one_pair_goes_while_another_comes() {
+fn swapped_pairs_match_evaluation_from_scratch() {
     swap_pairs(200, false);
     swap_pairs(200, true);
 }
 
 #[test]
 #[ignore = "takes a minute without optimisation"]
-fn one_pair_goes_while_another_comes_many_times() {
+fn many_swapped_pairs_match_evaluation_from_scratch() {
     swap_pairs(2_500, false);
     swap_pairs(2_500, true);
 }
 
 #[test]
-fn rules_that_make_names_one_come_and_go() {
+fn removing_an_equality_rule_splits_its_classes() {
     let mut engine = engine("p(?x, ?y) ^ p(?x, ?z) -> sameAs(?y, ?z) .", "p(a, b), p(a, c), q(c)");
-    let before = shown(&engine);
+    let before = displayed(&engine);
     assert!(before.contains("q(b)"), "{before:?}");
     let rule = engine
         .program()
@@ -277,9 +279,9 @@ fn rules_that_make_names_one_come_and_go() {
         .expect("the rule")
         .clone();
     let change = engine.remove_rule(&rule.identity).expect("safe rules");
-    assert!(!shown(&engine).contains("q(b)") && change.insert.is_empty(), "{change:?}");
+    assert!(!displayed(&engine).contains("q(b)") && change.insert.is_empty(), "{change:?}");
     engine.add_rules([rule]).expect("safe rules");
-    assert_eq!(shown(&engine), before);
+    assert_eq!(displayed(&engine), before);
 }
 
 #[test]
@@ -292,19 +294,19 @@ fn equality_is_switched_on_by_a_change() {
     let pair = fact(&mut engine, "sameAs(b, c)");
     let change =
         engine.change(Delta { insert: vec![pair.clone()], delete: vec![] }, complete).expect("safe rules");
-    let now = shown(&engine);
+    let now = displayed(&engine);
     for expected in ["p(a, c)", "q(b)", "r(b)", "sameAs(b, c)", "sameAs(c, b)"] {
         assert!(now.contains(expected), "{expected}: {now:?}");
     }
     assert!(change.delete.is_empty() && !change.insert.is_empty(), "{change:?}");
     engine.apply(Delta { insert: vec![], delete: vec![pair] }).expect("within the budget");
-    assert!(!shown(&engine).contains("r(b)"));
+    assert!(!displayed(&engine).contains("r(b)"));
 }
 
-/// A pair that a rule concludes from a name that becomes another name's is deleted with that name; the pairs that follow
-/// without that name are found all the same.
+/// A derived pair that mentions a name is deleted when the name becomes equal to another one. The pairs
+/// that follow without that name must be derived again.
 #[test]
-fn pairs_are_found_where_constants_of_rules_become_one() {
+fn pairs_are_derived_again_when_constants_of_rules_become_equal() {
     let rules = "p(?x, ?y) ^ sameAs(?x, c) -> q(?y, ?x) .
         p(?x, ?w) ^ q(?y, ?x) ^ q(?z, ?x) -> sameAs(?y, ?z) .
         p(?x, ?y) -> n(?x) ^ n(?y) .
@@ -312,5 +314,5 @@ fn pairs_are_found_where_constants_of_rules_become_one() {
         r(?x) -> p(?x, e) .";
     let mut engine = engine(rules, "r(c), p(e, a), p(e, c)");
     let pair = fact(&mut engine, "sameAs(a, c)");
-    assert!(engine.holds(&pair), "{:?}", shown(&engine));
+    assert!(engine.holds(&pair), "{:?}", displayed(&engine));
 }

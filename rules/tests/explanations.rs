@@ -1,4 +1,4 @@
-//! Why, and why not, as text.
+//! Tests of `why` and `why_not`, as text.
 
 use crate::text::{engine, fact};
 use metaplan_rules::Obstacle;
@@ -13,15 +13,15 @@ const RULES: &str = "
 const STATED: &str =
     "design(a), design(b), needs(a, 0.5), needs(b, 2), measured(m, 0.75), measured(n, 1.5), twin(a, a)";
 
-/// The obstacles of each rule that could conclude the fact.
-fn check(wanted: &str, expected: &[&[&str]]) {
+/// Compares the obstacles of each rule that could derive a fact.
+fn check(text: &str, expected: &[&[&str]]) {
     let mut engine = engine(RULES, STATED).expect("rules");
-    let fact = fact(&mut engine, wanted);
+    let fact = fact(&mut engine, text);
     let show = |obstacle: &Obstacle| obstacle.display(engine.symbols()).to_string();
     let misses = engine.why_not(&fact);
-    let found: Vec<Vec<String>> =
+    let obstacles: Vec<Vec<String>> =
         misses.iter().map(|miss| miss.obstacles.iter().map(show).collect()).collect();
-    assert_eq!(found, expected);
+    assert_eq!(obstacles, expected);
 }
 
 #[test]
@@ -40,12 +40,12 @@ fn the_nearest_match_is_reported() {
 fn derivations_print_as_trees() {
     let mut engine = engine(RULES, STATED).expect("rules");
     let fact = fact(&mut engine, "ready(a)");
-    let shown = engine.why(&fact).expect("it holds").display(engine.symbols()).to_string();
+    let displayed = engine.why(&fact).expect("it holds").display(engine.symbols()).to_string();
     let expected = "<ready>(<a>) by rule test#4 (both)
   <usable>(<a>) by rule test#0 (usable)
     not <broken>(<a>)
     <design>(<a>) is stated
   <design>(<a>) is stated
 ";
-    assert_eq!(shown, expected);
+    assert_eq!(displayed, expected);
 }

@@ -1,4 +1,5 @@
-//! The master test: random programs under random scripts of changes, against naive evaluation from scratch.
+//! Master test: random programs under random scripts of changes, compared with naive evaluation from
+//! scratch.
 
 use std::ops::Range;
 
@@ -22,7 +23,7 @@ fn case(steps: Range<usize>) -> impl Strategy<Value = (Vec<RawRule>, Vec<RawChan
 proptest! {
     #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
     #[test]
-    fn incremental_is_from_scratch((rules, start, script) in case(1..20), equality in 0..4_u8) {
+    fn incremental_equals_from_scratch((rules, start, script) in case(1..20), equality in 0..4_u8) {
         check(&rules, &start, &script, equality == 0);
     }
 }
@@ -31,7 +32,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: scripts(), ..ProptestConfig::default() })]
     #[test]
     #[ignore = "minutes long; run with --release; METAPLAN_SCRIPTS is their number, 100,000 by default"]
-    fn incremental_is_from_scratch_at_length((rules, start, script) in case(50..60), equality in 0..4_u8) {
+    fn long_scripts_equal_from_scratch((rules, start, script) in case(50..60), equality in 0..4_u8) {
         check(&rules, &start, &script, equality == 0);
     }
 }

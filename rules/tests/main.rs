@@ -1,4 +1,4 @@
-//! The rule engine through its public functions.
+//! Tests of the rule engine through its public interface.
 
 mod aggregates;
 mod built_ins;

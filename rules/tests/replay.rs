@@ -1,5 +1,5 @@
-//! Derivations are checked without the engine: what is changed in them is found, and named. Random programs are replayed by
-//! the master test, after every step.
+//! Independent check of derivations: modified derivations are rejected with the right fault. The master
+//! test replays random programs after every step.
 
 use crate::text::{engine, facts, prefixes};
 use metaplan_rules::replay::{Replayed, replay};
@@ -20,58 +20,58 @@ fn stated(engine: &Engine) -> Vec<Fact> {
     engine.facts().filter(|fact| engine.is_asserted(fact)).collect()
 }
 
-/// Replays what the engine says, changed.
+/// Replays the modified derivation of all facts.
 fn check(change: impl Fn(&mut Derivation, &Engine), expected: Result<usize, &str>) {
     let engine = engine(RULES, STATED).expect("rules");
     let mut derivation = engine.everything();
     change(&mut derivation, &engine);
     let mut symbols = engine.symbols().clone();
-    let found = replay(engine.program(), &mut symbols, &stated(&engine), &derivation);
-    let found = found.map(|Replayed { derived, .. }| derived).map_err(|fault| fault.to_string());
-    match (found, expected) {
-        (Err(found), Err(expected)) => assert!(found.contains(expected), "{found}"),
-        (found, expected) => assert_eq!(found, expected.map_err(str::to_owned)),
+    let result = replay(engine.program(), &mut symbols, &stated(&engine), &derivation);
+    let result = result.map(|Replayed { derived, .. }| derived).map_err(|fault| fault.to_string());
+    match (result, expected) {
+        (Err(result), Err(expected)) => assert!(result.contains(expected), "{result}"),
+        (result, expected) => assert_eq!(result, expected.map_err(str::to_owned)),
     }
 }
 
-/// The position of the step that concludes a fact, as it is displayed.
+/// Position of the step for a fact, given as displayed.
 fn position(derivation: &Derivation, engine: &Engine, fact: &str) -> usize {
-    let shown = |step: &metaplan_rules::DerivationStep| step.fact.display(engine.symbols()).to_string();
-    derivation.steps.iter().position(|step| shown(step) == fact).expect("a step")
+    let display = |step: &metaplan_rules::DerivationStep| step.fact.display(engine.symbols()).to_string();
+    derivation.steps.iter().position(|step| display(step) == fact).expect("a step")
 }
 
-/// Takes a step out that no other one rests on.
+/// Removes a step that supports no other step.
 fn without(fact: &'static str) -> impl Fn(&mut Derivation, &Engine) {
     move |derivation, engine| {
-        let at = position(derivation, engine, fact);
-        derivation.steps.remove(at);
+        let removed = position(derivation, engine, fact);
+        derivation.steps.remove(removed);
         for step in &mut derivation.steps {
             if let Reason::Rule { supports, .. } = &mut step.reason {
-                assert!(!supports.contains(&at), "{fact}");
-                supports.iter_mut().filter(|support| **support > at).for_each(|support| *support -= 1);
+                assert!(!supports.contains(&removed), "{fact}");
+                supports.iter_mut().filter(|support| **support > removed).for_each(|support| *support -= 1);
             }
         }
     }
 }
 
 #[test]
-fn what_holds_is_accepted() {
+fn a_complete_derivation_is_accepted() {
     check(|_, _| {}, Ok(10));
 }
 
 #[test]
-fn what_is_missing_is_found() {
+fn missing_steps_are_rejected() {
     check(without("<usable>(<a>)"), Err("<usable>(<a>) follows by rule test#0 (usable), and is missing"));
     check(without("<after>(<a>, <d>)"), Err("<after>(<a>, <d>) follows by rule test#4 (steps)"));
     check(without("<requires>(<a>, <d>)"), Err("rule test#5 (many) does not apply"));
 }
 
 #[test]
-fn what_does_not_follow_is_found() {
+fn steps_that_do_not_follow_are_rejected() {
     let edit = |fact: &'static str, edit: fn(&mut Reason)| {
         move |derivation: &mut Derivation, engine: &Engine| {
-            let at = position(derivation, engine, fact);
-            edit(&mut derivation.steps[at].reason);
+            let position = position(derivation, engine, fact);
+            edit(&mut derivation.steps[position].reason);
         }
     };
     check(edit("<usable>(<a>)", |reason| *reason = Reason::Asserted), Err("<usable>(<a>): is not stated"));
@@ -95,7 +95,7 @@ fn what_does_not_follow_is_found() {
         }),
         Err("<after>(<a>, <d>): a support that does not come before"),
     );
-    // The other rule for the same conclusion.
+    // Another rule with the same conclusion.
     check(
         edit("<broken>(<b>)", |reason| {
             if let Reason::Rule { identity, .. } = reason {
@@ -107,8 +107,9 @@ fn what_does_not_follow_is_found() {
 }
 
 #[test]
-fn what_is_negated_must_not_hold() {
-    // With `broken(b)` left out, `usable(b)` would be founded; but then something is missing.
+fn omitting_a_negated_fact_is_rejected() {
+    // Without `broken(b)`, the step for `usable(b)` would be founded. The missing conclusion must be
+    // detected.
     let deny = |derivation: &mut Derivation, engine: &Engine| {
         without("<broken>(<b>)")(derivation, engine);
         let mut usable = derivation.steps[position(derivation, engine, "<usable>(<a>)")].clone();
@@ -123,9 +124,10 @@ fn what_is_negated_must_not_hold() {
     check(deny, Err("<broken>(<b>) follows by rule test#1 (low), and is missing"));
 }
 
-/// A rule that compares a variable with a name concludes about that name, and about its other names by equality only.
+/// A rule that compares a variable with a name derives facts about that name. Facts about its other names
+/// follow by equality.
 #[test]
-fn names_in_rules_stay_as_they_are_written() {
+fn derivations_use_names_as_written_in_rules() {
     for (rules, later) in [
         ("sameAs(?x, b) -> p(?x) . q(?y) -> sameAs(b, a) .", "q(c)"),
         ("q(?y) -> sameAs(b, a) . sameAs(b, ?x) -> p(?x) .", "q(c)"),
@@ -134,7 +136,7 @@ fn names_in_rules_stay_as_they_are_written() {
         ("r(?x) ^ sameAs(?x, b) -> p(?x) . p(?y) -> sameAs(b, a) .", "r(b), r(c)"),
         ("sameAs(?x, b) -> p(?x) . p(b) -> sameAs(b, a) . p(a) -> sameAs(c, a) .", "q(c)"),
     ] {
-        // Facts about `p` are the first ones, and `a` stands for all of its names.
+        // The facts about `p` come first, so that `a` is the representative of all its names.
         let (text, mut symbols) = (format!("p(a) ^ never(a) -> p(a) . {rules}"), Symbols::new());
         let program = parse_rules(&text, "test", &mut symbols, &prefixes()).expect("rules");
         let program = Program { equality: true, ..program };

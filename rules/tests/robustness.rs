@@ -1,4 +1,4 @@
-//! No input makes the readers panic, and what they read prints and reads back as the same value.
+//! Robustness: no input makes a parser panic, and parsed values are printed and parsed to the same values.
 
 use metaplan_rules::{Engine, Limits, Literal, Prefixes, Symbols, parse_rules, print_rules};
 use proptest::prelude::*;

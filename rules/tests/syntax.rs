@@ -1,4 +1,4 @@
-//! Rule text: what is read prints and reads back the same; what is wrong is reported with its position.
+//! Rule text: parsed rules are printed and parsed to the same rules, and errors have positions.
 
 use crate::text::{engine, prefixes};
 use metaplan_rules::{COADAPTATION_RULES, Symbols, TOMASYS_RULES, parse_rules, print_rules};
@@ -28,11 +28,12 @@ fn printed_rules_read_back_the_same() {
 }
 
 #[test]
-fn replaced_names_do_not_meet_those_of_the_author() {
+fn replacement_names_differ_from_existing_names() {
     let mut symbols = Symbols::new();
     let text = "p(?a, ?b) ^ q(?c) -> r(?b, ?c) .";
     let mut program = parse_rules(text, "test", &mut symbols, &prefixes()).expect("rules");
-    // The third has no spelling, and its number is the name of the second.
+    // The third variable has a name that the syntax cannot express, and its replacement is the name of the
+    // second.
     program.rules[0].variables = ["a", "_2", "c:::"].map(Into::into).to_vec();
     let printed = print_rules(&program, &symbols, &prefixes());
     let again = parse_rules(&printed, "test", &mut symbols, &prefixes()).expect(&printed);
@@ -43,7 +44,7 @@ fn replaced_names_do_not_meet_those_of_the_author() {
 }
 
 #[test]
-fn names_that_the_syntax_has_no_room_for_are_replaced() {
+fn names_that_the_syntax_cannot_express_are_replaced() {
     let mut symbols = Symbols::new();
     let text = "[a] p(?x, ?y) ^ q(?z) -> r(?x, ?y, ?z) .";
     let mut program = parse_rules(text, "test", &mut symbols, &prefixes()).expect("rules");
@@ -63,8 +64,8 @@ fn names_that_the_syntax_has_no_room_for_are_replaced() {
 
 fn check(rules: &str, expected: &[&str]) {
     let errors = engine(rules, "").expect_err(rules);
-    let shown: Vec<String> = errors.iter().map(ToString::to_string).collect();
-    assert_eq!(shown, expected);
+    let messages: Vec<String> = errors.iter().map(ToString::to_string).collect();
+    assert_eq!(messages, expected);
 }
 
 #[test]

@@ -1,25 +1,25 @@
-//! Literals by value, and built-ins on them.
+//! Literals as values, and built-ins on them.
 
 use crate::text::literal;
 use metaplan_rules::{BuiltIn, Literal};
 
-/// `=`: one value; `<`, `>`: ordered; `~`: compare equal, though in different value spaces; `#`: incomparable.
+/// Relations: `=` identical; `<` and `>` ordered; `~` equal in order but not identical; `#` incomparable.
 fn check(left: &str, relation: &str, right: &str) {
     let (a, b) = (literal(left), literal(right));
     let order = a.compare(&b);
-    let found = match order {
+    let actual = match order {
         Some(std::cmp::Ordering::Less) => "<",
         Some(std::cmp::Ordering::Greater) => ">",
         Some(std::cmp::Ordering::Equal) if a == b => "=",
         Some(std::cmp::Ordering::Equal) => "~",
         None => "#",
     };
-    assert_eq!(found, relation, "{left} {relation} {right}");
+    assert_eq!(actual, relation, "{left} {relation} {right}");
     assert_eq!(b.compare(&a), order.map(std::cmp::Ordering::reverse), "{left} {relation} {right}");
 }
 
 #[test]
-fn values_compare_as_xsd_says() {
+fn values_compare_as_defined_by_xsd() {
     for (left, relation, right) in [
         ("1.50", "=", "\"1.5\"^^xsd:decimal"),
         ("5", "=", "\"5.0\"^^xsd:decimal"),
@@ -119,7 +119,7 @@ fn values(arguments: &str) -> Vec<Literal> {
 }
 
 #[test]
-fn functions_compute() {
+fn functions_compute_results() {
     for (name, arguments, expected) in [
         ("add", "1.5 2 0.25", Some("3.75")),
         ("add", "0.1 0.2e0", Some("\"0.30000000000000004\"^^xsd:double")),
@@ -171,7 +171,7 @@ fn functions_compute() {
     }
 }
 
-/// Values written `kind:lexical`, where the kind is a date, time or duration type, or else as rule text.
+/// Parses a value written as `kind:lexical` for a date, time or duration, and otherwise as rule text.
 fn temporal(text: &str) -> Literal {
     let (kind, lexical) = text.split_once(':').unwrap_or(("", text));
     let datatype = match kind {
@@ -185,7 +185,7 @@ fn temporal(text: &str) -> Literal {
 }
 
 #[test]
-fn moments_and_durations_compute() {
+fn functions_of_moments_and_durations_compute_results() {
     for (name, arguments, expected) in [
         ("yearMonthDuration", "1 14", Some("p:P2Y2M")),
         ("dayTimeDuration", "1 2 3 4.5", Some("p:P1DT2H3M4.5S")),
@@ -253,7 +253,7 @@ fn moments_and_durations_compute() {
 }
 
 #[test]
-fn tests_hold_or_do_not() {
+fn tests_hold_or_fail() {
     for (name, arguments, expected) in [
         ("equal", "2 2e0", true),
         ("equal", "2 \"2\"", false),
@@ -318,7 +318,7 @@ fn value_spaces_contain_their_values() {
 }
 
 #[test]
-fn patterns_are_those_of_xpath() {
+fn patterns_have_the_syntax_of_xpath() {
     let matches = |text: &str, pattern: &str| {
         BuiltIn::Matches.holds(&[&Literal::string(text), &Literal::string(pattern)])
     };

@@ -1,4 +1,4 @@
-//! Transitive closure of a random graph: the number of paths, by each peer.
+//! Transitive closure of a random graph by each peer: computes the number of paths.
 
 use std::collections::HashMap;
 
@@ -10,7 +10,7 @@ use crate::Random;
 type Edge = (u32, u32);
 type Run = fn(&[Edge]) -> usize;
 
-/// The first is what the others are compared with.
+/// Implementations. Ratios refer to the first.
 pub const PEERS: [(&str, Run); 5] = [
     ("metaplan-rules", engine),
     ("hand-written worklist", worklist),
@@ -98,7 +98,7 @@ fn by_ascent(edges: &[Edge]) -> usize {
 fn by_datafrog(edges: &[Edge]) -> usize {
     let mut iteration = datafrog::Iteration::new();
     let edge: datafrog::Relation<Edge> = edges.iter().copied().collect();
-    // Paths by their end, so that they join edges by their start.
+    // Reversed paths, because datafrog joins on the first column.
     let path = iteration.variable::<Edge>("path");
     path.extend(edges.iter().map(|&(x, y)| (y, x)));
     while iteration.changed() {

@@ -1,14 +1,15 @@
-//! The engine beside its peers, in one run: transitive closure from scratch, and single updates of a status cascade.
+//! Comparison of the engine with its peers, in one run: transitive closure from scratch, and single updates
+//! of a status cascade.
 //!
-//! `cargo run --release` prints a table; times are medians, one thread each, those from scratch in processor time (Linux). The engine also records a derivation of
-//! every fact, which no peer does.
+//! `cargo run --release` prints a table. Times are medians on one thread. Times from scratch are processor
+//! time (Linux). The engine also records a derivation of every fact; no peer does.
 
 mod closure;
 mod updates;
 
 use std::time::Duration;
 
-/// A linear congruential generator: the same input in every run.
+/// A linear congruential generator with a fixed seed, so that every run has the same input.
 pub struct Random(pub u64);
 
 impl Random {
@@ -23,14 +24,14 @@ pub fn median(mut times: Vec<Duration>) -> Duration {
     times[times.len() / 2]
 }
 
-/// What this thread has used, so that other work on the machine does not count.
+/// Processor time of this thread, which excludes other load on the machine.
 fn processor_time() -> Duration {
     let statistics = std::fs::read_to_string("/proc/thread-self/schedstat").expect("Linux");
     let nanoseconds = statistics.split(' ').next().and_then(|field| field.parse().ok());
     Duration::from_nanos(nanoseconds.expect("nanoseconds on the processor"))
 }
 
-/// What the process holds in memory, as the kernel reports it, and the most it ever held.
+/// Resident memory of the process and its peak, as reported by the kernel.
 fn resident() -> String {
     let status = std::fs::read_to_string("/proc/self/status").expect("Linux");
     status

@@ -1,4 +1,4 @@
-//! A component fails or recovers: 31 facts change among some 50 facts per ten designs.
+//! Failure and recovery of a component. An update changes 31 of three facts per design.
 
 use std::time::{Duration, Instant};
 
@@ -14,7 +14,7 @@ const RULES: &str = r#"
     solvesO(?fg, ?o) ^ fg_status(?fg, "IN_ERROR_COMPONENT") -> o_status(?o, "IN_ERROR_COMPONENT") .
 "#;
 
-/// The engine over three facts for each design.
+/// Engine with three facts per design.
 pub fn build(designs: u32) -> Engine {
     let mut symbols = Symbols::new();
     let program = parse_rules(RULES, "status", &mut symbols, &Prefixes::new()).expect("rules");
@@ -31,7 +31,7 @@ pub fn build(designs: u32) -> Engine {
     Engine::new(symbols, program, facts).expect("safe rules")
 }
 
-/// The median time of one update.
+/// Median time of one update.
 pub fn engine(designs: u32) -> Duration {
     let mut engine = build(designs);
     let symbols = engine.symbols_mut();
@@ -49,7 +49,7 @@ pub fn engine(designs: u32) -> Duration {
     median(times.collect())
 }
 
-/// The median time of one update, flushed and probed.
+/// Median time of one update by differential dataflow, until the probe has reached the new time.
 pub fn differential(designs: u32) -> Duration {
     timely::execute_directly(move |worker| {
         let (mut requires, mut types, mut solves, mut failed, probe) =

@@ -1,4 +1,5 @@
-//! Individuals with several names: equality by representatives beside the rules of table 4 of OWL 2 RL.
+//! Individuals with several names: equality by representatives, compared with the rules of table 4 of OWL 2
+//! RL.
 
 use std::fmt::Write;
 use std::time::Instant;
@@ -9,28 +10,28 @@ use super::median;
 
 const RULES: &str = "linked(?x, ?y) ^ tagged(?y) -> near(?x) . linked(?x, ?y) -> linked(?y, ?x) .";
 
-/// Classes of so many names; each name is linked to the next class.
+/// 2,000 names in classes of the given size. Each name is linked to the next class.
 fn facts(symbols: &mut Symbols, names: usize) -> (Vec<Fact>, Fact) {
     let classes = 2000 / names;
     let mut facts = Vec::new();
-    let [linked, tagged, same] =
+    let [linked, tagged, same_as] =
         ["linked", "tagged", "http://www.w3.org/2002/07/owl#sameAs"].map(|n| symbols.name(n));
     for class in 0..classes {
         let mut name = |class: usize, number: usize| symbols.name(&format!("i{class}_{number}"));
         for number in 0..names {
             facts.push(Fact::new(linked, [name(class, number), name((class + 1) % classes, 0)]));
             if number > 0 {
-                facts.push(Fact::new(same, [name(class, 0), name(class, number)]));
+                facts.push(Fact::new(same_as, [name(class, 0), name(class, number)]));
             }
         }
         facts.push(Fact::new(tagged, [name(class, 0)]));
     }
-    let pair = Fact::new(same, [symbols.name("i3_0"), symbols.name("i3_1")]);
+    let pair = Fact::new(same_as, [symbols.name("i3_0"), symbols.name("i3_1")]);
     (facts, pair)
 }
 
-/// Equality as rules: an equivalence under which every relation is closed. In rule text `sameAs` is an atom of its own,
-/// so that a relation of another name stands for it.
+/// The program with equality as rules: an equivalence under which every relation is closed. In rule text,
+/// `sameAs` is a special atom, so a relation with another name represents it.
 fn by_rules(program: &Program, symbols: &mut Symbols) -> Program {
     let mut text = String::from(
         "same_as(?x, ?y) -> same_as(?y, ?x) .
@@ -46,7 +47,7 @@ fn by_rules(program: &Program, symbols: &mut Symbols) -> Program {
     Program { rules, ..program.clone() }
 }
 
-/// The times to build, to take a pair back and to state it again; how many facts hold.
+/// Times to build the engine, retract a pair and state it again, and the number of facts that hold.
 fn measure(names: usize, representatives: bool) -> ([f64; 3], usize) {
     let mut symbols = Symbols::new();
     let program = parse_rules(RULES, "bench", &mut symbols, &Prefixes::new()).expect("rules");
@@ -54,11 +55,11 @@ fn measure(names: usize, representatives: bool) -> ([f64; 3], usize) {
     let program = if representatives {
         program.with_equality(&mut symbols)
     } else {
-        let (same, relation) = (pair.predicate, symbols.name("same_as"));
+        let (same_as, relation) = (pair.predicate, symbols.name("same_as"));
         facts
             .iter_mut()
             .chain([&mut pair])
-            .filter(|f| f.predicate == same)
+            .filter(|f| f.predicate == same_as)
             .for_each(|f| f.predicate = relation);
         by_rules(&program, &mut symbols)
     };
@@ -76,20 +77,20 @@ fn measure(names: usize, representatives: bool) -> ([f64; 3], usize) {
     ([median(builds), median(deletes), median(inserts)], count)
 }
 
-/// The time of a run by the clock in seconds, and what it gives.
+/// Wall-clock time of a function in seconds, and its result.
 fn clocked<T>(run: impl FnOnce() -> T) -> (f64, T) {
     let start = Instant::now();
     let result = run();
     (start.elapsed().as_secs_f64(), result)
 }
 
-/// Prints both for classes of several sizes.
+/// Prints the times of both variants for classes of several sizes.
 pub(crate) fn compare() {
     println!("2,000 names in classes: representatives beside rules");
     for names in [2, 10, 100] {
         let (ours, count) = measure(names, true);
-        let (theirs, same) = measure(names, false);
-        assert_eq!(count, same);
+        let (theirs, theirs_count) = measure(names, false);
+        assert_eq!(count, theirs_count);
         print!("  classes of {names:3}, {count:7} facts hold:");
         for ((what, ours), theirs) in ["build", "retract a pair", "state it"].iter().zip(ours).zip(theirs) {
             print!(" {what} {:.3} / {:.3} ms, {:.1} times;", ours * 1e3, theirs * 1e3, theirs / ours);

@@ -1,8 +1,8 @@
-//! What the engine costs beside what it could cost, in one run: TOMASys rules from scratch beside a worklist written by
-//! hand for these rules, transitive closure, single updates of a small and a large knowledge base, and equality beside
-//! the rules that it stands for.
+//! Ratios between the engine and alternatives, in one run: TOMASys rules from scratch and a worklist
+//! written by hand for these rules; transitive closure; single updates of a small and a large knowledge
+//! base; equality by representatives and by rules.
 //!
-//! Times are processor time of the thread (Linux), so that other work on the machine counts for little.
+//! Times are processor time of the thread (Linux), so that other load on the machine has little influence.
 
 #![allow(clippy::print_stdout, reason = "a program whose result is what it prints")]
 
@@ -14,34 +14,34 @@ use std::time::Duration;
 
 use metaplan_rules::{Engine, Fact, Prefixes, Program, Symbols, parse_rules};
 
-/// A linear congruential generator: the same input in every run.
+/// A linear congruential generator with a fixed seed, so that every run has the same input.
 pub(crate) struct Random(u64);
 
 impl Random {
-    /// A number below a bound.
+    /// A number below the bound.
     pub(crate) fn below(&mut self, bound: u64) -> u64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 33) % bound
     }
 }
 
-/// What an engine is built from.
+/// Input of an engine: symbols, rules and stated facts.
 pub(crate) type Task = (Symbols, Program, Vec<Fact>);
 
-/// What this thread has used.
+/// Processor time of this thread.
 pub(crate) fn processor_time() -> Duration {
     let statistics = std::fs::read_to_string("/proc/thread-self/schedstat").expect("Linux");
     let nanoseconds = statistics.split(' ').next().and_then(|field| field.parse().ok());
     Duration::from_nanos(nanoseconds.expect("nanoseconds on the processor"))
 }
 
-/// The middle of several runs, in seconds.
+/// Median of several times, in seconds.
 pub(crate) fn median(mut times: Vec<f64>) -> f64 {
     times.sort_by(f64::total_cmp);
     times[times.len() / 2]
 }
 
-/// The processor time of a run in seconds, and what it gives.
+/// Processor time of a function in seconds, and its result.
 pub(crate) fn timed<T>(run: impl FnOnce() -> T) -> (f64, T) {
     let start = processor_time();
     let result = run();
@@ -68,9 +68,9 @@ fn main() {
         let (time, engine) = timed(|| Engine::new(symbols, program, facts).expect("safe rules"));
         ours.push(time);
         derived = engine.facts().count() - stated;
-        let (time, found) = timed(|| worklist::run(&task.0, &task.2));
+        let (time, count) = timed(|| worklist::run(&task.0, &task.2));
         theirs.push(time);
-        assert_eq!(found, derived, "the worklist derives the same");
+        assert_eq!(count, derived, "the worklist derives the same");
     }
     let (ours, theirs) = (median(ours), median(theirs));
     println!("TOMASys from scratch: {} facts stated, {derived} derived", task.2.len());

@@ -1,4 +1,4 @@
-//! A component fails and recovers, in a small and in a large knowledge base.
+//! Failure and recovery of a component, in a small and in a large knowledge base.
 
 use std::time::Instant;
 
@@ -8,7 +8,7 @@ use super::{median, worklist};
 
 const ROUNDS: usize = 2000;
 
-/// The median time of one update in seconds, and how many facts it changes.
+/// Median time of one update in seconds, number of changed facts, and number of stated facts.
 fn update(designs: u64) -> (f64, usize, usize) {
     let (mut symbols, program, facts) = worklist::knowledge_base(designs);
     let (stated, failed) = (facts.len(), symbols.literal(Literal::string("FALSE")));
@@ -27,11 +27,15 @@ fn update(designs: u64) -> (f64, usize, usize) {
     (median(times), changed, stated)
 }
 
-/// Prints both and their ratio.
+/// Prints both times and their ratio.
 pub(crate) fn compare() {
-    let ((small, changed, few), (large, same, many)) = (update(70), update(72_000));
-    assert_eq!(changed, same);
+    let ((small, changed, small_size), (large, large_changed, large_size)) = (update(70), update(72_000));
+    assert_eq!(changed, large_changed);
     println!("a component fails or recovers, {changed} facts change");
     let ratio = large / small;
-    println!("  {few} facts {:.1} us, {many} facts {:.1} us, ratio {ratio:.2}", small * 1e6, large * 1e6);
+    println!(
+        "  {small_size} facts {:.1} us, {large_size} facts {:.1} us, ratio {ratio:.2}",
+        small * 1e6,
+        large * 1e6
+    );
 }

@@ -1,5 +1,5 @@
-//! The rules of `tomasys.swrl` by hand: relations with just the hash indexes that they look up, and a worklist of what
-//! was concluded. Each conclusion is stored once; nothing else is recorded of it.
+//! Hand-written evaluation of `tomasys.swrl`: relations with only the needed hash indexes, and a worklist
+//! of derived facts. Each derived fact is stored once, without a record of its derivation.
 
 use metaplan_rules::{Fact, Literal, Prefixes, Symbol, Symbols, TOMASYS_RULES, parse_rules};
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -8,13 +8,13 @@ use super::{Random, Task};
 
 const TOMASYS: &str = "http://metacontrol.org/tomasys#";
 
-/// Sixteen facts for each design; every other component has failed.
+/// Knowledge base with sixteen facts per design. Every second component has failed.
 pub(crate) fn knowledge_base(designs: u64) -> Task {
     let mut symbols = Symbols::new();
     let program = parse_rules(TOMASYS_RULES, "tomasys", &mut symbols, &Prefixes::new()).expect("rules");
     let (mut facts, mut random) = (Vec::new(), Random(3));
     let failed = symbols.literal(Literal::string("FALSE"));
-    let less = symbols.literal(Literal::string("<"));
+    let less_than = symbols.literal(Literal::string("<"));
     for number in 0..designs {
         let tenth = number / 10;
         let (component, attribute) = (format!("c{tenth}"), format!("qa{}", number % 50));
@@ -51,7 +51,7 @@ pub(crate) fn knowledge_base(designs: u64) -> Task {
             state("c_status", &component, failed);
         }
         if number < 50 {
-            state("qa_comparison_operator", &attribute, less);
+            state("qa_comparison_operator", &attribute, less_than);
         }
         for subject in ["m#", "e#"] {
             let value = Literal::integer(random.below(1000) as i64);
@@ -63,7 +63,7 @@ pub(crate) fn knowledge_base(designs: u64) -> Task {
     (symbols, program, facts)
 }
 
-/// Rows by the value of one column, threaded through a vector: the store's own layout.
+/// Rows by the value of one column, as linked lists in a vector. This is the layout of the engine's store.
 #[derive(Default)]
 struct Index {
     heads: FxHashMap<Symbol, u32>,
@@ -79,15 +79,15 @@ impl Index {
     }
 
     fn rows(&self, key: Symbol) -> impl Iterator<Item = u32> {
-        let first = self.heads.get(&key).copied().filter(|&row| row != NONE);
-        std::iter::successors(first, |&row| Some(self.next[row as usize]).filter(|&row| row != NONE))
+        let head = self.heads.get(&key).copied().filter(|&row| row != NONE);
+        std::iter::successors(head, |&row| Some(self.next[row as usize]).filter(|&row| row != NONE))
     }
 }
 
-/// Pairs, by either side where that is looked up.
+/// A binary relation, with indexes on the columns that rules look up.
 #[derive(Default)]
 struct Pairs {
-    seen: FxHashSet<(Symbol, Symbol)>,
+    pairs: FxHashSet<(Symbol, Symbol)>,
     rows: Vec<(Symbol, Symbol)>,
     by_first: Option<Index>,
     by_second: Option<Index>,
@@ -95,7 +95,7 @@ struct Pairs {
 
 impl Pairs {
     fn insert(&mut self, first: Symbol, second: Symbol) -> bool {
-        let is_new = self.seen.insert((first, second));
+        let is_new = self.pairs.insert((first, second));
         if is_new {
             self.rows.push((first, second));
             if let Some(index) = &mut self.by_first {
@@ -119,7 +119,7 @@ impl Pairs {
     }
 }
 
-/// Which side of which relation the rules look up.
+/// Relations, with flags for an index on the first and on the second column.
 const INDEXES: [(&str, bool, bool); 19] = [
     ("requiresC", false, true),
     ("typeFD", true, true),
@@ -149,11 +149,11 @@ struct Run {
     derived: usize,
 }
 
-/// Stores the facts, derives what follows and returns how many facts that are.
+/// Stores the facts, derives all consequences and returns their number.
 pub(crate) fn run(symbols: &Symbols, facts: &[Fact]) -> usize {
     let mut symbols = symbols.clone();
-    let all = ["fd_realisability", "b_status", "cc_availability", "cspec_availability", "fd_error_log"];
-    let indexed = INDEXES.iter().copied().chain(all.map(|name| (name, false, false)));
+    let derived = ["fd_realisability", "b_status", "cc_availability", "cspec_availability", "fd_error_log"];
+    let indexed = INDEXES.iter().copied().chain(derived.map(|name| (name, false, false)));
     let mut run =
         Run { relations: FxHashMap::default(), names: FxHashMap::default(), open: Vec::new(), derived: 0 };
     for (name, first, second) in indexed {
@@ -194,10 +194,10 @@ impl Run {
     fn derive(&mut self, symbols: &mut Symbols) {
         let no = symbols.literal(Literal::Boolean(false));
         let yes = symbols.literal(Literal::Boolean(true));
-        let [failed, component, quality, function, less] =
+        let [failed, component, quality, function, less_than] =
             ["FALSE", "IN_ERROR_COMPONENT", "IN_ERROR_NFR", "IN_ERROR_FR", "<"]
                 .map(|text| symbols.literal(Literal::string(text)));
-        self.missed(symbols, less, quality);
+        self.missed(symbols, less_than, quality);
         let broken = [failed, no].map(|status| self.before("c_status", status)).concat();
         for broken in broken {
             for design in self.before("requiresC", broken) {
@@ -262,31 +262,31 @@ impl Run {
         }
     }
 
-    /// Groundings whose measured value is below the estimated one.
-    fn missed(&mut self, symbols: &Symbols, less: Symbol, quality: Symbol) {
+    /// Derives the status of groundings whose measured value is less than the estimated one.
+    fn missed(&mut self, symbols: &Symbols, less_than: Symbol, quality: Symbol) {
         let measured: Vec<(Symbol, Symbol)> = self.pairs("hasQAvalue").rows.clone();
         for (grounding, measurement) in measured {
-            let mut found = false;
+            let mut is_missed = false;
             for kind in self.pairs("isQAtype").after(measurement) {
-                if !self.pairs("qa_comparison_operator").after(kind).any(|sign| sign == less) {
+                if !self.pairs("qa_comparison_operator").after(kind).any(|sign| sign == less_than) {
                     continue;
                 }
                 for value in self.pairs("hasValue").after(measurement) {
                     for design in self.pairs("typeFD").after(grounding) {
                         for estimation in self.pairs("hasQAestimation").after(design) {
-                            let fits = self.pairs("isQAtype").seen.contains(&(estimation, kind));
+                            let fits = self.pairs("isQAtype").pairs.contains(&(estimation, kind));
                             let literal = |symbol| symbols.value(symbol).as_literal();
                             let is_less = |estimated: Symbol| {
                                 let order =
                                     literal(value).zip(literal(estimated)).and_then(|(a, b)| a.compare(b));
                                 order == Some(std::cmp::Ordering::Less)
                             };
-                            found |= fits && self.pairs("hasValue").after(estimation).any(is_less);
+                            is_missed |= fits && self.pairs("hasValue").after(estimation).any(is_less);
                         }
                     }
                 }
             }
-            if found {
+            if is_missed {
                 self.conclude("fg_status", grounding, quality);
             }
         }

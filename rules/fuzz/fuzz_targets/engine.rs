@@ -1,4 +1,5 @@
-//! Random programs under random scripts of changes, against naive evaluation from scratch.
+//! Fuzz target: random programs under random scripts of changes, compared with naive evaluation from
+//! scratch.
 
 #![no_main]
 

@@ -1,12 +1,13 @@
-//! Any text is rules or errors; what is read prints and reads back as the same rules; the engine takes or refuses it
-//! within its step budget.
+//! Fuzz target: any text gives rules or errors. Parsed rules are printed and parsed to the same rules. The
+//! engine accepts or rejects them within its step budget.
 
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
 use metaplan_rules::{Engine, Limits, Prefixes, Program, Symbols, parse_rules, print_rules};
 
-/// Rules without names of variables and labels, which the syntax cannot always spell.
+/// Heads and bodies of the rules, without variable names and labels, which the syntax cannot always
+/// express.
 fn bare(program: &Program) -> Vec<String> {
     program.rules.iter().map(|rule| format!("{:?} {:?}", rule.head, rule.body)).collect()
 }

@@ -24,11 +24,11 @@ impl BuiltIn {
             return None;
         }
         let all_parts: Vec<&Literal> =
-            parts.iter().zip(&canonical).map(|(known, canonical)| known.unwrap_or(canonical)).collect();
+            parts.iter().zip(&canonical).map(|(known, part)| known.unwrap_or(part)).collect();
         // Checks the known parts by composing the value again.
         let is_consistent = self.compute(&all_parts).is_some_and(|value| value == *whole);
         let unknown = parts.iter().zip(&canonical).filter(|(known, _)| known.is_none());
-        is_consistent.then(|| unknown.map(|(_, canonical)| canonical.clone()).collect())
+        is_consistent.then(|| unknown.map(|(_, part)| part.clone()).collect())
     }
 
     fn of_duration(self, duration: &Duration) -> Option<Vec<Literal>> {

@@ -66,7 +66,7 @@ built_ins! {
     OutsideDataRange "outsideDataRange" 2..=2 Test,
     /// Equal values.
     Equal "equal" 2..=2 Test,
-    /// Not equal values. Ill-typed literals are not tested.
+    /// Unequal values. Ill-typed literals are not tested.
     NotEqual "notEqual" 2..=2 Test,
     /// First < second.
     LessThan "lessThan" 2..=2 Test,

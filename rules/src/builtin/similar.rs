@@ -14,17 +14,15 @@ impl BuiltIn {
         let candidates: Vec<&'static str> = if iri.starts_with(SWRLB) {
             Self::ALL
                 .iter()
-                .filter(|candidates| Self::from_name(candidates.name()).is_some())
-                .map(|candidates| candidates.name())
+                .filter(|known| Self::from_name(known.name()).is_some())
+                .map(|known| known.name())
                 .collect()
         } else {
             library::names_in_library(iri)
         };
         // Optimal string alignment distance: transposed neighbours count as one difference.
-        let similar_names =
-            candidates.into_iter().map(|name| (strsim::osa_distance(&written, &local(name)), name));
-        let similar_names =
-            similar_names.filter(|(distance, _)| length > 1 && *distance <= (length / 3).clamp(1, 3));
-        similar_names.min_by_key(|(distance, _)| *distance).map(|(_, name)| name)
+        let scored = candidates.into_iter().map(|name| (strsim::osa_distance(&written, &local(name)), name));
+        let scored = scored.filter(|(distance, _)| length > 1 && *distance <= (length / 3).clamp(1, 3));
+        scored.min_by_key(|(distance, _)| *distance).map(|(_, name)| name)
     }
 }

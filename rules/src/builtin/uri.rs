@@ -33,7 +33,7 @@ fn compose(components: &[String]) -> Option<String> {
     let (scheme, query, fragment) = (mark("", scheme, ":"), mark("?", query, ""), mark("#", fragment, ""));
     let text = format!("{scheme}{authority}{path}{query}{fragment}");
     let parsed = parts(&text)?;
-    parsed.iter().zip(components).all(|(parsed, components)| parsed.lexical() == *components).then_some(text)
+    parsed.iter().zip(components).all(|(parsed, component)| parsed.lexical() == *component).then_some(text)
 }
 
 /// Splits a reference into scheme, host, port, path, query and fragment. `None` for an invalid reference,

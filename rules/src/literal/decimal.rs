@@ -50,14 +50,11 @@ impl Decimal {
             _ => (false, mantissa),
         };
         let (whole, fraction) = digits.split_once('.').unwrap_or((digits, ""));
-        let all_digits = format!("{whole}{fraction}");
-        if all_digits.is_empty()
-            || !all_digits.bytes().all(|b| b.is_ascii_digit())
-            || exponent.abs() > MAX_EXPONENT
-        {
+        let text = format!("{whole}{fraction}");
+        if text.is_empty() || !text.bytes().all(|b| b.is_ascii_digit()) || exponent.abs() > MAX_EXPONENT {
             return None;
         }
-        let magnitude: BigInt = all_digits.parse().ok()?;
+        let magnitude: BigInt = text.parse().ok()?;
         let unscaled = if negative { -magnitude } else { magnitude };
         Some(Self::from_exponent(unscaled, exponent - i64::try_from(fraction.len()).ok()?))
     }
@@ -231,7 +228,7 @@ mod tests {
 
     /// The fast path gives the same representation as the general path.
     #[test]
-    fn few_digits_are_the_nearest_decimal() {
+    fn short_conversion_equals_general_conversion() {
         let mut values = vec![(i64::MAX, 1), (i64::MIN, 1), (i64::MAX, 10), (1, i64::MAX), (0, 7), (100, 1)];
         values
             .extend((-60..60).flat_map(|numerator| (1..70).map(move |denominator| (numerator, denominator))));

@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn two_values_or_one_or_undecided() {
+    fn differences_are_certain_or_undecided() {
         // 1: equal; 2: different; 0: undecided.
         for (left, right, expected) in [
             ("1.0^decimal", "1^integer", 1),
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn in_a_datatype_or_outside_or_undecided() {
+    fn membership_is_certain_or_undecided() {
         for (literal, datatype, expected) in [
             ("1^own", "decimal", None),
             ("1^decimal", "own", None),

@@ -111,7 +111,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn values_of_several_datatypes_in_another() {
+    fn intersections_of_datatypes_are_subsumed() {
         for (datatypes, by, expected) in [
             ("byte", "short", true),
             ("short", "byte", false),

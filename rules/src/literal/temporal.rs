@@ -14,7 +14,8 @@ use super::decimal::{Decimal, ten_to};
 use num_bigint::BigInt;
 use num_traits::Zero;
 
-const SECONDS_PER_DAY: i64 = 86_400;
+/// Seconds per day.
+const DAY: i64 = 86_400;
 /// Largest offset of a time zone from UTC, in seconds.
 const ZONE_LIMIT: i64 = 14 * 3600;
 
@@ -64,10 +65,10 @@ impl Moment {
         let mut clock = time.map_or(Some(Decimal::from(0)), parse_clock)?;
         // A time of day has only one midnight: 24:00:00 is 00:00:00 (XML Schema 1.1, part 2, section
         // 3.3.8).
-        if kind == MomentKind::Time && clock == Decimal::from(SECONDS_PER_DAY) {
+        if kind == MomentKind::Time && clock == Decimal::from(DAY) {
             clock = Decimal::from(0);
         }
-        let offset = days.checked_mul(SECONDS_PER_DAY)?.checked_sub(zone.unwrap_or(0))?;
+        let offset = days.checked_mul(DAY)?.checked_sub(zone.unwrap_or(0))?;
         Some(Self { kind, seconds: add_seconds(&clock, offset), zone })
     }
 
@@ -97,12 +98,12 @@ impl Moment {
         };
         let date = (1..=date).rev().find(fits)?;
         let shift = days_from_civil(year, month, date) - day;
-        let seconds = add(&add_seconds(&local, shift.checked_mul(SECONDS_PER_DAY)?), &duration.seconds);
+        let seconds = add(&add_seconds(&local, shift.checked_mul(DAY)?), &duration.seconds);
         let (day, _) = split_day(&seconds);
         let seconds = match self.kind {
             MomentKind::DateTime => seconds,
-            MomentKind::Date => Decimal::from(day * SECONDS_PER_DAY),
-            MomentKind::Time => add_seconds(&seconds, -day * SECONDS_PER_DAY),
+            MomentKind::Date => Decimal::from(day * DAY),
+            MomentKind::Time => add_seconds(&seconds, -day * DAY),
         };
         let seconds = add_seconds(&seconds, -self.zone.unwrap_or(0));
         Some(Self { kind: self.kind, seconds, zone: self.zone })
@@ -232,7 +233,7 @@ impl Duration {
         }
         let months = years.checked_mul(12)?.checked_add(months)?;
         let whole = days
-            .checked_mul(SECONDS_PER_DAY)?
+            .checked_mul(DAY)?
             .checked_add(hours.checked_mul(3600)?)?
             .checked_add(minutes.checked_mul(60)?)?;
         let seconds = add_seconds(&seconds, whole);
@@ -272,12 +273,7 @@ impl Duration {
         let unit = ten_to(scale);
         let whole = i64::try_from(&unscaled / &unit).ok()?;
         let fraction = Decimal::new(unscaled % unit, scale);
-        Some((
-            whole / SECONDS_PER_DAY,
-            whole % SECONDS_PER_DAY / 3600,
-            whole % 3600 / 60,
-            add_seconds(&fraction, whole % 60),
-        ))
+        Some((whole / DAY, whole % DAY / 3600, whole % 3600 / 60, add_seconds(&fraction, whole % 60)))
     }
 
     /// Returns the duration with the opposite sign. `None` on overflow.
@@ -400,8 +396,7 @@ fn parse_clock(text: &str) -> Option<Decimal> {
         return None;
     }
     let value = add_seconds(&Decimal::parse(seconds)?, hours * 3600 + minutes * 60);
-    (value <= Decimal::from(SECONDS_PER_DAY) && (hours < 24 || value == Decimal::from(SECONDS_PER_DAY)))
-        .then_some(value)
+    (value <= Decimal::from(DAY) && (hours < 24 || value == Decimal::from(DAY))).then_some(value)
 }
 
 /// Parses `-?yyyy-mm-dd` to days since 1970-01-01.
@@ -448,12 +443,12 @@ fn split_day(seconds: &Decimal) -> (i64, String) {
         fraction += &unit;
     }
     let whole = i64::try_from(whole).unwrap_or(0);
-    let clock = whole.rem_euclid(SECONDS_PER_DAY);
+    let clock = whole.rem_euclid(DAY);
     let tail = if scale == 0 {
         String::new()
     } else {
         format!(".{:0>width$}", fraction.to_string(), width = scale as usize)
     };
     let text = format!("{:02}:{:02}:{:02}{tail}", clock / 3600, clock / 60 % 60, clock % 60);
-    (whole.div_euclid(SECONDS_PER_DAY), text)
+    (whole.div_euclid(DAY), text)
 }

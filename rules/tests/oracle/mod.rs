@@ -1,5 +1,5 @@
-//! The oracle: naive evaluation of a program, round by round from scratch, sharing nothing with the engine but the
-//! meaning of single built-ins.
+//! Oracle: naive evaluation of a program from scratch, round by round. It shares only the evaluation of
+//! single built-ins with the engine.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,11 +7,11 @@ use metaplan_rules::{
     Aggregate, Atom, BuiltIn, Fact, Literal, Program, Rule, Symbol, Symbols, Term, Variable,
 };
 
-/// Values of variables.
+/// Values of the variables of a rule.
 pub type Binding = BTreeMap<Variable, Symbol>;
 
-/// Everything that follows, given the level of each predicate: rules run level by level, so that what a rule negates
-/// is complete. `close` adds what follows by other means than rules.
+/// Computes all facts that hold. `level` is the stratum of a predicate. Rules run level by level, so that
+/// negated predicates are complete. `close` adds the consequences of equality.
 pub fn naive(
     program: &Program,
     symbols: &mut Symbols,
@@ -24,10 +24,10 @@ pub fn naive(
     let heads = program.rules.iter().flat_map(|rule| rule.head.iter().map(move |head| (rule, head)));
     let heads: Vec<(usize, &Rule, &Atom)> =
         heads.map(|(rule, head)| (level(predicate(head)), rule, head)).collect();
-    for wanted in heads.iter().map(|&(level, ..)| level).collect::<BTreeSet<_>>() {
+    for current in heads.iter().map(|&(level, ..)| level).collect::<BTreeSet<_>>() {
         loop {
             let mut new = BTreeSet::new();
-            for (_, rule, head) in heads.iter().filter(|(level, ..)| *level == wanted) {
+            for (_, rule, head) in heads.iter().filter(|(level, ..)| *level == current) {
                 new.extend(matches(rule, symbols, &facts).iter().map(|binding| ground(head, binding)));
             }
             let before = facts.len();
@@ -43,26 +43,26 @@ pub fn naive(
 
 const SAME_AS: &str = "http://www.w3.org/2002/07/owl#sameAs";
 
-/// The classes of names that pairs of names relate; literals are never one with anything.
+/// Equality classes of names, from the pairs among the facts. Literals are never equal to anything else.
 fn classes(symbols: &Symbols, facts: &BTreeSet<Fact>) -> Vec<BTreeSet<Symbol>> {
     let mut classes: Vec<BTreeSet<Symbol>> = Vec::new();
-    let Some(same) = symbols.find_name(SAME_AS) else { return classes };
-    for fact in facts.iter().filter(|fact| is_pair(fact, same, symbols)) {
-        let (mut joined, others): (Vec<_>, Vec<_>) =
+    let Some(same_as) = symbols.find_name(SAME_AS) else { return classes };
+    for fact in facts.iter().filter(|fact| is_pair(fact, same_as, symbols)) {
+        let (mut joined, other_classes): (Vec<_>, Vec<_>) =
             classes.into_iter().partition(|class| fact.arguments.iter().any(|symbol| class.contains(symbol)));
         joined.push(fact.arguments.iter().copied().collect());
-        classes = others;
+        classes = other_classes;
         classes.push(joined.into_iter().flatten().collect());
     }
     classes
 }
 
-fn is_pair(fact: &Fact, same: Symbol, symbols: &Symbols) -> bool {
+fn is_pair(fact: &Fact, same_as: Symbol, symbols: &Symbols) -> bool {
     let is_name = |&symbol: &Symbol| symbols.value(symbol).as_name().is_some();
-    fact.predicate == same && fact.arguments.iter().all(is_name)
+    fact.predicate == same_as && fact.arguments.iter().all(is_name)
 }
 
-/// The first name of each name's class.
+/// Maps each name to the first name of its class.
 pub fn representatives(symbols: &Symbols, facts: &BTreeSet<Fact>) -> BTreeMap<Symbol, Symbol> {
     let classes = classes(symbols, facts);
     let first = |class: &BTreeSet<Symbol>| *class.first().expect("a name");
@@ -72,21 +72,21 @@ pub fn representatives(symbols: &Symbols, facts: &BTreeSet<Fact>) -> BTreeMap<Sy
         .collect()
 }
 
-/// The binding of representatives.
+/// Replaces the values of a binding by representatives.
 pub fn normal(binding: &Binding, representatives: &BTreeMap<Symbol, Symbol>) -> Binding {
     let find = |symbol| representatives.get(&symbol).copied().unwrap_or(symbol);
     binding.iter().map(|(&variable, &symbol)| (variable, find(symbol))).collect()
 }
 
-/// Whether a fact relates a symbol to itself by equality.
+/// Returns `true` if a fact relates a symbol to itself by equality.
 pub fn is_reflexive(symbols: &Symbols, fact: &Fact) -> bool {
     symbols.find_name(SAME_AS) == Some(fact.predicate) && fact.arguments[0] == fact.arguments[1]
 }
 
-/// Closes facts under equality: puts each member of a class in the place of each other. Pairs relate all members of a
-/// class; a name without others is related to itself only where that is stated.
+/// Closes facts under equality: replaces each name by all members of its class. Pairs relate all members of
+/// a class. The pair of a name without other names with itself holds only if it is stated.
 pub fn close_under_equality(symbols: &Symbols, stated: &BTreeSet<Fact>, facts: &mut BTreeSet<Fact>) {
-    let Some(same) = symbols.find_name(SAME_AS) else { return };
+    let Some(same_as) = symbols.find_name(SAME_AS) else { return };
     facts.retain(|fact| !is_reflexive(symbols, fact) || stated.contains(fact));
     let classes = classes(symbols, facts);
     let class_of = |symbol: Symbol| {
@@ -94,22 +94,22 @@ pub fn close_under_equality(symbols: &Symbols, stated: &BTreeSet<Fact>, facts: &
         class.map_or_else(|| vec![symbol], |class| class.iter().copied().collect())
     };
     let mut closed = BTreeSet::new();
-    for fact in facts.iter().filter(|fact| !is_pair(fact, same, symbols)) {
+    for fact in facts.iter().filter(|fact| !is_pair(fact, same_as, symbols)) {
         let mut rows = vec![Vec::new()];
         for &symbol in &fact.arguments {
             let members = class_of(symbol);
-            let longer = |row: &Vec<Symbol>| {
+            let extend_row = |row: &Vec<Symbol>| {
                 let row = row.clone();
                 members.iter().map(move |&member| [row.as_slice(), &[member]].concat()).collect::<Vec<_>>()
             };
-            rows = rows.iter().flat_map(longer).collect();
+            rows = rows.iter().flat_map(extend_row).collect();
         }
         closed.extend(rows.into_iter().map(|row| Fact::new(fact.predicate, row)));
     }
     for class in &classes {
         let pairs = class.iter().flat_map(|&a| class.iter().map(move |&b| [a, b]));
         let pairs = pairs.filter(|_| class.len() > 1);
-        closed.extend(pairs.map(|pair| Fact::new(same, pair)));
+        closed.extend(pairs.map(|pair| Fact::new(same_as, pair)));
     }
     facts.append(&mut closed);
 }
@@ -121,7 +121,7 @@ fn predicate(atom: &Atom) -> Symbol {
     }
 }
 
-/// A relation or negated atom under a binding of all its variables.
+/// Instance of a relation atom or negated atom under a binding of all its variables.
 pub fn ground(atom: &Atom, binding: &Binding) -> Fact {
     Fact::new(predicate(atom), atom.terms().into_iter().map(|term| value(term, binding).expect("bound")))
 }
@@ -133,7 +133,7 @@ pub fn value(term: Term, binding: &Binding) -> Option<Symbol> {
     }
 }
 
-/// All matches of a body: relations first in textual order, then the rest as soon as it is bound.
+/// All matches of a body: relation atoms in textual order, then the other atoms as soon as they are bound.
 pub fn matches(rule: &Rule, symbols: &mut Symbols, facts: &BTreeSet<Fact>) -> BTreeSet<Binding> {
     extensions(&rule.body, Binding::new(), symbols, facts)
 }
@@ -149,13 +149,16 @@ fn extensions(
     for atom in body.iter().filter(|atom| matches!(atom, Atom::Relation { .. })) {
         partial = partial.iter().flat_map(|binding| extend(atom, binding, facts)).collect();
     }
-    let mut rest: Vec<&Atom> = body.iter().filter(|atom| !matches!(atom, Atom::Relation { .. })).collect();
-    while !rest.is_empty() {
-        let known = |atom: &Atom, binding: &Binding| {
+    let mut remaining: Vec<&Atom> =
+        body.iter().filter(|atom| !matches!(atom, Atom::Relation { .. })).collect();
+    while !remaining.is_empty() {
+        let is_ready = |atom: &Atom, binding: &Binding| {
             if let Atom::Aggregate { .. } = atom {
                 let outside = outside(body, atom);
-                let own = atom.terms()[1..].to_vec();
-                return own.iter().all(|term| !outside.contains(term) || value(*term, binding).is_some());
+                let inner_terms = atom.terms()[1..].to_vec();
+                return inner_terms
+                    .iter()
+                    .all(|term| !outside.contains(term) || value(*term, binding).is_some());
             }
             let unbound = atom.terms().iter().filter(|&&term| value(term, binding).is_none()).count();
             let binds = match atom {
@@ -168,8 +171,8 @@ fn extensions(
             unbound <= binds
         };
         let Some(example) = partial.first() else { return BTreeSet::new() };
-        let ready = rest.iter().position(|atom| known(atom, example)).expect("a safe rule");
-        let atom = rest.remove(ready);
+        let index = remaining.iter().position(|atom| is_ready(atom, example)).expect("a safe rule");
+        let atom = remaining.remove(index);
         let outside = outside(body, atom);
         let pass = |binding| filter(atom, binding, symbols, facts, &outside);
         partial = partial.into_iter().filter_map(pass).collect();
@@ -184,11 +187,11 @@ fn extend(atom: &Atom, binding: &Binding, facts: &BTreeSet<Fact>) -> Vec<Binding
         .take_while(|fact| fact.predicate == predicate(atom))
         .filter(|fact| fact.arguments.len() == terms.len());
     rows.filter_map(|fact| {
-        let mut longer = binding.clone();
+        let mut extended = binding.clone();
         for (&term, &symbol) in terms.iter().zip(&fact.arguments) {
             match term {
                 Term::Variable(variable) => {
-                    if *longer.entry(variable).or_insert(symbol) != symbol {
+                    if *extended.entry(variable).or_insert(symbol) != symbol {
                         return None;
                     }
                 }
@@ -196,22 +199,22 @@ fn extend(atom: &Atom, binding: &Binding, facts: &BTreeSet<Fact>) -> Vec<Binding
                 Term::Constant(_) => {}
             }
         }
-        Some(longer)
+        Some(extended)
     })
     .collect()
 }
 
-/// The terms of a body's atoms, of other aggregates only the result.
+/// Terms of a body's atoms. Other aggregates contribute only their results.
 fn outside(body: &[Atom], aggregate: &Atom) -> BTreeSet<Term> {
-    let others = body.iter().filter(|&other| !std::ptr::eq(other, aggregate));
-    let visible = others.flat_map(|other| match other {
+    let other_atoms = body.iter().filter(|&other| !std::ptr::eq(other, aggregate));
+    let visible = other_atoms.flat_map(|other| match other {
         Atom::Aggregate { result, .. } => vec![*result],
         other => other.terms(),
     });
     visible.collect()
 }
 
-/// What an aggregate comes to under a binding of its group, over integers.
+/// Value of an aggregate of integers under a binding of its group.
 pub fn aggregate(
     atom: &Atom,
     binding: &Binding,
@@ -222,12 +225,13 @@ pub fn aggregate(
     let Atom::Aggregate { aggregate, body, .. } = atom else { panic!("{atom:?} is not an aggregate") };
     let mut group = binding.clone();
     group.retain(|variable, _| outside.contains(&Term::Variable(*variable)));
-    let found = extensions(body, group, symbols, facts);
+    let matches = extensions(body, group, symbols, facts);
     let representatives = representatives(symbols, facts);
-    let found: BTreeSet<Binding> = found.iter().map(|binding| normal(binding, &representatives)).collect();
-    let values = found.iter().map(|binding| literal(aggregate.value()?, binding, symbols)?.as_rational());
+    let matches: BTreeSet<Binding> =
+        matches.iter().map(|binding| normal(binding, &representatives)).collect();
+    let values = matches.iter().map(|binding| literal(aggregate.value()?, binding, symbols)?.as_rational());
     if let Aggregate::Count = aggregate {
-        return Some(Literal::integer(found.len() as i64));
+        return Some(Literal::integer(matches.len() as i64));
     }
     let values: Vec<_> = values.collect::<Option<_>>()?;
     let result = match aggregate {
@@ -247,11 +251,11 @@ fn filter(
 ) -> Option<Binding> {
     match atom {
         Atom::Aggregate { result, .. } => {
-            let found = aggregate(atom, &binding, symbols, facts, outside)?;
-            let found = symbols.literal(found);
+            let result_value = aggregate(atom, &binding, symbols, facts, outside)?;
+            let result_value = symbols.literal(result_value);
             match value(*result, &binding) {
-                Some(wanted) => (wanted == found).then_some(binding),
-                None => bind(*result, found, binding),
+                Some(expected) => (expected == result_value).then_some(binding),
+                None => bind(*result, result_value, binding),
             }
         }
         Atom::Not { .. } => (!facts.contains(&ground(atom, &binding))).then_some(binding),
@@ -261,8 +265,8 @@ fn filter(
                 let find = |symbol| names.get(&symbol).copied().unwrap_or(symbol);
                 (find(a) == find(b)).then_some(binding)
             }
-            (Some(known), None) => bind(*right, known, binding),
-            (None, Some(known)) => bind(*left, known, binding),
+            (Some(symbol), None) => bind(*right, symbol, binding),
+            (None, Some(symbol)) => bind(*left, symbol, binding),
             (None, None) => panic!("an unsafe equality"),
         },
         Atom::Different(left, right) => {
@@ -287,7 +291,7 @@ fn bind(term: Term, symbol: Symbol, mut binding: Binding) -> Option<Binding> {
     Some(binding)
 }
 
-/// Whether a built-in holds of bound arguments.
+/// Returns `true` if a built-in holds for bound arguments.
 pub fn holds(built_in: BuiltIn, arguments: &[Term], binding: &Binding, symbols: &Symbols) -> bool {
     let values: Option<Vec<&Literal>> =
         arguments.iter().map(|&term| literal(term, binding, symbols)).collect();

@@ -1,5 +1,5 @@
-//! A random program, and a random script of changes: after every step the engine holds exactly what naive evaluation
-//! derives from scratch, reports exactly the difference, and can prove every fact.
+//! Random programs under random scripts of changes. After every step, the engine holds exactly the facts of
+//! naive evaluation from scratch, reports exactly the difference, and can prove every fact.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,25 +15,25 @@ use crate::oracle::{
 };
 
 const PREDICATES: u8 = 9;
-/// Predicates of one level, with one, two and three arguments.
+/// Number of predicates per level, with one, two and three arguments.
 const PER_LEVEL: u8 = 3;
-/// The predicate that is `owl:sameAs` in scripts with equality.
+/// Number of the predicate that is `owl:sameAs` in scripts with equality.
 const EQUALITY: u8 = 1;
 const SAME_AS: &str = "http://www.w3.org/2002/07/owl#sameAs";
-/// The predicate that is `owl:differentFrom` in scripts with equality.
+/// Number of the predicate that is `owl:differentFrom` in scripts with equality.
 const DIFFERENCE: u8 = 4;
 const DIFFERENT_FROM: &str = "http://www.w3.org/2002/07/owl#differentFrom";
 const VARIABLES: u8 = 4;
 const CONSTANTS: u8 = 4;
-/// Which predicates changes and heads take: few, so that conclusions meet.
+/// Predicates of changes and of heads. There are few, so that different conclusions interact.
 const CHANGED: [u8; 16] = [0, 0, 0, 0, 1, 1, 1, 1, 0, 1, 2, 3, 3, 4, 6, 7];
 const CONCLUDED: [u8; 9] = [0, 1, 2, 3, 3, 4, 4, 6, 7];
 
-/// An atom before it is made safe: kind, predicate, arguments.
+/// An unprocessed random atom: kind, predicate, arguments.
 pub type RawAtom = (u8, u8, [u8; 3]);
-/// A rule before it is made safe: head predicates and arguments, body.
+/// An unprocessed random rule: head predicates and arguments, body.
 pub type RawRule = (Vec<(u8, [u8; 3])>, Vec<RawAtom>);
-/// A change: whether it inserts, predicate, arguments.
+/// A random change: insertion flag, predicate, arguments.
 pub type RawChange = (bool, u8, [u8; 3]);
 
 fn arity(predicate: u8) -> usize {
@@ -68,7 +68,7 @@ impl World {
     fn level(&self, predicate: Symbol) -> usize {
         self.predicates
             .iter()
-            .position(|&known| known == predicate)
+            .position(|&candidate| candidate == predicate)
             .map_or(0, |position| position / usize::from(PER_LEVEL))
     }
 
@@ -91,7 +91,8 @@ impl World {
         Atom::relation(self.predicates[usize::from(predicate)], arguments)
     }
 
-    /// Levels make negation stratified; terms that nothing binds become constants.
+    /// Creates a safe, stratified rule from random numbers. Negated predicates have a lower level than the
+    /// heads. Unbound variables become constants.
     fn rule(&self, position: usize, raw: &RawRule) -> Rule {
         let (heads, body) = raw;
         let constraint = heads[0].0 % 9 == 8;
@@ -121,7 +122,7 @@ impl World {
                     built_in: if p % 2 == 0 { BuiltIn::LessThan } else { BuiltIn::NotEqual },
                     arguments: vec![left, right],
                 }),
-                // Under equality that asks for a relation of level 1.
+                // Under equality, `differentFrom` is a relation of level 1.
                 8 if p % 2 == 0 && self.equality && level == 0 => {}
                 8 if p % 2 == 0 => atoms.push(Atom::Different(left, right)),
                 8 => {
@@ -142,11 +143,11 @@ impl World {
                 }
                 11 | 12 if level > 0 => {
                     let result = Term::Variable(Variable(u16::from(VARIABLES + c % 2)));
-                    // What is asked of outside must lie below, too.
+                    // Outer atoms that bind variables of an aggregate must have a lower level, too.
                     let differs = self.equality && level == 1 && body.iter().any(|(kind, ..)| kind % 13 == 8);
                     let below = !differs && atoms.iter().all(|atom| self.is_below(atom, level));
-                    let outside = if below { bound.clone() } else { BTreeSet::new() };
-                    atoms.push(self.aggregate(result, (kind / 13, p, [a, b, c]), level, &outside));
+                    let outer_variables = if below { bound.clone() } else { BTreeSet::new() };
+                    atoms.push(self.aggregate(result, (kind / 13, p, [a, b, c]), level, &outer_variables));
                     bound.insert(result);
                 }
                 _ => {}
@@ -170,17 +171,19 @@ impl World {
         Term::Constant(self.symbols.find_literal(&Literal::Uri(iri.into())).expect("interned"))
     }
 
-    /// An aggregate over one or two atoms of lower levels; the second may ask for variables bound outside.
+    /// Creates an aggregate over one or two atoms of lower levels. The second may contain variables that
+    /// are bound outside.
     fn aggregate(&self, result: Term, (way, p, numbers): RawAtom, level: u8, bound: &BTreeSet<Term>) -> Atom {
         let below = PER_LEVEL * level;
         let first = self.relation(p % below, &numbers);
         let terms = first.terms();
         let value = terms[usize::from(way) % terms.len()];
-        let outside = bound.iter().nth(usize::from(p) % bound.len().max(1)).copied().unwrap_or(terms[0]);
+        let outer_variable =
+            bound.iter().nth(usize::from(p) % bound.len().max(1)).copied().unwrap_or(terms[0]);
         let second = match way / 4 % 5 {
             0 => Some(self.relation((p / 3) % below, &[numbers[2], numbers[1], numbers[0]])),
             1 => Some(Atom::Not { predicate: self.predicates[0], arguments: vec![value] }),
-            2 => Some(Atom::BuiltIn { built_in: BuiltIn::LessThan, arguments: vec![value, outside] }),
+            2 => Some(Atom::BuiltIn { built_in: BuiltIn::LessThan, arguments: vec![value, outer_variable] }),
             _ => None,
         };
         let aggregate = match way % 4 {
@@ -201,11 +204,11 @@ impl World {
     }
 }
 
-/// The first step follows from its supports by its rule, and no fact supports itself. The other steps are first in
-/// derivations of their own.
+/// Checks that the first step follows from its supports by its rule, and that no fact supports itself. The
+/// other steps are the first steps of their own derivations.
 fn check_derivation(engine: &Engine, derivation: &Derivation, facts: &BTreeSet<Fact>) {
     let mut supported = vec![false; derivation.steps.len()];
-    // Supports are settled in as many passes as the longest chain; a circle never is.
+    // The number of passes is at most the length of the longest chain. A circle is never resolved.
     for _ in 0..derivation.steps.len() {
         for (position, step) in derivation.steps.iter().enumerate() {
             supported[position] |= match &step.reason {
@@ -223,7 +226,8 @@ fn check_derivation(engine: &Engine, derivation: &Derivation, facts: &BTreeSet<F
     let names = representatives(engine.symbols(), facts);
     let find = |symbol: Symbol| names.get(&symbol).copied().unwrap_or(symbol);
     if let Reason::Equality { supports } = &derivation.steps[0].reason {
-        let supporting: Vec<&Fact> = supports.iter().map(|&at| &derivation.steps[at].fact).collect();
+        let supporting: Vec<&Fact> =
+            supports.iter().map(|&support| &derivation.steps[support].fact).collect();
         check_equality(engine, &derivation.steps[0].fact, &supporting);
     }
     for step in &derivation.steps[..1] {
@@ -247,7 +251,8 @@ fn check_derivation(engine: &Engine, derivation: &Derivation, facts: &BTreeSet<F
             });
             atoms.map(|atom| ground(atom, &values)).collect::<Vec<_>>()
         };
-        let supporting: Vec<Fact> = supports.iter().map(|&at| derivation.steps[at].fact.clone()).collect();
+        let supporting: Vec<Fact> =
+            supports.iter().map(|&support| derivation.steps[support].fact.clone()).collect();
         assert_eq!(body(false), supporting);
         assert_eq!(&body(true), absent);
         assert!(absent.iter().all(|fact| !engine.holds(fact)));
@@ -260,14 +265,14 @@ fn check_derivation(engine: &Engine, derivation: &Derivation, facts: &BTreeSet<F
                 }
                 Atom::Different(left, right) => value(*left, &values) != value(*right, &values),
                 Atom::Aggregate { aggregate, result, .. } => {
-                    let found = aggregates.next().expect("one for each");
-                    let known: BTreeSet<Term> = values.keys().map(|&variable| variable.into()).collect();
+                    let aggregated = aggregates.next().expect("one for each");
+                    let bound: BTreeSet<Term> = values.keys().map(|&variable| variable.into()).collect();
                     let mut symbols = engine.symbols().clone();
-                    let expected = oracle::aggregate(atom, &values, &mut symbols, facts, &known);
-                    value(*result, &values) == Some(found.result)
-                        && expected.as_ref() == engine.symbols().value(found.result).as_literal()
+                    let expected = oracle::aggregate(atom, &values, &mut symbols, facts, &bound);
+                    value(*result, &values) == Some(aggregated.result)
+                        && expected.as_ref() == engine.symbols().value(aggregated.result).as_literal()
                         && (*aggregate != Aggregate::Count
-                            || expected == Some(Literal::integer(found.matches.len() as i64)))
+                            || expected == Some(Literal::integer(aggregated.matches.len() as i64)))
                 }
                 Atom::Relation { .. } | Atom::Not { .. } => true,
             });
@@ -275,17 +280,18 @@ fn check_derivation(engine: &Engine, derivation: &Derivation, facts: &BTreeSet<F
     }
 }
 
-/// A fact follows from the same fact about other names, or a pair of names from pairs between them.
+/// Checks that a fact follows from the corresponding fact about other names, or a pair of names from a path
+/// of pairs.
 fn check_equality(engine: &Engine, fact: &Fact, supporting: &[&Fact]) {
-    let same = engine.symbols().find_name(SAME_AS).expect("a name");
+    let same_as = engine.symbols().find_name(SAME_AS).expect("a name");
     let is_name = |&symbol: &Symbol| engine.symbols().value(symbol).as_name().is_some();
-    let is_pair = |fact: &Fact| fact.predicate == same && fact.arguments.iter().all(is_name);
+    let is_pair = |fact: &Fact| fact.predicate == same_as && fact.arguments.iter().all(is_name);
     let (first, pairs) =
         if is_pair(fact) { (None, supporting) } else { (Some(supporting[0]), &supporting[1..]) };
     assert!(pairs.iter().all(|pair| is_pair(pair)));
     let mut pairs: BTreeSet<Fact> = pairs.iter().map(|&pair| pair.clone()).collect();
     close_under_equality(engine.symbols(), &BTreeSet::new(), &mut pairs);
-    let are_one = |a: Symbol, b: Symbol| a == b || pairs.contains(&Fact::new(same, [a, b]));
+    let are_one = |a: Symbol, b: Symbol| a == b || pairs.contains(&Fact::new(same_as, [a, b]));
     match first {
         None => assert!(are_one(fact.arguments[0], fact.arguments[1])),
         Some(other) => {
@@ -295,14 +301,14 @@ fn check_equality(engine: &Engine, fact: &Fact, supporting: &[&Fact]) {
     }
 }
 
-/// The constraints that fire, with how many matches each has.
+/// Violated constraints, with the number of matches of each.
 fn violations(program: &Program, symbols: &mut Symbols, facts: &BTreeSet<Fact>) -> BTreeMap<u32, usize> {
     let random = program.rules.iter().filter(|rule| is_random(rule));
     let constraints = random.filter(|rule| rule.head.is_empty());
     let names = representatives(symbols, facts);
     let counts = constraints.map(|rule| {
-        let found = matches(rule, symbols, facts);
-        let individuals: BTreeSet<Binding> = found.iter().map(|binding| normal(binding, &names)).collect();
+        let bindings = matches(rule, symbols, facts);
+        let individuals: BTreeSet<Binding> = bindings.iter().map(|binding| normal(binding, &names)).collect();
         (rule.identity.position, individuals.len())
     });
     counts.filter(|&(_, count)| count > 0).collect()
@@ -320,7 +326,7 @@ fn check_state(engine: &Engine, world: &World, stated: &BTreeSet<Fact>) -> BTree
     let program = Program { rules, ..Program::default() };
     let expected = naive(&program, &mut symbols, stated, level, close);
     let facts: BTreeSet<Fact> = engine.facts().collect();
-    // Pairs of a name with itself are shown only where they are stated.
+    // A pair of a name with itself is reported only if it is stated.
     let is_shown = |fact: &&Fact| !is_reflexive(&symbols, fact) || stated.contains(fact);
     assert_eq!(facts, expected.iter().filter(is_shown).cloned().collect());
     for fact in &facts {
@@ -352,7 +358,8 @@ fn check_state(engine: &Engine, world: &World, stated: &BTreeSet<Fact>) -> BTree
     facts
 }
 
-/// What the engine says that holds, with why, is accepted without it; something that is missing or made up is not.
+/// Checks that the derivation of all facts is accepted by `replay`, and that a missing or an invented step
+/// is rejected.
 fn check_replay(engine: &Engine, stated: &BTreeSet<Fact>, facts: &BTreeSet<Fact>) {
     let rules = engine.program().rules.iter().filter(|rule| !rule.head.is_empty()).cloned().collect();
     let program = Program { rules, ..engine.program().clone() };
@@ -365,11 +372,11 @@ fn check_replay(engine: &Engine, stated: &BTreeSet<Fact>, facts: &BTreeSet<Fact>
         return;
     }
     replayed.expect("what holds");
-    let said: BTreeSet<&Fact> = everything.steps.iter().map(|step| &step.fact).collect();
+    let proved: BTreeSet<&Fact> = everything.steps.iter().map(|step| &step.fact).collect();
     let hidden = |fact: &&Fact| !facts.contains(fact);
-    assert!(facts.iter().all(|fact| said.contains(fact)));
-    assert!(said.iter().copied().filter(hidden).all(|fact| is_reflexive(&symbols, fact)));
-    // A pair of names may follow from the others.
+    assert!(facts.iter().all(|fact| proved.contains(fact)));
+    assert!(proved.iter().copied().filter(hidden).all(|fact| is_reflexive(&symbols, fact)));
+    // Under equality, the pair of the last step may follow from other pairs.
     if !program.equality
         && let Some(last) = everything.steps.pop()
     {
@@ -382,13 +389,13 @@ fn check_replay(engine: &Engine, stated: &BTreeSet<Fact>, facts: &BTreeSet<Fact>
     }
 }
 
-/// Runs a script of changes and compares with the oracle after every step.
+/// Runs a script of changes and compares the engine with naive evaluation after every step.
 pub fn check(rules: &[RawRule], start: &[RawChange], script: &[Vec<RawChange>], equality: bool) {
     let world = World::new(equality);
     let rules = program(rules.iter().enumerate().map(|(at, raw)| world.rule(at, raw)).collect());
-    // Identical rules are evaluated once, under the first one's identity.
-    let mut seen = BTreeSet::new();
-    let distinct = |rule: &Rule| seen.insert(format!("{:?}{:?}", rule.head, rule.body));
+    // The engine evaluates identical rules once, under the identity of the first.
+    let mut contents = BTreeSet::new();
+    let distinct = |rule: &Rule| contents.insert(format!("{:?}{:?}", rule.head, rule.body));
     let program = program(rules.rules.into_iter().filter(distinct).collect());
     let program = renumber(program);
     let mut symbols = world.symbols.clone();
@@ -415,8 +422,8 @@ pub fn check(rules: &[RawRule], start: &[RawChange], script: &[Vec<RawChange>], 
             assert_difference(&change, &before, &after);
             before = after;
         }
-        let facts = |wanted: bool| {
-            let chosen = step.iter().filter(move |(insert, ..)| *insert == wanted);
+        let facts = |is_insertion: bool| {
+            let chosen = step.iter().filter(move |(insert, ..)| *insert == is_insertion);
             chosen.map(|&(_, p, arguments)| world.fact(p, arguments)).collect::<Vec<_>>()
         };
         let delta = Delta { insert: facts(true), delete: facts(false) };
@@ -441,7 +448,7 @@ fn assert_difference(change: &Delta, before: &BTreeSet<Fact>, after: &BTreeSet<F
     assert_eq!(change.delete, before.difference(after).cloned().collect::<Vec<_>>());
 }
 
-/// Takes an active rule away or brings an absent one back, in one of the ways there are.
+/// Removes an active rule, or adds an absent one, by one of several functions.
 fn switch(
     engine: &mut Engine,
     program: &Program,
@@ -451,17 +458,17 @@ fn switch(
 ) -> Delta {
     let rule = &program.rules[position];
     let number = rule.identity.position;
-    let comes = absent.remove(&number);
-    if !comes {
+    let is_absent = absent.remove(&number);
+    if !is_absent {
         absent.insert(number);
     }
     let change = match way % 2 {
-        0 if !comes => engine.remove_rule(&rule.identity),
+        0 if !is_absent => engine.remove_rule(&rule.identity),
         0 => engine.add_rules([rule.clone()]),
         _ => {
             let mut rules = engine.program().rules.clone();
             rules.retain(|other| other != rule);
-            if comes {
+            if is_absent {
                 rules.insert(0, rule.clone());
             }
             engine.set_program(Program { rules, ..engine.program().clone() })

@@ -1,4 +1,4 @@
-//! Facts and engines from text, read by the rule parser.
+//! Facts and engines from text, parsed by the rule parser.
 #![allow(dead_code, reason = "each suite uses a part")]
 
 use metaplan_rules::{Atom, Engine, Errors, Fact, Literal, Prefixes, Symbols, Term, Violation, parse_rules};
@@ -7,10 +7,10 @@ pub fn prefixes() -> Prefixes {
     Prefixes::new().with("t", "http://metacontrol.org/tomasys#").with("mros", "http://ros/mros#")
 }
 
-/// `p(a, "x"), q(1)` as facts: the head of a rule without body.
+/// Parses facts such as `p(a, "x"), q(1)`, as the head of a rule without body.
 pub fn facts(symbols: &mut Symbols, text: &str) -> Vec<Fact> {
     let program = parse_rules(&format!("-> {text} ."), "facts", symbols, &prefixes()).expect("facts");
-    let [same, different] = ["sameAs", "differentFrom"]
+    let [same_as, different] = ["sameAs", "differentFrom"]
         .map(|name| symbols.name(&format!("http://www.w3.org/2002/07/owl#{name}")));
     let ground = |term| match term {
         Term::Constant(symbol) => symbol,
@@ -18,7 +18,7 @@ pub fn facts(symbols: &mut Symbols, text: &str) -> Vec<Fact> {
     };
     let fact = |atom| match atom {
         Atom::Relation { predicate, arguments } => Fact::new(predicate, arguments.into_iter().map(ground)),
-        Atom::Same(left, right) => Fact::new(same, [ground(left), ground(right)]),
+        Atom::Same(left, right) => Fact::new(same_as, [ground(left), ground(right)]),
         Atom::Different(left, right) => Fact::new(different, [ground(left), ground(right)]),
         other => panic!("{other:?} is not a fact"),
     };
@@ -36,14 +36,14 @@ pub fn engine(rules: &str, stated: &str) -> Result<Engine, Errors> {
     Engine::new(symbols, program, facts)
 }
 
-/// `"lexical"^^datatype`, `"text"@en` or a number, as the parser reads it.
+/// Parses a literal: `"lexical"^^datatype`, `"text"@en` or a number.
 pub fn literal(text: &str) -> Literal {
     let mut symbols = Symbols::new();
     let fact = facts(&mut symbols, &format!("p({text})")).remove(0);
     symbols.value(fact.arguments[0]).as_literal().expect("a literal").clone()
 }
 
-/// The facts that violate something, one line each.
+/// Facts of a violation, on one line.
 pub fn show_violation(engine: &Engine, violation: &Violation) -> String {
     let supports = violation.supports.iter().map(|fact| fact.display(engine.symbols()).to_string());
     supports.collect::<Vec<_>>().join(" and ")
