@@ -27,9 +27,10 @@ use crate::store::Store;
 use crate::symbol::Symbols;
 use crate::vocabulary::SAME_AS;
 
-/// Joins are planned again when the number of facts has grown by this factor …
+/// Growth factor of the number of facts since the last planning, beyond which the joins are planned again.
 const REPLAN_FACTOR: usize = 4;
-/// … over the number at the last planning, or over this number if it is larger.
+/// Minimum number of facts assumed for the last planning. Small engines are then not planned after every
+/// update.
 const REPLAN_FROM: usize = 32;
 
 impl Engine {

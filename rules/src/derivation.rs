@@ -10,8 +10,8 @@ use crate::symbol::{Symbol, Symbols};
 /// and not of the derivation tree.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Derivation {
-    /// Steps of the derivation. The first one is the explained fact. Supports come after the facts that
-    /// they support.
+    /// Steps of the derivation. The first one is the explained fact. The order is breadth-first: every
+    /// other fact comes after the first fact that it supports.
     pub steps: Vec<DerivationStep>,
 }
 

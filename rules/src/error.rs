@@ -115,7 +115,7 @@ pub enum Error {
     /// A variable that occurs only in negated, comparison or equality atoms.
     #[error("R203 rule {rule}: variable ?{variable} is only tested, never bound")]
     UnsafeBody {
-        /// Which rule.
+        /// The rule.
         rule: RuleIdentity,
         /// The rule.
         variable: String,

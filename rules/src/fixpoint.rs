@@ -6,9 +6,9 @@
 //! Evaluation is set-at-a-time: crepe's tuples contain block numbers, so crepe's bookkeeping costs nothing
 //! per match, and the store is never copied.
 //!
-//! A block has one owner: the rule that extends it consumes it. A small block passes all remaining steps of
-//! its plan within one rule application. A typical update starts plans on one or two matches each;
-//! bookkeeping for each step would then take longer than the steps.
+//! A block has one owner: the rule that extends it consumes it. A small block passes the following steps of
+//! its plan within one rule application, until it is large or complete. A typical update starts plans on
+//! one or two matches each; bookkeeping for each step would then take longer than the steps.
 
 use std::cell::RefCell;
 use std::hash::{BuildHasherDefault, Hash, Hasher};
@@ -108,7 +108,8 @@ mod program {
 #[derive(Clone, Copy)]
 pub(crate) struct Handle<'a>(&'a dyn Evaluate);
 
-/// Operations of a round that the crepe program calls. Each returns the next step and the extended block.
+/// Operations of a round that the crepe program calls. `seed` and `extend` return the next step and the
+/// extended block.
 trait Evaluate {
     fn seed(&self, seed: u32) -> Option<(u32, BlockId)>;
     fn extend(&self, plan: PlanId, step: u32, block: BlockId) -> Option<(u32, BlockId)>;
@@ -327,7 +328,6 @@ impl Round<'_> {
                 if relation.state(row) & skip == 0 && !(lookup.is_link && relation.record(row).rule == rule) {
                     extend_match(&mut extended, bound, relation.row(row), lookup.pattern);
                 }
-                // Without key columns, all rows are candidates.
             };
             if let Some(index) = lookup.index {
                 for (slot, source) in key.iter_mut().zip(lookup.key) {
@@ -335,6 +335,7 @@ impl Round<'_> {
                 }
                 relation.lookup(index, &key[..lookup.key.len()]).for_each(&mut visit);
             } else {
+                // Without key columns, all rows are candidates.
                 (0..relation.bound()).for_each(&mut visit);
             }
             let steps = ((extended.len() - before) / width) as u64;
@@ -387,8 +388,8 @@ impl Round<'_> {
         block.truncate(end);
         block
     }
-    /// Binds the result of a function for each match. A match for which the function is undefined is dropped.
 
+    /// Binds the result of a function for each match. A match for which the function is undefined is dropped.
     fn compute(
         &self,
         mut block: Vec<Symbol>,

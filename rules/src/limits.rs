@@ -73,7 +73,7 @@ pub(crate) struct Budget {
     limits: Limits,
     remaining_steps: Cell<u64>,
     rows_until_check: Cell<u64>,
-    /// `true` while recursive rules are evaluated.
+    /// `true` during semi-naive rounds, in which rules may use their own conclusions.
     pub recursive: Cell<bool>,
     stopped: Cell<Option<(Stop, u32)>>,
     /// Last value that a recursive rule computed before the budget was exhausted.

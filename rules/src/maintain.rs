@@ -25,7 +25,7 @@ use crate::symbol::{Symbol, Symbols};
 /// Number of rows that start one run of the crepe program. Bounds the memory of partial matches.
 const CHUNK: usize = 2048;
 
-/// Rows by relation.
+/// Rows with their relations.
 type Rows = Vec<(RelationId, Row)>;
 
 /// Effective change of the stated facts, with the affected rows.

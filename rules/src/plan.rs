@@ -253,7 +253,7 @@ impl Planner<'_> {
             }
             let is_aggregate = |p: usize| matches!(self.lowered.body[p], Condition::Aggregate { .. });
             let ready = |p: usize| is_ready(&self.lowered.body[p], &bound);
-            // Tests come before aggregates, because an aggregate is expensive and never fails.
+            // Tests come before aggregates, because an aggregate is more expensive.
             let test = remaining.iter().position(|&p| ready(p) && !is_aggregate(p));
             let ready = test.or_else(|| remaining.iter().position(|&p| ready(p)));
             let chosen = ready.or_else(|| self.cheapest(&remaining, &bound))?;
@@ -298,8 +298,9 @@ impl Planner<'_> {
                 let mask = columns.iter().fold(0, |mask, column| mask | 1 << column);
                 // Most rows of a closure are not links; visiting each of them would take longer than all
                 // conclusions.
-                let without = is_link.then_some(self.number);
-                let index = (mask != 0).then(|| self.store.get_mut(*relation).index_without(mask, without));
+                let excluded_rule = is_link.then_some(self.number);
+                let index =
+                    (mask != 0).then(|| self.store.get_mut(*relation).index_without(mask, excluded_rule));
                 let key = columns.iter().map(|&column| sources[column]).collect();
                 let open_columns =
                     sources.iter().copied().enumerate().filter(|(column, _)| mask & (1 << column) == 0);

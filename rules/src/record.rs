@@ -59,6 +59,7 @@ impl Records {
 
     /// Bindings of a record; empty for [`Record::NONE`].
     pub fn get(&self, record: Record) -> &[Symbol] {
+        // `Record::NONE` has a rule number beyond the table.
         self.rules.get(record.rule as usize).map_or(&[], |slots| {
             let start = record.slot as usize * slots.width;
             &slots.bindings[start..start + slots.width]

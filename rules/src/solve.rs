@@ -28,6 +28,7 @@ impl Round<'_> {
                 let values: Vec<Symbol> =
                     values.into_iter().map(|value| intern(&mut symbols, value)).collect();
                 let is_new = symbols.len() > before;
+                // Several new values of one solution are charged once, by the size of the largest.
                 let largest = values.iter().filter_map(|&value| symbols.as_literal(value));
                 let largest = largest.max_by_key(|value| value.size());
                 if !self.budget.spend(1, rule) || (is_new && !self.budget.spend_on_value(largest, rule)) {

@@ -379,6 +379,7 @@ impl Index {
         let hash_of = |row: Row| hash(Self::key(mask, row_of(row)));
         let has_key = |&head: &Row| Self::key(mask, row_of(head)).eq(Self::key(mask, row_of(row)));
         self.previous[row as usize] = NO_ROW;
+        // A new row becomes the head of its list, so that no list is traversed.
         if let Some(head) = self.heads.find_mut(hash_of(row), has_key) {
             self.next[row as usize] = *head;
             self.previous[*head as usize] = row;

@@ -50,13 +50,16 @@ impl Search<'_> {
                 }
                 continue;
             };
+            // The node stays on the path until all its successors are visited.
             path.push((node, position + 1));
             match self.order[successor] {
                 None => {
                     self.open(successor);
                     path.push((successor, 0));
                 }
-                Some(order) if self.component[next].is_none() => self.low[node] = self.low[node].min(order),
+                Some(order) if self.component[successor].is_none() => {
+                    self.low[node] = self.low[node].min(order)
+                }
                 Some(_) => {}
             }
         }

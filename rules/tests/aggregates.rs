@@ -84,8 +84,8 @@ fn an_aggregate_depends_on_one_atom_per_group_variable() {
         s(?x, ?n) ^ swrlb:add(?y, ?x, 1) -> t(?y) .";
     let mut engine = engine(rules, "p(1), p(2), p(3), t(1), r(0), r(1)").expect("stratified");
     for (text, expected) in [("s(1, 1)", true), ("s(2, 2)", true), ("s(3, 2)", true), ("s(4, 2)", false)] {
-        let text = fact(&mut engine, text);
-        assert_eq!(engine.holds(&text), expected);
+        let conclusion = fact(&mut engine, text);
+        assert_eq!(engine.holds(&conclusion), expected);
     }
 }
 
@@ -131,8 +131,8 @@ fn derivations_list_the_matches() {
 }
 
 fn miss(engine: &mut Engine, text: &str) -> Vec<String> {
-    let text = fact(engine, text);
-    let misses = engine.why_not(&text);
+    let conclusion = fact(engine, text);
+    let misses = engine.why_not(&conclusion);
     let show = |obstacle: &Obstacle| obstacle.display(engine.symbols()).to_string();
     misses.iter().flat_map(|miss| miss.obstacles.iter().map(show)).collect()
 }

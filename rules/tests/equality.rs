@@ -222,7 +222,7 @@ fn swap_pairs(scripts: u64, exchanges_rules: bool) {
             for fact in &deleted {
                 stated.remove(fact);
             }
-            stated.extend(come);
+            stated.extend(inserted);
             let before = displayed(&incremental);
             let delta = Delta { insert, delete };
             let change = if exchanges_rules {

@@ -31,6 +31,7 @@ pub(super) fn compute(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Liter
 }
 
 fn promote(arguments: &[&Literal]) -> Option<Numbers> {
+    // Promotion of `XPath`: a double makes all numbers doubles, and otherwise a float makes all floats.
     if arguments.iter().all(|a| matches!(a, Literal::Decimal(_))) {
         return Some(Numbers::Exact(arguments.iter().map(|a| a.as_rational()).collect::<Option<_>>()?));
     }

@@ -66,7 +66,7 @@ built_ins! {
     OutsideDataRange "outsideDataRange" 2..=2 Test,
     /// Equal values.
     Equal "equal" 2..=2 Test,
-    /// Unequal values. Ill-typed literals are not tested.
+    /// Values that do not compare equal, including incomparable values. False for ill-typed literals.
     NotEqual "notEqual" 2..=2 Test,
     /// First < second.
     LessThan "lessThan" 2..=2 Test,
@@ -259,7 +259,7 @@ impl BuiltIn {
         }
     }
 
-    /// Returns `true` if the known arguments determine the values of the others.
+    /// Returns `true` if the values of the unknown arguments can be computed from the known arguments.
     pub fn binds(self, known: &[bool]) -> bool {
         let kind = self.shape().map(|(.., kind)| kind);
         let inputs_known = known.get(1..).is_some_and(|inputs_known| inputs_known.iter().all(|known| *known));

@@ -5,8 +5,8 @@ use super::signature::{BuiltIn, SWRLB};
 
 impl BuiltIn {
     /// Returns the name of the built-in of the same library with the most similar name, if at most a third
-    /// of the letters and at most three letters differ. The result is the local name of a SWRL built-in, or
-    /// the IRI of another built-in.
+    /// of the letters and at most three letters differ (one letter may always differ). The result is the
+    /// local name of a SWRL built-in, or the IRI of another built-in.
     pub fn similar(iri: &str) -> Option<&'static str> {
         let local = |iri: &str| iri.rsplit_once('#').map_or(iri, |(_, local)| local).to_ascii_lowercase();
         let written = local(iri);

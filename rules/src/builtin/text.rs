@@ -66,6 +66,7 @@ fn substring(text: &str, bounds: &[&Literal]) -> Option<String> {
 
 fn translate(text: &str, from: &str, to: &str) -> String {
     let replace = |character| match from.chars().position(|f| f == character) {
+        // A character without a counterpart is removed.
         Some(position) => to.chars().nth(position),
         None => Some(character),
     };

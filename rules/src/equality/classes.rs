@@ -50,7 +50,7 @@ pub(super) struct Classes {
 }
 
 impl Classes {
-    /// Representative of a name: the name itself if no other name is equals it.
+    /// Representative of a name. A name without other equal names represents itself.
     pub fn find(&self, name: Symbol) -> Symbol {
         self.representatives.get(&name).copied().unwrap_or(name)
     }
@@ -134,7 +134,7 @@ impl Classes {
         if left == right {
             return;
         }
-        // Equal sizes: the greater symbol is kept, so that the result does not depend on the order of the
+        // Equal sizes: the smaller symbol is kept, so that the result does not depend on the order of the
         // arguments.
         let size = |name| self.members(name).map_or(1, |members| members.len());
         let representative = if (size(left), right) >= (size(right), left) { left } else { right };

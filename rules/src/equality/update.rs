@@ -226,6 +226,7 @@ impl<'e> Update<'e> {
     fn mentions(&mut self, name: Symbol) -> Vec<Fact> {
         let mut rows = Vec::new();
         for relation in &mut self.engine.store.relations {
+            // Matches of constraints and aggregates are derived, so they need no restatement.
             let Some(predicate) = relation.predicate else { continue };
             for column in 0..relation.arity() {
                 if !relation.has_index(1 << column) {

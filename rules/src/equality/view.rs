@@ -50,7 +50,7 @@ impl Equality {
         facts
     }
 
-    /// Facts about names that a row represents. Of an equality row, only the pairs of different names.
+    /// Facts about names that a row represents. An equality row represents only pairs of different names.
     pub(super) fn facts_of<'n>(
         &'n self,
         row: &Fact,
@@ -114,7 +114,7 @@ impl Equality {
         results
     }
 
-    /// Pairs of a literal with something different.
+    /// Equality rows that relate a literal to a different symbol.
     pub fn clashes(&self, engine: &Engine) -> Vec<Fact> {
         let rows = engine.matching_rows(self.same_as, &[None, None]);
         let clashes = rows.filter(|row| engine.symbols.differ(row[0], row[1]));

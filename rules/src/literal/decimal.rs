@@ -69,6 +69,7 @@ impl Decimal {
     /// Creates the number `unscaled / 10^scale`.
     pub fn new(unscaled: BigInt, scale: u32) -> Self {
         let (mut unscaled, mut scale) = (unscaled, scale);
+        // Trailing zeros of a machine integer are removed without big-integer arithmetic.
         if let Some(small) = unscaled.to_i64() {
             let (small, scale) = strip_zeros(small, scale);
             if scale <= SMALL_SCALE {

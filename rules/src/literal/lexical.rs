@@ -120,6 +120,7 @@ fn parse_rational(lexical: &str) -> Parsed {
     let (Some(numerator), Some(denominator)) = (plain(numerator), plain(denominator)) else {
         return Parsed::IllTyped;
     };
+    // The grammar of `owl:rational` requires a positive denominator.
     if denominator <= BigInt::zero() {
         return Parsed::IllTyped;
     }

@@ -1,5 +1,5 @@
-//! Three-valued tests (yes, no, undecided): if two literals have different values, and if a value lies in a
-//! datatype.
+//! Three-valued tests (yes, no, undecided): whether two literals have different values, and whether a value
+//! lies in a datatype.
 
 use super::datatype::{OWL_RATIONAL, OWL_REAL, RDF, RDFS_LITERAL, XSD};
 use super::lexical::{Parsed, parse_xsd};
@@ -60,8 +60,8 @@ impl Literal {
         self.membership(datatype_iri) == Some(true)
     }
 
-    /// Tests if the value lies in the value space of a datatype. Returns `None` if that is undecided,
-    /// because the datatype of the literal or the other datatype is unsupported.
+    /// Decides whether the value lies in the value space of a datatype. Returns `None` if that is
+    /// undecided, because the datatype of the literal or the other datatype is unsupported.
     pub fn membership(&self, datatype_iri: &str) -> Option<bool> {
         if self.is_ill_typed() {
             return Some(false);

@@ -8,7 +8,8 @@
 //! two time zones.
 //!
 //! Of an unsupported datatype, only one fact is known: equal forms denote the same value. It is undecided
-//! if two different forms denote one value, or if a value lies in another datatype ([`Literal::differs`],
+//! whether two different forms denote one value, and whether a value lies in another datatype
+//! ([`Literal::differs`],
 //! [`Literal::membership`]).
 //!
 //! [1] W3C XML Schema Definition Language 1.1 Part 2: Datatypes, 2012.

@@ -1,5 +1,5 @@
-//! Subsumption of datatypes: decides if the intersection of several datatypes is contained in another one.
-//! Uses the type hierarchy of XML Schema ([1], section 3) and the bounds of its integer types.
+//! Subsumption of datatypes: decides whether the intersection of several datatypes is contained in another
+//! one. Uses the type hierarchy of XML Schema ([1], section 3) and the bounds of its integer types.
 
 use super::datatype::{OWL_RATIONAL, OWL_REAL, RDF, RDFS_LITERAL, XSD, integer_range};
 

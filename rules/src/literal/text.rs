@@ -28,11 +28,12 @@ fn is_language(text: &str) -> bool {
 }
 
 fn is_name(text: &str) -> bool {
+    // Deviation from XML 1.0: combining marks (U+0300 to U+036F), U+203F and U+2040 may start a name, too.
     let start = |c: char| is_name_character(c) && !c.is_ascii_digit() && !matches!(c, '-' | '.' | '\u{B7}');
     text.chars().next().is_some_and(start) && text.chars().all(is_name_character)
 }
 
-/// Returns `true` for a `NameChar` of XML 1.0, fifth edition, extended by combining marks.
+/// Returns `true` for a `NameChar` of XML 1.0, fifth edition.
 fn is_name_character(c: char) -> bool {
     matches!(c, ':' | '_' | '-' | '.' | '0'..='9' | 'A'..='Z' | 'a'..='z' | '\u{B7}' | '\u{C0}'..='\u{D6}'
         | '\u{D8}'..='\u{F6}' | '\u{F8}'..='\u{37D}' | '\u{37F}'..='\u{1FFF}' | '\u{200C}' | '\u{200D}'

@@ -165,6 +165,7 @@ impl Literal {
             (Self::Boolean(a), Self::Boolean(b)) => Some(a.cmp(b)),
             (Self::Moment(a), Self::Moment(b)) => a.partial_cmp(b),
             (Self::Duration(a), Self::Duration(b)) => a.partial_cmp(b),
+            // A decimal is promoted to float, and with a double, both numbers are promoted to double.
             (Self::Float(_) | Self::Decimal(_), Self::Float(_) | Self::Decimal(_)) => {
                 self.as_f32()?.partial_cmp(&other.as_f32()?)
             }

@@ -43,7 +43,7 @@ pub(super) struct Matcher<'m> {
     /// `true` if a rule compared two names that may be equal. The given facts alone then do not determine
     /// the result.
     pub compares_names: bool,
-    /// `true` if a body has more than [`MATCH_LIMIT`] matches.
+    /// `true` if an enumeration was stopped at [`MATCH_LIMIT`] matches.
     pub too_many: bool,
 }
 

@@ -25,8 +25,8 @@ pub struct Syntax {
     pub built_ins: Vec<BuiltIn>,
 }
 
-/// Parses rules. `source` names the text in rule identities and errors. Prefix declarations of the text are
-/// added to `prefixes`.
+/// Parses rules. `source` names the text in rule identities and errors. Prefix declarations of the text
+/// supplement `prefixes`.
 ///
 /// ```
 /// use metaplan_rules::{Prefixes, Symbols, parse_rules};
@@ -298,7 +298,7 @@ impl Parser<'_> {
         })
     }
 
-    /// Replaces the variable names in the expression of a mathematical built-in, which is its second
+    /// Adds the names of the variables to the expression of a mathematical built-in, which is its second
     /// argument.
     fn name_expression(&mut self, built_in: BuiltIn, arguments: &mut [Term]) {
         let [_, Term::Constant(text), values @ ..] = arguments else { return };

@@ -1,6 +1,7 @@
-//! Parser and evaluator of arithmetic expressions in the syntax of the Java Math Expression Parser 2.4: `+
-//! - * / % ^`, signs, brackets, the constants `pi` and `e`, functions of one or two numbers, and implicit
-//! multiplication (`2x`, `3(a + b)`).
+//! Parser and evaluator of arithmetic expressions in the syntax of the Java Math Expression Parser 2.4.
+//!
+//! The syntax consists of the operators `+`, `-`, `*`, `/`, `%` and `^`, signs, brackets, the constants `pi` and `e`,
+//! functions of one or two numbers, and implicit multiplication (`2x`, `3(a + b)`).
 
 /// Maximum nesting depth of brackets, signs and powers. It protects the stack.
 const MAX_DEPTH: usize = 200;

@@ -1,7 +1,7 @@
 //! The `swrlm` library: square root, natural logarithm, and evaluation of expressions.
 //!
-//! An expression of `eval` refers to the variables of its atom by name (`swrlm:eval(?r, "(57 * x) / y", ?x,
-//! ?y)`). A built-in receives values only. Therefore [`BuiltIn::with_names`] inserts the names into the
+//! An expression of `eval` refers to the variables of its atom by name:
+//! `swrlm:eval(?r, "(57 * x) / y", ?x, ?y)`. A built-in receives values only. Therefore [`BuiltIn::with_names`] inserts the names into the
 //! text when a rule is parsed: `"x, y: (57 * x) / y"`. Text of that form is not changed.
 
 use super::expression;

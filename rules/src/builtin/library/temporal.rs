@@ -219,7 +219,7 @@ impl Definition for AllenRelation {
 fn periods(arguments: &[&Literal]) -> Option<(Period, Period)> {
     let (granularity, moments) = match arguments.split_last()? {
         (last, others) if others.len() >= 2 => match Granularity::of(last) {
-            Some(granularity) => (granularity, rest),
+            Some(granularity) => (granularity, others),
             None => (G::Milliseconds, arguments),
         },
         _ => (G::Milliseconds, arguments),
