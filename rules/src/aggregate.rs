@@ -22,7 +22,11 @@ pub(crate) struct Function {
 
 impl Function {
     /// Aggregate of rows; `None` if it has no value.
-    pub fn of<'r>(&self, rows: impl Iterator<Item = &'r [Symbol]>, symbols: &Symbols) -> Option<Literal> {
+    pub fn evaluate<'r>(
+        &self,
+        rows: impl Iterator<Item = &'r [Symbol]>,
+        symbols: &Symbols,
+    ) -> Option<Literal> {
         let literal = |row: &[Symbol]| {
             symbols.as_literal(match self.value {
                 Source::Variable(column) => row[usize::from(column)],
@@ -132,7 +136,7 @@ mod tests {
         let value = Source::Variable(0);
         let function = Function { aggregate: aggregate(crate::rule::Variable(0).into()), value };
         for _ in 0..2 {
-            let result = function.of(rows.iter().map(<[Symbol; 1]>::as_slice), &symbols);
+            let result = function.evaluate(rows.iter().map(<[Symbol; 1]>::as_slice), &symbols);
             assert_eq!(result, expected.as_ref().map(read), "{values:?}");
             rows.reverse();
         }

@@ -78,9 +78,9 @@ impl Engine {
     fn build(&mut self, facts: Vec<Fact>) -> Result<(), Errors> {
         let mut evaluated = Arc::clone(&self.program);
         if self.equality.is_some() {
-            self.begin(facts);
+            self.state_initial_facts(facts);
         } else {
-            self.store.state(facts);
+            self.store.insert_stated(facts);
         }
         if let Some(equality) = &mut self.equality {
             evaluated = Arc::new(equality.normal_program(&self.program));
@@ -91,7 +91,7 @@ impl Engine {
         self.records = Records::new(&network);
         self.network = Arc::new(network);
         Maintenance::new(self).derive_all()?;
-        self.settle().map_err(Errors::from)
+        self.join_derived_pairs().map_err(Errors::from)
     }
 
     /// Changes the set of stated facts. Returns the net change of all facts that hold, stated or derived,
@@ -166,7 +166,7 @@ impl Engine {
         let unlimited = Limits { steps: u64::MAX, interrupt: None };
         let limits = std::mem::replace(&mut self.limits, unlimited);
         if let Some(equality) = &mut self.equality {
-            *equality = Arc::new(equality.emptied(&self.program));
+            *equality = Arc::new(equality.without_facts(&self.program));
             self.store = Store::default();
             // The same derivation succeeded within the budget before, so it cannot fail without a budget.
             let _ = self.build(facts);
@@ -175,7 +175,7 @@ impl Engine {
                 Arc::make_mut(relation).clear_all();
             }
             self.records = Records::new(&self.network);
-            self.store.state(facts);
+            self.store.insert_stated(facts);
             let _ = Maintenance::new(self).derive_all();
         }
         self.limits = limits;

@@ -48,7 +48,8 @@ impl Costs {
     }
 }
 
-/// Number of distinct values of each column. It is scaled up if most values occur only once in the sample.
+/// Number of distinct values of each column. It is scaled up if more than half of the
+/// sampled values are distinct.
 fn sample(relation: &Relation) -> Vec<f64> {
     let stride = (relation.bound() as usize / SAMPLE).max(1);
     let rows: Vec<Row> =

@@ -65,13 +65,13 @@ pub struct Aggregated {
 /// A violation of an integrity constraint or of a datatype.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub struct Violation {
-    /// Violated constraint.
+    /// Cause of the violation.
     pub cause: Cause,
     /// Facts that cause the violation together.
     pub supports: Vec<Fact>,
 }
 
-/// Cause of a [`Violation`].
+/// Kind of a [`Violation`].
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
 #[non_exhaustive]
 pub enum Cause {

@@ -369,9 +369,9 @@ impl Round<'_> {
                 let value = match group.index {
                     Some(index) => {
                         let members = group.relation.lookup(index, &key).filter(visible);
-                        function.of(members.map(rows), &symbols)
+                        function.evaluate(members.map(rows), &symbols)
                     }
-                    None => function.of(group.relation.scan().filter(visible).map(rows), &symbols),
+                    None => function.evaluate(group.relation.scan().filter(visible).map(rows), &symbols),
                 };
                 value.map(|value| intern(&mut symbols, value))
             });

@@ -69,7 +69,7 @@ impl<'a> Lowering<'a> {
             heads.push(Template { relation, arguments: columns(&variables) });
             self.constraints.push((relation, position));
         }
-        let is_closure = Lowered::closes(&heads, &body);
+        let is_closure = Lowered::is_transitivity(&heads, &body);
         self.lowered.push(Lowered { rule: position, width, heads, body, is_closure });
     }
 

@@ -56,8 +56,8 @@ pub(crate) fn state_change(engine: &mut Engine, delta: Delta) -> Stated {
         if relation.state(row) & state::ASSERTED == 0 {
             continue;
         }
-        // A row with a recorded derivation still holds; only its assertion ends.
         relation.clear(row, state::ASSERTED);
+        // A row with a recorded derivation still holds; only its assertion ends.
         if relation.record(row) == Record::NONE {
             relation.set(row, state::DOOMED);
             stated.doomed.push((id, row));
@@ -111,7 +111,7 @@ impl<'a> Maintenance<'a> {
     pub fn derive_all(mut self) -> Result<(), Error> {
         let network = Arc::clone(&self.network);
         for stratum in &network.strata {
-            self.begin(&stratum.initial)?;
+            self.run_initial_plans(&stratum.initial)?;
             self.saturate(stratum)?;
         }
         for (relation, row) in self.added {
@@ -123,11 +123,11 @@ impl<'a> Maintenance<'a> {
     /// Updates the derived facts after a change of the stated facts. Rows that no longer hold remain marked
     /// as doomed.
     pub fn update(&mut self, stated: &Stated) -> Result<(), Error> {
-        self.begin_with(stated);
+        self.start_update(stated);
         self.propagate(&FxHashSet::default())
     }
 
-    fn begin_with(&mut self, stated: &Stated) {
+    fn start_update(&mut self, stated: &Stated) {
         self.added.clone_from(&stated.added);
         self.doomed.clone_from(&stated.doomed);
         for &(relation, _) in stated.added.iter().chain(&stated.doomed) {
@@ -144,7 +144,7 @@ impl<'a> Maintenance<'a> {
         heads: &FxHashSet<RelationId>,
         added: &FxHashSet<u32>,
     ) -> Result<(), Error> {
-        self.begin_with(stated);
+        self.start_update(stated);
         // Relations are visited in a fixed order, so that equal histories give equal results.
         let mut ids: Vec<RelationId> = heads.iter().copied().collect();
         ids.sort_unstable();
@@ -175,7 +175,7 @@ impl<'a> Maintenance<'a> {
             if self.touched[number] || !new.is_empty() {
                 self.over_delete(stratum)?;
                 self.rederive(stratum)?;
-                self.begin(&new)?;
+                self.run_initial_plans(&new)?;
                 self.insert(stratum)?;
             }
         }
@@ -183,7 +183,7 @@ impl<'a> Maintenance<'a> {
     }
 
     /// Runs plans from the empty match, or from all visible rows of a relation.
-    fn begin(&mut self, plans: &[(Option<RelationId>, PlanId)]) -> Result<(), Error> {
+    fn run_initial_plans(&mut self, plans: &[(Option<RelationId>, PlanId)]) -> Result<(), Error> {
         for (relation, plan) in plans {
             if let Some(id) = *relation {
                 let relation = self.engine.store.get(id);

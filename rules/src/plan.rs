@@ -109,7 +109,7 @@ pub(crate) struct Lowered {
 
 impl Lowered {
     /// Returns `true` if heads and body state transitivity: `p(x, y), p(y, z) -> p(x, z)`.
-    pub fn closes(heads: &[Template], body: &[Condition]) -> bool {
+    pub fn is_transitivity(heads: &[Template], body: &[Condition]) -> bool {
         let ([head], [Condition::Relation(first, left), Condition::Relation(second, right)]) = (heads, body)
         else {
             return false;

@@ -153,7 +153,7 @@ impl Engine {
         state_change(self, delta);
         let stated = self.rows_with(state::ASSERTED).collect();
         self.store = Store::default();
-        self.store.state(stated);
+        self.store.insert_stated(stated);
         let symbols = Arc::make_mut(&mut self.symbols);
         let network = compile(new, symbols, &mut self.store, &self.limits).map_err(first)?;
         self.records = Records::new(&network);

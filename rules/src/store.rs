@@ -75,7 +75,7 @@ impl Store {
     }
 
     /// Inserts stated rows, unless they exist.
-    pub fn state(&mut self, facts: Vec<Fact>) {
+    pub fn insert_stated(&mut self, facts: Vec<Fact>) {
         for fact in facts {
             let relation = self.relation(fact.predicate, fact.arguments.len());
             let relation = self.get_mut(relation);

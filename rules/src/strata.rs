@@ -43,7 +43,7 @@ impl Search<'_> {
         let mut path = vec![(root, 0)];
         self.open(root);
         while let Some((node, position)) = path.pop() {
-            let Some(&successor) = self.successors[node].get(position) else {
+            let Some(&child) = self.successors[node].get(position) else {
                 self.close(node);
                 if let Some(&(parent, _)) = path.last() {
                     self.low[parent] = self.low[parent].min(self.low[node]);
@@ -52,14 +52,12 @@ impl Search<'_> {
             };
             // The node stays on the path until all its successors are visited.
             path.push((node, position + 1));
-            match self.order[successor] {
+            match self.order[child] {
                 None => {
-                    self.open(successor);
-                    path.push((successor, 0));
+                    self.open(child);
+                    path.push((child, 0));
                 }
-                Some(order) if self.component[successor].is_none() => {
-                    self.low[node] = self.low[node].min(order)
-                }
+                Some(order) if self.component[child].is_none() => self.low[node] = self.low[node].min(order),
                 Some(_) => {}
             }
         }

@@ -321,7 +321,7 @@ impl Search<'_> {
         state: &mut State,
     ) {
         let symbols = &self.engine.symbols;
-        let found = function.of(self.engine.group(matches, group).map(|(_, row)| row), symbols);
+        let found = function.evaluate(self.engine.group(matches, group).map(|(_, row)| row), symbols);
         let wanted = value(result, &state.bound);
         let interned = found.as_ref().and_then(|found| symbols.find_literal(found));
         match (wanted, interned) {

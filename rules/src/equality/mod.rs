@@ -99,7 +99,7 @@ impl Equality {
     }
 
     /// Returns an equality without facts.
-    pub fn emptied(&self, program: &Arc<Program>) -> Self {
+    pub fn without_facts(&self, program: &Arc<Program>) -> Self {
         Self::new(self.same_as, program)
     }
 

@@ -57,7 +57,7 @@ impl Engine {
     }
 
     /// Merges the classes of all pairs derived by the first evaluation, and reports nothing.
-    pub(crate) fn settle(&mut self) -> Result<(), Error> {
+    pub(crate) fn join_derived_pairs(&mut self) -> Result<(), Error> {
         let Some(equality) = self.equality.take() else { return Ok(()) };
         let same_as = equality.same_as;
         let mut update = Update::new(self, equality);
@@ -71,7 +71,7 @@ impl Engine {
     }
 
     /// States facts and merges the classes of the stated pairs, before the first evaluation.
-    pub(crate) fn begin(&mut self, facts: Vec<Fact>) {
+    pub(crate) fn state_initial_facts(&mut self, facts: Vec<Fact>) {
         let Some(equality) = self.equality.take() else { return };
         let mut update = Update::new(self, equality);
         let facts: BTreeSet<Fact> = facts.into_iter().collect();

@@ -233,7 +233,7 @@ impl Matcher<'_> {
         };
         let rows: Option<Vec<Symbol>> = distinct.iter().map(row).collect();
         let function = Function { aggregate: column(*aggregate), value: Source::Variable(0) };
-        function.of(rows?.iter().map(std::slice::from_ref), self.symbols)
+        function.evaluate(rows?.iter().map(std::slice::from_ref), self.symbols)
     }
 }
 

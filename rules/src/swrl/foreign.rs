@@ -17,7 +17,7 @@ pub(super) struct ForeignAtom {
 impl ForeignAtom {
     /// Creates a foreign atom if the atom has not one or two arguments, or if its first argument is a
     /// literal.
-    pub fn of(name: &str, arguments: &[Term], place: (u32, u32), symbols: &Symbols) -> Option<Self> {
+    pub fn from_atom(name: &str, arguments: &[Term], place: (u32, u32), symbols: &Symbols) -> Option<Self> {
         let is_literal = |term: &Term| match term {
             Term::Constant(symbol) => symbols.as_literal(*symbol).is_some(),
             Term::Variable(_) => false,

@@ -255,7 +255,7 @@ impl Parser<'_> {
             }
             self.expect(&Token::Close, "`,` or `)`")?;
         }
-        self.foreign.extend(ForeignAtom::of(&predicate, &arguments, place, self.symbols));
+        self.foreign.extend(ForeignAtom::from_atom(&predicate, &arguments, place, self.symbols));
         if negated {
             self.refuse_in_swrl("negation as failure", place)?;
             if let (true, [value]) = (is_datatype(&predicate), arguments.as_slice()) {

@@ -32,7 +32,7 @@ enum Granularity {
 use Granularity as G;
 
 impl Granularity {
-    fn of(literal: &Literal) -> Option<Self> {
+    fn from_literal(literal: &Literal) -> Option<Self> {
         let Literal::String(name) = literal else { return None };
         Some(match name.to_ascii_lowercase().as_str() {
             "years" => G::Years,
@@ -113,7 +113,7 @@ fn comparable(moments: &[Moment]) -> bool {
 /// Number of granules between two moments.
 fn difference(arguments: &[&Literal]) -> Option<i64> {
     let [from, to, granularity] = arguments else { return None };
-    let (granularity, moments) = (Granularity::of(granularity)?, [moment(from)?, moment(to)?]);
+    let (granularity, moments) = (Granularity::from_literal(granularity)?, [moment(from)?, moment(to)?]);
     let [from, to] = [granularity.granule(&moments[0])?, granularity.granule(&moments[1])?];
     comparable(&moments).then(|| (to - from).abs())
 }
@@ -176,7 +176,7 @@ impl Definition for AddFunction {
     /// otherwise.
     fn compute(&self, arguments: &[&Literal]) -> Option<Literal> {
         let [from, count, granularity] = arguments else { return None };
-        let granularity = Granularity::of(granularity)?;
+        let granularity = Granularity::from_literal(granularity)?;
         let count = count.as_rational().filter(num_rational::Ratio::is_integer)?.to_integer().to_i64()?;
         let from = moment(from)?;
         let from = if granularity > G::Days { from.as_date_time() } else { from };
@@ -218,7 +218,7 @@ impl Definition for AllenRelation {
 /// default milliseconds).
 fn periods(arguments: &[&Literal]) -> Option<(Period, Period)> {
     let (granularity, moments) = match arguments.split_last()? {
-        (last, others) if others.len() >= 2 => match Granularity::of(last) {
+        (last, others) if others.len() >= 2 => match Granularity::from_literal(last) {
             Some(granularity) => (granularity, others),
             None => (G::Milliseconds, arguments),
         },
