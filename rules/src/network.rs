@@ -134,8 +134,8 @@ pub(crate) fn revise(
     let mut missing: Vec<usize> = positions.into_values().filter(|p| !compiled.contains(p)).collect();
     missing.sort_unstable();
     let heads = revised.rules.iter().flat_map(|rule| &rule.heads);
-    let taken = heads.map(|head| head.relation).collect();
-    let mut lowering = Lowering::new(symbols, store, &mut revised.constraints, taken);
+    let used_relations = heads.map(|head| head.relation).collect();
+    let mut lowering = Lowering::new(symbols, store, &mut revised.constraints, used_relations);
     for position in missing {
         lowering.rule(position, &new.rules[position]);
     }

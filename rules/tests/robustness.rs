@@ -28,11 +28,11 @@ proptest! {
         let mut symbols = Symbols::new();
         if let Ok(program) = parse_rules(&text, "random", &mut symbols, &Prefixes::new()) {
             let printed = print_rules(&program, &symbols, &Prefixes::new());
-            let again = parse_rules(&printed, "random", &mut symbols, &Prefixes::new()).expect(&printed);
-            let bare = |program: &metaplan_rules::Program| -> Vec<_> {
+            let reparsed = parse_rules(&printed, "random", &mut symbols, &Prefixes::new()).expect(&printed);
+            let content = |program: &metaplan_rules::Program| -> Vec<_> {
                 program.rules.iter().map(|rule| (rule.head.clone(), rule.body.clone())).collect()
             };
-            prop_assert_eq!(bare(&program), bare(&again), "{}", printed);
+            prop_assert_eq!(content(&program), content(&reparsed), "{}", printed);
             let _ = Engine::with_limits(symbols, program, [], Limits { steps: 1000, ..Limits::default() });
         }
     }
@@ -41,8 +41,8 @@ proptest! {
     fn any_lexical_form_is_a_literal(text in "[-+0-9.eETZPYMDHS:INFtrué ]{0,24}", datatype in 0..DATATYPES.len()) {
         let iri = format!("http://www.w3.org/2001/XMLSchema#{}", DATATYPES[datatype]);
         let literal = Literal::parse(&text, Some(&iri), None);
-        let again = Literal::parse(&literal.lexical(), Some(literal.datatype()), None);
-        prop_assert_eq!(&again, &literal);
+        let reparsed = Literal::parse(&literal.lexical(), Some(literal.datatype()), None);
+        prop_assert_eq!(&reparsed, &literal);
         prop_assert!(literal.is_ill_typed() || literal.is_in(&iri));
         let _ = literal.compare(&Literal::integer(1));
     }

@@ -5,7 +5,7 @@ use metaplan_rules::{COADAPTATION_RULES, Symbols, TOMASYS_RULES, parse_rules, pr
 
 #[test]
 fn printed_rules_read_back_the_same() {
-    let odd = r#"
+    let unusual = r#"
         prefix ex: <http://example.org/>
         [as Protégé writes it] ex:A(?x) ^ swrlb:greaterThanOrEqual(?x, -0.5) ^ sameAs(?x, ?y) -> ex:B(?y)
         ex:p(?x.1, "a \"b\"\n"@en-GB) ∧ differentFrom(?x, ex:i) ∧ ex:r() → <urn:x y>(?x), sameAs(?x, ex:i) .
@@ -16,14 +16,14 @@ fn printed_rules_read_back_the_same() {
         [range] ex:p(?x, ?y) ^ xsd:decimal(?y) ^ rdf:PlainLiteral(?x) ^ not xsd:string(?x) -> ex:q(?x) .
         # the end
     "#;
-    let odd = odd.replace("?x.1", "?x");
-    for text in [TOMASYS_RULES, COADAPTATION_RULES, &odd] {
+    let unusual = unusual.replace("?x.1", "?x");
+    for text in [TOMASYS_RULES, COADAPTATION_RULES, &unusual] {
         let mut symbols = Symbols::new();
         let program = parse_rules(text, "test", &mut symbols, &prefixes()).expect("rules");
         assert!(program.rules.len() > 3);
         let printed = print_rules(&program, &symbols, &prefixes());
-        let again = parse_rules(&printed, "test", &mut symbols, &prefixes()).expect(&printed);
-        assert_eq!(program, again, "{printed}");
+        let reparsed = parse_rules(&printed, "test", &mut symbols, &prefixes()).expect(&printed);
+        assert_eq!(program, reparsed, "{printed}");
     }
 }
 
@@ -36,11 +36,11 @@ fn replacement_names_differ_from_existing_names() {
     // second.
     program.rules[0].variables = ["a", "_2", "c:::"].map(Into::into).to_vec();
     let printed = print_rules(&program, &symbols, &prefixes());
-    let again = parse_rules(&printed, "test", &mut symbols, &prefixes()).expect(&printed);
-    let bare = |program: &metaplan_rules::Program| {
+    let reparsed = parse_rules(&printed, "test", &mut symbols, &prefixes()).expect(&printed);
+    let content = |program: &metaplan_rules::Program| {
         format!("{:?} {:?}", program.rules[0].head, program.rules[0].body)
     };
-    assert_eq!(bare(&program), bare(&again), "{printed}");
+    assert_eq!(content(&program), content(&reparsed), "{printed}");
 }
 
 #[test]
@@ -55,10 +55,10 @@ fn names_that_the_syntax_cannot_express_are_replaced() {
         printed.ends_with("[two lines [1)] <p>(?_0, ?_1) ^ <q>(?_2) -> <r>(?_0, ?_1, ?_2) .\n"),
         "{printed}"
     );
-    let again = parse_rules(&printed, "test", &mut symbols, &prefixes()).expect(&printed);
+    let reparsed = parse_rules(&printed, "test", &mut symbols, &prefixes()).expect(&printed);
     assert_eq!(
         (&program.rules[0].head, &program.rules[0].body),
-        (&again.rules[0].head, &again.rules[0].body)
+        (&reparsed.rules[0].head, &reparsed.rules[0].body)
     );
 }
 

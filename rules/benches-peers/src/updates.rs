@@ -1,4 +1,5 @@
-//! Failure and recovery of a component. An update changes 31 of three facts per design.
+//! Failure and recovery of a component. Each update changes 31 facts: one status, and three derived facts for
+//! each of ten designs.
 
 use std::time::{Duration, Instant};
 

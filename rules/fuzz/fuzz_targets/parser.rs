@@ -8,7 +8,7 @@ use metaplan_rules::{Engine, Limits, Prefixes, Program, Symbols, parse_rules, pr
 
 /// Heads and bodies of the rules, without variable names and labels, which the syntax cannot always
 /// express.
-fn bare(program: &Program) -> Vec<String> {
+fn content(program: &Program) -> Vec<String> {
     program.rules.iter().map(|rule| format!("{:?} {:?}", rule.head, rule.body)).collect()
 }
 
@@ -16,7 +16,7 @@ fuzz_target!(|text: &str| {
     let mut symbols = Symbols::new();
     let Ok(program) = parse_rules(text, "fuzz", &mut symbols, &Prefixes::new()) else { return };
     let printed = print_rules(&program, &symbols, &Prefixes::new());
-    let again = parse_rules(&printed, "fuzz", &mut symbols, &Prefixes::new()).expect(&printed);
-    assert_eq!(bare(&program), bare(&again), "{printed}");
+    let reparsed = parse_rules(&printed, "fuzz", &mut symbols, &Prefixes::new()).expect(&printed);
+    assert_eq!(content(&program), content(&reparsed), "{printed}");
     let _ = Engine::with_limits(symbols, program, [], Limits { steps: 1000, ..Limits::default() });
 });
