@@ -3,7 +3,7 @@
 //!
 //! A plan starts from a row of one atom (its seed) and extends partial matches by one atom at a time in a
 //! greedy order: tests as soon as their variables are bound, then the atom with the smallest expected
-//! number of matches, given the columns bound so far and the size of its relation.
+//! number of matches, given the bound columns and the size of its relation.
 
 use crate::aggregate::Function;
 use crate::builtin::BuiltIn;
@@ -154,7 +154,7 @@ impl Condition {
     }
 }
 
-/// Set of the variables that are bound so far.
+/// Set of the bound variables.
 #[derive(Clone, PartialEq, Eq)]
 pub(crate) struct Bound(pub Vec<bool>);
 

@@ -1,4 +1,4 @@
-//! Why-not explanations: for each rule that could derive a fact, the binding of its body with the fewest
+//! Explanations of absent facts: for each rule that could derive a fact, the binding of its body with the fewest
 //! unsatisfied atoms.
 //!
 //! A depth-first branch-and-bound search finds the binding with the lowest weight of unsatisfied atoms (a
