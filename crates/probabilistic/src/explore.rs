@@ -7,9 +7,9 @@ use std::hash::Hash;
 
 use crate::error::Error;
 use crate::fraction::Fraction;
-use crate::mdp::{MOST, Mdp, dense};
+use crate::mdp::{MAX_COUNT, Mdp, dense};
 use crate::number::Number;
-use crate::states::{Look, States};
+use crate::states::{Probe, States};
 
 /// The action of the self-loop that a state without choices gets.
 pub const DEADLOCK: u32 = u32::MAX;
@@ -70,7 +70,7 @@ pub type Written<'a, S, N> = (&'a [(S, N)], &'a [N]);
 impl<S: Clone, N: Number> Choices<S, N> {
     /// The transitions and rewards of the first choice with an action.
     pub fn find(&self, action: u32) -> Option<Written<'_, S, N>> {
-        let at = self.ends.iter().position(|(known, _)| *known == action)?;
+        let at = self.ends.iter().position(|(candidate, _)| *candidate == action)?;
         let begin = at.checked_sub(1).map_or(0, |before| self.ends[before].1);
         let kinds = self.rewards.len().checked_div(self.ends.len())?;
         let rewards = if kinds == 0 { &[] } else { self.rewards.chunks(kinds).nth(at)? };
@@ -164,18 +164,18 @@ pub fn explore<N: Number, G: Generator<N>>(
     bounds: &Bounds<'_>,
 ) -> Result<Explored<G::State, N>, Error> {
     let mut exploration = Exploration::new(generator, bounds)?;
-    exploration.go_on(generator, bounds, usize::MAX)?;
+    exploration.run(generator, bounds, usize::MAX)?;
     Ok(exploration.found)
 }
 
 /// A resumable exploration.
 pub(crate) struct Exploration<S, N> {
-    /// The process so far.
+    /// The explored part of the process.
     pub found: Explored<S, N>,
     /// The next state to expand.
     next: usize,
     /// The state at which progress is reported next.
-    told: usize,
+    next_report: usize,
 }
 
 impl<S: Clone + Eq + Hash, N: Number> Exploration<S, N> {
@@ -183,26 +183,28 @@ impl<S: Clone + Eq + Hash, N: Number> Exploration<S, N> {
     pub fn new<G: Generator<N, State = S>>(generator: &G, bounds: &Bounds<'_>) -> Result<Self, Error> {
         let mut states = States::new(generator.codes());
         for start in generator.starts() {
-            let look = states.look(&start, |state| generator.code(state));
-            let number = states.insert(start, look);
-            number
-                .ok_or_else(|| Error::StateLimit { states: states.len(), limit: bounds.states.min(MOST) })?;
+            let probe = states.probe(&start, |state| generator.code(state));
+            let number = states.insert(start, probe);
+            number.ok_or_else(|| Error::StateLimit {
+                states: states.len(),
+                limit: bounds.states.min(MAX_COUNT),
+            })?;
         }
         let rewards = vec![Vec::new(); generator.rewards()];
         let explored = Explored { mdp: Mdp::default(), starts: states.len(), states, rewards, deadlocks: 0 };
-        Ok(Self { found: explored, next: 0, told: 0 })
+        Ok(Self { found: explored, next: 0, next_report: 0 })
     }
 
     /// Explores until all states are expanded or `transitions` is reached, possibly exceeded by
     /// one batch. Returns `true` if all states are expanded.
-    pub fn go_on<G: Generator<N, State = S>>(
+    pub fn run<G: Generator<N, State = S>>(
         &mut self,
         generator: &G,
         bounds: &Bounds<'_>,
         transitions: usize,
     ) -> Result<bool, Error> {
-        let mut batch = Batch { choices: Choices::default(), ends: Vec::new(), looks: Vec::new() };
-        let limit = bounds.states.min(MOST);
+        let mut batch = Batch { choices: Choices::default(), ends: Vec::new(), probes: Vec::new() };
+        let limit = bounds.states.min(MAX_COUNT);
         loop {
             let begin = self.next;
             let end = self.found.states.len().min(begin.saturating_add(BATCH));
@@ -212,8 +214,8 @@ impl<S: Clone + Eq + Hash, N: Number> Exploration<S, N> {
             if self.found.mdp.transition_count() >= transitions {
                 return Ok(false);
             }
-            if begin >= self.told {
-                self.told = begin.saturating_add(TELL);
+            if begin >= self.next_report {
+                self.next_report = begin.saturating_add(REPORT_INTERVAL);
                 if !(bounds.progress)(self.found.states.len()) {
                     return Err(Error::Interrupted { states: self.found.states.len() });
                 }
@@ -229,7 +231,7 @@ impl<S: Clone + Eq + Hash, N: Number> Exploration<S, N> {
 /// latencies overlap.
 const BATCH: usize = 32;
 /// Number of states between two progress reports.
-const TELL: usize = 65_536;
+const REPORT_INTERVAL: usize = 65_536;
 
 /// The choices of a few consecutive states.
 struct Batch<S, N> {
@@ -237,7 +239,7 @@ struct Batch<S, N> {
     /// The end of the choices of each state.
     ends: Vec<usize>,
     /// For each transition, a first lookup of its target.
-    looks: Vec<Look>,
+    probes: Vec<Probe>,
 }
 
 impl<S: Clone + Eq + Hash, N: Number> Batch<S, N> {
@@ -253,9 +255,9 @@ impl<S: Clone + Eq + Hash, N: Number> Batch<S, N> {
             generator.successors(&states[state], &mut self.choices)?;
             self.ends.push(self.choices.ends.len());
         }
-        self.looks.clear();
+        self.probes.clear();
         let targets = self.choices.transitions.iter();
-        self.looks.extend(targets.map(|(target, _)| states.look(target, |state| generator.code(state))));
+        self.probes.extend(targets.map(|(target, _)| states.probe(target, |state| generator.code(state))));
         Ok(())
     }
 }
@@ -266,17 +268,17 @@ impl<S: Clone + Eq + Hash, N: Number> Explored<S, N> {
         clippy::arithmetic_side_effects,
         reason = "no more deadlocks than states, which are counted by 32 bits, and positions in lists"
     )]
-    fn add(&mut self, batch: &mut Batch<S, N>, first: usize, most: usize) -> Result<(), Error> {
+    fn add(&mut self, batch: &mut Batch<S, N>, first: usize, limit: usize) -> Result<(), Error> {
         let Self { mdp, states, rewards, deadlocks, .. } = self;
-        let too_many = |states: usize| Error::StateLimit { states, limit: most };
-        let mut transitions = batch.choices.transitions.drain(..).zip(&batch.looks);
+        let too_many = |states: usize| Error::StateLimit { states, limit: limit };
+        let mut transitions = batch.choices.transitions.drain(..).zip(&batch.probes);
         let mut reward = batch.choices.rewards.drain(..);
         let mut choices = batch.choices.ends.drain(..);
-        let (mut begin, mut taken) = (0, 0);
+        let (mut begin, mut finished_choices) = (0, 0);
         for (at, end) in batch.ends.iter().enumerate() {
-            for (action, end) in choices.by_ref().take(end - taken) {
-                for ((target, probability), look) in transitions.by_ref().take(end - begin) {
-                    let target = states.insert(target, *look);
+            for (action, end) in choices.by_ref().take(end - finished_choices) {
+                for ((target, probability), probe) in transitions.by_ref().take(end - begin) {
+                    let target = states.insert(target, *probe);
                     mdp.push_transition(target.ok_or_else(|| too_many(states.len()))?, probability);
                 }
                 begin = end;
@@ -285,8 +287,8 @@ impl<S: Clone + Eq + Hash, N: Number> Explored<S, N> {
                     values.push(reward.next().unwrap_or_else(N::zero));
                 }
             }
-            taken = *end;
-            if states.len() > most {
+            finished_choices = *end;
+            if states.len() > limit {
                 return Err(too_many(states.len()));
             }
             if mdp.open_choices() == 0 {
@@ -306,7 +308,7 @@ impl<S: Clone + Eq + Hash, N: Number> Explored<S, N> {
 impl<S: Clone> Exploration<S, Fraction> {
     /// Converts to doubles. Returns `None` if a number is out of range.
     pub fn rounded(&self) -> Option<Exploration<S, f64>> {
-        Some(Exploration { found: self.found.rounded()?, next: self.next, told: self.told })
+        Some(Exploration { found: self.found.rounded()?, next: self.next, next_report: self.next_report })
     }
 }
 

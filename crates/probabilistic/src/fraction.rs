@@ -178,14 +178,14 @@ impl Number for Fraction {
     }
     fn plus(&self, other: &Self) -> Self {
         match (self, other) {
-            (Short(0, _), known) | (known, Short(0, _)) => known.clone(),
+            (Short(0, _), term) | (term, Short(0, _)) => term.clone(),
             (Short(a, b), Short(c, d)) => sum((*a, *b), (*c, *d), false),
             _ => Self::from_long(&*self.long() + &*other.long()),
         }
     }
     fn minus(&self, other: &Self) -> Self {
         match (self, other) {
-            (known, Short(0, _)) => known.clone(),
+            (term, Short(0, _)) => term.clone(),
             (Short(a, b), Short(c, d)) => sum((*a, *b), (*c, *d), true),
             _ => Self::from_long(&*self.long() - &*other.long()),
         }
@@ -235,7 +235,7 @@ mod tests {
         let sizes = (0_u32..72, any::<i128>()).prop_map(|(bits, number)| number >> (127 - bits));
         let word = i128::from(i64::MAX);
         let ends = (-3_i128..4, prop_oneof![Just(0), Just(word), Just(-word), Just(1 << 53)]);
-        prop_oneof![sizes, ends.prop_map(|(more, end)| end + more), -12_i128..13]
+        prop_oneof![sizes, ends.prop_map(|(offset, end)| end + offset), -12_i128..13]
     }
 
     fn rational() -> impl Strategy<Value = BigRational> {
@@ -245,14 +245,14 @@ mod tests {
 
     /// Checks that a fraction has a value, and that it is short exactly if both parts fit into
     /// words.
-    fn is(found: &Fraction, expected: &BigRational) {
+    fn is(fraction: &Fraction, expected: &BigRational) {
         let fits = i64::try_from(expected.numer()).is_ok() && i64::try_from(expected.denom()).is_ok();
-        assert_eq!(matches!(found, Short(..)), fits, "{found:?} {expected}");
-        assert_eq!(found.to_rational().as_ref(), Some(expected));
-        assert_eq!(*found, Fraction::from_rational(expected));
-        assert_eq!(Number::is_zero(found), expected.numer().bits() == 0);
-        assert_eq!(Number::is_unit(found), expected.numer() == expected.denom());
-        assert_eq!(found.size(), expected.numer().bits() + expected.denom().bits());
+        assert_eq!(matches!(fraction, Short(..)), fits, "{fraction:?} {expected}");
+        assert_eq!(fraction.to_rational().as_ref(), Some(expected));
+        assert_eq!(*fraction, Fraction::from_rational(expected));
+        assert_eq!(Number::is_zero(fraction), expected.numer().bits() == 0);
+        assert_eq!(Number::is_unit(fraction), expected.numer() == expected.denom());
+        assert_eq!(fraction.size(), expected.numer().bits() + expected.denom().bits());
     }
 
     proptest! {

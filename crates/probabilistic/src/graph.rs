@@ -18,7 +18,7 @@ const SHRINK_THRESHOLD: usize = 100_000;
 struct Frame {
     node: u32,
     /// The visit number of the node.
-    own: u32,
+    visit_number: u32,
     /// Number of its edges that have been followed.
     followed: u32,
 }
@@ -48,7 +48,7 @@ pub fn visit_components<'a, E>(
         }
         next += 1;
         low[root as usize] = next;
-        frames.push(Frame { node: root, own: next, followed: 0 });
+        frames.push(Frame { node: root, visit_number: next, followed: 0 });
         while let Some(frame) = frames.last_mut() {
             let v = frame.node as usize;
             let edges = &successors(frame.node)[frame.followed as usize..];
@@ -67,17 +67,17 @@ pub fn visit_components<'a, E>(
             if let Some(child) = child {
                 next += 1;
                 low[child as usize] = next;
-                frames.push(Frame { node: child, own: next, followed: 0 });
+                frames.push(Frame { node: child, visit_number: next, followed: 0 });
                 continue;
             }
-            let Frame { node, own, .. } = *frame;
+            let Frame { node, visit_number, .. } = *frame;
             frames.pop();
-            if least != own {
+            if least != visit_number {
                 stack.push(node);
                 continue;
             }
             let mut begin = stack.len();
-            while begin > 0 && low[stack[begin - 1] as usize] >= own {
+            while begin > 0 && low[stack[begin - 1] as usize] >= visit_number {
                 begin -= 1;
                 low[stack[begin] as usize] = DONE;
             }

@@ -21,10 +21,10 @@ use crate::prism::ast::{
 /// A construct that JANI cannot express (rewards of commands without an action), or a formula
 /// that contains itself.
 pub fn write(name: &str, model: &Model) -> Result<Value, Error> {
-    let endless: Vec<Diagnostic> =
-        model.formulas.iter().filter_map(|formula| endless(model, formula)).collect();
-    if !endless.is_empty() {
-        return Err(Error::Model(endless.into()));
+    let recursive: Vec<Diagnostic> =
+        model.formulas.iter().filter_map(|formula| recursive(model, formula)).collect();
+    if !recursive.is_empty() {
+        return Err(Error::Model(recursive.into()));
     }
     let writer = Writer { formulas: &model.formulas };
     let mut problems = Vec::new();
@@ -81,7 +81,7 @@ pub fn write(name: &str, model: &Model) -> Result<Value, Error> {
 fn is_taken(model: &Model, name: &str) -> bool {
     let declared = model.modules.iter().flat_map(|module| &module.variables).chain(&model.globals);
     let mut names = declared.map(|v| &v.name).chain(model.constants.iter().map(|constant| &constant.name));
-    names.any(|known| known == name)
+    names.any(|existing| existing == name)
 }
 
 /// The name of a label; prefixed if it is taken.
@@ -91,10 +91,10 @@ fn label_name(model: &Model, name: &str) -> String {
 
 /// The name of a reward structure; prefixed if it is taken.
 fn reward_name(model: &Model, name: &str) -> String {
-    let taken = is_taken(model, name) || model.labels.iter().any(|label| label.name == name);
+    let collides = is_taken(model, name) || model.labels.iter().any(|label| label.name == name);
     match name {
         "" => "reward".to_owned(),
-        _ if taken => format!("reward_{name}"),
+        _ if collides => format!("reward_{name}"),
         _ => name.to_owned(),
     }
 }
@@ -138,8 +138,8 @@ fn endless(model: &Model, formula: &Named) -> Option<Diagnostic> {
             let text = format!("`{name}` stands for something with itself in it");
             return Some(Diagnostic::new("Q204", formula.place, text));
         }
-        if !used[..at].iter().any(|(known, _)| *known == name)
-            && let Some(inner) = model.formulas.iter().find(|known| known.name == name)
+        if !used[..at].iter().any(|(earlier, _)| *earlier == name)
+            && let Some(inner) = model.formulas.iter().find(|earlier| earlier.name == name)
         {
             inner.expression.names(&mut used);
         }
@@ -149,11 +149,11 @@ fn endless(model: &Model, formula: &Named) -> Option<Diagnostic> {
 
 /// The conjuncts of a condition.
 fn parts(condition: &Expr) -> Vec<&Expr> {
-    let (mut open, mut conjuncts) = (vec![condition], Vec::new());
-    while let Some(part) = open.pop() {
+    let (mut stack, mut conjuncts) = (vec![condition], Vec::new());
+    while let Some(part) = stack.pop() {
         match &part.kind {
             // The stack yields the left operand first.
-            ExprKind::Binary(BinaryOp::And, left, right) => open.extend([&**right, &**left]),
+            ExprKind::Binary(BinaryOp::And, left, right) => stack.extend([&**right, &**left]),
             _ => conjuncts.push(part),
         }
     }
@@ -173,8 +173,8 @@ impl Writer<'_> {
                 transient.push(json!({ "ref": name, "value": self.expression(&label.expression) }));
             }
             for rewards in &model.rewards {
-                let of_states = rewards.items.iter().filter(|item| item.action.is_none());
-                if let Some(value) = self.sum(of_states, &[]) {
+                let state_items = rewards.items.iter().filter(|item| item.action.is_none());
+                if let Some(value) = self.sum(state_items, &[]) {
                     transient.push(json!({ "ref": reward_name(model, &rewards.name), "value": value }));
                 }
             }
@@ -196,7 +196,7 @@ impl Writer<'_> {
     fn edge(&self, model: &Model, module: &Module, command: &Command) -> Value {
         // The first of the synchronised modules carries the rewards of the action.
         let action = command.action.as_deref();
-        let shares = |other: &&Module| other.commands.iter().any(|c| c.action.as_deref() == action);
+        let shares = |candidate: &&Module| candidate.commands.iter().any(|c| c.action.as_deref() == action);
         let carries =
             action.is_some() && model.modules.iter().find(shares).is_some_and(|m| m.name == module.name);
         let mut assignments = Vec::new();

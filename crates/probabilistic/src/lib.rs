@@ -1,11 +1,11 @@
 //! Probabilistic model checking of Markov decision processes, with bounds that are certified or exact.
 //!
-//! A model comes as PRISM-language text ([`prism`]) or from a [`explore::Generator`] that computes successors natively.
+//! A model is PRISM-language text ([`prism`]) or an [`explore::Generator`] that computes successors natively.
 //! It becomes a sparse process ([`mdp`]); [`solve`] computes least and greatest probabilities and expected rewards with
 //! bounds and policies; [`policy`] evaluates a given policy; [`pareto`] trades two objectives. [`check`] does all of
 //! this for a property in PRISM's syntax.
 //!
-//! Not here: OWL, PDDL, file access and output.
+//! Absent: OWL, PDDL, file access and output.
 
 #![warn(
     clippy::cast_possible_truncation,

@@ -12,7 +12,7 @@ use crate::number::Number;
 
 /// Upper limit on the number of states and of choices; the two greatest 32-bit numbers are
 /// reserved.
-pub(crate) const MOST: usize = 0xFFFF_FFFE;
+pub(crate) const MAX_COUNT: usize = 0xFFFF_FFFE;
 
 /// Converts a position to 32 bits. Positions of states, choices, transitions and characters of a
 /// text are below 2^32.
@@ -123,7 +123,7 @@ impl<N: Number> Mdp<N> {
     )]
     pub fn push_transition(&mut self, target: u32, probability: N) {
         let first = self.first_transition[self.actions.len()] as usize;
-        if let Some(at) = self.targets[first..].iter().position(|known| *known == target) {
+        if let Some(at) = self.targets[first..].iter().position(|existing| *existing == target) {
             self.probabilities[first + at] = self.probabilities[first + at].plus(&probability);
         } else {
             self.targets.push(target);
@@ -137,7 +137,7 @@ impl<N: Number> Mdp<N> {
     /// More choices or transitions than 32 bits can count.
     pub fn end_choice(&mut self, action: u32) -> Result<(), Error> {
         let end = u32::try_from(self.targets.len()).map_err(|_| self.too_large())?;
-        if self.actions.len() >= MOST {
+        if self.actions.len() >= MAX_COUNT {
             return Err(self.too_large());
         }
         self.actions.push(action);
@@ -150,7 +150,7 @@ impl<N: Number> Mdp<N> {
         self.first_choice.push(dense(self.actions.len()));
     }
 
-    /// Number of choices of the current state so far.
+    /// Number of choices of the current state that were added.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "the state that is being written starts after the choices of those before"

@@ -66,9 +66,9 @@ pub struct Bounded<N> {
 }
 
 /// Upper limit on the number of vertices.
-const VERTICES: usize = 2000;
+const MAX_VERTICES: usize = 2000;
 /// Upper limit on the number of branch-and-bound nodes for the best deterministic policy.
-const BRANCHES: usize = 3000;
+const MAX_BRANCHES: usize = 3000;
 
 /// Two objectives in one process.
 #[derive(Debug)]
@@ -159,8 +159,8 @@ impl<'a, N: Number> Pareto<'a, N> {
             allowed,
         };
         let solution = solve(problem, None).ok_or(Exhausted)?;
-        let kept = conserving(&problem, &solution);
-        Ok((solution, kept))
+        let optimal_choices = conserving(&problem, &solution);
+        Ok((solution, optimal_choices))
     }
 
     /// The losses of a policy.
@@ -188,12 +188,12 @@ impl<'a, N: Number> Pareto<'a, N> {
             weights[number] = N::one();
             weights
         };
-        let (best, kept) = self.solve(&unit(first), allowed)?;
+        let (best, optimal_choices) = self.solve(&unit(first), allowed)?;
         if best.infinite.contains(0) {
             return Ok(None);
         }
         let secondary = usize::from(first == 0);
-        let (second, _) = self.solve(&unit(secondary), Some(&kept))?;
+        let (second, _) = self.solve(&unit(secondary), Some(&optimal_choices))?;
         let policy = second.policy.iter().zip(&best.policy).map(|(s, b)| if *s == NONE { *b } else { *s });
         self.point(policy.collect()).map(Some)
     }
@@ -212,7 +212,7 @@ impl<'a, N: Number> Pareto<'a, N> {
         while let Some(next) = open.last() {
             let weights = [at.losses[1].minus(&next.losses[1]), next.losses[0].minus(&at.losses[0])];
             let flat = weights.iter().any(|w| !clearly_positive(w));
-            let between = if flat || done.len().saturating_add(open.len()) > VERTICES {
+            let between = if flat || done.len().saturating_add(open.len()) > MAX_VERTICES {
                 None
             } else {
                 let (solution, _) = self.solve(&weights, allowed)?;
@@ -287,7 +287,7 @@ impl<'a, N: Number> Pareto<'a, N> {
         let mut choices = FixedBitSet::with_capacity(self.mdp.choice_count());
         choices.insert_range(..);
         let mut open = vec![choices];
-        let mut remaining_nodes = 0..BRANCHES;
+        let mut remaining_nodes = 0..MAX_BRANCHES;
         while let Some(allowed) = open.pop() {
             if remaining_nodes.next().is_none() {
                 return Ok(best.map(|best| (Bounded { lower: 0.0, ..best }, false)));
@@ -311,8 +311,8 @@ impl<'a, N: Number> Pareto<'a, N> {
             };
             for choice in self.mdp.choices(state).filter(|choice| allowed.contains(*choice)) {
                 let mut restricted = allowed.clone();
-                for other in self.mdp.choices(state) {
-                    restricted.set(other, other == choice);
+                for alternative in self.mdp.choices(state) {
+                    restricted.set(alternative, alternative == choice);
                 }
                 open.push(restricted);
             }

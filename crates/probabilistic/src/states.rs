@@ -1,13 +1,14 @@
-//! The states of a process in the order in which they were found, and the way back from a state to its number.
+//! The states of a process in order of discovery, and the map from states to their numbers.
 
 use std::hash::{BuildHasher, Hash};
 
 use rustc_hash::FxBuildHasher;
 
-use crate::mdp::{MOST, dense};
+use crate::mdp::{MAX_COUNT, dense};
 
-/// Codes up to which a table is laid out. Its memory is taken as it is touched, so that a sparse one costs less.
-const TABLE: usize = 1 << 29;
+/// Upper limit on the number of codes for which a table is used. Its memory is provided on first access, so that a
+/// sparse table costs less.
+const MAX_TABLE_CODES: usize = 1 << 29;
 
 /// States and their numbers.
 #[derive(Debug, Clone)]
@@ -18,62 +19,63 @@ pub struct States<S> {
 
 #[derive(Debug, Clone)]
 enum Numbers {
-    /// For each code the number of its state plus one, 0 where there is none.
+    /// For each code, the number of its state plus one, or 0 if the state is not known.
     Table(Vec<u32>),
-    /// Numbers by the hash of their states.
-    Hash(Places),
+    /// Numbers by the hashes of the states.
+    Hash(HashTable),
 }
 
-/// A hash table with open addresses: the upper half of an entry is the hash of a state, the lower half its number plus one.
+/// A hash table with linear probing. The upper half of an entry is the hash of a state, the lower half its number plus
+/// one; 0 is a free slot.
 ///
-/// The place of a hash are its first bits, so that places have the order of hashes, and a greater table is written from one end to the
-/// other.
+/// The home slot of a hash is its leading bits. Slots are therefore in the order of hashes, and growing writes the larger
+/// table from one end to the other.
 #[derive(Debug, Clone)]
-struct Places {
+struct HashTable {
     entries: Vec<u64>,
-    /// How many bits of a hash are not part of its place.
+    /// Number of trailing bits of a hash that do not determine its home slot.
     shift: u32,
 }
 
-/// Bits of the place in the first table.
-const FIRST: u32 = 8;
+/// Bits of the slot numbers of the initial table.
+const INITIAL_BITS: u32 = 8;
 
-impl Places {
+impl HashTable {
     fn new(bits: u32) -> Self {
         Self { entries: vec![0; 1 << bits], shift: 32_u32.saturating_sub(bits) }
     }
 
-    /// The place at which a hash is looked for first.
+    /// The first slot that is probed for a hash.
     const fn home(&self, hash: u32) -> usize {
         hash as usize >> self.shift
     }
 
-    /// The number of a state with this hash, or the place that is free for it.
+    /// Returns the number of the entry with this hash for which `is_match` holds, or else the free slot for it.
     #[expect(clippy::arithmetic_side_effects, reason = "there are at least 2^8 entries")]
-    fn find(&self, hash: u32, is_it: impl Fn(u32) -> bool) -> Result<u32, usize> {
+    fn find(&self, hash: u32, is_match: impl Fn(u32) -> bool) -> Result<u32, usize> {
         let last = self.entries.len() - 1;
-        let mut place = self.home(hash);
+        let mut slot = self.home(hash);
         loop {
-            match number_of(self.entries[place], hash) {
-                _ if self.entries[place] == 0 => return Err(place),
-                Some(number) if is_it(number) => return Ok(number),
-                _ => place = place.wrapping_add(1) & last,
+            match number_of(self.entries[slot], hash) {
+                _ if self.entries[slot] == 0 => return Err(slot),
+                Some(number) if is_match(number) => return Ok(number),
+                _ => slot = slot.wrapping_add(1) & last,
             }
         }
     }
 
-    /// Twice as many places where less than a third is free. None where hashes have no more bits for that.
-    fn make_room(&mut self, taken: usize) -> Option<()> {
-        if taken.saturating_mul(3) < self.entries.len().saturating_mul(2) {
+    /// Doubles the table if less than a third of its slots is free. Returns `None` if hashes have no further bits.
+    fn grow_if_full(&mut self, count: usize) -> Option<()> {
+        if count.saturating_mul(3) < self.entries.len().saturating_mul(2) {
             return Some(());
         }
-        let mut more = Self::new(33_u32.checked_sub(self.shift).filter(|bits| *bits <= 32)?);
+        let mut larger = Self::new(33_u32.checked_sub(self.shift).filter(|bits| *bits <= 32)?);
         for entry in self.entries.drain(..).filter(|entry| *entry != 0) {
-            if let Err(place) = more.find(upper(entry), |_| false) {
-                more.entries[place] = entry;
+            if let Err(slot) = larger.find(upper(entry), |_| false) {
+                larger.entries[slot] = entry;
             }
         }
-        *self = more;
+        *self = larger;
         Some(())
     }
 }
@@ -82,106 +84,109 @@ const fn upper(entry: u64) -> u32 {
     (entry >> 32) as u32
 }
 
-/// The number of an entry, if it has this hash.
+/// Returns the number of an entry if the entry has the given hash.
 #[expect(clippy::cast_possible_truncation, reason = "the lower half")]
 const fn number_of(entry: u64, hash: u32) -> Option<u32> {
     if upper(entry) == hash { (entry as u32).checked_sub(1) } else { None }
 }
 
 fn hash<S: Hash>(state: &S) -> u32 {
-    // The first bits of what the hasher has before it turns them around are the best ones.
+    // The hasher rotates its best bits away from the top; the multiplication brings them back.
     upper(FxBuildHasher.hash_one(state).wrapping_mul(0x9E37_79B9_7F4A_7C15))
 }
 
-/// What a first look at a state tells.
+/// Result of the first probe for a state.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Look {
-    /// Its code, or its hash.
+pub(crate) struct Probe {
+    /// The code or the hash of the state.
     key: usize,
-    /// Its number plus one, 0 if it was not seen at once.
-    after: u32,
+    /// Number of the state plus one, or 0 if the first probe did not find it.
+    number_plus_one: u32,
 }
 
 impl<S: Eq + Hash> States<S> {
-    /// No states; `codes` says how many codes they have, if they have.
+    /// Creates an empty set. `codes` is the number of codes, if the generator numbers all conceivable states.
     pub fn new(codes: Option<usize>) -> Self {
-        let numbers = match codes.filter(|codes| *codes <= TABLE) {
+        let numbers = match codes.filter(|codes| *codes <= MAX_TABLE_CODES) {
             Some(codes) => Numbers::Table(vec![0; codes]),
-            None => Numbers::Hash(Places::new(FIRST)),
+            None => Numbers::Hash(HashTable::new(INITIAL_BITS)),
         };
         Self { list: Vec::new(), numbers }
     }
 
-    /// A first look at a state. Looks at several states wait for memory at the same time, which takes most of the time of finding one.
-    pub(crate) fn look(&self, state: &S, code: impl FnOnce(&S) -> usize) -> Look {
+    /// Probes once for a state. Memory accesses dominate the time of a lookup; those of several probes overlap.
+    pub(crate) fn probe(&self, state: &S, code: impl FnOnce(&S) -> usize) -> Probe {
         match &self.numbers {
             Numbers::Table(table) => {
                 let key = code(state);
-                Look { key, after: table[key] }
+                Probe { key, number_plus_one: table[key] }
             }
-            Numbers::Hash(places) => {
+            Numbers::Hash(hash_table) => {
                 let hash = hash(state);
-                let number = number_of(places.entries[places.home(hash)], hash);
+                let number = number_of(hash_table.entries[hash_table.home(hash)], hash);
                 let number = number.filter(|number| self.list[*number as usize] == *state);
-                Look { key: hash as usize, after: number.map_or(0, |number| number.saturating_add(1)) }
+                Probe {
+                    key: hash as usize,
+                    number_plus_one: number.map_or(0, |number| number.saturating_add(1)),
+                }
             }
         }
     }
 
-    /// The number of a state that was looked at, which it gets if it has none; none where there are too many states to number them.
-    pub(crate) fn insert(&mut self, state: S, look: Look) -> Option<u32> {
-        if let Some(known) = look.after.checked_sub(1) {
-            return Some(known);
+    /// Returns the number of a probed state; adds the state if it is new. `None` if there are too many states.
+    pub(crate) fn insert(&mut self, state: S, probe: Probe) -> Option<u32> {
+        if let Some(number) = probe.number_plus_one.checked_sub(1) {
+            return Some(number);
         }
-        if self.list.len() >= MOST {
+        if self.list.len() >= MAX_COUNT {
             return None;
         }
         let next = dense(self.list.len());
         match &mut self.numbers {
             Numbers::Table(table) => {
-                let number = &mut table[look.key];
-                if let Some(known) = number.checked_sub(1) {
-                    return Some(known);
+                let number = &mut table[probe.key];
+                if let Some(number) = number.checked_sub(1) {
+                    return Some(number);
                 }
                 *number = next.saturating_add(1);
             }
-            Numbers::Hash(places) => {
-                let hash = dense(look.key);
-                let is_it = |number: u32| self.list[number as usize] == state;
-                let place = match places.find(hash, is_it) {
-                    Ok(known) => return Some(known),
-                    Err(place) => place,
+            Numbers::Hash(hash_table) => {
+                let hash = dense(probe.key);
+                let is_match = |number: u32| self.list[number as usize] == state;
+                let slot = match hash_table.find(hash, is_match) {
+                    Ok(number) => return Some(number),
+                    Err(slot) => slot,
                 };
-                places.entries[place] = u64::from(hash) << 32 | u64::from(next.saturating_add(1));
-                places.make_room(self.list.len())?;
+                hash_table.entries[slot] = u64::from(hash) << 32 | u64::from(next.saturating_add(1));
+                hash_table.grow_if_full(self.list.len())?;
             }
         }
         self.list.push(state);
         Some(next)
     }
 
-    /// The number of a state with its code, if it was found.
+    /// Returns the number of a state, given the state and its code.
     pub fn number(&self, code: usize, state: &S) -> Option<usize> {
-        let found = match &self.numbers {
+        let number = match &self.numbers {
             Numbers::Table(table) => table.get(code).copied().unwrap_or(0).checked_sub(1),
-            Numbers::Hash(places) => {
-                places.find(hash(state), |number| self.list[number as usize] == *state).ok()
+            Numbers::Hash(hash_table) => {
+                hash_table.find(hash(state), |number| self.list[number as usize] == *state).ok()
             }
         };
-        found.map(|number| number as usize)
+        number.map(|number| number as usize)
     }
 
-    /// Forgets how to find the numbers of states, which takes memory: [`number`](Self::number) finds none any more.
+    /// Frees the map from states to numbers. Afterwards, [`number`](Self::number) returns `None`.
     pub(crate) fn forget_numbers(&mut self) {
         self.numbers = Numbers::Table(Vec::new());
     }
 
-    /// How many there are.
+    /// Number of states.
     pub fn len(&self) -> usize {
         self.list.len()
     }
 
-    /// Whether there are none.
+    /// Returns `true` if there are no states.
     pub fn is_empty(&self) -> bool {
         self.list.is_empty()
     }

@@ -1,4 +1,4 @@
-//! Bounds enclose the true value also where doubles round, and models that would take all memory or time are refused.
+//! Bounds enclose the true value even if doubles round, and models that would exhaust memory or time are rejected.
 
 use metaplan_probabilistic::check::{Answer, Exactness, Options, Outcome, PolicyTable, Quantity, check};
 use metaplan_probabilistic::{Error, prism, property};
@@ -17,22 +17,22 @@ fn value(model: &str, question: &str, exactness: Exactness) -> Quantity {
     }
 }
 
-fn encloses(found: &Quantity, exact: &BigRational) -> bool {
+fn encloses(quantity: &Quantity, exact: &BigRational) -> bool {
     let end = |end: f64| BigRational::from_float(end);
-    end(found.lower).is_some_and(|lower| lower <= *exact)
-        && end(found.upper).is_some_and(|upper| upper >= *exact)
+    end(quantity.lower).is_some_and(|lower| lower <= *exact)
+        && end(quantity.upper).is_some_and(|upper| upper >= *exact)
 }
 
-/// The exact value, which the bounds of the doubles enclose.
+/// Returns the exact value, after checking that the bounds in doubles enclose it.
 fn enclosed(model: &str, question: &str) -> BigRational {
     let exact = value(model, question, Exactness::Always).exact.expect("a fraction");
-    let found = value(model, question, Exactness::Never);
-    assert!(encloses(&found, &exact), "{question}: {found:?}, exactly {exact}");
+    let rounded = value(model, question, Exactness::Never);
+    assert!(encloses(&rounded, &exact), "{question}: {rounded:?}, exactly {exact}");
     exact
 }
 
-/// The codes of what is wrong with a model.
-fn refused(model: &str, question: &str, exactness: Exactness) -> Vec<&'static str> {
+/// Codes of the errors in a model.
+fn error_codes(model: &str, question: &str, exactness: Exactness) -> Vec<&'static str> {
     match outcome(model, question, &Options::default().with_exactness(exactness)) {
         Err(Error::Model(problems)) => problems.iter().map(|problem| problem.code).collect(),
         other => panic!("{other:?}"),
@@ -40,7 +40,7 @@ fn refused(model: &str, question: &str, exactness: Exactness) -> Vec<&'static st
 }
 
 #[test]
-fn choices_that_differ_by_less_than_policy_iteration_sees() {
+fn choices_that_differ_by_less_than_the_tolerance_are_enclosed() {
     let model = "mdp
         module m
           s:[0..4] init 0;
@@ -54,7 +54,7 @@ fn choices_that_differ_by_less_than_policy_iteration_sees() {
 }
 
 #[test]
-fn sums_that_are_not_quite_one() {
+fn probabilities_with_a_rounded_sum_are_scaled_to_one() {
     let model = "dtmc
         module m
           s:[0..300] init 0;
@@ -83,7 +83,7 @@ fn constants_are_exact() {
         module m s:[0..1] init 0; [] s=0 -> 1-p-0.3:(s'=1) + p+0.3:(s'=0); endmodule
         label \"goal\" = s=1;";
     assert_eq!(enclosed(model, "P=? [ F \"goal\" ]").to_string(), "0");
-    // In doubles this would be less than zero.
+    // In doubles, this probability would be negative.
     enclosed(&model.replace("1-p-0.3", "0.3-0.2-0.1").replace("p+0.3", "1"), "P=? [ F \"goal\" ]");
     let guard = "dtmc
         module m s:[0..3] init 0; [] s*0.1!=0.3 -> (s'=min(s+1,3)); endmodule
@@ -92,7 +92,7 @@ fn constants_are_exact() {
 }
 
 #[test]
-fn values_below_the_least_double() {
+fn values_below_the_least_double_are_enclosed() {
     let model = "dtmc
         module m s:[0..400] init 0; d:bool init false;
           [] s<400 & !d -> 0.1:(s'=s+1) + 0.9:(d'=true);
@@ -101,11 +101,11 @@ fn values_below_the_least_double() {
     enclosed(model, "P=? [ F \"goal\" ]");
     enclosed(&model.replace("0.9:(d'=true)", "0.5:(d'=true) + 0.4:(s'=max(s-1,0))"), "P=? [ F \"goal\" ]");
     let rare = model.replace("0.1:", "1e-300:").replace("0.9:", "1-1e-300:");
-    assert_eq!(refused(&rare, "P=? [ F \"goal\" ]", Exactness::Never), ["Q303"]);
+    assert_eq!(error_codes(&rare, "P=? [ F \"goal\" ]", Exactness::Never), ["Q303"]);
 }
 
 #[test]
-fn rewards_that_are_nearly_whole() {
+fn nearly_integral_rewards_are_enclosed() {
     let model = "dtmc
         module m s:[0..2] init 0; [] s<2 -> (s'=s+1); endmodule
         rewards s=0 : 0.99999999999999999999; s=1 : 3; endrewards
@@ -116,7 +116,7 @@ fn rewards_that_are_nearly_whole() {
 }
 
 #[test]
-fn bounded_steps() {
+fn step_bounded_values_are_enclosed() {
     let model = "dtmc
         module m s:[0..2] init 0;
           [] s=0 -> 0.5:(s'=1) + 0.5:(s'=2);
@@ -124,9 +124,9 @@ fn bounded_steps() {
         endmodule
         label \"goal\" = s=2;";
     enclosed(model, "P=? [ F<=50 \"goal\" ]");
-    // In fractions this takes too long, so that doubles answer.
-    let found = value(model, "P=? [ F<=1000000 \"goal\" ]", Exactness::Auto);
-    assert!(found.exact.is_none() && found.lower <= 1.0 && found.upper >= 1.0, "{found:?}");
+    // Exact arithmetic exceeds its budget, so that the answer is in doubles.
+    let rounded = value(model, "P=? [ F<=1000000 \"goal\" ]", Exactness::Auto);
+    assert!(rounded.exact.is_none() && rounded.lower <= 1.0 && rounded.upper >= 1.0, "{rounded:?}");
 }
 
 #[test]
@@ -144,18 +144,18 @@ fn a_policy_is_evaluated_over_bounded_steps() {
     ];
     for (question, expected) in cases {
         let evaluate = Some(PolicyTable::from_json(policy).expect("a policy"));
-        let found =
+        let answer =
             outcome(model, question, &Options::default().with_evaluation(evaluate)).expect("an answer");
-        let Outcome::Value(Answer::Finite(found)) = found else { panic!("{found:?}") };
-        assert_eq!(found.exact.map(|exact| exact.to_string()).as_deref(), Some(expected), "{question}");
+        let Outcome::Value(Answer::Finite(answer)) = answer else { panic!("{answer:?}") };
+        assert_eq!(answer.exact.map(|exact| exact.to_string()).as_deref(), Some(expected), "{question}");
     }
     let evaluate = Some(PolicyTable::from_json(policy).expect("a policy"));
-    let both = "multi(R{\"cost\"}min=? [ F \"goal\" ], Pmax=? [ F \"goal\" ])";
-    assert!(outcome(model, both, &Options::default().with_evaluation(evaluate)).is_err());
+    let two_objectives = "multi(R{\"cost\"}min=? [ F \"goal\" ], Pmax=? [ F \"goal\" ])";
+    assert!(outcome(model, two_objectives, &Options::default().with_evaluation(evaluate)).is_err());
 }
 
 #[test]
-fn ties_of_small_values_are_ties() {
+fn the_policy_for_tiny_values_is_optimal() {
     let model = "mdp
         module m s:[0..40] init 0; d:bool init false; h:bool init false;
           [slow] s<40 & !d & !h -> (h'=true);
@@ -169,13 +169,13 @@ fn ties_of_small_values_are_ties() {
     let options = Options::default().with_exactness(Exactness::Never).with_policy(true);
     let report = check(&model, &question, &options).expect("an answer");
     let options = Options::default().with_exactness(Exactness::Always).with_evaluation(report.policy);
-    let again = check(&model, &question, &options).expect("an answer").outcome;
-    let Outcome::Value(Answer::Finite(found)) = again else { panic!("{again:?}") };
-    assert_eq!(found.exact.map(|exact| exact.to_string()).as_deref(), Some("1/100000000"));
+    let exact = check(&model, &question, &options).expect("an answer").outcome;
+    let Outcome::Value(Answer::Finite(quantity)) = exact else { panic!("{exact:?}") };
+    assert_eq!(quantity.exact.map(|exact| exact.to_string()).as_deref(), Some("1/100000000"));
 }
 
 #[test]
-fn two_objectives_in_doubles_have_the_bounds_of_their_policies() {
+fn two_objectives_in_doubles_have_enclosing_bounds() {
     let model = "mdp
         module m s:[0..2] init 0; r:[0..7] init 0;
           [risk] s=0 & r<7 -> 1/3:(s'=1) + 1/7:(s'=2) + 11/21:(r'=r+1);
@@ -185,8 +185,8 @@ fn two_objectives_in_doubles_have_the_bounds_of_their_policies() {
         label \"end\" = s>0; label \"good\" = s=1;";
     let question = "multi(R{\"cost\"}min=? [ F \"end\" ], Pmax=? [ F \"good\" ])";
     let [exact, rounded] = [Exactness::Always, Exactness::Never].map(|exactness| {
-        let found = outcome(model, question, &Options::default().with_exactness(exactness));
-        let Ok(Outcome::Front(front)) = found else { panic!("{found:?}") };
+        let result = outcome(model, question, &Options::default().with_exactness(exactness));
+        let Ok(Outcome::Front(front)) = result else { panic!("{result:?}") };
         front
     });
     assert!(exact.len() > 1 && exact.len() == rounded.len(), "{exact:?} {rounded:?}");
@@ -219,7 +219,7 @@ fn two_objectives_in_doubles_have_the_bounds_of_their_policies() {
 }
 
 #[test]
-fn extreme_models_are_refused_or_answered() {
+fn extreme_models_are_rejected_or_answered() {
     let wide =
         "mdp module m x:[-5000000000000000000..5000000000000000000] init 0; [] x=0 -> (x'=1); endmodule
         label \"goal\" = x=1;";
@@ -229,30 +229,30 @@ fn extreme_models_are_refused_or_answered() {
         format!("module m{number} x{number}:[0..1] init 0;\n{}endmodule\n", command.repeat(20))
     };
     let modules: Vec<String> = (0..12).map(module).collect();
-    let many = format!("mdp\n{}label \"goal\" = x0=1;", modules.concat());
-    assert_eq!(refused(&many, "Pmax=? [ F \"goal\" ]", Exactness::Auto), ["Q306"]);
+    let synchronised = format!("mdp\n{}label \"goal\" = x0=1;", modules.concat());
+    assert_eq!(error_codes(&synchronised, "Pmax=? [ F \"goal\" ]", Exactness::Auto), ["Q306"]);
     let growing = "const double p = pow(pow(pow(1.5,900),900),900);
         mdp module m x:[0..1] init 0; [] x=0 -> p:(x'=1); endmodule label \"goal\" = x=1;";
-    assert_eq!(refused(growing, "Pmax=? [ F \"goal\" ]", Exactness::Auto), ["Q303"]);
+    assert_eq!(error_codes(growing, "Pmax=? [ F \"goal\" ]", Exactness::Auto), ["Q303"]);
     let square = |n: usize| format!("const double c{} = c{n}*c{n};\n", n + 1);
     let squares = (0..60).map(square).collect::<Vec<_>>().concat();
     let growing = format!(
         "const double c0 = 0.9;\n{squares} mdp module m x:[0..1] init 0; [] x=0 -> c60:(x'=1) + 1-c60:(x'=0); endmodule
         label \"goal\" = x=1;"
     );
-    assert_eq!(refused(&growing, "Pmax=? [ F \"goal\" ]", Exactness::Auto), ["Q303"]);
+    assert_eq!(error_codes(&growing, "Pmax=? [ F \"goal\" ]", Exactness::Auto), ["Q303"]);
     for update in ["1/x:(x'=1)", "1:(x'=1/0)", "0.5:(x'=1)", "-1:(x'=1) + 2:(x'=0)", "(x'=2)"] {
         let model =
             format!("mdp module m x:[0..1] init 0; [] x=0 -> {update}; endmodule label \"goal\" = x=1;");
-        assert_eq!(refused(&model, "Pmax=? [ F \"goal\" ]", Exactness::Auto).len(), 1, "{update}");
+        assert_eq!(error_codes(&model, "Pmax=? [ F \"goal\" ]", Exactness::Auto).len(), 1, "{update}");
     }
     let empty = "mdp module m x:[3..2]; endmodule label \"goal\" = x=1;";
-    assert_eq!(refused(empty, "Pmax=? [ F \"goal\" ]", Exactness::Auto), ["Q207"]);
+    assert_eq!(error_codes(empty, "Pmax=? [ F \"goal\" ]", Exactness::Auto), ["Q207"]);
 }
 
-/// Without optimisation the frames of functions are large.
+/// The test needs a thread with a large stack, because stack frames are large without optimisation.
 #[test]
-fn deep_and_large_expressions_are_refused() {
+fn deep_and_large_expressions_are_rejected() {
     let deep = || {
         let sum = |terms: usize| format!("x=0{}", "+0".repeat(terms));
         let chain = |link: &str, length: usize| {
@@ -265,13 +265,13 @@ fn deep_and_large_expressions_are_refused() {
             )
         };
         assert_eq!(enclosed(&model("", &sum(450)), "Pmax=? [ F \"goal\" ]").to_string(), "1");
-        let many = format!("(x=0{})", "|x=0".repeat(9000));
-        assert_eq!(enclosed(&model("", &many), "Pmax=? [ F \"goal\" ]").to_string(), "1");
+        let disjunction = format!("(x=0{})", "|x=0".repeat(9000));
+        assert_eq!(enclosed(&model("", &disjunction), "Pmax=? [ F \"goal\" ]").to_string(), "1");
         let long = prism::parse(&model("", &sum(9000))).expect_err("too long");
         assert_eq!(long.diagnostics()[0].code, "Q104");
         for (link, length) in [("f & x>=0", 5000), ("f & f", 60)] {
             let model = model(&chain(link, length), &format!("f{length}"));
-            assert_eq!(refused(&model, "Pmax=? [ F \"goal\" ]", Exactness::Auto)[0], "Q104", "{link}");
+            assert_eq!(error_codes(&model, "Pmax=? [ F \"goal\" ]", Exactness::Auto)[0], "Q104", "{link}");
         }
     };
     let thread = std::thread::Builder::new().stack_size(16 << 20).spawn(deep);

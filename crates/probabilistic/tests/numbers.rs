@@ -1,4 +1,4 @@
-//! Numbers at the borders of their types: each is computed as the definition says or refused with its place, and none wraps.
+//! Numbers at the limits of their types: each is computed as defined, or rejected with its position, and none wraps around.
 
 use metaplan_probabilistic::check::{Exactness, Options, Outcome, PolicyTable, check};
 use metaplan_probabilistic::explore::Bounds;
@@ -9,12 +9,12 @@ fn first(problems: &[Diagnostic]) -> String {
     format!("{} {}:{}", problem.code, problem.place.line, problem.place.column)
 }
 
-/// The value of a property as text, or code, line and column of what is wrong first.
-fn ask(model: &str, question: &str) -> String {
-    asked(model, question, Exactness::Auto)
+/// Value of a property as text, or code, line and column of the first error.
+fn value_or_error(model: &str, question: &str) -> String {
+    value_or_error_with(model, question, Exactness::Auto)
 }
 
-fn asked(model: &str, question: &str, exactness: Exactness) -> String {
+fn value_or_error_with(model: &str, question: &str, exactness: Exactness) -> String {
     let model = match prism::parse(model) {
         Ok(model) => model,
         Err(error) => return first(error.diagnostics()),
@@ -24,11 +24,13 @@ fn asked(model: &str, question: &str, exactness: Exactness) -> String {
         Err(Error::Property(problems)) => return first(&problems),
         Err(other) => panic!("{other}"),
     };
-    // No limit but that of memory, and of the numbers of states.
+    // Memory and the range of state numbers are the only limits.
     let bounds = Bounds::default().with_states(usize::MAX);
     match check(&model, &property, &Options::default().with_bounds(bounds).with_exactness(exactness)) {
         Ok(report) => match report.outcome {
-            Outcome::Value(answer) => answer.quantity().map_or(f64::NAN, |found| found.value).to_string(),
+            Outcome::Value(answer) => {
+                answer.quantity().map_or(f64::NAN, |quantity| quantity.value).to_string()
+            }
             other => panic!("{other:?}"),
         },
         Err(Error::Model(problems) | Error::Property(problems)) => first(&problems),
@@ -36,14 +38,14 @@ fn asked(model: &str, question: &str, exactness: Exactness) -> String {
     }
 }
 
-/// A variable with a range and an initial value, and a command on the third line.
-fn moving(range: &str, initial: &str, command: &str) -> String {
+/// A model with a range and an initial value on the second line, and a command on the third.
+fn counter_model(range: &str, initial: &str, command: &str) -> String {
     let least = "const int least = -9223372036854775807-1; const int greatest = 9223372036854775807;";
     format!("mdp {least}\nmodule m s:[{range}] init {initial};\n{command}\nendmodule")
 }
 
 #[test]
-fn ranges_may_be_as_wide_as_their_type() {
+fn ranges_may_span_the_integer_type() {
     for (range, initial, command, goal, expected) in [
         ("0..9223372036854775807", "greatest", "[] s>greatest-9 -> (s'=s-1);", "s=greatest-9", "1"),
         ("0..9223372036854775807", "greatest", "[] true -> (s'=s+1);", "s=0", "Q303 3:13"),
@@ -66,17 +68,17 @@ fn ranges_may_be_as_wide_as_their_type() {
         ("-1..1", "pow(-1,greatest)", "[] s<0 -> (s'=pow(1,greatest));", "s=1", "1"),
         ("-1..1", "pow(-1,greatest-1)", "[] s>0 -> (s'=pow(0,greatest));", "s=0", "1"),
         ("0..1", "0", "[] s=0 -> (s'=pow(0,0));", "s=1", "1"),
-        // Commands are found by the value that they fix, which need not be in the range.
+        // Commands are indexed by the value that they fix, which may lie outside the range.
         ("0..3", "0", "[a] s=greatest -> (s'=1); [a] s=least -> (s'=1); [a] s=0 -> (s'=2);", "s=2", "1"),
         ("-3..3", "-3", "[a] s=-4 -> (s'=1); [a] s=4 -> (s'=1); [a] s=-3 -> (s'=2);", "s=2", "1"),
     ] {
-        let model = moving(range, initial, command);
-        assert_eq!(ask(&model, &format!("Pmax=? [ F {goal} ]")), expected, "{model}");
+        let model = counter_model(range, initial, command);
+        assert_eq!(value_or_error(&model, &format!("Pmax=? [ F {goal} ]")), expected, "{model}");
     }
 }
 
 #[test]
-fn probabilities_and_rewards_beyond_doubles_are_refused() {
+fn probabilities_and_rewards_beyond_doubles_are_rejected() {
     for (command, reward, expected) in [
         ("[] s=0 -> (s'=1);", "pow(10.5,400)", "Q303 5:21"),
         ("[] s=0 -> (s'=1);", "1e2147483648", "Q105 5:25"),
@@ -84,23 +86,27 @@ fn probabilities_and_rewards_beyond_doubles_are_refused() {
         ("[] s=0 -> (s'=1);", "pow(0.0,-1.0)", "Q303 5:21"),
         ("[] s=0 -> 1e-300:(s'=1)+1-1e-300:(s'=0);", "1", "Q303 3:1"),
     ] {
-        let model = moving("0..1", "0", command);
+        let model = counter_model("0..1", "0", command);
         let model = format!("{model}\nrewards \"r\" true:0; s=0:{reward}; endrewards");
-        assert_eq!(asked(&model, "R{\"r\"}min=? [ F s=1 ]", Exactness::Never), expected, "{model}");
+        assert_eq!(
+            value_or_error_with(&model, "R{\"r\"}min=? [ F s=1 ]", Exactness::Never),
+            expected,
+            "{model}"
+        );
     }
 }
 
 #[test]
-fn bounds_on_steps_are_whole_numbers_that_are_not_rounded() {
+fn step_bounds_are_integers_and_are_not_rounded() {
     // The state is 3 after 3 steps, and not before.
-    let model = moving("0..3", "0", "[] s<3 -> (s'=s+1);");
+    let model = counter_model("0..3", "0", "[] s<3 -> (s'=s+1);");
     for (bound, expected) in [
         ("<=3", "1"),
         ("<=2", "0"),
         ("<3", "0"),
         ("<4", "1"),
         ("<=(2.5)", "Q203 1:15"),
-        // The double nearest to this is 3.
+        // The nearest double is 3.
         ("<=(2.99999999999999999999)", "Q203 1:15"),
         ("<=999999999", "1"),
         ("<=1000000000", "Q503 1:14"),
@@ -113,13 +119,13 @@ fn bounds_on_steps_are_whole_numbers_that_are_not_rounded() {
         ("<0", "Q503 1:13"),
         ("<=(-1)", "Q503 1:15"),
     ] {
-        assert_eq!(ask(&model, &format!("Pmax=? [ F {bound} s=3 ]")), expected, "{bound}");
+        assert_eq!(value_or_error(&model, &format!("Pmax=? [ F {bound} s=3 ]")), expected, "{bound}");
     }
 }
 
 #[test]
-fn a_policy_with_numbers_of_any_size_is_refused() {
-    let model = prism::parse(&moving("0..3", "0", "[] s<3 -> (s'=s+1);")).expect("a model");
+fn a_policy_with_an_invalid_choice_is_rejected() {
+    let model = prism::parse(&counter_model("0..3", "0", "[] s<3 -> (s'=s+1);")).expect("a model");
     let property = property::parse("Pmax=? [ F s=3 ]").expect("a property");
     for (choice, expected) in [
         ("0", None),
@@ -129,14 +135,14 @@ fn a_policy_with_numbers_of_any_size_is_refused() {
         ("-1", Some("state 2: `choice` must be a number")),
         ("0.5", Some("state 2: `choice` must be a number")),
     ] {
-        // The choices of the second state do not start with 0.
+        // The choices of the second state have global numbers that do not start with 0.
         let row = |s: u8, choice: &str| {
             format!("{{\"state\": {{\"s\": {s}}}, \"action\": \"\", \"choice\": {choice}}}")
         };
         let rows = [row(0, "0"), row(1, choice), row(2, "0")].join(", ");
         let json = format!("{{\"format\": \"metaplan-policy/1\", \"states\": [{rows}]}}");
-        let found = PolicyTable::from_json(&json)
+        let result = PolicyTable::from_json(&json)
             .and_then(|table| check(&model, &property, &Options::default().with_evaluation(table)));
-        assert_eq!(found.err().map(|error| error.to_string()).as_deref(), expected, "{choice}");
+        assert_eq!(result.err().map(|error| error.to_string()).as_deref(), expected, "{choice}");
     }
 }

@@ -1,4 +1,4 @@
-//! Properties beyond plain reachability. Values are those of Storm (stormpy 2.0.0, exact), unless a comment says where they come from.
+//! Properties beyond plain reachability. Values are those of Storm (stormpy 2.0.0, exact), unless a comment names another source.
 
 use metaplan_probabilistic::check::{Answer, Exactness, Options, Outcome, check, check_all};
 use metaplan_probabilistic::{Error, prism, property};
@@ -43,16 +43,16 @@ fn outcome(model: &str, question: &str, exactness: Exactness) -> Outcome {
     check(&model, &property, &options).unwrap_or_else(|error| panic!("{question}: {error:?}")).outcome
 }
 
-fn refused(model: &str, question: &str) -> (&'static str, String) {
+fn error(model: &str, question: &str) -> (&'static str, String) {
     let model = prism::parse(model).unwrap_or_else(|problems| panic!("{problems:?}"));
-    let found = property::parse(question).and_then(|property| check(&model, &property, &Options::default()));
-    match found {
+    let result = property::parse(question).and_then(|property| check(&model, &property, &Options::default()));
+    match result {
         Err(Error::Property(problems)) => (problems[0].code, problems[0].message.clone()),
         other => panic!("{question}: {other:?}"),
     }
 }
 
-/// The exact value, and bounds of the doubles that enclose it and are tight.
+/// Checks the exact value, and that the bounds in doubles enclose it tightly.
 fn agree(model: &str, question: &str, expected: &str) {
     let value = |exactness| match outcome(model, question, exactness) {
         Outcome::Value(answer) => answer,
@@ -64,16 +64,16 @@ fn agree(model: &str, question: &str, expected: &str) {
     }
     let expected: BigRational = expected.parse().expect("a fraction");
     let exact = value(Exactness::Always);
-    assert_eq!(exact.quantity().and_then(|found| found.exact.as_ref()), Some(&expected), "{question}");
+    assert_eq!(exact.quantity().and_then(|quantity| quantity.exact.as_ref()), Some(&expected), "{question}");
     let answer = value(Exactness::Never);
-    let found = answer.quantity().unwrap_or_else(|| panic!("{question}: {answer:?}"));
+    let quantity = answer.quantity().unwrap_or_else(|| panic!("{question}: {answer:?}"));
     let end = |end: f64| BigRational::from_float(end).expect("finite");
-    assert!(end(found.lower) <= expected && expected <= end(found.upper), "{question}: {found:?}");
-    assert!(found.upper - found.lower <= 1e-9, "{question}: {found:?}");
+    assert!(end(quantity.lower) <= expected && expected <= end(quantity.upper), "{question}: {quantity:?}");
+    assert!(quantity.upper - quantity.lower <= 1e-9, "{question}: {quantity:?}");
 }
 
 #[test]
-fn paths_and_rewards_of_a_chain() {
+fn paths_and_rewards_of_a_chain_have_the_expected_values() {
     for (question, expected) in [
         ("P=? [ F<=4 \"b\" ]", "25/48"),
         ("P=? [ F[2,5] \"b\" ]", "85/144"),
@@ -91,7 +91,7 @@ fn paths_and_rewards_of_a_chain() {
         ("R{\"r\"}=? [ I=3 ]", "53/40"),
         ("R{\"r\"}=? [ C<=4 ]", "799/120"),
         ("P=? [ F (P>=0.45 [ X \"a\" ] & s>0) ]", "7/10"),
-        // Storm reads these as `F[3,3]`, `X X X F`, and what they are the opposite of.
+        // Storm reads these as `F[3,3]`, `X X X F`, and their complements.
         ("P=? [ F=3 \"b\" ]", "31/120"),
         ("P=? [ G=3 !\"b\" ]", "89/120"),
         ("P=? [ !\"a\" U=4 \"b\" ]", "349/1200"),
@@ -104,8 +104,8 @@ fn paths_and_rewards_of_a_chain() {
         ("P=? [ G<=3 s<3 ]", "7/12"),
         ("P=? [ s<3 W<=4 \"b\" ]", "53/72"),
         ("P=? [ G[2,4] s>=3 ]", "5/12"),
-        // What follows has no form that Storm reads: by the complement, 3 and 4 are visited for ever once they are reached;
-        // `a W b` and `b R !a` are `a U b` here, where one of 3 and 5 is reached.
+        // Storm has no form for the remaining properties. States 3 and 4 are visited infinitely often once they are reached, and
+        // `a W b` and `b R !a` are equal to `a U b`, because 3 or 5 is reached with probability 1.
         ("P=? [ F>=3 \"a\" ]", "7/10"),
         ("1 - P=? [ F \"a\" ]", "3/10"),
         ("P=? [ s<3 W \"b\" ]", "3/5"),
@@ -117,7 +117,7 @@ fn paths_and_rewards_of_a_chain() {
 }
 
 #[test]
-fn paths_and_rewards_of_a_process() {
+fn paths_and_rewards_of_a_process_have_the_expected_values() {
     for (question, expected) in [
         ("Pmax=? [ F[2,4] \"b\" ]", "391/400"),
         ("Pmin=? [ F<=3 \"b\" ]", "0"),
@@ -148,9 +148,9 @@ fn paths_and_rewards_of_a_process() {
     }
 }
 
-/// The values of the states are added by hand: of P [ F d=1 ] they are 3/10, 1/5, 2/5, 0, 0, 1 and 1.
+/// The aggregates are computed by hand. The values of P [ F d=1 ] are 3/10, 1/5, 2/5, 0, 0, 1 and 1.
 #[test]
-fn filters() {
+fn filters_aggregate_the_values_of_states() {
     for (question, expected) in [
         ("filter(max, P=? [ X \"a\" ], s<3)", "1/3"),
         ("filter(sum, P=? [ F d=1 ], true)", "29/10"),
@@ -172,8 +172,8 @@ fn filters() {
         ("s=0 & \"init\"", true),
         ("filter(exists, \"deadlock\")", false),
     ] {
-        let found = outcome(CHAIN, question, Exactness::Auto);
-        assert!(matches!(found, Outcome::Truth(holds, _) if holds == expected), "{question}: {found:?}");
+        let result = outcome(CHAIN, question, Exactness::Auto);
+        assert!(matches!(result, Outcome::Truth(holds, _) if holds == expected), "{question}: {result:?}");
     }
     let Outcome::States(states) = outcome(CHAIN, "filter(print, P=? [ F d=1 ])", Exactness::Auto) else {
         panic!("no states");
@@ -182,27 +182,28 @@ fn filters() {
     assert_eq!(values, [0, 1, 2, 5, 6]);
 }
 
-/// States in which it can start: each by the same equations as for the others, P [ F d=1 ] as above.
+/// The values of P [ F d=1 ] in the initial states are those of the states above.
 #[test]
-fn several_states_to_start_in() {
+fn several_initial_states_yield_a_range() {
     let model = CHAIN.replace(" init 0;", ";") + " init s<=2 & d=0 endinit";
-    let found = outcome(&model, "P=? [ F d=1 ]", Exactness::Auto);
-    let Outcome::Range(least, greatest) = found else { panic!("{found:?}") };
-    let exact = |answer: &Answer| answer.quantity().and_then(|found| found.exact.clone()).expect("exact");
+    let result = outcome(&model, "P=? [ F d=1 ]", Exactness::Auto);
+    let Outcome::Range(least, greatest) = result else { panic!("{result:?}") };
+    let exact =
+        |answer: &Answer| answer.quantity().and_then(|quantity| quantity.exact.clone()).expect("exact");
     assert_eq!([exact(&least), exact(&greatest)].map(|value| value.to_string()), ["1/5", "2/5"]);
     agree(&model, "filter(sum, P=? [ F d=1 ], \"init\")", "9/10");
-    let found = outcome(&model, "P>=0.2 [ F d=1 ]", Exactness::Auto);
-    assert!(matches!(found, Outcome::Truth(true, _)), "{found:?}");
+    let result = outcome(&model, "P>=0.2 [ F d=1 ]", Exactness::Auto);
+    assert!(matches!(result, Outcome::Truth(true, _)), "{result:?}");
 }
 
-/// A bound on a reward, as a counter in the model says it.
+/// A bound on a reward is equivalent to a bound on a counter in the model.
 #[test]
-fn bounds_on_rewards_are_those_of_a_counter() {
+fn reward_bounds_agree_with_a_counter() {
     let counted = PROCESS
         .replace("s : [0..5] init 0;", "s : [0..5] init 0; c : [0..40] init 0;")
         .replace("(s'=", "(c'=min(40,c+COST))&(s'=")
         .replace("[wait] s=0 -> true;", "[wait] s=0 -> (c'=min(40,c+2));");
-    // What a step costs, command by command.
+    // Cost of each command.
     let mut priced = String::new();
     for line in counted.lines() {
         let cost = match line.trim() {
@@ -222,14 +223,14 @@ fn bounds_on_rewards_are_those_of_a_counter() {
                 panic!("{counter}")
             };
             let expected =
-                answer.quantity().and_then(|found| found.exact.clone()).expect("exact").to_string();
+                answer.quantity().and_then(|quantity| quantity.exact.clone()).expect("exact").to_string();
             agree(PROCESS, &format!("P{direction}=? [ F^{{rew{{\"r\"}}<={budget}}} s=4 ]"), &expected);
         }
     }
 }
 
 #[test]
-fn what_is_not_handled_is_refused_by_its_name() {
+fn unsupported_properties_are_rejected_by_name() {
     for (question, word) in [
         ("P=? [ F (\"a\" & X \"b\") ]", "LTL"),
         ("P=? [ (F \"a\") & (F \"b\") ]", "LTL"),
@@ -237,11 +238,11 @@ fn what_is_not_handled_is_refused_by_its_name() {
         ("A [ G \"a\" ]", "CTL"),
         ("R{\"r\"}=? [ F (\"a\" & X \"b\") ]", "LTL"),
     ] {
-        let (code, message) = refused(CHAIN, question);
+        let (code, message) = error(CHAIN, question);
         assert_eq!(code, "Q403", "{question}: {message}");
         assert!(message.contains(word), "{question}: {message}");
     }
-    let (code, message) = refused(PROCESS, "S=? [ \"a\" ]");
+    let (code, message) = error(PROCESS, "S=? [ \"a\" ]");
     assert_eq!(code, "Q403");
     assert!(message.contains('S'), "{message}");
     for (question, code) in [
@@ -252,12 +253,12 @@ fn what_is_not_handled_is_refused_by_its_name() {
         ("P=? [ F[3,2] \"a\" ]", "Q503"),
         ("F \"a\"", "Q403"),
     ] {
-        assert_eq!(refused(CHAIN, question).0, code, "{question}");
+        assert_eq!(error(CHAIN, question).0, code, "{question}");
     }
 }
 
 #[test]
-fn a_file_of_properties() {
+fn a_property_file_declares_constants_labels_and_names() {
     let text = "// A constant that stays open, and a label.
         const int k; const int twice = 2*k;
         label \"near\" = s<=k;
@@ -285,10 +286,10 @@ fn a_file_of_properties() {
     options.settings.insert("k".to_owned(), "2".to_owned());
     let reports = check_all(&model, &properties, &options).expect("reports");
     let Ok(first) = &reports[0] else { panic!("{reports:?}") };
-    let Outcome::Value(Answer::Finite(found)) = &first.outcome else { panic!("{first:?}") };
-    assert_eq!(found.exact.as_ref().map(ToString::to_string).as_deref(), Some("25/48"));
+    let Outcome::Value(Answer::Finite(quantity)) = &first.outcome else { panic!("{first:?}") };
+    assert_eq!(quantity.exact.as_ref().map(ToString::to_string).as_deref(), Some("25/48"));
     assert!(matches!(&reports[2], Err(Error::Property(problems)) if problems[0].code == "Q202"));
-    // What is wrong with a declaration is told as of the file of properties, and not as of the model.
+    // An error in a declaration is attributed to the property file, not to the model.
     options.declarations.labels[0].expression = prism::ast::Expr::name("nothing");
     assert!(matches!(check_all(&model, &properties, &options), Err(Error::Property(_))));
 }
@@ -299,7 +300,7 @@ fn models_without_a_keyword_and_actions_named_like_functions() {
     agree(model, "Pmax=? [ F round=1 ]", "1");
 }
 
-/// The letter that begins a property of rewards is also an operator of paths.
+/// `R` begins a reward property, and is also a path operator.
 #[test]
 fn properties_of_rewards_need_no_semicolon_before() {
     let text = "P=? [ F \"a\" ]\nR{\"t\"}=? [ C ]\n// RESULT: 0\nR=? [ I=6 ]\nR<100 [ C<=3 ]\n\"last\": P=? [ \"b\" R s!=3 ]";
@@ -311,9 +312,9 @@ fn properties_of_rewards_need_no_semicolon_before() {
     );
 }
 
-/// What is not handled is refused by itself; all else in the file is answered.
+/// Each unsupported property is rejected alone; all others in the file are answered.
 #[test]
-fn properties_that_are_not_handled_leave_the_others_alone() {
+fn unsupported_properties_do_not_affect_the_others() {
     let text = "P=? [ F \"a\" ]
         P=? [ F (\"a\" & X \"b\") ] + P=? [ X (F \"a\") ]
         R{\"t\"}=? [ (s<3 U \"a\") ]
@@ -325,16 +326,16 @@ fn properties_that_are_not_handled_leave_the_others_alone() {
     let model = prism::parse(CHAIN).expect("a model");
     let options = Options::default().with_declarations(file.declarations);
     let properties = file.properties.iter().map(|listed| &listed.property);
-    let found = check_all(&model, properties, &options).expect("answers");
-    let found = found.into_iter().map(|report| match report.map(|report| report.outcome) {
+    let reports = check_all(&model, properties, &options).expect("answers");
+    let reports = reports.into_iter().map(|report| match report.map(|report| report.outcome) {
         Ok(Outcome::Value(answer)) => {
-            answer.quantity().and_then(|found| found.exact.clone()).expect("exact").to_string()
+            answer.quantity().and_then(|quantity| quantity.exact.clone()).expect("exact").to_string()
         }
         Err(Error::Property(problems)) => problems[0].code.to_owned(),
         other => panic!("{other:?}"),
     });
     let expected = ["7/10", "Q403", "Q403", "Q403", "Q403", "Q403", "3/10"];
-    assert_eq!(found.collect::<Vec<_>>(), expected);
+    assert_eq!(reports.collect::<Vec<_>>(), expected);
     assert_eq!(file.properties[3].text, "filter(forall, A [ G s<3 ], s<2) & (s=0)");
     let broken = property::parse_file("P=? [ F (\"a\" & X \"b\") ]; P=? [ F \"a\" + ]");
     assert!(
@@ -342,9 +343,9 @@ fn properties_that_are_not_handled_leave_the_others_alone() {
     );
 }
 
-/// Written out by hand these are properties of the tests above; labels of the model come before properties of the same name.
+/// The expanded properties occur in the tests above. A label of the model takes precedence over a property of the same name.
 #[test]
-fn properties_that_are_parts_of_others_by_name() {
+fn named_properties_are_expanded() {
     let text = "
         \"sum\": \"less\" + 2 * \"ever\";
         \"less\": 1 - \"ever\";
@@ -375,14 +376,14 @@ fn properties_that_are_parts_of_others_by_name() {
     ] {
         let listed = file.properties.iter().find(|listed| listed.name.as_deref() == Some(name));
         let property = &listed.unwrap_or_else(|| panic!("{name}")).property;
-        let found = match check(&model, property, &options).map(|report| report.outcome) {
+        let result = match check(&model, property, &options).map(|report| report.outcome) {
             Ok(Outcome::Value(answer)) => {
-                answer.quantity().and_then(|found| found.exact.clone()).expect("exact").to_string()
+                answer.quantity().and_then(|quantity| quantity.exact.clone()).expect("exact").to_string()
             }
             Ok(Outcome::Truth(holds, _)) => holds.to_string(),
             Err(Error::Property(problems)) => problems[0].code.to_owned(),
             other => panic!("{name}: {other:?}"),
         };
-        assert_eq!(found, expected, "{name}");
+        assert_eq!(result, expected, "{name}");
     }
 }

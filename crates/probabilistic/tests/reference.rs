@@ -1,4 +1,4 @@
-//! Models with known values: exact ones, and those of Storm and PRISM on larger models.
+//! Models with known values: exact ones, and values of Storm and PRISM for larger models.
 
 #![allow(clippy::print_stdout)]
 
@@ -43,66 +43,72 @@ fn rational(text: &str) -> BigRational {
     parse_decimal(numerator).expect("number") / parse_decimal(denominator).expect("number")
 }
 
-/// The value, its bounds and its exact form, against what is expected; `exact` is a fraction or `inf`.
-fn expect(what: &str, answer: &Answer, exact: &str, is_exact: bool) {
+/// Checks value, bounds and exact form of an answer; `exact` is a fraction or `inf`.
+fn expect(description: &str, answer: &Answer, exact: &str, is_exact: bool) {
     match answer {
-        Answer::Infinite => assert_eq!(exact, "inf", "{what}"),
-        Answer::Undefined => panic!("{what}: undefined"),
+        Answer::Infinite => assert_eq!(exact, "inf", "{description}"),
+        Answer::Undefined => panic!("{description}: undefined"),
         Answer::Finite(quantity) => {
-            assert_ne!(exact, "inf", "{what}: {quantity:?}");
+            assert_ne!(exact, "inf", "{description}: {quantity:?}");
             let expected = rational(exact);
             let lower = BigRational::from_float(quantity.lower).expect("finite");
-            let upper =
-                BigRational::from_float(quantity.upper).unwrap_or_else(|| panic!("{what}: {quantity:?}"));
-            assert!(lower <= expected && expected <= upper, "{what}: {exact} is not in {quantity:?}");
+            let upper = BigRational::from_float(quantity.upper)
+                .unwrap_or_else(|| panic!("{description}: {quantity:?}"));
+            assert!(lower <= expected && expected <= upper, "{description}: {exact} is not in {quantity:?}");
             let scale = quantity.value.abs().max(1.0);
-            assert!(quantity.upper - quantity.lower <= 1e-6 * scale, "{what}: {quantity:?} is too wide");
+            assert!(
+                quantity.upper - quantity.lower <= 1e-6 * scale,
+                "{description}: {quantity:?} is too wide"
+            );
             assert!(
                 (quantity.value - Number::to_f64(&expected)).abs() <= 1e-6 * scale,
-                "{what}: {quantity:?}"
+                "{description}: {quantity:?}"
             );
             if is_exact {
-                assert_eq!(quantity.exact, Some(expected), "{what}");
+                assert_eq!(quantity.exact, Some(expected), "{description}");
             }
         }
     }
 }
 
 #[test]
-fn exact_cases() {
+fn values_equal_the_exact_reference() {
     let Some(folder) = shared("reference/prism_cases") else { return };
     for case in json(&folder.join("expected.json"))["cases"].as_array().expect("cases") {
         let text = |key: &str| case[key].as_str().expect("text");
         for exactness in [Exactness::Auto, Exactness::Never] {
             let model = folder.join(text("file"));
             let report = run(&model, text("property"), text("constants"), exactness);
-            let what = format!("{} {} {} {exactness:?}", text("file"), text("constants"), text("property"));
-            let Outcome::Value(answer) = &report.outcome else { panic!("{what}: {:?}", report.outcome) };
-            expect(&what, answer, text("exact"), exactness == Exactness::Auto);
+            let description =
+                format!("{} {} {} {exactness:?}", text("file"), text("constants"), text("property"));
+            let Outcome::Value(answer) = &report.outcome else {
+                panic!("{description}: {:?}", report.outcome)
+            };
+            expect(&description, answer, text("exact"), exactness == Exactness::Auto);
             let sizes = [report.states, report.choices, report.transitions];
             let expected =
                 ["states", "choices", "transitions"].map(|key| case[key].as_u64().expect("number"));
-            assert_eq!(sizes.map(|size| size as u64), expected, "{what}");
+            assert_eq!(sizes.map(|size| size as u64), expected, "{description}");
         }
     }
 }
 
 #[test]
-fn two_objectives() {
+fn two_objectives_equal_the_exact_reference() {
     let Some(folder) = shared("reference/prism_cases") else { return };
     for case in json(&folder.join("expected.json"))["multi_objective"].as_array().expect("cases") {
         let text = |key: &str| case[key].as_str().expect("text");
         for exactness in [Exactness::Auto, Exactness::Never] {
             let report = run(&folder.join(text("file")), text("property"), "", exactness);
-            let what = format!("{} {} {exactness:?}", text("file"), text("property"));
+            let description = format!("{} {} {exactness:?}", text("file"), text("property"));
             match &report.outcome {
-                Outcome::Front(found) => {
+                Outcome::Front(front) => {
                     let expected = case["pareto_vertices"].as_array().expect("vertices");
-                    assert_eq!(found.len(), expected.len(), "{what}: {found:?}");
-                    for (pair, expected) in found.iter().zip(expected) {
+                    assert_eq!(front.len(), expected.len(), "{description}: {front:?}");
+                    for (pair, expected) in front.iter().zip(expected) {
                         for (answer, exact) in pair.iter().zip(expected.as_array().expect("pair")) {
                             expect(
-                                &what,
+                                &description,
                                 answer,
                                 exact.as_str().expect("text"),
                                 exactness == Exactness::Auto,
@@ -112,18 +118,18 @@ fn two_objectives() {
                 }
                 Outcome::Constrained { randomised, deterministic, proved } => {
                     let is_exact = exactness == Exactness::Auto;
-                    expect(&what, randomised, text("exact_randomised"), is_exact);
-                    expect(&what, deterministic, text("exact_deterministic"), is_exact);
-                    assert!(proved, "{what}");
+                    expect(&description, randomised, text("exact_randomised"), is_exact);
+                    expect(&description, deterministic, text("exact_deterministic"), is_exact);
+                    assert!(proved, "{description}");
                 }
-                other => panic!("{what}: {other:?}"),
+                other => panic!("{description}: {other:?}"),
             }
         }
     }
 }
 
 #[test]
-fn storm_on_models_of_the_map() {
+fn map_models_agree_with_storm() {
     let (Some(reference), Some(summary), Some(generator)) = (
         shared("reference/storm_reference.json"),
         shared("reference/p2cp3_summary.json"),
@@ -137,26 +143,31 @@ fn storm_on_models_of_the_map() {
     for case in reference["own_models"].as_array().expect("cases") {
         let text = |key: &str| case[key].as_str().expect("text");
         let model = folder.join(Path::new(text("model")).file_name().expect("a name"));
-        let made = Command::new("python3")
+        let generated = Command::new("python3")
             .args([&generator, &summary, &model])
             .args(text("options").split_whitespace())
             .output();
-        if !made.is_ok_and(|output| output.status.success()) {
+        if !generated.is_ok_and(|output| output.status.success()) {
             println!("skipped: no python3 to generate the models");
             return;
         }
-        // Large models are not solved exactly, and once is enough.
+        // Large models are checked only once, in doubles.
         let large = case["storm"]["states"].as_u64().is_some_and(|states| states > 5_000);
-        let ways = if large { &[Exactness::Never][..] } else { &[Exactness::Auto, Exactness::Never] };
-        for exactness in ways.iter().copied() {
+        let modes = if large { &[Exactness::Never][..] } else { &[Exactness::Auto, Exactness::Never] };
+        for exactness in modes.iter().copied() {
             let report = run(&model, text("property"), "", exactness);
-            let what = format!("{} {} {exactness:?}", text("options"), text("property"));
-            let Outcome::Value(answer) = &report.outcome else { panic!("{what}: {:?}", report.outcome) };
+            let description = format!("{} {} {exactness:?}", text("options"), text("property"));
+            let Outcome::Value(answer) = &report.outcome else {
+                panic!("{description}: {:?}", report.outcome)
+            };
             if let Some(exact) = case["exact"].as_str() {
-                expect(&what, answer, exact, exactness == Exactness::Auto);
+                expect(&description, answer, exact, exactness == Exactness::Auto);
             } else {
                 let value = answer.quantity().expect("finite").value;
-                assert!((value - case["value"].as_f64().expect("number")).abs() < 1e-6, "{what}: {value}");
+                assert!(
+                    (value - case["value"].as_f64().expect("number")).abs() < 1e-6,
+                    "{description}: {value}"
+                );
             }
         }
     }
@@ -167,10 +178,10 @@ fn storm_on_models_of_the_map() {
         Command::new("python3").args([&generator, &summary, &model]).args(options.split(' ')).output();
     assert!(status.is_ok_and(|output| output.status.success()));
     let report = run(&model, front["property"].as_str().expect("text"), "", Exactness::Auto);
-    let Outcome::Front(found) = &report.outcome else { panic!("{:?}", report.outcome) };
+    let Outcome::Front(vertices) = &report.outcome else { panic!("{:?}", report.outcome) };
     let expected = front["vertices"].as_array().expect("vertices");
-    assert_eq!(found.len(), expected.len(), "{found:?}");
-    for (pair, expected) in found.iter().zip(expected) {
+    assert_eq!(vertices.len(), expected.len(), "{vertices:?}");
+    for (pair, expected) in vertices.iter().zip(expected) {
         for (answer, exact) in pair.iter().zip(expected.as_array().expect("pair")) {
             expect("front", answer, exact.as_str().expect("text"), true);
         }
@@ -179,7 +190,7 @@ fn storm_on_models_of_the_map() {
 }
 
 #[test]
-fn files_of_the_repository() {
+fn repository_models_agree_with_storm() {
     let (Some(reference), Some(folder)) = (shared("reference/storm_reference.json"), shared("real/prism"))
     else {
         return;
@@ -195,11 +206,17 @@ fn files_of_the_repository() {
         checked += 1;
         for exactness in [Exactness::Auto, Exactness::Never] {
             let report = run(&model, text("property"), text("constants"), exactness);
-            let what = format!("{} {} {exactness:?}", text("case"), text("property"));
-            let Outcome::Value(answer) = &report.outcome else { panic!("{what}: {:?}", report.outcome) };
-            let value = answer.quantity().unwrap_or_else(|| panic!("{what}: {answer:?}")).value;
-            assert!((value - case["value"].as_f64().expect("number")).abs() < 1e-6, "{what}: {value}");
-            assert_eq!(report.states as u64, case["storm"]["states"].as_u64().expect("number"), "{what}");
+            let description = format!("{} {} {exactness:?}", text("case"), text("property"));
+            let Outcome::Value(answer) = &report.outcome else {
+                panic!("{description}: {:?}", report.outcome)
+            };
+            let value = answer.quantity().unwrap_or_else(|| panic!("{description}: {answer:?}")).value;
+            assert!((value - case["value"].as_f64().expect("number")).abs() < 1e-6, "{description}: {value}");
+            assert_eq!(
+                report.states as u64,
+                case["storm"]["states"].as_u64().expect("number"),
+                "{description}"
+            );
         }
     }
     assert!(checked > 0, "no file of the reference is there");

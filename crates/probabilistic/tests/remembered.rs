@@ -1,5 +1,5 @@
-//! What a program remembers of its modules changes nothing: random models are explored with and without, to the same process, or
-//! to the same refusal.
+//! The cache of module behaviours does not change results: random models are explored with and without it, to the same
+//! process or to the same error.
 
 use std::fmt::Write as _;
 
@@ -20,57 +20,57 @@ impl Random {
     }
 }
 
-/// A condition on a module's variables, and now and then on those of another.
-fn guard(random: &mut Random, own: u64, modules: u64) -> String {
+/// A guard over the variables of a module, and sometimes of another module.
+fn guard(random: &mut Random, module: u64, modules: u64) -> String {
     let other = random.below(modules);
     match random.below(6) {
-        0 => format!("a{own}={}", random.below(4)),
-        1 => format!("a{own}<{} & !(b{other})", random.below(5)),
-        2 => format!("a{own}!=a{other} | b{own}"),
-        3 => format!("mod(a{own}+a{other}, {})=0", random.below(3) + 1),
+        0 => format!("a{module}={}", random.below(4)),
+        1 => format!("a{module}<{} & !(b{other})", random.below(5)),
+        2 => format!("a{module}!=a{other} | b{module}"),
+        3 => format!("mod(a{module}+a{other}, {})=0", random.below(3) + 1),
         4 => format!("g<{}", random.below(4)),
         _ => "true".to_owned(),
     }
 }
 
-fn assignment(random: &mut Random, own: u64, modules: u64, global: bool) -> String {
+fn assignment(random: &mut Random, module: u64, modules: u64, global: bool) -> String {
     let other = random.below(modules);
     match random.below(if global { 6 } else { 5 }) {
-        0 => format!("(a{own}'=min(3, a{own}+1))"),
-        1 => format!("(a{own}'=mod(a{own}+a{other}, 4)) & (b{own}'=!b{own})"),
-        2 => format!("(a{own}'={})", random.below(4)),
-        // Leaves its range now and then.
-        3 if random.below(12) == 0 => format!("(a{own}'=a{own}+1)"),
+        0 => format!("(a{module}'=min(3, a{module}+1))"),
+        1 => format!("(a{module}'=mod(a{module}+a{other}, 4)) & (b{module}'=!b{module})"),
+        2 => format!("(a{module}'={})", random.below(4)),
+        // Sometimes leaves its range.
+        3 if random.below(12) == 0 => format!("(a{module}'=a{module}+1)"),
         5 => "(g'=mod(g+1, 3))".to_owned(),
         _ => "true".to_owned(),
     }
 }
 
-fn command(random: &mut Random, own: u64, modules: u64) -> String {
+fn command(random: &mut Random, module: u64, modules: u64) -> String {
     let action = random.one_of(&["", "", "x", "y", "z"]);
-    let mut update = || assignment(random, own, modules, action.is_empty());
+    let mut update = || assignment(random, module, modules, action.is_empty());
     let (first, second) = (update(), update());
     let updates = match random.below(4) {
         0 => format!("1/3 : {first} + 2/3 : {second}"),
-        1 => format!("a{own}/4 : {first} + 1-a{own}/4 : {second}"),
+        1 => format!("a{module}/4 : {first} + 1-a{module}/4 : {second}"),
         _ => first,
     };
-    format!("  [{action}] {} -> {updates};\n", guard(random, own, modules))
+    format!("  [{action}] {} -> {updates};\n", guard(random, module, modules))
 }
 
-/// A model of one to four modules; they can have values of many bits, so that they are found by hash, or not at all.
+/// A model of one to four modules. Some have values of many bits, so that the cache uses a hash map, or is not used.
 fn model(random: &mut Random) -> String {
     let modules = random.below(4) + 1;
     let mut text = format!("{}\nglobal g : [0..3];\n", random.one_of(&["mdp", "dtmc"]));
     let wide = random.below(3) == 0;
-    for own in 0..modules {
-        let _ = write!(text, "module m{own}\n  a{own} : [0..3];\n  b{own} : bool;\n");
+    for module in 0..modules {
+        let _ = write!(text, "module m{module}\n  a{module} : [0..3];\n  b{module} : bool;\n");
         if wide {
             let other = random.below(modules);
-            let _ = write!(text, "  c{own} : [0..{}];\n  [] c{own}+c{other}>0 -> true;\n", 1_u64 << 40);
+            let _ = write!(text, "  c{module} : [0..{}];\n  [] c{module}+c{other}>0 -> true;\n", 1_u64 << 40);
         }
         for _ in 0..=random.below(5) {
-            text += &command(random, own, modules);
+            text += &command(random, module, modules);
         }
         text += "endmodule\n";
     }
@@ -78,8 +78,8 @@ fn model(random: &mut Random) -> String {
     text
 }
 
-fn shown<N: Number>(found: Result<Explored<Packed, N>, Error>) -> String {
-    match found {
+fn shown<N: Number>(result: Result<Explored<Packed, N>, Error>) -> String {
+    match result {
         Ok(Explored { mdp, starts, states, rewards, deadlocks, .. }) => {
             let states: Vec<_> = states.iter().collect();
             format!("{mdp:?} {starts} {states:?} {rewards:?} {deadlocks}")
@@ -94,7 +94,7 @@ fn agree<N: Number>(text: &str) {
     let bounds = Bounds::default().with_states(3000);
     let plain = shown(explore(&program, &bounds));
     let remembered = shown(explore(&Remembered::new(&program), &bounds));
-    // Where there are too many states, it may be noticed a few states later.
+    // The cache may detect the state limit a few states later.
     if !plain.starts_with("StateLimit") || !remembered.starts_with("StateLimit") {
         assert_eq!(plain, remembered, "{text}");
     }
@@ -111,9 +111,9 @@ fn random_models_are_explored_to_the_same_process() {
     }
 }
 
-/// Values that are seen when no more are kept are found anew.
+/// Behaviours beyond the limit of the cache are computed again on every request.
 #[test]
-fn modules_with_more_behaviours_than_are_kept() {
+fn behaviours_beyond_the_cache_limit_are_recomputed() {
     let text = "mdp
 module m  x : [0..99999] init 0;  [] x<99999 -> 1/2 : (x'=x+1) + 1/2 : true;  [x] x=99999 -> (x'=0); endmodule
 module n  y : [0..1];  [] mod(x, 2)=0 & x>99990 -> (y'=1-y);  [x] true -> true; endmodule

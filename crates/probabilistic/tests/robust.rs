@@ -1,4 +1,4 @@
-//! No text makes the reader or the checker panic, and what is written reads back as the same model.
+//! No text makes the parser or the checker panic, and a written model parses to the same model.
 
 use metaplan_probabilistic::check::{Answer, Exactness, Options, Outcome, check};
 use metaplan_probabilistic::explore::Bounds;
@@ -100,6 +100,7 @@ const PROPERTY_WORDS: [&str; 32] = [
     "s",
 ];
 
+/// Parses, checks and translates a model; only a panic is a failure.
 fn survive(text: &str) {
     if let Ok(model) = prism::parse(text) {
         let property = property::parse("Pmax=? [ F \"goal\" ]").expect("a property");
@@ -109,8 +110,8 @@ fn survive(text: &str) {
     }
 }
 
-/// Asks a question of the model, if it is one.
-fn ask(question: &str) {
+/// Checks a property of [`MODEL`], if the text is a property; only a panic is a failure.
+fn survive_property(question: &str) {
     thread_local! {
         static READ: prism::ast::Model = prism::parse(MODEL).expect("a model");
     }
@@ -122,9 +123,9 @@ fn ask(question: &str) {
     }
 }
 
-/// All properties that are broken are answered as they stand.
+/// All properties that other tests break are valid and supported.
 #[test]
-fn whole_properties_are_answered() {
+fn intact_properties_have_answers() {
     let model = prism::parse(MODEL).expect("a model");
     for question in PROPERTIES {
         let property = property::parse(question).unwrap_or_else(|error| panic!("{question}: {error:?}"));
@@ -133,7 +134,7 @@ fn whole_properties_are_answered() {
 }
 
 #[test]
-fn formulas_that_contain_themselves_are_refused() {
+fn recursive_formulas_are_rejected() {
     let model = "mdp formula a = b; formula b = a; module m s:[0..1] init 0; [] a -> (s'=1); endmodule";
     survive(&format!("{model} label \"goal\" = a;"));
     let problems = jani::write("m", &prism::parse(model).expect("a model")).expect_err("refused");
@@ -144,11 +145,11 @@ fn formulas_that_contain_themselves_are_refused() {
 }
 
 #[test]
-fn what_is_written_reads_back() {
+fn a_written_model_parses_to_the_same_model() {
     let model = prism::parse(MODEL).expect("a model");
     let text = prism::write(&model);
-    let again = prism::parse(&text).unwrap_or_else(|problems| panic!("{problems:?}\n{text}"));
-    assert_eq!(prism::write(&again), text);
+    let parsed = prism::parse(&text).unwrap_or_else(|problems| panic!("{problems:?}\n{text}"));
+    assert_eq!(prism::write(&parsed), text);
     for question in [
         "Pmax=? [ F \"goal\" ]",
         "R{\"cost\"}min=? [ F done ]",
@@ -157,7 +158,7 @@ fn what_is_written_reads_back() {
     ] {
         let property = property::parse(question).expect("a property");
         let outcome = |model| check(model, &property, &Options::default()).expect("an answer").outcome;
-        assert_eq!(outcome(&model), outcome(&again), "{question}");
+        assert_eq!(outcome(&model), outcome(&parsed), "{question}");
     }
 }
 
@@ -193,7 +194,7 @@ fn exact_and_rounded_answers_agree() {
     }
 }
 
-/// `PROPTEST_CASES`, or a few.
+/// Number of random cases: `PROPTEST_CASES`, or 200.
 fn cases() -> u32 {
     std::env::var("PROPTEST_CASES").ok().and_then(|text| text.parse().ok()).unwrap_or(200)
 }
@@ -202,20 +203,20 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: cases(), failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn broken_models_are_refused_without_panic(at in 0..MODEL.len(), length in 0_usize..40, word in 0..WORDS.len()) {
+    fn broken_models_do_not_panic(at in 0..MODEL.len(), length in 0_usize..40, word in 0..WORDS.len()) {
         let end = (at + length).min(MODEL.len());
         survive(&format!("{}{}{}", &MODEL[..at], WORDS[word], &MODEL[end..]));
     }
 
     #[test]
-    fn words_in_any_order_are_refused_without_panic(words in prop::collection::vec(0..WORDS.len(), 0..40)) {
+    fn words_in_any_order_do_not_panic(words in prop::collection::vec(0..WORDS.len(), 0..40)) {
         let text: Vec<&str> = words.into_iter().map(|word| WORDS[word]).collect();
         survive(&format!("mdp {}", text.join(" ")));
         let _ = property::parse(&text.join(" "));
     }
 
     #[test]
-    fn broken_properties_are_refused_without_panic(
+    fn broken_properties_do_not_panic(
         which in 0..PROPERTIES.len(),
         at in 0.0..1.0_f64,
         length in 0_usize..12,
@@ -226,19 +227,19 @@ proptest! {
         let end = (at + length).min(text.len());
         let words: Vec<&str> = words.into_iter().map(|word| PROPERTY_WORDS[word]).collect();
         let part = |range: &[char]| range.iter().collect::<String>();
-        ask(&format!("{} {} {}", part(&text[..at]), words.join(" "), part(&text[end..])));
+        survive_property(&format!("{} {} {}", part(&text[..at]), words.join(" "), part(&text[end..])));
     }
 
     #[test]
-    fn property_words_in_any_order_are_refused_without_panic(
+    fn property_words_in_any_order_do_not_panic(
         words in prop::collection::vec(0..PROPERTY_WORDS.len(), 0..16),
     ) {
         let words: Vec<&str> = words.into_iter().map(|word| PROPERTY_WORDS[word]).collect();
-        ask(&words.join(" "));
+        survive_property(&words.join(" "));
     }
 }
 
-/// A walk over a square that hangs together in two dimensions; elimination fills up, so it is iterated from both sides.
+/// A random walk on a square. Elimination has much fill-in in two dimensions, so that interval iteration is used.
 #[test]
 #[ignore = "20 s in release, minutes in debug: a component of 90,000 states"]
 fn a_large_component_gets_bounds() {

@@ -1,4 +1,4 @@
-//! Chains that are left so rarely that no certificate in doubles can tell: elimination has a small relative error all the same.
+//! Chains with a tiny probability of leaving, for which no certificate in doubles exists. Elimination has a small relative error.
 
 #![allow(clippy::print_stdout)]
 
@@ -14,7 +14,7 @@ fn value(model: &str, question: &str, exactness: Exactness) -> Quantity {
     let options = Options::default().with_exactness(exactness);
     let start = Instant::now();
     let report = check(&model, &property::parse(question).expect("a property"), &options).expect("an answer");
-    // What took minutes takes milliseconds; the rest is for slow machines and for code that is not optimised.
+    // Elimination takes milliseconds, iteration took minutes. The margin is for slow machines and unoptimised code.
     assert!(start.elapsed() < Duration::from_secs(5), "{question}: {:?}", start.elapsed());
     match report.outcome {
         Outcome::Value(Answer::Finite(quantity)) => quantity,
@@ -22,20 +22,23 @@ fn value(model: &str, question: &str, exactness: Exactness) -> Quantity {
     }
 }
 
-/// The exact value by request and by default, within tight bounds of the doubles.
+/// Checks the exact value, by request and by default, and that the bounds in doubles are tight.
 fn agree(model: &str, question: &str, expected: &BigRational) {
     for exactness in [Exactness::Always, Exactness::Auto] {
         assert_eq!(value(model, question, exactness).exact.as_ref(), Some(expected), "{question}");
     }
-    let found = value(model, question, Exactness::Never);
+    let rounded = value(model, question, Exactness::Never);
     let end = |end: f64| BigRational::from_float(end).expect("finite");
-    assert!(end(found.lower) <= *expected && *expected <= end(found.upper), "{found:?}, exactly {expected}");
-    assert!(found.upper - found.lower <= 1e-6 * found.value, "{found:?} is wide");
+    assert!(
+        end(rounded.lower) <= *expected && *expected <= end(rounded.upper),
+        "{rounded:?}, exactly {expected}"
+    );
+    assert!(rounded.upper - rounded.lower <= 1e-6 * rounded.value, "{rounded:?} is wide");
 }
 
-/// Haddad and Monmege, TCS 735, 2018, section 4: value iteration from below stops at once, far from one half.
+/// Haddad and Monmege, TCS 735, 2018, section 4: value iteration from below stops immediately, far from one half.
 #[test]
-fn two_ends_that_are_equally_rare() {
+fn equally_rare_exits_have_probability_one_half() {
     for n in [20, 27, 28, 40, 60, 100] {
         let model = format!(
             "dtmc const int N={n};
@@ -50,9 +53,9 @@ fn two_ends_that_are_equally_rare() {
     }
 }
 
-/// From 1 one further or back to 0, which leads to 1: 3·2^(N−1) − 3 steps, by the recurrence of the expected times.
+/// From each x one step up or back to 0, and from 0 to 1: 3·2^(N−1) − 3 expected steps, by recurrence.
 #[test]
-fn a_goal_that_takes_long() {
+fn a_huge_expected_time_is_exact() {
     for n in [26_u32, 28, 40, 60, 100] {
         let model = format!(
             "dtmc module m x:[0..{n}] init 1;
@@ -67,9 +70,9 @@ fn a_goal_that_takes_long() {
     }
 }
 
-/// Choices beside a stiff chain: the better one differs from the other by less than doubles can tell of one step.
+/// Choices in a stiff process. The values after one step of the better and the other choice are almost equal in doubles.
 #[test]
-fn choices_in_a_process_that_is_rarely_left() {
+fn the_better_choice_in_a_stiff_process_is_found() {
     for n in [28, 50] {
         let model = format!(
             "mdp const int N={n};
@@ -86,7 +89,7 @@ fn choices_in_a_process_that_is_rarely_left() {
     }
 }
 
-/// A gambler who wins with 2/5 and stops at 1,000: (3/2 − 1) / ((3/2)^1000 − 1), about 4.5·10^−177 from 1.
+/// A gambler who wins with probability 2/5 and stops at 1,000: (3/2 − 1) / ((3/2)^1000 − 1), about 4.5·10^−177, from 1.
 #[test]
 fn bounds_of_tiny_values_are_relative() {
     let model = "dtmc module m x:[0..1000] init 1;
@@ -96,18 +99,18 @@ fn bounds_of_tiny_values_are_relative() {
     let odds = BigRational::new(BigInt::from(3), BigInt::from(2));
     let one = BigRational::from(BigInt::from(1));
     let expected = (&odds - &one) / (odds.pow(1000) - &one);
-    let found = value(model, "P=? [ F x=1000 ]", Exactness::Never);
+    let rounded = value(model, "P=? [ F x=1000 ]", Exactness::Never);
     let end = |end: f64| BigRational::from_float(end).expect("finite");
-    assert!(end(found.lower) <= expected && expected <= end(found.upper), "{found:?}");
-    assert!(found.upper - found.lower <= 1e-6 * found.value, "{found:?} is wide");
+    assert!(end(rounded.lower) <= expected && expected <= end(rounded.upper), "{rounded:?}");
+    assert!(rounded.upper - rounded.lower <= 1e-6 * rounded.value, "{rounded:?} is wide");
     let bounded = value(model, "P=? [ F<=300 x=100 ]", Exactness::Never);
     assert!(bounded.value > 0.0 && bounded.upper - bounded.lower <= 1e-6 * bounded.value, "{bounded:?}");
 }
 
-/// Bounds that are there at once, if not tight: what makes them better must not take 17 s. The value is Metaplan's own exact one; the
-/// model is that of the Quantitative Verification Benchmark Set.
+/// Wide bounds are available immediately, and their improvement must not take 17 s. The value is Metaplan's own exact
+/// value; the model belongs to the Quantitative Verification Benchmark Set.
 #[test]
-fn wide_bounds_are_made_better_while_that_is_cheap() {
+fn wide_bounds_are_improved_only_if_that_is_cheap() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/real/qvbs/mdp/zeroconf/zeroconf.prism");
     let Ok(model) = std::fs::read_to_string(path) else {
         println!("skipped: {path} is not there");
@@ -119,7 +122,7 @@ fn wide_bounds_are_made_better_while_that_is_cheap() {
     let question = "Pmin=? [ F (l=4 & ip=1) ]";
     let exact = value(&model, question, Exactness::Always).exact.expect("exact");
     assert_eq!(exact.to_string(), "322687697779/64024000322687697779");
-    let found = value(&model, question, Exactness::Never);
+    let rounded = value(&model, question, Exactness::Never);
     let end = |end: f64| BigRational::from_float(end).expect("finite");
-    assert!(end(found.lower) <= exact && exact <= end(found.upper), "{found:?}");
+    assert!(end(rounded.lower) <= exact && exact <= end(rounded.upper), "{rounded:?}");
 }

@@ -21,8 +21,8 @@ impl From<Error> for Stop {
 pub type Asked<T> = Result<T, Stop>;
 
 /// Converts `None`, the result of exact arithmetic that exceeded its budget, to an error.
-pub fn worked<T>(found: Option<T>) -> Asked<T> {
-    found.ok_or(Stop::TooMuchWork)
+pub fn worked<T>(result: Option<T>) -> Asked<T> {
+    result.ok_or(Stop::TooMuchWork)
 }
 
 /// An error in a property.

@@ -19,7 +19,7 @@ use crate::prism::ast::Steps;
 use crate::solve::{Direction, Problem, Work, solve_within};
 
 /// Upper limit on the budget.
-const BUDGETS: usize = 100_000;
+const MAX_BUDGET: usize = 100_000;
 
 impl<N: Number> Query<'_, N> {
     /// The probabilities of reaching the terminal states of a problem while a reward stays within
@@ -30,7 +30,7 @@ impl<N: Number> Query<'_, N> {
         name: Option<&str>,
         steps: &Steps,
     ) -> Asked<Valued<N>> {
-        if self.given.is_some() || steps.least.is_some() {
+        if self.evaluated.is_some() || steps.least.is_some() {
             return Err(refusal(
                 "Q403",
                 "of bounds on rewards, those from above are handled, without a given policy",
@@ -48,7 +48,7 @@ impl<N: Number> Query<'_, N> {
         } else {
             limit.floor()
         };
-        let budgets = whole.to_usize().filter(|budget| *budget < BUDGETS).ok_or_else(out_of_range)?;
+        let budgets = whole.to_usize().filter(|budget| *budget < MAX_BUDGET).ok_or_else(out_of_range)?;
         let earned = whole_rewards(self.rewards(name)?)?;
         let layers = Layers::new(self.mdp(), problem, &earned)?;
         let n = self.mdp().states();
@@ -154,6 +154,7 @@ impl<'a, N: Number> Sweep<'a, N> {
             for choice in problem.choices(state as usize) {
                 let targets = mdp.targets(choice);
                 widest = widest.max(targets.len());
+                // The value of such a choice would depend on itself.
                 if earned[choice] == 0
                     && targets.contains(&state)
                     && targets.iter().any(|target| *target != state)
@@ -178,7 +179,7 @@ impl<'a, N: Number> Sweep<'a, N> {
 
     /// Computes the values of a budget from those of smaller budgets. Returns `None` if exact
     /// arithmetic exceeds its budget.
-    fn layer(&self, values: &mut [N], known: &[Vec<N>], budget: usize, work: &mut Work) -> Option<()> {
+    fn layer(&self, values: &mut [N], previous: &[Vec<N>], budget: usize, work: &mut Work) -> Option<()> {
         let mdp = self.problem.mdp;
         for (state, value) in values.iter_mut().enumerate() {
             *value = if self.problem.terminal.contains(state) { N::one() } else { N::zero() };
@@ -190,7 +191,7 @@ impl<'a, N: Number> Sweep<'a, N> {
                     0 if mdp.targets(choice) == [*state] => None,
                     0 => Some(&*values),
                     earned if earned > budget => None,
-                    earned => Some(&known[known.len().saturating_sub(earned)]),
+                    earned => Some(&previous[previous.len().saturating_sub(earned)]),
                 };
                 let value = from.map_or_else(N::zero, |from| {
                     mdp.transitions(choice)

@@ -48,19 +48,19 @@ impl<N: Number> Query<'_, N> {
     }
 
     fn of_truth(&self, filter: Filter, holds: &FixedBitSet, chosen: &FixedBitSet) -> Asked<Filtered> {
-        let both = || chosen.intersection(holds);
+        let satisfying = || chosen.intersection(holds);
         let listed = |state: usize| Listed {
             values: self.values_of(state),
             truth: Some(holds.contains(state)),
             answer: None,
         };
         Ok(match filter {
-            Filter::Count => Filtered::Number(whole(both().count())),
+            Filter::Count => Filtered::Number(whole(satisfying().count())),
             Filter::ForAll => Filtered::Truth(chosen.is_subset(holds)),
-            Filter::Exists => Filtered::Truth(both().next().is_some()),
+            Filter::Exists => Filtered::Truth(satisfying().next().is_some()),
             Filter::First => Filtered::Truth(holds.contains(self.first(chosen))),
             Filter::State => Filtered::Truth(holds.contains(only(chosen)?)),
-            Filter::Print => Filtered::States(self.sorted(both()).into_iter().map(listed).collect()),
+            Filter::Print => Filtered::States(self.sorted(satisfying()).into_iter().map(listed).collect()),
             Filter::PrintAll => {
                 Filtered::States(self.sorted(chosen.ones()).into_iter().map(listed).collect())
             }
@@ -76,8 +76,7 @@ impl<N: Number> Query<'_, N> {
         };
         let values_of_states =
             |states: Vec<usize>| Filtered::States(states.into_iter().map(listed).collect());
-        let is_something =
-            |state: &usize| vector.infinite.contains(*state) || !vector.values[*state].is_zero();
+        let is_nonzero = |state: &usize| vector.infinite.contains(*state) || !vector.values[*state].is_zero();
         Ok(match filter {
             Filter::Min => Filtered::Number(extreme(vector, chosen, false)),
             Filter::Max => Filtered::Number(extreme(vector, chosen, true)),
@@ -86,7 +85,7 @@ impl<N: Number> Query<'_, N> {
             Filter::Average => Filtered::Number(sum(vector, chosen, chosen.count_ones(..))),
             Filter::First => Filtered::Number(vector.answer(self.first(chosen))),
             Filter::State => Filtered::Number(vector.answer(only(chosen)?)),
-            Filter::Print => values_of_states(self.sorted(chosen.ones().filter(is_something))),
+            Filter::Print => values_of_states(self.sorted(chosen.ones().filter(is_nonzero))),
             Filter::PrintAll => values_of_states(self.sorted(chosen.ones())),
             Filter::ArgMin | Filter::ArgMax => {
                 let best = extreme(vector, chosen, filter == Filter::ArgMax);
@@ -143,19 +142,20 @@ pub fn extreme<N: Number>(vector: &Vector<N>, chosen: &FixedBitSet, greatest: bo
             }
             continue;
         };
-        let Some(known) = &mut best else {
+        let Some(incumbent) = &mut best else {
             best = Some(next);
             continue;
         };
         let pick = |a: f64, b: f64| if greatest { a.max(b) } else { a.min(b) };
-        let better = match (&known.exact, &next.exact) {
-            (Some(known), Some(next)) => (next > known) == greatest && next != known,
-            _ => (next.value > known.value) == greatest,
+        let better = match (&incumbent.exact, &next.exact) {
+            (Some(incumbent), Some(next)) => (next > incumbent) == greatest && next != incumbent,
+            _ => (next.value > incumbent.value) == greatest,
         };
         if better {
-            (known.value, known.exact) = (next.value, next.exact);
+            (incumbent.value, incumbent.exact) = (next.value, next.exact);
         }
-        (known.lower, known.upper) = (pick(known.lower, next.lower), pick(known.upper, next.upper));
+        (incumbent.lower, incumbent.upper) =
+            (pick(incumbent.lower, next.lower), pick(incumbent.upper, next.upper));
     }
     best.map_or(Answer::Infinite, Answer::Finite)
 }

@@ -28,7 +28,7 @@ struct Ends {
 
 impl<N: Number> Query<'_, N> {
     fn no_given_policy(&self) -> Asked<()> {
-        match self.given {
+        match self.evaluated {
             None => Ok(()),
             Some(_) => Err(refusal("Q403", "a policy is not evaluated for what happens for ever")),
         }
@@ -67,7 +67,7 @@ impl<N: Number> Query<'_, N> {
         self.no_given_policy()?;
         if direction == Direction::Min || self.program.kind == ModelKind::Dtmc {
             // A total is finite only if rewards are eventually 0 forever.
-            let free = self.free_for_ever(rewards);
+            let free = self.free_forever(rewards);
             return self.solved(self.problem(Direction::Min, Some(rewards), &free)).map(without_policy);
         }
         let mdp = self.mdp();
@@ -77,6 +77,7 @@ impl<N: Number> Query<'_, N> {
             let pays = mdp.choices(state).any(|c| ends.alive.contains(c) && !rewards[c].is_zero());
             infinite.set(state, pays);
         }
+        // A state that can reach an infinite value has one itself.
         reach_back(mdp, &mut infinite);
         let merged = EcQuotient::new(mdp, &ends, rewards, &infinite)?;
         let problem = Problem::new(&merged.mdp, Direction::Max, Some(&merged.rewards), &merged.end);
@@ -94,7 +95,7 @@ impl<N: Number> Query<'_, N> {
     }
 
     /// The states from which a policy can avoid all rewards forever (a greatest fixpoint).
-    fn free_for_ever(&self, rewards: &[N]) -> FixedBitSet {
+    fn free_forever(&self, rewards: &[N]) -> FixedBitSet {
         let mdp = self.mdp();
         let mut free = self.every();
         loop {
@@ -148,9 +149,10 @@ impl<N: Number> Query<'_, N> {
             let average = sum.over(&time);
             if !N::EXACT {
                 let rounding = 16.0 + 4.0 * crate::number::count(mdp.targets(choice).len());
-                let (own, long) = (average.to_f64(), time.to_f64());
-                let shorter = (long - time_error).max(f64::MIN_POSITIVE);
-                error = error.max((sum_error + own * time_error) / shorter + rounding * f64::EPSILON * own);
+                let (value, duration) = (average.to_f64(), time.to_f64());
+                let least_duration = (duration - time_error).max(f64::MIN_POSITIVE);
+                error = error
+                    .max((sum_error + value * time_error) / least_duration + rounding * f64::EPSILON * value);
             }
             averages[state] = average;
         }
@@ -158,15 +160,15 @@ impl<N: Number> Query<'_, N> {
             Problem { terminal_values: Some(&averages), ..Problem::new(mdp, Direction::Max, None, &chosen) };
         let solution = worked(solve_within(problem, None, &mut self.work.borrow_mut()))?;
         let mut vector = Vector::solved(solution, Span::Positive);
-        for own in &mut vector.errors {
-            *own += error;
+        for bound in &mut vector.errors {
+            *bound += error;
         }
         Ok(vector.into())
     }
 }
 
-fn without_policy<N>(found: Valued<N>) -> Valued<N> {
-    Valued { policy: None, ..found }
+fn without_policy<N>(values: Valued<N>) -> Valued<N> {
+    Valued { policy: None, ..values }
 }
 
 /// Extends a set by all states that can reach it.
@@ -264,7 +266,7 @@ impl<N: Number> EcQuotient<N> {
             };
             place[state] = number;
             match members.get_mut(number as usize) {
-                Some(known) => known.push(state),
+                Some(block_members) => block_members.push(state),
                 None => members.push(vec![state]),
             }
         }

@@ -28,8 +28,8 @@ use crate::prism::ast::{BinaryOp, Expr, ExprKind, Model};
 use crate::prism::{Names, Packed, Program, Remembered, Settings};
 use crate::property::{Declarations, Path, Property, RewardPath, Steps};
 use crate::solve::NONE;
-use crate::solve::work::MOST;
-use named::written_out;
+use crate::solve::work::DEFAULT_BUDGET;
+use named::expand_references;
 use query::Query;
 use state::is_of_states;
 use validate::{expressions_of, properties_in, steps_of, validate};
@@ -39,7 +39,7 @@ pub use options::{Exactness, Options};
 pub use table::{PolicyTable, Row};
 
 /// Upper limit on the transitions of a model that is explored in rationals by default.
-const SMALL: usize = 150_000;
+const MAX_EXACT_TRANSITIONS: usize = 150_000;
 
 /// The default budget of exact arithmetic for a model, in work units of about 1 ns.
 fn budget(transitions: usize) -> u64 {
@@ -80,14 +80,14 @@ pub struct Report {
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let model = prism::parse("dtmc module m s:[0..2] init 0; [] s=0 -> 1/3:(s'=1) + 2/3:(s'=2); endmodule")?;
 /// let report = check(&model, &property::parse("P=? [ F s=1 ]")?, &Options::default())?;
-/// let Outcome::Value(Answer::Finite(found)) = report.outcome else { panic!("a probability is finite") };
-/// assert!(found.lower <= 1.0 / 3.0 && found.upper >= 1.0 / 3.0);
+/// let Outcome::Value(Answer::Finite(quantity)) = report.outcome else { panic!("a probability is finite") };
+/// assert!(quantity.lower <= 1.0 / 3.0 && quantity.upper >= 1.0 / 3.0);
 /// # Ok(())
 /// # }
 /// ```
 ///
 /// # Errors
-/// Everything that is wrong with model, property, constants or policy, or that a limit was reached.
+/// An error in the model, the property, the constants or the policy, or an exceeded limit.
 pub fn check(model: &Model, property: &Property, options: &Options<'_>) -> Result<Report, Error> {
     let reports = check_all(model, [property], options)?;
     reports.into_iter().next().unwrap_or_else(|| Err(Error::Property(Vec::new().into())))
@@ -106,33 +106,35 @@ pub fn check_all<'p>(
     let start = Instant::now();
     let joined = join(model, &options.declarations);
     let properties =
-        properties.into_iter().map(|property| written_out(property, &joined, &options.declarations));
+        properties.into_iter().map(|property| expand_references(property, &joined, &options.declarations));
     let properties: Vec<_> = properties.collect();
     let program = Program::<f64>::new(&joined, &options.settings)
         .map_err(|error| blame(error, model, &joined, &options.settings))?;
-    let (mut wanted, mut refused) = (Vec::new(), Vec::new());
+    let (mut required, mut refused) = (Vec::new(), Vec::new());
     for property in &properties {
         let reward_numbers = property.as_ref().map_err(Clone::clone).and_then(|property| {
-            let reward_numbers = wanted_rewards(&program.reward_names, property, options)?;
+            let reward_numbers = required_rewards(&program.reward_names, property, options)?;
             validate(&program, property).map(|()| reward_numbers)
         });
-        refused.push(reward_numbers.map(|reward_numbers| wanted.extend(reward_numbers)).err());
+        refused.push(reward_numbers.map(|reward_numbers| required.extend(reward_numbers)).err());
     }
+    // If all properties are invalid, the model need not be explored.
     if !refused.iter().any(Option::is_none) {
         return Ok(refused.into_iter().flatten().map(Err).collect());
     }
-    wanted.sort_unstable();
-    wanted.dedup();
+    required.sort_unstable();
+    required.dedup();
+    // Several properties may need states beyond the end of a single one.
     let end = match &properties[..] {
         [Ok(only)] => end_of(only, &program.names, options),
         _ => None,
     };
-    let program = program.with_rewards(&wanted).stopping(end.as_ref());
+    let program = program.with_rewards(&required).stopping(end.as_ref());
     let exact = if options.exactness == Exactness::Never {
         None
     } else {
         let exact = Program::<Fraction>::new(&joined, &options.settings)?;
-        Some(exact.with_rewards(&wanted).stopping(end.as_ref()))
+        Some(exact.with_rewards(&required).stopping(end.as_ref()))
     };
     let mut processes = Processes::explore(&program, exact.as_ref(), options)?;
     if options.evaluate.is_none() {
@@ -146,7 +148,7 @@ pub fn check_all<'p>(
             continue;
         };
         let start = Instant::now();
-        let report = processes.report(&program, exact.as_ref(), property, options, &wanted);
+        let report = processes.report(&program, exact.as_ref(), property, options, &required);
         reports.push(report.map(|report| Report { build, solve: start.elapsed(), ..report }));
     }
     Ok(reports)
@@ -159,6 +161,7 @@ fn end_of(property: &Property, names: &Names, options: &Options<'_>) -> Option<E
     if options.policy || options.evaluate.is_some() || options.secondary.is_some() {
         return None;
     }
+    // Before a lower step bound, reaching the goal does not decide the property.
     let lasts = |steps: &Option<Box<Steps>>| steps.as_ref().is_none_or(|steps| steps.least.is_none());
     let not = |inner: &Expr| Expr { kind: ExprKind::Not(Box::new(inner.clone())), place: inner.place };
     let end = match property {
@@ -232,14 +235,14 @@ impl Processes {
         }
         let exact = Remembered::new(exact);
         let mut exploration = Exploration::new(&exact, bounds)?;
-        if exploration.go_on(&exact, bounds, SMALL)? {
+        if exploration.run(&exact, bounds, MAX_EXACT_TRANSITIONS)? {
             let budget = budget(exploration.found.mdp.transition_count());
             return Ok(Self { exact: Some(exploration.found), doubles: None, budget });
         }
         let doubles = match exploration.rounded() {
             Some(mut rounded) => {
                 drop(exploration);
-                rounded.go_on(&Remembered::new(program), bounds, usize::MAX)?;
+                rounded.run(&Remembered::new(program), bounds, usize::MAX)?;
                 rounded.found
             }
             // The exploration in doubles reports the place of the number.
@@ -261,13 +264,13 @@ impl Processes {
         exact: Option<&Program<Fraction>>,
         property: &Property,
         options: &Options<'_>,
-        wanted: &[usize],
+        computed_rewards: &[usize],
     ) -> Result<Report, Error> {
         if let (Some(program), Some(explored)) = (exact, &self.exact) {
-            let mut query = Query::new(program, explored, options, wanted, self.budget)?;
+            let mut query = Query::new(program, explored, options, computed_rewards, self.budget)?;
             query.doubles = Some(explored.mdp.to_f64());
-            if let Some(found) = query.answer(property)? {
-                return Ok(report(program, explored, found, options));
+            if let Some(answer) = query.answer(property)? {
+                return Ok(report(program, explored, answer, options));
             }
         }
         if self.doubles.is_none() {
@@ -276,17 +279,17 @@ impl Processes {
                 Some(rounded.map_or_else(|| explore(&Remembered::new(program), &options.bounds), Ok)?);
         }
         let explored = self.doubles.as_ref().expect("invariant: explored just now");
-        let answer = Query::new(program, explored, options, wanted, 0)?.answer(property)?;
+        let answer = Query::new(program, explored, options, computed_rewards, 0)?.answer(property)?;
         let answer = answer.expect("invariant: doubles cost nothing");
         let wide = options.precision.is_some_and(|precision| !answer.0.is_within(precision));
         if let Some(exact) = exact.filter(|_| wide) {
-            let budget = MOST.saturating_mul(10);
+            let budget = DEFAULT_BUDGET.saturating_mul(10);
             if self.exact.is_none() {
                 self.exact = Some(explore(&Remembered::new(exact), &options.bounds)?);
             }
             if self.budget < budget {
                 self.budget = budget;
-                return self.report(program, Some(exact), property, options, wanted);
+                return self.report(program, Some(exact), property, options, computed_rewards);
             }
         }
         Ok(report(program, explored, answer, options))
@@ -296,7 +299,7 @@ impl Processes {
 fn report<N: Number>(
     program: &Program<N>,
     explored: &Explored<Packed, N>,
-    (outcome, policy): outcome::Found,
+    (outcome, policy): outcome::Attained,
     options: &Options<'_>,
 ) -> Report {
     let mdp = &explored.mdp;
@@ -319,12 +322,16 @@ fn report<N: Number>(
 
 /// The numbers of the reward structures that a property and the tie-breaking of its policy
 /// require.
-fn wanted_rewards(names: &[String], property: &Property, options: &Options<'_>) -> Result<Vec<usize>, Error> {
-    let mut wanted = Vec::new();
+fn required_rewards(
+    names: &[String],
+    property: &Property,
+    options: &Options<'_>,
+) -> Result<Vec<usize>, Error> {
+    let mut required = Vec::new();
     let mut parts = vec![property];
     while let Some(part) = parts.pop() {
-        if let Property::Multi(more) = part {
-            parts.extend(more);
+        if let Property::Multi(nested) = part {
+            parts.extend(nested);
         }
         let name = match part {
             Property::Reward(_, name, _) => Some(name),
@@ -332,16 +339,16 @@ fn wanted_rewards(names: &[String], property: &Property, options: &Options<'_>) 
             _ => None,
         };
         if let Some(name) = name {
-            wanted.push(query::structure(names, name.as_deref())?);
+            required.push(query::structure(names, name.as_deref())?);
         }
         for expression in expressions_of(part) {
             properties_in(expression, &mut parts);
         }
     }
     if let Some(name) = &options.secondary {
-        wanted.push(query::structure(names, Some(name))?);
+        required.push(query::structure(names, Some(name))?);
     }
-    Ok(wanted)
+    Ok(required)
 }
 
 /// The decisions of a policy in each state that it can reach.

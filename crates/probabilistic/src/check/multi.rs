@@ -16,6 +16,7 @@ impl<N: Number> Query<'_, N> {
         let [first, second] = parts else {
             return Err(property_error("Q403", place, "`multi` is handled with two objectives").into());
         };
+        // A bounded objective becomes the second one.
         let (first, second, swapped) =
             if bound_of(first).is_some() { (second, first, true) } else { (first, second, false) };
         if bound_of(first).is_some() {
@@ -34,15 +35,15 @@ impl<N: Number> Query<'_, N> {
         if let Some((_, bound)) = bound_of(second) {
             let bound = N::from_rational(&self.constant(bound)?);
             let limit = if objectives[1].rewards.is_some() { bound } else { N::one().minus(&bound) };
-            let Ok(found) = pareto.constrained(&limit) else { return Err(Stop::TooMuchWork) };
-            let shown = |found: Bounded<N>| {
+            let Ok(optimum) = pareto.constrained(&limit) else { return Err(Stop::TooMuchWork) };
+            let shown = |bounded: Bounded<N>| {
                 if N::EXACT {
-                    return shown(0, &found.value, 0.0);
+                    return shown(0, &bounded.value, 0.0);
                 }
-                let answer = Answer::between(found.value.to_f64(), [found.lower, found.upper]);
+                let answer = Answer::between(bounded.value.to_f64(), [bounded.lower, bounded.upper]);
                 if objectives[0].rewards.is_none() { answer.complement() } else { answer }
             };
-            return Ok(constrained(found, shown));
+            return Ok(constrained(optimum, shown));
         }
         let Ok(vertices) = pareto.vertices(None) else { return Err(Stop::TooMuchWork) };
         let pairs = vertices.iter().map(|vertex| {
@@ -92,18 +93,18 @@ fn bound_of(property: &Property) -> Option<&(BinaryOp, Expr)> {
     }
 }
 
-fn constrained<N: Number>(found: Option<Constrained<N>>, shown: impl Fn(Bounded<N>) -> Answer) -> Outcome {
-    match found {
+fn constrained<N: Number>(optimum: Option<Constrained<N>>, shown: impl Fn(Bounded<N>) -> Answer) -> Outcome {
+    match optimum {
         None => Outcome::Constrained {
             randomised: Answer::Undefined,
             deterministic: Answer::Undefined,
             proved: true,
         },
-        Some(found) => {
-            let proved = found.deterministic.as_ref().is_some_and(|(_, proved)| *proved);
+        Some(optimum) => {
+            let proved = optimum.deterministic.as_ref().is_some_and(|(_, proved)| *proved);
             Outcome::Constrained {
-                randomised: shown(found.randomised),
-                deterministic: found.deterministic.map_or(Answer::Undefined, |(value, _)| shown(value)),
+                randomised: shown(optimum.randomised),
+                deterministic: optimum.deterministic.map_or(Answer::Undefined, |(value, _)| shown(value)),
                 proved,
             }
         }

@@ -8,13 +8,13 @@ use crate::prism::ast::{Expr, ExprKind, Model, Path, Property, RewardPath};
 use crate::property::Declarations;
 
 /// Upper limit on the number of replaced references in a property.
-const NAMES: usize = 1000;
+const MAX_REFERENCES: usize = 1000;
 
 /// Returns a property without references to named properties.
 ///
 /// # Errors
 /// A circular reference, or too many references.
-pub fn written_out<'p>(
+pub fn expand_references<'p>(
     property: &'p Property,
     model: &Model,
     declarations: &Declarations,
@@ -22,22 +22,23 @@ pub fn written_out<'p>(
     if declarations.properties.is_empty() {
         return Ok(Cow::Borrowed(property));
     }
-    let mut writing = Writing { model, declarations, within: Vec::new(), written: 0, problem: None };
-    let expanded = writing.property(property);
-    writing.problem.map_or(Ok(Cow::Owned(expanded)), |problem| Err(Error::Property(problem.into())))
+    let mut expansion =
+        Expansion { model, declarations, within: Vec::new(), expanded_count: 0, problem: None };
+    let expanded = expansion.property(property);
+    expansion.problem.map_or(Ok(Cow::Owned(expanded)), |problem| Err(Error::Property(problem.into())))
 }
 
-struct Writing<'a> {
+struct Expansion<'a> {
     model: &'a Model,
     declarations: &'a Declarations,
     /// The names that are being expanded, outermost first.
     within: Vec<String>,
     /// Number of expanded references.
-    written: usize,
+    expanded_count: usize,
     problem: Option<Diagnostic>,
 }
 
-impl Writing<'_> {
+impl Expansion<'_> {
     fn property(&mut self, property: &Property) -> Property {
         match property {
             Property::Probability(question, path) => Property::Probability(question.clone(), self.path(path)),
@@ -99,7 +100,7 @@ impl Writing<'_> {
             return None;
         }
         let declarations = self.declarations;
-        let (_, property) = declarations.properties.iter().find(|(known, _)| known == name)?;
+        let (_, property) = declarations.properties.iter().find(|(candidate, _)| candidate == name)?;
         if let Property::Refused(problem) = property {
             self.problem = Some(problem.clone());
             return None;
@@ -109,9 +110,9 @@ impl Writing<'_> {
             self.problem = Some(Diagnostic::new("Q204", place, text));
             return None;
         }
-        self.written = self.written.saturating_add(1);
-        if self.written > NAMES {
-            let text = format!("more than {NAMES} parts that are properties with names");
+        self.expanded_count = self.expanded_count.saturating_add(1);
+        if self.expanded_count > MAX_REFERENCES {
+            let text = format!("more than {MAX_REFERENCES} parts that are properties with names");
             self.problem = Some(Diagnostic::new("Q104", place, text));
             return None;
         }

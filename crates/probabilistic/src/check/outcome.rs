@@ -16,21 +16,21 @@ use crate::prism::ast::{BinaryOp, Filter, ModelKind, Property, Question, Type};
 use crate::solve::Direction;
 
 /// An outcome and a policy that attains it.
-pub type Found = (Outcome, Option<Vec<u32>>);
+pub type Attained = (Outcome, Option<Vec<u32>>);
 
 impl<N: Number> Query<'_, N> {
     /// Evaluates a property. Returns `None` if exact arithmetic exceeds its budget.
-    pub fn answer(&self, property: &Property) -> Result<Option<Found>, Error> {
+    pub fn answer(&self, property: &Property) -> Result<Option<Attained>, Error> {
         match self.outcome(property) {
-            Ok(found) => Ok(Some(found)),
+            Ok(answer) => Ok(Some(answer)),
             Err(Stop::TooMuchWork) => Ok(None),
             Err(Stop::Wrong(error)) => Err(error),
         }
     }
 
-    fn outcome(&self, property: &Property) -> Asked<Found> {
+    fn outcome(&self, property: &Property) -> Asked<Attained> {
         match property {
-            Property::Multi(_) if self.given.is_some() => {
+            Property::Multi(_) if self.evaluated.is_some() => {
                 Err(refusal("Q403", "a policy is evaluated for one objective at a time"))
             }
             Property::Multi(_) if self.explored.starts > 1 => {
@@ -107,8 +107,8 @@ impl<N: Number> Query<'_, N> {
         let value = quantity.exact.clone().or_else(|| BigRational::from_float(quantity.value));
         let mut vector = Vector::everywhere(&value.unwrap_or_default(), n);
         let error = (quantity.upper - quantity.value).max(quantity.value - quantity.lower);
-        for known in &mut vector.errors {
-            *known = known.max(error.next_up());
+        for bound in &mut vector.errors {
+            *bound = bound.max(error.next_up());
         }
         vector
     }

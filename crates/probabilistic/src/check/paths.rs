@@ -13,7 +13,7 @@ use crate::prism::ast::{ModelKind, Path, RewardPath, StepBound, Steps};
 use crate::solve::{Direction, Problem, Solution, draft, solve_within};
 
 /// Upper limit on step bounds.
-const STEPS: u32 = 1_000_000_000;
+const MAX_STEPS: u32 = 1_000_000_000;
 
 /// Values, and a policy that attains them if a memoryless one exists.
 #[derive(Debug)]
@@ -57,6 +57,7 @@ impl<N: Number> Query<'_, N> {
             }
             Path::Globally(goal, steps) => {
                 let every_state = self.every();
+                // The complement: a bad state is reached.
                 let bad = inverse(self.truth(goal)?);
                 Ok(complement(self.until(opposite(direction), &every_state, &bad, steps.as_deref())?))
             }
@@ -69,11 +70,13 @@ impl<N: Number> Query<'_, N> {
                 Ok(complement(self.until(opposite(direction), &keep, &bad, steps.as_deref())?))
             }
             Path::Release(left, right, steps) => {
+                // The complement: `right` fails before or when `left` holds for the first time.
                 let (keep, bad) = (inverse(self.truth(left)?), inverse(self.truth(right)?));
                 Ok(complement(self.until(opposite(direction), &keep, &bad, steps.as_deref())?))
             }
             Path::Repeatedly(goal) => self.repeatedly(direction, &self.truth(goal)?),
             Path::Persistently(goal) => {
+                // The complement: bad states are visited infinitely often.
                 let bad = inverse(self.truth(goal)?);
                 Ok(complement(self.repeatedly(opposite(direction), &bad)?))
             }
@@ -109,8 +112,8 @@ impl<N: Number> Query<'_, N> {
             return Ok(then.into());
         }
         // Before the lower step bound, `left` must hold, regardless of `right`.
-        let (none, outside) = (FixedBitSet::with_capacity(left.len()), inverse(left.clone()));
-        let before = Problem { blocked: Some(&outside), ..self.problem(direction, None, &none) };
+        let (no_states, outside) = (FixedBitSet::with_capacity(left.len()), inverse(left.clone()));
+        let before = Problem { blocked: Some(&outside), ..self.problem(direction, None, &no_states) };
         let errors = then.errors;
         let mut values = self.stepped(before, then.values, 1)?.values;
         for state in outside.ones() {
@@ -146,11 +149,11 @@ impl<N: Number> Query<'_, N> {
         self.limit(bound, 0_i8.saturating_sub(i8::from(bound.strict)))
     }
 
-    /// The value of a step bound plus `more`.
-    fn limit(&self, bound: &StepBound, more: i8) -> Asked<u32> {
+    /// The value of a step bound plus `offset`.
+    fn limit(&self, bound: &StepBound, offset: i8) -> Asked<u32> {
         // `validate` has checked that the bound is an integer.
-        let limit = self.constant(&bound.limit)?.to_integer() + more;
-        Ok(limit.to_u32().filter(|most| *most < STEPS).ok_or_else(|| {
+        let limit = self.constant(&bound.limit)?.to_integer() + offset;
+        Ok(limit.to_u32().filter(|most| *most < MAX_STEPS).ok_or_else(|| {
             let text = "the number of steps must be at least 0 and below 10^9";
             property_error("Q503", bound.limit.place, text)
         })?)
@@ -187,7 +190,7 @@ impl<N: Number> Query<'_, N> {
 
     /// The optimal values after `steps` steps, or those of the given policy.
     fn stepped(&self, problem: Problem<'_, N>, values: Vec<N>, steps: u32) -> Asked<steps::Stepped<N>> {
-        let problem = Problem { allowed: self.given.as_ref(), ..problem };
+        let problem = Problem { allowed: self.evaluated.as_ref(), ..problem };
         worked(steps::apply(problem, values, steps, &mut self.work.borrow_mut()))
     }
 
@@ -203,10 +206,10 @@ impl<N: Number> Query<'_, N> {
     /// Solves a problem or evaluates the given policy, and breaks ties between optimal choices.
     pub fn solved(&self, problem: Problem<'_, N>) -> Asked<Valued<N>> {
         let span = if problem.rewards.is_none() { Span::Probability } else { Span::Positive };
-        let problem = Problem { allowed: self.given.as_ref(), ..problem };
+        let problem = Problem { allowed: self.evaluated.as_ref(), ..problem };
         let solution = worked(self.solve_hinted(problem))?;
         let mut policy = solution.policy.clone();
-        if self.options.policy && self.given.is_none() {
+        if self.options.policy && self.evaluated.is_none() {
             let secondary = match &self.options.secondary {
                 Some(name) => self.rewards(Some(name))?.to_vec(),
                 None => vec![N::one(); self.mdp().choice_count()],
@@ -235,8 +238,8 @@ impl<N: Number> Query<'_, N> {
 }
 
 /// The complementary probabilities; an optimal policy for one objective is optimal for the other.
-fn complement<N: Number>(found: Valued<N>) -> Valued<N> {
-    Valued { vector: found.vector.complement(), policy: found.policy }
+fn complement<N: Number>(values: Valued<N>) -> Valued<N> {
+    Valued { vector: values.vector.complement(), policy: values.policy }
 }
 
 /// The complement of a set of states.

@@ -21,20 +21,20 @@ pub struct Query<'a, N> {
     pub explored: &'a Explored<Packed, N>,
     pub options: &'a Options<'a>,
     /// The numbers of the computed reward structures.
-    pub wanted: &'a [usize],
+    pub computed_rewards: &'a [usize],
     /// The process in doubles, for computing an initial policy.
     pub doubles: Option<Mdp<f64>>,
     /// The remaining budget of exact arithmetic.
     pub work: RefCell<Work>,
     /// The choices of the evaluated policy.
-    pub given: Option<FixedBitSet>,
+    pub evaluated: Option<FixedBitSet>,
 }
 
 /// Returns the number of a reward structure.
 pub fn structure(names: &[String], name: Option<&str>) -> Result<usize, Error> {
     let number = match name {
         None => (!names.is_empty()).then_some(0),
-        Some(name) => names.iter().position(|known| known == name),
+        Some(name) => names.iter().position(|candidate| candidate == name),
     };
     number.ok_or_else(|| {
         let text = match name {
@@ -54,18 +54,19 @@ impl<'a, N: Number> Query<'a, N> {
         program: &'a Program<N>,
         explored: &'a Explored<Packed, N>,
         options: &'a Options<'a>,
-        wanted: &'a [usize],
+        computed_rewards: &'a [usize],
         work: u64,
     ) -> Result<Self, Error> {
-        let given = options.evaluate.as_ref().map(|table| table.choices(program, explored)).transpose()?;
-        let given = given.map(|policy| choices_of(&explored.mdp, &policy));
+        let evaluated =
+            options.evaluate.as_ref().map(|table| table.choices(program, explored)).transpose()?;
+        let evaluated = evaluated.map(|policy| choices_of(&explored.mdp, &policy));
         let mut work = Work::new(work);
         if let Some(Precision::Relative(width)) = options.precision {
             work.tight = width.clamp(1e-14, work.tight);
         } else if options.precision.is_some() {
             work.tight = 1e-12;
         }
-        Ok(Self { program, explored, options, wanted, doubles: None, work: work.into(), given })
+        Ok(Self { program, explored, options, computed_rewards, doubles: None, work: work.into(), evaluated })
     }
 
     pub fn mdp(&self) -> &Mdp<N> {
@@ -75,7 +76,7 @@ impl<'a, N: Number> Query<'a, N> {
     /// The rewards of a structure, for each choice.
     pub fn rewards(&self, name: Option<&str>) -> Result<&[N], Error> {
         let number = structure(&self.program.reward_names, name)?;
-        let at = self.wanted.iter().position(|wanted| *wanted == number);
+        let at = self.computed_rewards.iter().position(|computed_rewards| *computed_rewards == number);
         let at = at.ok_or_else(|| Error::Policy("these rewards were not computed".to_owned()))?;
         Ok(&self.explored.rewards[at])
     }

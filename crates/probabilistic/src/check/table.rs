@@ -31,8 +31,8 @@ pub struct Row {
 }
 
 /// Prefixes an error with the position of a state, from 1.
-fn numbered(number: usize, what: &str) -> String {
-    format!("state {}: {what}", number.saturating_add(1))
+fn numbered(number: usize, description: &str) -> String {
+    format!("state {}: {description}", number.saturating_add(1))
 }
 
 /// Name and version of the format.
@@ -56,20 +56,22 @@ impl PolicyTable {
     /// # Errors
     /// The first violation of the format.
     pub fn from_json(text: &str) -> Result<Self, Error> {
-        let wrong = |what: String| Error::Policy(what);
-        let json: Value = serde_json::from_str(text).map_err(|error| wrong(format!("not JSON: {error}")))?;
+        let policy_error = |description: String| Error::Policy(description);
+        let json: Value =
+            serde_json::from_str(text).map_err(|error| policy_error(format!("not JSON: {error}")))?;
         if json["format"] != FORMAT {
-            return Err(wrong(format!("`format` must be `{FORMAT}`")));
+            return Err(policy_error(format!("`format` must be `{FORMAT}`")));
         }
         let Some(states) = json["states"].as_array() else {
-            return Err(wrong("`states` must be a list".to_owned()));
+            return Err(policy_error("`states` must be a list".to_owned()));
         };
         let mut table = Self { variables: Vec::new(), rows: Vec::new() };
         for (number, entry) in states.iter().enumerate() {
-            let problem = |what: &str| wrong(numbered(number, what));
+            let problem = |description: &str| policy_error(numbered(number, description));
             let Some(state) = entry["state"].as_object() else {
                 return Err(problem("`state` must be an object"));
             };
+            // The first state determines the names and types of the variables.
             if number == 0 {
                 table.variables =
                     state.iter().map(|(name, value)| (name.clone(), value.is_boolean())).collect();

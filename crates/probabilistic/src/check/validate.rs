@@ -19,22 +19,22 @@ pub fn validate<N: Number>(program: &Program<N>, property: &Property) -> Result<
 }
 
 /// Collects the properties that are nested in an expression.
-pub fn properties_in<'a>(expression: &'a Expr, found: &mut Vec<&'a Property>) {
+pub fn properties_in<'a>(expression: &'a Expr, nested: &mut Vec<&'a Property>) {
     match &expression.kind {
-        ExprKind::Property(property) => found.push(property),
-        ExprKind::Not(inner) | ExprKind::Negative(inner) => properties_in(inner, found),
+        ExprKind::Property(property) => nested.push(property),
+        ExprKind::Not(inner) | ExprKind::Negative(inner) => properties_in(inner, nested),
         ExprKind::Binary(_, left, right) => {
-            properties_in(left, found);
-            properties_in(right, found);
+            properties_in(left, nested);
+            properties_in(right, nested);
         }
         ExprKind::If(condition, then, otherwise) => {
             for part in [condition, then, otherwise] {
-                properties_in(part, found);
+                properties_in(part, nested);
             }
         }
         ExprKind::Call(_, arguments) => {
             for argument in arguments {
-                properties_in(argument, found);
+                properties_in(argument, nested);
             }
         }
         _ => {}
@@ -131,16 +131,16 @@ impl Validation {
     }
 
     fn typed(&mut self, expression: &Expr, kind: Type) {
-        let written = with_placeholders(expression, &self.names);
-        if let Err(problem) = self.names.typed(&written, kind) {
+        let plain = with_placeholders(expression, &self.names);
+        if let Err(problem) = self.names.typed(&plain, kind) {
             self.problems.push(problem);
         }
         self.within(expression);
     }
 
     fn any(&mut self, expression: &Expr) {
-        let written = with_placeholders(expression, &self.names);
-        if let Err(problem) = self.names.compile(&written) {
+        let plain = with_placeholders(expression, &self.names);
+        if let Err(problem) = self.names.compile(&plain) {
             self.problems.push(problem);
         }
         self.within(expression);

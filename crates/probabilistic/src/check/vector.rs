@@ -52,11 +52,11 @@ impl<N: Number> Vector<N> {
     }
 
     /// Converts step-bounded values.
-    pub fn stepped(found: Stepped<N>, span: Span) -> Self {
-        let states = found.values.len();
+    pub fn stepped(source: Stepped<N>, span: Span) -> Self {
+        let states = source.values.len();
         let errors =
-            if N::EXACT { Vec::new() } else { (0..states).map(|state| found.error(state)).collect() };
-        Self { values: found.values, errors, infinite: FixedBitSet::with_capacity(states), span }
+            if N::EXACT { Vec::new() } else { (0..states).map(|state| source.error(state)).collect() };
+        Self { values: source.values, errors, infinite: FixedBitSet::with_capacity(states), span }
     }
 
     /// Upper limit on the absolute error of the value of a state.

@@ -447,20 +447,20 @@ impl Expr {
     }
 
     /// Collects the names in the expression.
-    pub fn names<'a>(&'a self, found: &mut Vec<(&'a str, Place)>) {
+    pub fn names<'a>(&'a self, occurrences: &mut Vec<(&'a str, Place)>) {
         match &self.kind {
-            ExprKind::Name(name) => found.push((name, self.place)),
-            ExprKind::Not(inner) | ExprKind::Negative(inner) => inner.names(found),
+            ExprKind::Name(name) => occurrences.push((name, self.place)),
+            ExprKind::Not(inner) | ExprKind::Negative(inner) => inner.names(occurrences),
             ExprKind::Binary(_, left, right) => {
-                left.names(found);
-                right.names(found);
+                left.names(occurrences);
+                right.names(occurrences);
             }
             ExprKind::If(condition, then, otherwise) => {
                 for part in [condition, then, otherwise] {
-                    part.names(found);
+                    part.names(occurrences);
                 }
             }
-            ExprKind::Call(_, arguments) => arguments.iter().for_each(|argument| argument.names(found)),
+            ExprKind::Call(_, arguments) => arguments.iter().for_each(|argument| argument.names(occurrences)),
             ExprKind::Bool(_)
             | ExprKind::Int(_)
             | ExprKind::Number(_)
@@ -483,19 +483,19 @@ impl Expr {
     /// descends.
     #[must_use]
     pub fn rewrite(&self, with: &mut dyn FnMut(&Self) -> Option<Self>) -> Self {
-        if let Some(other) = with(self) {
-            return other;
+        if let Some(replacement) = with(self) {
+            return replacement;
         }
-        let mut again = |part: &Self| Box::new(part.rewrite(with));
+        let mut rewritten = |part: &Self| Box::new(part.rewrite(with));
         let kind = match &self.kind {
-            ExprKind::Not(inner) => ExprKind::Not(again(inner)),
-            ExprKind::Negative(inner) => ExprKind::Negative(again(inner)),
-            ExprKind::Binary(op, left, right) => ExprKind::Binary(*op, again(left), again(right)),
+            ExprKind::Not(inner) => ExprKind::Not(rewritten(inner)),
+            ExprKind::Negative(inner) => ExprKind::Negative(rewritten(inner)),
+            ExprKind::Binary(op, left, right) => ExprKind::Binary(*op, rewritten(left), rewritten(right)),
             ExprKind::If(condition, then, otherwise) => {
-                ExprKind::If(again(condition), again(then), again(otherwise))
+                ExprKind::If(rewritten(condition), rewritten(then), rewritten(otherwise))
             }
             ExprKind::Call(function, arguments) => {
-                ExprKind::Call(*function, arguments.iter().map(|argument| *again(argument)).collect())
+                ExprKind::Call(*function, arguments.iter().map(|argument| *rewritten(argument)).collect())
             }
             other => other.clone(),
         };

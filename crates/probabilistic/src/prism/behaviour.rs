@@ -14,18 +14,17 @@ use crate::prism::model::{Group, Program};
 use crate::prism::run::{Values, enabled};
 use crate::prism::state::{Edit, Packed};
 
-/// Upper limit on the number of actions.
-pub const ACTIONS: usize = 128;
-/// Upper limits on the cached behaviours and edits of each module; further ones are computed each
-/// time.
-const KEPT: [usize; 2] = [1 << 16, 1 << 20];
-/// The number of a behaviour whose evaluation has failed.
-const WRONG: u32 = u32::MAX - 1;
+/// Upper limit on the number of actions: a behaviour stores its disabled actions in a `u128`.
+pub const MAX_ACTIONS: usize = 128;
+/// Upper limits on the cached behaviours and edits of each module. Further behaviours are computed on every request.
+const CACHE_LIMITS: [usize; 2] = [1 << 16, 1 << 20];
+/// Cache entry of a behaviour whose evaluation has failed.
+const FAILED: u32 = u32::MAX - 1;
 
 /// A module: its commands by action, and its cached behaviours.
 #[derive(Debug)]
 pub struct Module<N> {
-    /// The actions that it takes part in, and where their commands stand in the program: action, position.
+    /// The actions of the module and the position of its command group in `Program::synchronised`: action, position.
     pub actions: Vec<(usize, usize)>,
     numbers: Option<Numbers>,
     /// For each behaviour, the disabled actions as a bit set.
@@ -39,7 +38,7 @@ pub struct Module<N> {
     updates: Vec<(N, u32)>,
     edits: Vec<Edit>,
     /// Cached lengths of the lists: behaviours, commands, updates, edits.
-    kept: [usize; 4],
+    cached_lengths: [usize; 4],
 }
 
 /// A command of a behaviour, by number.
@@ -67,11 +66,11 @@ impl<N: Number> Module<N> {
             commands: Vec::new(),
             updates: Vec::new(),
             edits: Vec::new(),
-            kept: [0; 4],
+            cached_lengths: [0; 4],
         }
     }
 
-    /// The behaviour in a state; `None` if its evaluation fails. It is valid until the next call.
+    /// Returns the behaviour in a state, or `None` if its evaluation fails. It is valid until the next call.
     pub fn behaviour(
         &mut self,
         program: &Program<N>,
@@ -79,19 +78,23 @@ impl<N: Number> Module<N> {
         state: &Packed,
         values: impl FnOnce() -> Values,
     ) -> Option<usize> {
-        if let Some(known) = self.numbers.as_ref().and_then(|numbers| numbers.get(state)) {
-            return (known != WRONG).then_some(known as usize);
+        if let Some(cached) = self.numbers.as_ref().and_then(|numbers| numbers.get(state)) {
+            return (cached != FAILED).then_some(cached as usize);
         }
-        self.forget();
-        let is_full = self.numbers.is_none() || self.kept[0] >= KEPT[0] || self.kept[3] >= KEPT[1];
-        let behaviour = self.write(program, number, &values()).ok().map(|()| self.kept[0]);
+        // An uncached behaviour of the previous call lies behind the cached ones.
+        self.discard_uncached();
+        // With a full cache, the behaviour is still written, but not registered: the next call discards it.
+        let is_full = self.numbers.is_none()
+            || self.cached_lengths[0] >= CACHE_LIMITS[0]
+            || self.cached_lengths[3] >= CACHE_LIMITS[1];
+        let behaviour = self.write(program, number, &values()).ok().map(|()| self.cached_lengths[0]);
         if behaviour.is_none() {
-            self.forget();
+            self.discard_uncached();
         }
         if !is_full {
-            self.kept = self.lengths();
+            self.cached_lengths = self.lengths();
             if let Some(numbers) = &mut self.numbers {
-                numbers.note(state, behaviour.map_or(WRONG, dense));
+                numbers.note(state, behaviour.map_or(FAILED, dense));
             }
         }
         behaviour
@@ -101,9 +104,9 @@ impl<N: Number> Module<N> {
         [self.prevented.len(), self.commands.len(), self.updates.len(), self.edits.len()]
     }
 
-    /// Removes what is not cached.
-    fn forget(&mut self) {
-        let [behaviours, commands, updates, edits] = self.kept;
+    /// Removes the entries behind the cached ones.
+    fn discard_uncached(&mut self) {
+        let [behaviours, commands, updates, edits] = self.cached_lengths;
         self.prevented.truncate(behaviours);
         self.slots.truncate(behaviours.saturating_mul(self.width()));
         self.commands.truncate(commands);
@@ -154,8 +157,9 @@ impl<N: Number> Module<N> {
             for (variable, code, place) in &update.assignments {
                 let value = program.assigned(*variable, code, *place, values)?;
                 let edit = program.layout.edit(*variable, value);
-                match self.edits[begin..].iter_mut().find(|known| known.joins(&edit)) {
-                    Some(known) => known.join(&edit),
+                // Assignments to variables of one word are merged into one edit.
+                match self.edits[begin..].iter_mut().find(|earlier| earlier.joins(&edit)) {
+                    Some(earlier) => earlier.join(&edit),
                     None => self.edits.push(edit),
                 }
             }
@@ -188,6 +192,7 @@ impl<N: Number> Module<N> {
     /// The updates of a command: probabilities and edits.
     pub fn updates(&self, command: Chosen) -> impl ExactSizeIterator<Item = (&N, &[Edit])> {
         let range = self.range(command);
+        // Only ends are stored: a command begins at the end of its predecessor.
         let mut begin = range.start.checked_sub(1).map_or(0, |before| self.updates[before].1);
         self.updates[range].iter().map(move |(probability, end)| {
             let edits = &self.edits[begin as usize..*end as usize];

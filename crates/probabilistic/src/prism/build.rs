@@ -10,6 +10,7 @@ use crate::prism::command::{Command, RewardItem, Update, Variable, probabilities
 use crate::prism::compile::Names;
 use crate::prism::guard::Guard;
 
+/// Evaluates the range and the initial value of a variable.
 pub fn declare(names: &mut Names, variable: &ast::Variable) -> Result<Variable, Diagnostic> {
     let whole = |names: &mut Names, expression: &ast::Expr, kind| match names.constant(expression, kind)? {
         Code::Whole(value) => Ok(value),
@@ -36,12 +37,14 @@ pub fn declare(names: &mut Names, variable: &ast::Variable) -> Result<Variable, 
     Ok(Variable { name: variable.name.clone(), is_bool, least, greatest, initial })
 }
 
+/// Compiles a command. `writable` returns `true` for the variables that the command may assign.
 pub fn compile_command<N: Number>(
     command: &ast::Command,
     names: &mut Names,
     writable: impl Fn(&str) -> bool,
 ) -> Result<Command<N>, Vec<Diagnostic>> {
     let mut problems = Vec::new();
+    // A faulty expression is replaced by a constant, so that all problems of the command are reported.
     let mut keep = |result: Result<Code, Diagnostic>| {
         result.unwrap_or_else(|problem| {
             problems.push(problem);
@@ -83,6 +86,7 @@ pub fn compile_command<N: Number>(
     if !problems.is_empty() {
         return Err(problems);
     }
+    // Constant probabilities that do not sum to 1 are reported in the first state in which the command is enabled.
     let constant = updates.iter().all(|update| update.probability.is_constant());
     let certain = constant.then(|| probabilities(&updates, &[], command.place)).and_then(Result::ok);
     Ok(Command { guard: Guard::new(guard), updates, certain, place: command.place })
@@ -94,6 +98,7 @@ pub fn reward_item<N: Number>(
 ) -> Result<RewardItem<N>, Diagnostic> {
     let guard = Guard::new(names.typed(&item.guard, Type::Bool)?);
     let reward = names.typed(&item.reward, Type::Double)?;
+    // An invalid constant is reported when the item is evaluated.
     let value = reward.is_constant().then(|| reward.number(&[]));
     let value = value.and_then(Result::ok).filter(|value| !value.is_negative());
     let certain = value.and_then(|value| rounded(&value).ok());

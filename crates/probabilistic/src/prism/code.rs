@@ -1,5 +1,6 @@
-//! Expressions with names resolved and types known, and their evaluation: exact, so that `1 - 0.7 - 0.3` is zero whatever
-//! kind of number the model is solved in.
+//! Typed expressions over resolved names, and their evaluation.
+//!
+//! Arithmetic is exact, so that `1 - 0.7 - 0.3` is zero even if the model is solved in doubles.
 
 use num_bigint::BigInt;
 use num_rational::BigRational;
@@ -11,7 +12,7 @@ use crate::prism::ast::{BinaryOp, Function, Type};
 /// An expression over the values of the variables; truth values are 0 and 1.
 #[derive(Debug, Clone)]
 pub enum Code {
-    /// A whole number or a truth value.
+    /// An integer or a truth value.
     Whole(i64),
     /// Any other number.
     Number(BigRational),
@@ -21,35 +22,35 @@ pub enum Code {
     Not(Box<Self>),
     /// `-`.
     Negative(Box<Self>, Type),
-    /// All of them hold.
+    /// Conjunction.
     All(Vec<Self>),
-    /// One of them holds.
+    /// Disjunction.
     Any(Vec<Self>),
-    /// Both hold or neither does.
+    /// Equivalence.
     Iff(Box<Self>, Box<Self>),
-    /// A comparison; the type is that of both sides together.
+    /// A comparison, with the common type of its operands.
     Compare(BinaryOp, Type, Box<Self>, Box<Self>),
-    /// Arithmetic; the type is that of the result.
+    /// Arithmetic, with the type of the result.
     Arithmetic(BinaryOp, Type, Box<Self>, Box<Self>),
     /// `condition ? then : otherwise`.
     If(Box<Self>, Box<Self>, Box<Self>),
-    /// A function; the type is that of the result.
+    /// A function call, with the type of the result.
     Call(Function, Type, Vec<Self>),
 }
 
-/// An evaluation that has no result.
+/// The reason why an evaluation has no result.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Fault(pub &'static str);
 
 type Result<T> = std::result::Result<T, Fault>;
 
-/// Bits that the operands of an operation may have together.
-const BITS: u64 = 100_000;
+/// Upper limit on the size of the operands of one operation, in bits, both together.
+const MAX_OPERAND_BITS: u64 = 100_000;
 
 const OVERFLOW: Fault = Fault("an integer grows out of its range");
 
 impl Code {
-    /// Its truth value.
+    /// Returns the truth value.
     pub fn holds(&self, values: &[i64]) -> Result<bool> {
         Ok(match self {
             Self::Whole(value) => *value != 0,
@@ -89,7 +90,7 @@ impl Code {
         })
     }
 
-    /// Its value, for whole numbers and truth values.
+    /// Returns the value of an integer or Boolean expression.
     pub fn whole(&self, values: &[i64]) -> Result<i64> {
         Ok(match self {
             Self::Whole(value) => *value,
@@ -117,14 +118,14 @@ impl Code {
         })
     }
 
-    /// Its value as a number, exactly.
+    /// Returns the value as an exact number.
     pub fn number(&self, values: &[i64]) -> Result<BigRational> {
         Ok(match self {
             Self::Number(value) => value.clone(),
             Self::Negative(inner, Type::Double) => -inner.number(values)?,
             Self::Arithmetic(op, Type::Double, left, right) => {
                 let (left, right) = (left.number(values)?, right.number(values)?);
-                if left.size().saturating_add(right.size()) > BITS {
+                if left.size().saturating_add(right.size()) > MAX_OPERAND_BITS {
                     return Err(Fault("a number with too many digits"));
                 }
                 match op {
@@ -147,50 +148,50 @@ impl Code {
         })
     }
 
-    /// The least number that is above all of its variables.
+    /// Returns the number of the greatest variable plus one, or 0 if no variable occurs.
     pub fn variables_below(&self) -> u32 {
         let mut below = 0;
         self.each_variable(&mut |variable| below = below.max(variable.saturating_add(1)));
         below
     }
 
-    /// Whether no variable occurs in it.
+    /// Returns `true` if no variable occurs.
     pub fn is_constant(&self) -> bool {
         self.variables_below() == 0
     }
 
-    /// Tells all variables that occur in it, some of them more than once.
-    pub fn each_variable(&self, tell: &mut impl FnMut(u32)) {
+    /// Calls `visit` with each occurrence of a variable; a variable that occurs twice is visited twice.
+    pub fn each_variable(&self, visit: &mut impl FnMut(u32)) {
         match self {
             Self::Whole(_) | Self::Number(_) => {}
-            Self::Variable(variable) => tell(*variable),
-            Self::Not(inner) | Self::Negative(inner, _) => inner.each_variable(tell),
+            Self::Variable(variable) => visit(*variable),
+            Self::Not(inner) | Self::Negative(inner, _) => inner.each_variable(visit),
             Self::All(parts) | Self::Any(parts) | Self::Call(_, _, parts) => {
                 for part in parts {
-                    part.each_variable(tell);
+                    part.each_variable(visit);
                 }
             }
             Self::Iff(left, right)
             | Self::Compare(_, _, left, right)
             | Self::Arithmetic(_, _, left, right) => {
-                left.each_variable(tell);
-                right.each_variable(tell);
+                left.each_variable(visit);
+                right.each_variable(visit);
             }
             Self::If(condition, then, otherwise) => {
                 for part in [condition, then, otherwise] {
-                    part.each_variable(tell);
+                    part.each_variable(visit);
                 }
             }
         }
     }
 }
 
-/// A whole number as a number.
+/// Converts an integer to a rational.
 pub fn from_whole(value: i64) -> BigRational {
     BigRational::from(BigInt::from(value))
 }
 
-/// A probability or a reward in the kind of number that is solved in.
+/// Converts a probability or reward to the number type of the solver.
 pub fn rounded<N: Number>(value: &BigRational) -> Result<N> {
     crate::number::rounded(value).ok_or(Fault("a number that is too large or too small for doubles"))
 }
@@ -243,6 +244,7 @@ fn whole_call(function: Function, arguments: &[Code], values: &[i64]) -> Result<
             let rounded = match function {
                 Function::Floor => value.floor(),
                 Function::Ceil => value.ceil(),
+                // Halves are rounded up, as in PRISM.
                 _ => (value + half()).floor(),
             };
             rounded.to_i64().ok_or(OVERFLOW)
@@ -272,8 +274,11 @@ fn number_call(function: Function, arguments: &[Code], values: &[i64]) -> Result
             let (base, exponent) = (number(0)?, number(1)?);
             let whole = exponent.is_integer().then(|| exponent.to_i32()).flatten();
             match whole {
+                // Beyond the size limit, the power is approximated like one with a fractional exponent.
                 Some(whole) if whole < 0 && Zero::is_zero(&base) => Err(Fault("a division by zero")),
-                Some(whole) if base.size().saturating_mul(whole.unsigned_abs().into()) <= BITS => {
+                Some(whole)
+                    if base.size().saturating_mul(whole.unsigned_abs().into()) <= MAX_OPERAND_BITS =>
+                {
                     Ok(base.pow(whole))
                 }
                 _ => irrational(Number::to_f64(&base).powf(Number::to_f64(&exponent))),
@@ -286,7 +291,7 @@ fn number_call(function: Function, arguments: &[Code], values: &[i64]) -> Result
     }
 }
 
-/// The double nearest to a number that is not rational.
+/// Converts an approximated power or logarithm back to a rational.
 fn irrational(value: f64) -> Result<BigRational> {
     BigRational::from_float(value).ok_or(Fault("a number that is not finite"))
 }

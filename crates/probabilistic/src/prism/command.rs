@@ -1,4 +1,4 @@
-//! Variables, commands and rewards of a program, their names resolved.
+//! Variables, commands and rewards of a program, with names resolved.
 
 use std::borrow::Cow;
 
@@ -10,15 +10,15 @@ use crate::number::Number;
 use crate::prism::code::{Code, Fault, rounded};
 use crate::prism::guard::Guard;
 
-/// How far the sum of probabilities may be from one, as in PRISM; what is within is scaled to one.
+/// Tolerance for the sum of the probabilities of a command, as in PRISM. Sums within it are scaled to 1.
 const SUM_TOLERANCE: f64 = 1e-5;
 
 /// A variable with its range evaluated.
 #[derive(Debug, Clone)]
 pub struct Variable {
-    /// Its name.
+    /// The name.
     pub name: String,
-    /// Whether it is a truth value.
+    /// `true` for Boolean variables; their range is 0 to 1.
     pub is_bool: bool,
     pub least: i64,
     pub greatest: i64,
@@ -35,22 +35,22 @@ pub struct Update {
 pub struct Command<N> {
     pub guard: Guard,
     pub updates: Vec<Update>,
-    /// The probabilities of the updates, where no variable occurs in them and they sum to one.
+    /// The probabilities of the updates, if they are constants that sum to 1.
     pub certain: Option<Vec<N>>,
     pub place: Place,
 }
 
 impl<N: Number> Command<N> {
-    /// Tells all variables that what it does depends on.
-    pub fn each_variable(&self, tell: &mut impl FnMut(u32)) {
-        self.guard.each_variable(tell);
+    /// Calls `visit` with each variable that the enabledness or the effect of the command depends on.
+    pub fn each_variable(&self, visit: &mut impl FnMut(u32)) {
+        self.guard.each_variable(visit);
         for update in &self.updates {
-            update.probability.each_variable(tell);
-            update.assignments.iter().for_each(|(_, value, _)| value.each_variable(tell));
+            update.probability.each_variable(visit);
+            update.assignments.iter().for_each(|(_, value, _)| value.each_variable(visit));
         }
     }
 
-    /// The probabilities of its updates in a state.
+    /// Returns the probabilities of the updates in a state.
     pub fn probabilities(&self, values: &[i64]) -> Result<Cow<'_, [N]>, Error> {
         Ok(match &self.certain {
             Some(certain) => Cow::Borrowed(certain),
@@ -63,20 +63,20 @@ impl<N: Number> Command<N> {
 pub struct RewardItem<N> {
     pub guard: Guard,
     pub reward: Code,
-    /// The reward, where no variable occurs in it.
+    /// The reward, if it is a valid constant.
     pub certain: Option<N>,
     pub place: Place,
 }
 
 impl<N> RewardItem<N> {
-    /// Tells all variables that it depends on.
-    pub fn each_variable(&self, tell: &mut impl FnMut(u32)) {
-        self.guard.each_variable(tell);
-        self.reward.each_variable(tell);
+    /// Calls `visit` with each variable that the reward depends on.
+    pub fn each_variable(&self, visit: &mut impl FnMut(u32)) {
+        self.guard.each_variable(visit);
+        self.reward.each_variable(visit);
     }
 }
 
-/// The probabilities of the updates of a command, which sum to one.
+/// Evaluates the probabilities of the updates of a command and scales them to the sum 1.
 pub fn probabilities<N: Number>(
     updates: &[Update],
     values: &[i64],
@@ -93,8 +93,8 @@ pub fn probabilities<N: Number>(
         exact.push(probability);
     }
     let sum: BigRational = exact.iter().sum();
-    let off = (Number::to_f64(&sum) - 1.0).abs();
-    if off.is_nan() || off > SUM_TOLERANCE {
+    let deviation = (Number::to_f64(&sum) - 1.0).abs();
+    if deviation.is_nan() || deviation > SUM_TOLERANCE {
         let text = format!("the probabilities sum to {}, not to 1", Number::to_f64(&sum));
         return Err(Diagnostic::new("Q301", place, text));
     }

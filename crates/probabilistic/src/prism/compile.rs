@@ -1,4 +1,4 @@
-//! Names, types and constants: the syntax tree's expressions to code.
+//! Compiles expressions of the syntax tree: resolves names, infers types, evaluates constants.
 
 use std::collections::BTreeMap;
 
@@ -12,12 +12,12 @@ use crate::prism::code::{Code, Fault};
 use crate::prism::expression::Cursor;
 use crate::prism::lexer::{Kind, tokens};
 
-/// What a name stands for.
+/// The declaration of a name.
 #[derive(Debug, Clone)]
 enum Meaning {
     Constant(Code, Type),
     Variable(u32, Type),
-    /// Its place in the list of formulas.
+    /// Index of the formula.
     Formula(usize),
 }
 
@@ -27,27 +27,27 @@ pub struct Names {
     meanings: FxHashMap<String, Meaning>,
     formulas: Vec<Expr>,
     labels: FxHashMap<String, Expr>,
-    /// Formulas and labels that are being written out.
+    /// Formulas and labels that are being expanded, outermost first.
     open: Vec<String>,
-    /// How deep the expression at hand is, formulas written out.
+    /// Nesting depth of the current expression, with formulas expanded.
     depth: usize,
-    /// How many parts of it have been written out, and how many in all.
+    /// Number of subexpressions compiled: of the current expression, and of all expressions.
     parts: [usize; 2],
 }
 
-/// How deep an expression may be with its formulas written out.
-const DEPTH: usize = 250;
-/// How many parts it may have then, and how many all expressions together.
-const PARTS: [usize; 2] = [200_000, 5_000_000];
+/// Upper limit on the nesting depth of an expression, with formulas expanded.
+const MAX_DEPTH: usize = 250;
+/// Upper limits on the number of subexpressions: of one expression, and of all expressions.
+const MAX_PARTS: [usize; 2] = [200_000, 5_000_000];
 
-/// Values of constants from outside, by name, as text.
+/// Values of constants set by the user, by name, as text.
 pub type Settings = BTreeMap<String, String>;
 
 impl Names {
-    /// Names of constants, formulas and labels; variables come with [`Names::variable`].
+    /// Declares constants, formulas and labels. Variables are added with [`Names::variable`].
     ///
     /// # Errors
-    /// Constants without value, values that do not fit, names that are given twice.
+    /// Constants without value, values of another type, names declared twice.
     pub fn new(model: &Model, settings: &Settings) -> Result<Self, Error> {
         let mut names = Self {
             meanings: FxHashMap::default(),
@@ -60,7 +60,7 @@ impl Names {
         let mut problems = Vec::new();
         for label in &model.labels {
             if names.labels.insert(label.name.clone(), label.expression.clone()).is_some() {
-                problems.push(twice(&format!("label `\"{}\"`", label.name), label.place));
+                problems.push(duplicate(&format!("label `\"{}\"`", label.name), label.place));
             }
         }
         for (number, formula) in model.formulas.iter().enumerate() {
@@ -68,15 +68,17 @@ impl Names {
         }
         for name in settings.keys() {
             if !model.constants.iter().any(|constant| constant.name == *name) {
-                let known: Vec<_> = model.constants.iter().map(|constant| constant.name.as_str()).collect();
+                let declared: Vec<_> =
+                    model.constants.iter().map(|constant| constant.name.as_str()).collect();
                 return Err(Error::Constant(format!(
                     "the model has no constant `{name}`; it has: {}",
-                    known.join(", ")
+                    declared.join(", ")
                 )));
             }
         }
         let mut missing = Vec::new();
-        // Constants may use constants that come later; each round settles those whose names are settled.
+        // A constant may use constants declared after it. Each round evaluates the constants whose names have values;
+        // a round without progress means that the remaining constants depend on each other.
         let mut waiting: Vec<_> = model.constants.iter().collect();
         while !waiting.is_empty() {
             let before = waiting.len();
@@ -90,7 +92,7 @@ impl Names {
                         zero(constant.kind)
                     }
                     (None, Some(value)) => {
-                        if names.waits(value, model) {
+                        if names.has_undefined(value, model) {
                             next.push(constant);
                             continue;
                         }
@@ -123,26 +125,27 @@ impl Names {
         Ok(names)
     }
 
-    /// Whether an expression uses a constant that has no value yet.
-    fn waits(&self, value: &Expr, model: &Model) -> bool {
+    /// Returns `true` if an expression uses a constant that has no value yet, directly or through formulas.
+    fn has_undefined(&self, value: &Expr, model: &Model) -> bool {
         let mut used = Vec::new();
         value.names(&mut used);
-        let mut waits = false;
+        let mut has_undefined = false;
         for at in 0.. {
             let Some((name, _)) = used.get(at).copied() else { break };
-            waits |= !self.meanings.contains_key(name) && model.constants.iter().any(|c| c.name == name);
+            has_undefined |=
+                !self.meanings.contains_key(name) && model.constants.iter().any(|c| c.name == name);
             if let Some(formula) = model.formulas.iter().find(|formula| formula.name == name)
-                && !used[..at].iter().any(|(known, _)| *known == name)
+                && !used[..at].iter().any(|(earlier, _)| *earlier == name)
             {
                 formula.expression.names(&mut used);
             }
         }
-        waits
+        has_undefined
     }
 
     fn declare(&mut self, name: &str, meaning: Meaning, place: Place, problems: &mut Vec<Diagnostic>) {
         if self.meanings.insert(name.to_owned(), meaning).is_some() {
-            problems.push(twice(&format!("name `{name}`"), place));
+            problems.push(duplicate(&format!("name `{name}`"), place));
         }
     }
 
@@ -166,7 +169,7 @@ impl Names {
         }
     }
 
-    /// What a label stands for.
+    /// Returns the expression of a label.
     pub fn label(&self, name: &str) -> Option<&Expr> {
         self.labels.get(name)
     }
@@ -178,7 +181,7 @@ impl Names {
         labels
     }
 
-    /// The value of an expression without variables.
+    /// Evaluates an expression without variables.
     pub fn constant(&mut self, value: &Expr, kind: Type) -> Result<Code, Diagnostic> {
         let code = self.typed(value, kind)?;
         if !code.is_constant() {
@@ -187,28 +190,29 @@ impl Names {
         fold(&code, kind).map_err(|Fault(text)| Diagnostic::new("Q303", value.place, text))
     }
 
-    /// An expression of a type; whole numbers serve as numbers, too.
-    pub fn typed(&mut self, expression: &Expr, wanted: Type) -> Result<Code, Diagnostic> {
-        let (code, found) = self.compile(expression)?;
-        if found == wanted || wanted == Type::Double && found == Type::Int {
+    /// Compiles an expression of the given type. Integers are accepted as `double`.
+    pub fn typed(&mut self, expression: &Expr, expected: Type) -> Result<Code, Diagnostic> {
+        let (code, actual) = self.compile(expression)?;
+        if actual == expected || expected == Type::Double && actual == Type::Int {
             return Ok(code);
         }
-        let text = format!("the type here must be `{}`, not `{}`", wanted.name(), found.name());
+        let text = format!("the type here must be `{}`, not `{}`", expected.name(), actual.name());
         Err(Diagnostic::new("Q203", expression.place, text))
     }
 
-    /// An expression as code, with its type.
+    /// Compiles an expression and infers its type.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "depth and parts are refused as soon as they pass their limits, and each leaves the depth that it entered"
     )]
     pub fn compile(&mut self, expression: &Expr) -> Result<(Code, Type), Diagnostic> {
+        // A top-level expression: the count of its parts starts at 0.
         if self.depth == 0 {
             self.parts[0] = 0;
         }
         self.depth += 1;
         self.parts = self.parts.map(|parts| parts + 1);
-        if self.depth > DEPTH || self.parts.iter().zip(PARTS).any(|(parts, most)| *parts > most) {
+        if self.depth > MAX_DEPTH || self.parts.iter().zip(MAX_PARTS).any(|(parts, most)| *parts > most) {
             self.depth -= 1;
             let text = "with its formulas written out, this is nested too deeply or too large";
             return Err(Diagnostic::new("Q104", expression.place, text));
@@ -227,10 +231,10 @@ impl Names {
             ExprKind::Label(label) => {
                 let Some(inner) = self.labels.get(label).cloned() else {
                     let text = match self.labels().join(", ") {
-                        none if none.is_empty() => {
+                        labels if labels.is_empty() => {
                             format!("there is no label `\"{label}\"`, and no other one")
                         }
-                        known => format!("there is no label `\"{label}\"`; there are: {known}"),
+                        labels => format!("there is no label `\"{label}\"`; there are: {labels}"),
                     };
                     return Err(Diagnostic::new("Q202", expression.place, text));
                 };
@@ -245,7 +249,7 @@ impl Names {
             ExprKind::If(condition, then, otherwise) => {
                 let condition = self.typed(condition, Type::Bool)?;
                 let (then, a) = self.compile(then)?;
-                let (other, b) = self.compile(otherwise)?;
+                let (alternative, b) = self.compile(otherwise)?;
                 let Some(kind) = common(a, b) else {
                     return Err(Diagnostic::new(
                         "Q203",
@@ -253,7 +257,7 @@ impl Names {
                         format!("the two sides of `:` are `{}` and `{}`", a.name(), b.name()),
                     ));
                 };
-                (Code::If(Box::new(condition), Box::new(then), Box::new(other)), kind)
+                (Code::If(Box::new(condition), Box::new(then), Box::new(alternative)), kind)
             }
             ExprKind::Call(function, arguments) => self.call(*function, arguments, expression.place)?,
             ExprKind::Property(_) | ExprKind::Temporal(_) => {
@@ -340,7 +344,7 @@ impl Names {
                 Ok((Code::Compare(op, kind, Box::new(left), Box::new(right)), Type::Bool))
             }
             BinaryOp::Plus | BinaryOp::Minus | BinaryOp::Times | BinaryOp::Divide => {
-                // Chains lean to the left.
+                // Arithmetic associates to the left. The chain is unrolled, so that long sums need no deep recursion.
                 let (mut chain, mut first) = (vec![(op, right)], left);
                 while let ExprKind::Binary(op, left, right) = &first.kind
                     && op.is_arithmetic()
@@ -351,8 +355,8 @@ impl Names {
                 let (mut code, mut kind) = self.numeric(first)?;
                 for (op, right) in chain.into_iter().rev() {
                     let (right, b) = self.numeric(right)?;
-                    let of_both = common(kind, b).unwrap_or(Type::Double);
-                    kind = if op == BinaryOp::Divide { Type::Double } else { of_both };
+                    let common_kind = common(kind, b).unwrap_or(Type::Double);
+                    kind = if op == BinaryOp::Divide { Type::Double } else { common_kind };
                     code = Code::Arithmetic(op, kind, Box::new(code), Box::new(right));
                 }
                 Ok((code, kind))
@@ -367,17 +371,17 @@ impl Names {
         place: Place,
     ) -> Result<(Code, Type), Diagnostic> {
         let mut codes = Vec::new();
-        let mut all = Type::Int;
+        let mut common_kind = Type::Int;
         for argument in arguments {
             let (code, kind) = self.numeric(argument)?;
-            all = common(all, kind).unwrap_or(Type::Double);
+            common_kind = common(common_kind, kind).unwrap_or(Type::Double);
             codes.push(code);
         }
-        if function == Function::Mod && all != Type::Int {
+        if function == Function::Mod && common_kind != Type::Int {
             return Err(Diagnostic::new("Q203", place, "`mod` takes integers"));
         }
         let kind = match function {
-            Function::Min | Function::Max | Function::Pow => all,
+            Function::Min | Function::Max | Function::Pow => common_kind,
             Function::Floor | Function::Ceil | Function::Round | Function::Mod => Type::Int,
             Function::Log => Type::Double,
         };
@@ -385,18 +389,18 @@ impl Names {
     }
 }
 
-fn twice(what: &str, place: Place) -> Diagnostic {
-    Diagnostic::new("Q206", place, format!("the {what} is given a second time here"))
+fn duplicate(description: &str, place: Place) -> Diagnostic {
+    Diagnostic::new("Q206", place, format!("the {description} is given a second time here"))
 }
 
-/// The operands of a chain of one operator.
+/// Appends the operands of a chain of one operator, in their order.
 fn flatten<'a>(op: BinaryOp, expression: &'a Expr, parts: &mut Vec<&'a Expr>) {
-    let mut rest = Vec::from([expression]);
-    while let Some(next) = rest.pop() {
+    let mut stack = Vec::from([expression]);
+    while let Some(next) = stack.pop() {
         match &next.kind {
-            ExprKind::Binary(found, left, right) if *found == op => {
-                rest.push(right);
-                rest.push(left);
+            ExprKind::Binary(inner_op, left, right) if *inner_op == op => {
+                stack.push(right);
+                stack.push(left);
             }
             _ => parts.push(next),
         }
@@ -424,19 +428,20 @@ fn fold(code: &Code, kind: Type) -> Result<Code, Fault> {
     }
 }
 
-/// A value from outside: a number, a fraction, a truth value, or an expression of these.
+/// Parses the value of a constant that the user sets: a decimal, or an expression without names.
 fn setting_code(text: &str, kind: Type, name: &str) -> Result<Code, Error> {
-    let wrong = || Error::Constant(format!("`{text}` is not a value of type `{}` for `{name}`", kind.name()));
+    let invalid =
+        || Error::Constant(format!("`{text}` is not a value of type `{}` for `{name}`", kind.name()));
     if kind == Type::Double
         && let Some(exact) = parse_decimal(text)
     {
         return Ok(Code::Number(exact));
     }
-    let tokens = tokens(text).map_err(|_| wrong())?;
+    let tokens = tokens(text).map_err(|_| invalid())?;
     let mut cursor = Cursor::new(&tokens);
-    let expression = cursor.expression().map_err(|_| wrong())?;
+    let expression = cursor.expression().map_err(|_| invalid())?;
     if *cursor.peek() != Kind::End {
-        return Err(wrong());
+        return Err(invalid());
     }
     let mut names = Names {
         meanings: FxHashMap::default(),
@@ -446,5 +451,5 @@ fn setting_code(text: &str, kind: Type, name: &str) -> Result<Code, Error> {
         depth: 0,
         parts: [0; 2],
     };
-    names.constant(&expression, kind).map_err(|_| wrong())
+    names.constant(&expression, kind).map_err(|_| invalid())
 }

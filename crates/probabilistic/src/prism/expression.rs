@@ -1,4 +1,4 @@
-//! Tokens to expressions, by precedence climbing.
+//! Parses expressions by precedence climbing.
 
 use crate::error::{Diagnostic, Place};
 use crate::number::parse_decimal;
@@ -6,80 +6,80 @@ use crate::prism::ast::{BinaryOp, Expr, ExprKind, Function};
 use crate::prism::lexer::{Kind, Token};
 use crate::prism::reserved::is_keyword;
 
-/// How deep expressions may be nested.
-const DEPTH: usize = 200;
-/// How many operators of arithmetic (and of implication) an expression may have, and how many others.
-const OPERATORS: [usize; 2] = [500, 20_000];
-/// How many of either kind an expression of a property may have.
-const PROPERTY: usize = 2_000;
+/// Upper limit on the nesting depth of an expression.
+const MAX_DEPTH: usize = 200;
+/// Upper limits on the number of operators in an expression: arithmetic and implication, and all others.
+const MAX_OPERATORS: [usize; 2] = [500, 20_000];
+/// Upper limit on the number of operators of either kind in an expression of a property.
+const MAX_PROPERTY_OPERATORS: usize = 2_000;
 
-/// Tokens and how far they are read.
+/// A position in a list of tokens.
 #[derive(Debug)]
 pub struct Cursor<'a> {
     tokens: &'a [Token],
     at: usize,
     depth: usize,
-    /// The operators of the expression at hand, as [`OPERATORS`] counts them.
+    /// Number of operators in the current top-level expression, by kind as in [`MAX_OPERATORS`].
     operators: [usize; 2],
-    /// What expressions of properties have besides.
-    besides: Option<Besides>,
+    /// Parsers of the additional syntax of properties; `None` in models.
+    property_syntax: Option<PropertySyntax>,
 }
 
-/// What expressions of properties have besides those of models.
+/// Parsers of the syntax that expressions of properties have in addition to those of models.
 #[derive(Debug, Clone, Copy)]
-pub struct Besides {
-    /// What starts with a word, if the next one is such a word.
-    pub start: fn(&mut Cursor<'_>) -> Read<Option<ExprKind>>,
-    /// What continues an expression.
-    pub go_on: fn(&mut Cursor<'_>, Expr) -> Read<Expr>,
+pub struct PropertySyntax {
+    /// Parses an expression that begins with an operator of properties, or returns `None` if the next token is another one.
+    pub parse_prefix: fn(&mut Cursor<'_>) -> Read<Option<ExprKind>>,
+    /// Parses an infix operator of properties, given its left operand. Returns the operand if no such operator follows.
+    pub parse_infix: fn(&mut Cursor<'_>, Expr) -> Read<Expr>,
 }
 
-/// What reading returns.
+/// Result of a parsing function.
 pub type Read<T> = Result<T, Diagnostic>;
 
 impl<'a> Cursor<'a> {
-    /// At the first token; the last one must be the end.
+    /// Creates a cursor at the first token; the last token must be [`Kind::End`].
     pub fn new(tokens: &'a [Token]) -> Self {
-        Self { tokens, at: 0, depth: 0, operators: [0; 2], besides: None }
+        Self { tokens, at: 0, depth: 0, operators: [0; 2], property_syntax: None }
     }
 
-    /// The same for the expressions of properties.
-    pub fn of_properties(tokens: &'a [Token], besides: Besides) -> Self {
-        Self { besides: Some(besides), ..Self::new(tokens) }
+    /// Creates a cursor that accepts expressions of properties.
+    pub fn for_properties(tokens: &'a [Token], property_syntax: PropertySyntax) -> Self {
+        Self { property_syntax: Some(property_syntax), ..Self::new(tokens) }
     }
 
-    /// How many tokens are read.
+    /// Returns the number of consumed tokens.
     pub fn position(&self) -> usize {
         self.at
     }
 
-    /// After a mistake: nothing is open any more.
+    /// Resets the nesting depth after an error.
     pub fn reset(&mut self) {
         self.depth = 0;
     }
 
-    /// Goes on after so many tokens, with nothing open.
+    /// Moves to a position that [`Self::position`] returned, and resets the nesting depth.
     pub fn back_to(&mut self, position: usize) {
         self.at = position.min(self.tokens.len().saturating_sub(1));
         self.depth = 0;
     }
 
-    /// The next token.
+    /// Returns the next token.
     pub fn peek(&self) -> &'a Kind {
         &self.tokens[self.at].kind
     }
 
-    /// The token after so many others.
+    /// Returns the token `offset` positions after the next one; the end beyond the last token.
     pub fn peek_at(&self, offset: usize) -> &'a Kind {
         self.tokens.get(self.at.saturating_add(offset)).map_or(&Kind::End, |token| &token.kind)
     }
 
-    /// Where the next token is.
+    /// Returns the position of the next token in the text.
     pub fn place(&self) -> Place {
         self.tokens[self.at].place
     }
 
-    /// Takes a token.
+    /// Consumes a token, except the end.
     pub fn advance(&mut self) {
         let next = self.at.saturating_add(1);
         if next < self.tokens.len() {
@@ -87,35 +87,35 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// Whether the next token is this sign.
+    /// Returns `true` if the next token is the given sign.
     pub fn is(&self, sign: &str) -> bool {
         matches!(self.peek(), Kind::Sign(found) if *found == sign)
     }
 
-    /// Whether the next token is this word.
+    /// Returns `true` if the next token is the given word.
     pub fn is_word(&self, word: &str) -> bool {
         matches!(self.peek(), Kind::Name(found) if found == word)
     }
 
-    /// Takes a sign if it is next.
+    /// Consumes a sign if it is next; returns `true` if it was.
     pub fn take(&mut self, sign: &str) -> bool {
-        let found = self.is(sign);
-        if found {
+        let is_next = self.is(sign);
+        if is_next {
             self.advance();
         }
-        found
+        is_next
     }
 
-    /// Takes a word if it is next.
+    /// Consumes a word if it is next; returns `true` if it was.
     pub fn take_word(&mut self, word: &str) -> bool {
-        let found = self.is_word(word);
-        if found {
+        let is_next = self.is_word(word);
+        if is_next {
             self.advance();
         }
-        found
+        is_next
     }
 
-    /// That something else was expected here.
+    /// Creates the error that `what` is expected at the next token.
     pub fn expected(&self, what: &str) -> Diagnostic {
         Diagnostic::new(
             "Q102",
@@ -124,17 +124,17 @@ impl<'a> Cursor<'a> {
         )
     }
 
-    /// Takes a sign that must be next.
+    /// Consumes a sign; an error if it is not next.
     pub fn need(&mut self, sign: &str) -> Read<()> {
         if self.take(sign) { Ok(()) } else { Err(self.expected(&format!("`{sign}`"))) }
     }
 
-    /// Takes a word that must be next.
+    /// Consumes a word; an error if it is not next.
     pub fn need_word(&mut self, word: &str) -> Read<()> {
         if self.take_word(word) { Ok(()) } else { Err(self.expected(&format!("`{word}`"))) }
     }
 
-    /// Takes a name that must be next.
+    /// Consumes a name; an error if a name is not next. Keywords are not names.
     pub fn name(&mut self, what: &str) -> Read<(String, Place)> {
         let place = self.place();
         match self.peek() {
@@ -151,10 +151,10 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// An expression.
+    /// Parses an expression.
     ///
     /// # Errors
-    /// The first thing that is none.
+    /// The first syntax error, or an expression beyond the limits.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "refused as soon as it passes its limit, and each leaves the depth that it entered"
@@ -164,7 +164,7 @@ impl<'a> Cursor<'a> {
             self.operators = [0; 2];
         }
         self.depth += 1;
-        if self.depth > DEPTH {
+        if self.depth > MAX_DEPTH {
             return Err(Diagnostic::new("Q104", self.place(), "this expression is nested too deeply"));
         }
         let condition = self.binary(2)?;
@@ -182,16 +182,18 @@ impl<'a> Cursor<'a> {
         Ok(result)
     }
 
+    /// Returns the binary operator at the next token, with its precedence.
     fn operator(&self) -> Option<(BinaryOp, u8)> {
         let Kind::Sign(sign) = self.peek() else { return None };
-        // `=?` ends an operator of a property; a condition in an expression has its `?` after an operand.
+        // `=?` ends a property operator. The `?` of a conditional expression follows an operand, never `=`.
         if *sign == "=" && matches!(self.peek_at(1), Kind::Sign("?")) {
             return None;
         }
-        let found = BinaryOp::ALL.into_iter().find(|op| op.sign().0 == *sign)?;
-        Some((found, found.sign().1))
+        let op = BinaryOp::ALL.into_iter().find(|op| op.sign().0 == *sign)?;
+        Some((op, op.sign().1))
     }
 
+    /// Parses a chain of binary operators of at least the given precedence.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "refused as soon as it passes its limit; strengths are below 20"
@@ -201,8 +203,12 @@ impl<'a> Cursor<'a> {
         while let Some((op, strength)) = self.operator().filter(|(_, strength)| *strength >= least) {
             let kind = usize::from(!op.is_arithmetic() && op != BinaryOp::Implies);
             self.operators[kind] += 1;
-            let most = if self.besides.is_some() { OPERATORS[kind].min(PROPERTY) } else { OPERATORS[kind] };
-            if self.operators[kind] > most {
+            let limit = if self.property_syntax.is_some() {
+                MAX_OPERATORS[kind].min(MAX_PROPERTY_OPERATORS)
+            } else {
+                MAX_OPERATORS[kind]
+            };
+            if self.operators[kind] > limit {
                 return Err(Diagnostic::new("Q104", self.place(), "this expression is too long"));
             }
             self.advance();
@@ -221,11 +227,11 @@ impl<'a> Cursor<'a> {
     fn unary(&mut self, least: u8) -> Read<Expr> {
         let place = self.place();
         self.depth += 1;
-        if self.depth > DEPTH {
+        if self.depth > MAX_DEPTH {
             return Err(Diagnostic::new("Q104", place, "this expression is nested too deeply"));
         }
         let result = if self.take("!") {
-            // Binds less than comparisons: `!x=1` is `!(x=1)`.
+            // `!` binds less than comparisons: `!x=1` is `!(x=1)`.
             let inner = self.binary(least.clamp(6, 7))?;
             Expr { kind: ExprKind::Not(Box::new(inner)), place }
         } else if self.take("-") {
@@ -240,8 +246,8 @@ impl<'a> Cursor<'a> {
 
     fn primary(&mut self) -> Read<Expr> {
         let place = self.place();
-        if let Some(besides) = self.besides
-            && let Some(kind) = (besides.start)(self)?
+        if let Some(property_syntax) = self.property_syntax
+            && let Some(kind) = (property_syntax.parse_prefix)(self)?
         {
             return Ok(Expr { kind, place });
         }
@@ -257,8 +263,8 @@ impl<'a> Cursor<'a> {
             Kind::Sign("(") => {
                 self.advance();
                 let mut inner = self.expression()?;
-                if let Some(besides) = self.besides {
-                    inner = (besides.go_on)(self, inner)?;
+                if let Some(property_syntax) = self.property_syntax {
+                    inner = (property_syntax.parse_infix)(self, inner)?;
                 }
                 self.need(")")?;
                 return Ok(Expr { place, ..inner });
@@ -283,13 +289,13 @@ impl<'a> Cursor<'a> {
         Ok(Expr { kind, place })
     }
 
-    /// The old form `func(min, a, b)`.
+    /// Parses the old form `func(min, a, b)`.
     fn function_by_word(&mut self) -> Read<Expr> {
         let place = self.place();
         self.advance();
         self.need("(")?;
-        let known = Function::ALL.iter().find(|(name, _)| self.is_word(name));
-        let Some((_, function)) = known else { return Err(self.expected("the name of a function")) };
+        let entry = Function::ALL.iter().find(|(name, _)| self.is_word(name));
+        let Some((_, function)) = entry else { return Err(self.expected("the name of a function")) };
         self.advance();
         self.need(",")?;
         Ok(Expr { kind: self.arguments(*function)?, place })

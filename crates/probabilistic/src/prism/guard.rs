@@ -1,20 +1,20 @@
-//! A condition to tests of single variables, which are quick, and the rest.
+//! Guards of commands, split into fast tests of single variables and a remainder.
 
 use crate::prism::ast::{BinaryOp, Type};
 use crate::prism::code::{Code, Fault};
 
-/// A condition.
+/// A condition in conjunctive form.
 #[derive(Debug, Clone)]
 pub struct Guard {
-    /// What it begins with; these cannot fail to have a value, and are evaluated in the order in which they stand.
+    /// The longest prefix of conjuncts that are tests. Tests always have a value.
     tests: Vec<Test>,
-    /// What comes after them.
-    rest: Vec<Code>,
-    /// The variables that it fixes to one value, anywhere in it.
+    /// The conjuncts after the tests, in the order of the text: a conjunct can prevent a failing evaluation of a later one.
+    remainder: Vec<Code>,
+    /// Variables that a conjunct fixes to one value, with that value.
     fixed: Vec<(u32, i64)>,
 }
 
-/// A variable lies in a range, or outside of it.
+/// A test of whether a variable lies inside or outside a range.
 #[derive(Debug, Clone, Copy)]
 struct Test {
     variable: u32,
@@ -24,28 +24,28 @@ struct Test {
 }
 
 impl Guard {
-    /// Takes a condition to pieces.
+    /// Splits a condition into conjuncts.
     pub fn new(code: Code) -> Self {
         let mut parts = Vec::new();
         flatten(code, &mut parts);
         let tests: Vec<Test> = parts.iter().map_while(test).collect();
         let fixed = parts.iter().filter_map(test).filter(|test| test.inside && test.least == test.greatest);
         let fixed = fixed.map(|test| (test.variable, test.least)).collect();
-        Self { rest: parts.split_off(tests.len()), tests, fixed }
+        Self { remainder: parts.split_off(tests.len()), tests, fixed }
     }
 
-    /// The variables that it fixes to one value.
+    /// Returns the variables that a conjunct fixes to one value, with that value.
     pub fn fixed(&self) -> &[(u32, i64)] {
         &self.fixed
     }
 
-    /// Tells all variables that occur in it.
-    pub fn each_variable(&self, tell: &mut impl FnMut(u32)) {
-        self.tests.iter().for_each(|test| tell(test.variable));
-        self.rest.iter().for_each(|part| part.each_variable(tell));
+    /// Calls `visit` with each occurrence of a variable.
+    pub fn each_variable(&self, visit: &mut impl FnMut(u32)) {
+        self.tests.iter().for_each(|test| visit(test.variable));
+        self.remainder.iter().for_each(|part| part.each_variable(visit));
     }
 
-    /// Whether it holds.
+    /// Returns the truth value.
     pub fn holds(&self, values: &[i64]) -> Result<bool, Fault> {
         for test in &self.tests {
             let value = values[test.variable as usize];
@@ -53,7 +53,7 @@ impl Guard {
                 return Ok(false);
             }
         }
-        for part in &self.rest {
+        for part in &self.remainder {
             if !part.holds(values)? {
                 return Ok(false);
             }
@@ -62,14 +62,17 @@ impl Guard {
     }
 }
 
+/// Appends the conjuncts of a condition.
 fn flatten(code: Code, parts: &mut Vec<Code>) {
     match code {
         Code::All(inner) => inner.into_iter().for_each(|part| flatten(part, parts)),
-        other => parts.push(other),
+        conjunct => parts.push(conjunct),
     }
 }
 
+/// Returns the test that is equivalent to an expression, if there is one.
 fn test(code: &Code) -> Option<Test> {
+    // A Boolean variable holds if it is not 0.
     let flag = |variable: u32, inside| Test { variable, least: 0, greatest: 0, inside };
     match code {
         Code::Variable(variable) => Some(flag(*variable, false)),
@@ -97,13 +100,13 @@ fn compared(variable: u32, op: BinaryOp, value: i64) -> Test {
     }
 }
 
-/// The comparison with its sides exchanged.
+/// Returns the comparison that is equivalent after exchanging its operands.
 fn mirrored(op: BinaryOp) -> BinaryOp {
     match op {
         BinaryOp::Less => BinaryOp::Greater,
         BinaryOp::LessEqual => BinaryOp::GreaterEqual,
         BinaryOp::Greater => BinaryOp::Less,
         BinaryOp::GreaterEqual => BinaryOp::LessEqual,
-        other => other,
+        symmetric => symmetric,
     }
 }

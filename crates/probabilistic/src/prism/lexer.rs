@@ -1,8 +1,8 @@
-//! PRISM text to tokens with places.
+//! Lexer: splits PRISM text into tokens with positions.
 
 use crate::error::{Diagnostic, Place};
 
-/// What a token is.
+/// The kind of a token.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Kind {
     /// A name or a keyword.
@@ -18,7 +18,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// How messages call it.
+    /// Returns the description for messages.
     pub fn describe(&self) -> String {
         match self {
             Self::Name(name) | Self::Number(name) => format!("`{name}`"),
@@ -29,37 +29,37 @@ impl Kind {
     }
 }
 
-/// A token and where it starts.
+/// A token and its position.
 #[derive(Debug, Clone)]
 pub struct Token {
-    /// What it is.
+    /// The kind.
     pub kind: Kind,
-    /// Where it starts.
+    /// Position of the first character.
     pub place: Place,
 }
 
-/// Signs, longer ones first.
+/// All signs. A sign comes before its prefixes, because the first match is taken.
 const SIGNS: [&str; 30] = [
     "<=>", "->", "=>", "<=", ">=", "!=", "..", "(", ")", "[", "]", "{", "}", "<", ">", "=", "+", "-", "*",
     "/", "!", "&", "|", "?", ":", ";", ",", "'", ".", "^",
 ];
 
-/// All tokens of a text, the end among them.
+/// Splits a text into tokens. The last token is [`Kind::End`].
 ///
 /// # Errors
-/// Characters that no token starts with, and quotation marks without end.
+/// Characters that begin no token, and unterminated quotation marks; all of them are reported.
 #[expect(clippy::arithmetic_side_effects, reason = "lines and columns of a text in memory")]
 pub fn tokens(text: &str) -> Result<Vec<Token>, Vec<Diagnostic>> {
     let (mut tokens, mut problems) = (Vec::new(), Vec::new());
     let mut place = Place { line: 1, column: 1 };
-    let mut rest = text;
-    while let Some(first) = rest.chars().next() {
+    let mut remainder = text;
+    while let Some(first) = remainder.chars().next() {
         let length = if first.is_whitespace() {
             first.len_utf8()
-        } else if rest.starts_with("//") {
-            rest.find('\n').unwrap_or(rest.len())
+        } else if remainder.starts_with("//") {
+            remainder.find('\n').unwrap_or(remainder.len())
         } else {
-            match token(rest) {
+            match token(remainder) {
                 Ok((kind, length)) => {
                     tokens.push(Token { kind, place });
                     length
@@ -70,28 +70,28 @@ pub fn tokens(text: &str) -> Result<Vec<Token>, Vec<Diagnostic>> {
                 }
             }
         };
-        let (taken, left) = rest.split_at(length);
-        for c in taken.chars() {
+        let (consumed, unread) = remainder.split_at(length);
+        for c in consumed.chars() {
             if c == '\n' {
                 place = Place { line: place.line + 1, column: 1 };
             } else {
                 place.column += 1;
             }
         }
-        rest = left;
+        remainder = unread;
     }
     tokens.push(Token { kind: Kind::End, place });
     if problems.is_empty() { Ok(tokens) } else { Err(problems) }
 }
 
-/// The first token of a text that is not empty, and its length in bytes.
+/// Returns the first token of a nonempty text, and its length in bytes.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "positions in a text in memory, which are at most its length"
 )]
 fn token(text: &str) -> Result<(Kind, usize), String> {
     let first = text.chars().next().unwrap_or(' ');
-    let length = |good: fn(char) -> bool| text.find(|c| !good(c)).unwrap_or(text.len());
+    let length = |is_part: fn(char) -> bool| text.find(|c| !is_part(c)).unwrap_or(text.len());
     if first.is_ascii_alphabetic() || first == '_' {
         let end = length(|c| c.is_ascii_alphanumeric() || c == '_');
         return Ok((Kind::Name(text[..end].to_owned()), end));
@@ -102,9 +102,11 @@ fn token(text: &str) -> Result<(Kind, usize), String> {
             from + text[from..].find(|c: char| !c.is_ascii_digit()).unwrap_or(text.len() - from)
         };
         let mut end = digits(0);
+        // A point belongs to a number only before a digit, so that `0..3` is a range.
         if text[end..].starts_with('.') && digit_follows(end + 1) {
             end = digits(end + 1);
         }
+        // Without digits, `e` begins a name.
         if text[end..].starts_with(['e', 'E']) {
             let sign = usize::from(text[end + 1..].starts_with(['+', '-']));
             if digit_follows(end + 1 + sign) {

@@ -1,4 +1,4 @@
-//! Values that depend on a few variables, by the values of these.
+//! Caches values that depend on a few variables of the state.
 
 use std::collections::BTreeSet;
 
@@ -6,88 +6,89 @@ use rustc_hash::FxHashMap;
 
 use crate::prism::state::{Key, Layout, Packed};
 
-/// Bits of keys up to which a table is laid out. Its memory is taken as it is touched.
-const TABLE: u32 = 20;
+/// Keys of at most this number of bits index a table. The operating system provides its memory on first access.
+const MAX_TABLE_BITS: u32 = 20;
 
-/// Numbers by the values of some variables.
+/// A map from the values of some variables to numbers.
 #[derive(Debug)]
 pub struct Numbers {
     key: Key,
-    found: Found,
+    entries: Entries,
 }
 
 #[derive(Debug)]
-enum Found {
-    /// The number plus one of each key, 0 where there is none.
+enum Entries {
+    /// For each key, its number plus one, or 0 if it has none.
     Table(Vec<u32>),
     Hash(FxHashMap<u64, u32>),
 }
 
 impl Numbers {
-    /// No numbers yet; none where the variables have too many values.
+    /// Creates an empty map. Returns `None` if the values of the variables need more than 64 bits.
     pub fn new(layout: &Layout, variables: &BTreeSet<u32>) -> Option<Self> {
         let key = layout.key(variables)?;
-        let found = if key.bits <= TABLE {
-            Found::Table(vec![0; 1 << key.bits])
+        let entries = if key.bits <= MAX_TABLE_BITS {
+            Entries::Table(vec![0; 1 << key.bits])
         } else {
-            Found::Hash(FxHashMap::default())
+            Entries::Hash(FxHashMap::default())
         };
-        Some(Self { key, found })
+        Some(Self { key, entries })
     }
 
-    /// The number that was noted for a state's values.
+    /// Returns the number that is stored for the values in a state.
     pub fn get(&self, state: &Packed) -> Option<u32> {
         let key = self.key.of(state);
-        match &self.found {
-            Found::Table(table) => table[usize::try_from(key).ok()?].checked_sub(1),
-            Found::Hash(numbers) => numbers.get(&key).copied(),
+        match &self.entries {
+            Entries::Table(table) => table[usize::try_from(key).ok()?].checked_sub(1),
+            Entries::Hash(numbers) => numbers.get(&key).copied(),
         }
     }
 
-    /// Notes a number, which must be less than the greatest one.
+    /// Stores a number, which must be less than `u32::MAX`.
     pub fn note(&mut self, state: &Packed, number: u32) {
         let key = self.key.of(state);
-        match &mut self.found {
-            Found::Table(table) => {
+        match &mut self.entries {
+            Entries::Table(table) => {
                 if let Some(entry) = usize::try_from(key).ok().and_then(|key| table.get_mut(key)) {
                     *entry = number.saturating_add(1);
                 }
             }
-            Found::Hash(numbers) => {
+            Entries::Hash(numbers) => {
                 numbers.insert(key, number);
             }
         }
     }
 }
 
-/// Values that a function of some variables has.
+/// Cache of a function of some variables.
 #[derive(Debug)]
 pub struct Memo<T> {
-    /// None where the variables have too many values for keys.
+    /// `None` if the values of the variables need more than 64 bits; then nothing is cached.
     numbers: Option<Numbers>,
     values: Vec<T>,
 }
 
-/// How many values are kept; what comes later is found anew each time.
-const KEPT: usize = 1 << 16;
+/// Upper limit on the number of cached values. Further values are computed on every request.
+const MAX_VALUES: usize = 1 << 16;
 
 impl<T> Memo<T> {
-    /// No values yet.
+    /// Creates an empty cache.
     pub fn new(layout: &Layout, variables: &BTreeSet<u32>) -> Self {
         Self { numbers: Numbers::new(layout, variables), values: Vec::new() }
     }
 
-    /// The value for a state; none where there is none.
+    /// Returns the value in a state; calls `find` if it is not cached. `None` if `find` fails.
     pub fn get(&mut self, state: &Packed, find: impl FnOnce() -> Option<T>) -> Option<&T> {
-        if let Some(known) = self.numbers.as_ref().and_then(|numbers| numbers.get(state)) {
-            return self.values.get(known as usize);
+        if let Some(number) = self.numbers.as_ref().and_then(|numbers| numbers.get(state)) {
+            return self.values.get(number as usize);
         }
         let value = find()?;
-        let most = if self.numbers.is_some() { KEPT } else { 0 };
-        self.values.truncate(most);
+        let limit = if self.numbers.is_some() { MAX_VALUES } else { 0 };
+        // Removes the uncached value of the previous call.
+        self.values.truncate(limit);
         self.values.push(value);
         let number = self.values.len().saturating_sub(1);
-        if number < most
+        if number < limit
             && let (Some(numbers), Ok(number)) = (&mut self.numbers, u32::try_from(number))
         {
             numbers.note(state, number);

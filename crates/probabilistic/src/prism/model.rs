@@ -1,7 +1,7 @@
-//! A model and the values of its constants to a program that can be run.
+//! Compiles a model to an executable program: resolves names and evaluates constants.
 //!
-//! Commands whose guards fix one variable (`l=5 & …`) are found by its value, and so are the actions that have such
-//! commands, so that the cost of a state does not grow with the number of commands for other states.
+//! Commands whose guards fix one variable (`l=5 & …`) are indexed by its value, and so are the actions of such
+//! commands. The cost of a state therefore does not grow with the number of commands for other states.
 
 use std::cmp::Reverse;
 
@@ -18,20 +18,20 @@ use crate::prism::compile::{Names, Settings};
 use crate::prism::starts::starts;
 use crate::prism::state::{Layout, Packed, Valuation, above_least};
 
-/// The action number of commands without name.
+/// Action number of commands without an action.
 pub const UNNAMED: u32 = u32::MAX - 1;
 
-/// The commands of one module that bear one action.
+/// The commands of one module with one action.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Group<N> {
     /// The number of the module.
     pub module: usize,
     pub commands: Vec<Command<N>>,
-    /// The variable by whose value commands are found, its least value, and the commands for each value.
+    /// Index of the commands: a variable, its least value, and the candidate commands for each value.
     pub index: Option<(u32, i64, Vec<Vec<u32>>)>,
 }
 
-/// For each value of a variable the actions that may be possible, as bits.
+/// For each value of a variable, the actions that may be enabled, as a bit set.
 #[derive(Debug, Clone)]
 pub(super) struct Mask {
     pub variable: u32,
@@ -42,46 +42,46 @@ pub(super) struct Mask {
 /// A reward structure.
 #[derive(Debug, Clone)]
 pub(super) struct Structure<N> {
-    /// Of states.
+    /// Items of states.
     pub states: Vec<RewardItem<N>>,
-    /// Of choices without action.
+    /// Items of choices without an action.
     pub unnamed: Vec<RewardItem<N>>,
-    /// For each action.
+    /// Items of choices, by action.
     pub actions: Vec<Vec<RewardItem<N>>>,
 }
 
-/// A model that can be explored.
+/// An executable model.
 #[derive(Debug, Clone)]
 pub struct Program<N> {
-    /// What kind of process it is.
+    /// The kind of process.
     pub kind: ModelKind,
-    /// Its variables.
+    /// The variables, global ones first.
     pub variables: Vec<Variable>,
-    /// The names of its actions.
+    /// The names of the actions.
     pub actions: Vec<String>,
-    /// The names of its reward structures.
+    /// The names of the reward structures.
     pub reward_names: Vec<String>,
     pub(crate) names: Names,
     pub(super) layout: Layout,
-    /// For each action the modules that take part, each with its commands.
+    /// For each action, the modules that synchronise on it, with their commands.
     pub(super) synchronised: Vec<Vec<Group<N>>>,
-    /// For each module the commands without action.
+    /// For each module, the commands without an action.
     pub(super) free: Vec<Group<N>>,
     pub(super) masks: Vec<Mask>,
     pub(super) rewards: Vec<Structure<N>>,
-    /// Which rewards are computed.
-    pub(super) wanted: Vec<usize>,
-    /// Where it can start.
+    /// Numbers of the reward structures that are computed.
+    pub(super) computed_rewards: Vec<usize>,
+    /// The initial states.
     pub(super) starts: Vec<Packed>,
-    /// Where nothing that happens later is asked for.
+    /// States in which this condition holds are made absorbing.
     pub(super) stop: Option<Code>,
 }
 
 impl<N: Number> Program<N> {
-    /// Resolves names and evaluates constants. Rewards are computed for the structures in `wanted` only, by number.
+    /// Resolves names and evaluates constants. No rewards are computed; see [`Self::with_rewards`].
     ///
     /// # Errors
-    /// All that is wrong with names and types; constants that are missing or unknown.
+    /// All errors in names and types; constants that are undefined or unknown.
     pub fn new(model: &Model, settings: &Settings) -> Result<Self, Error> {
         let mut names = Names::new(model, settings)?;
         let mut problems = Vec::new();
@@ -96,19 +96,19 @@ impl<N: Number> Program<N> {
             free: Vec::new(),
             masks: Vec::new(),
             rewards: Vec::new(),
-            wanted: Vec::new(),
+            computed_rewards: Vec::new(),
             starts: Vec::new(),
             stop: None,
         };
         let modules = model.modules.iter().map(|module| &module.variables);
         for variable in std::iter::once(&model.globals).chain(modules).flatten() {
             match declare(&mut names, variable) {
-                Ok(found) => {
-                    program.layout.push(found.least, found.greatest);
-                    let kind = if found.is_bool { Type::Bool } else { Type::Int };
+                Ok(declared) => {
+                    program.layout.push(declared.least, declared.greatest);
+                    let kind = if declared.is_bool { Type::Bool } else { Type::Int };
                     let number = dense(program.variables.len());
-                    names.variable(&found.name, number, kind, variable.place, &mut problems);
-                    program.variables.push(found);
+                    names.variable(&declared.name, number, kind, variable.place, &mut problems);
+                    program.variables.push(declared);
                 }
                 Err(problem) => problems.push(problem),
             }
@@ -137,13 +137,13 @@ impl<N: Number> Program<N> {
             };
             for item in &rewards.items {
                 match reward_item(item, &mut names) {
-                    Ok(found) => match &item.action {
-                        None => structure.states.push(found),
-                        Some(None) => structure.unnamed.push(found),
-                        // An action that no command has never happens.
+                    Ok(compiled) => match &item.action {
+                        None => structure.states.push(compiled),
+                        Some(None) => structure.unnamed.push(compiled),
+                        // Without a command for the action, the item never applies.
                         Some(Some(name)) => {
                             if let Some(number) = numbers.get(name.as_str()) {
-                                structure.actions[*number as usize].push(found);
+                                structure.actions[*number as usize].push(compiled);
                             }
                         }
                     },
@@ -172,39 +172,40 @@ impl<N: Number> Program<N> {
             return Ok(vec![self.layout.pack(&values)]);
         };
         let place = condition.place;
-        let found = starts(names.typed(condition, Type::Bool)?, place, &self.variables, &self.layout)?;
-        if found.is_empty() {
+        let initial_states =
+            starts(names.typed(condition, Type::Bool)?, place, &self.variables, &self.layout)?;
+        if initial_states.is_empty() {
             return Err(Diagnostic::new("Q307", place, "there is no state in which `init` holds"));
         }
-        Ok(found)
+        Ok(initial_states)
     }
 
-    /// Chooses the reward structures that are computed.
+    /// Selects the reward structures that are computed, by number.
     #[must_use]
-    pub fn with_rewards(mut self, wanted: &[usize]) -> Self {
-        self.wanted = wanted.to_vec();
+    pub fn with_rewards(mut self, computed_rewards: &[usize]) -> Self {
+        self.computed_rewards = computed_rewards.to_vec();
         self
     }
 
-    /// Lets states in which a condition holds keep where they are: what happens later is not asked for. A condition that does not fit the
-    /// model is left out.
+    /// Makes the states in which a condition holds absorbing, because the query does not depend on their successors.
+    /// A condition that does not compile is ignored.
     #[must_use]
     pub(crate) fn stopping(mut self, condition: Option<&Expr>) -> Self {
         self.stop = condition.and_then(|condition| self.names.clone().typed(condition, Type::Bool).ok());
         self
     }
 
-    /// The name of an action.
+    /// Returns the name of an action; empty for commands without an action.
     pub fn action_name(&self, action: u32) -> &str {
         self.actions.get(action as usize).map_or("", String::as_str)
     }
 
-    /// The values of the variables in a state.
+    /// Writes the values of the variables in a state to a buffer.
     pub fn unpack(&self, state: &Packed, values: &mut Valuation) {
         self.layout.unpack(state, values);
     }
 
-    /// The state with these values, if all are in range.
+    /// Returns the state with the given values, or `None` if a value is outside its range.
     pub fn pack(&self, values: &[i64]) -> Option<Packed> {
         let fits = values.len() == self.variables.len()
             && self.variables.iter().zip(values).all(|(v, value)| (v.least..=v.greatest).contains(value));
@@ -224,8 +225,10 @@ impl<N: Number> Program<N> {
         let mut by_action: FxHashMap<u32, Group<N>> = FxHashMap::default();
         for command in &module.commands {
             let writable = |name: &str| {
-                let own = module.variables.iter().any(|variable| variable.name == name);
-                own || command.action.is_none() && model.globals.iter().any(|variable| variable.name == name)
+                let is_local = module.variables.iter().any(|variable| variable.name == name);
+                // Commands with an action cannot write global variables: synchronised modules could write different values.
+                is_local
+                    || command.action.is_none() && model.globals.iter().any(|variable| variable.name == name)
             };
             match compile_command(command, names, writable) {
                 Ok(compiled) => match &command.action {
@@ -239,7 +242,7 @@ impl<N: Number> Program<N> {
                         group.commands.push(compiled);
                     }
                 },
-                Err(more) => problems.extend(more),
+                Err(errors) => problems.extend(errors),
             }
         }
         for (action, group) in by_action {
@@ -248,33 +251,37 @@ impl<N: Number> Program<N> {
         self.free.push(free);
     }
 
-    /// Chooses for each group the variable that most of its guards fix.
+    /// Indexes each group by the variable that most of its guards fix.
     fn index(&mut self) {
         let variables = &self.variables;
         for group in self.synchronised.iter_mut().flatten().chain(&mut self.free) {
             let fixed: Vec<&[(u32, i64)]> =
                 group.commands.iter().map(|command| command.guard.fixed()).collect();
             let count = |variable: u32| {
-                fixed.iter().filter(|fixed| fixed.iter().any(|(known, _)| *known == variable)).count()
+                fixed
+                    .iter()
+                    .filter(|fixed| fixed.iter().any(|(fixed_variable, _)| *fixed_variable == variable))
+                    .count()
             };
             let best =
                 (0..dense(variables.len())).max_by_key(|variable| (count(*variable), Reverse(*variable)));
             let Some(best) = best.filter(|best| count(*best) > 0) else { continue };
             let Variable { least, greatest, .. } = variables[best as usize];
-            // The table must not outgrow the commands by much.
-            let most = group.commands.len().saturating_mul(10).saturating_add(1000);
+            // The table must not be much larger than the list of commands.
+            let limit = group.commands.len().saturating_mul(10).saturating_add(1000);
             let Ok(above) = usize::try_from(greatest.abs_diff(least)) else { continue };
-            if above > most {
+            if above > limit {
                 continue;
             }
             let mut table: Vec<Vec<u32>> = vec![Vec::new(); above.saturating_add(1)];
             for (number, fixed) in fixed.iter().enumerate() {
-                match fixed.iter().find(|(known, _)| *known == best) {
+                match fixed.iter().find(|(fixed_variable, _)| *fixed_variable == best) {
                     Some((_, value)) => {
                         if let Some(list) = table.get_mut(above_least(*value, least)) {
                             list.push(dense(number));
                         }
                     }
+                    // A command that does not fix the variable is a candidate for each value.
                     None => table.iter_mut().for_each(|list| list.push(dense(number))),
                 }
             }
@@ -283,14 +290,14 @@ impl<N: Number> Program<N> {
         self.mask();
     }
 
-    /// Notes for each value of a variable which actions it leaves possible.
+    /// Computes the actions that each value of an indexed variable leaves possible.
     fn mask(&mut self) {
         let words = self.actions.len().div_ceil(64);
         let mut masks: Vec<Mask> = Vec::new();
         for (action, groups) in self.synchronised.iter().enumerate() {
             for (variable, least, commands) in groups.iter().filter_map(|group| group.index.as_ref()) {
-                let known = masks.iter().position(|mask| mask.variable == *variable);
-                let at = known.unwrap_or_else(|| {
+                let position = masks.iter().position(|mask| mask.variable == *variable);
+                let at = position.unwrap_or_else(|| {
                     let table = vec![vec![u64::MAX; words]; commands.len()];
                     masks.push(Mask { variable: *variable, least: *least, table });
                     masks.len().saturating_sub(1)

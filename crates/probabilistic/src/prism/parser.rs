@@ -1,4 +1,4 @@
-//! Tokens to the syntax tree of a model.
+//! Parses models.
 
 use crate::error::{Diagnostic, Error, Place};
 use crate::prism::ast::{
@@ -8,17 +8,17 @@ use crate::prism::expression::{Cursor, Read};
 use crate::prism::lexer::{Kind, tokens};
 use crate::prism::rename;
 
-/// Reads a model.
+/// Parses a model.
 ///
 /// ```
 /// use metaplan_probabilistic::prism;
 ///
-/// let wrong = prism::parse("mdp\nmodule m\n s:[0..1] init 0;\n [] s=0 -> (s'=1)\nendmodule").expect_err("no semicolon");
-/// assert_eq!(wrong.diagnostics()[0].place.line, 5);
+/// let error = prism::parse("mdp\nmodule m\n s:[0..1] init 0;\n [] s=0 -> (s'=1)\nendmodule").expect_err("no semicolon");
+/// assert_eq!(error.diagnostics()[0].place.line, 5);
 /// ```
 ///
 /// # Errors
-/// All that is wrong with its syntax; after a wrong part, reading goes on with the next one.
+/// All syntax errors; after an error, parsing continues with the next declaration.
 pub fn parse(text: &str) -> Result<Model, Error> {
     let tokens = tokens(text).map_err(|problems| Error::Model(problems.into()))?;
     let mut cursor = Cursor::new(&tokens);
@@ -40,6 +40,7 @@ pub fn parse(text: &str) -> Result<Model, Error> {
         if let Err(problem) = part(&mut cursor, &mut model, &mut kind, &mut problems) {
             problems.push(problem);
             skip(&mut cursor);
+            // An error at a keyword consumes nothing; without progress, the loop would not end.
             if cursor.position() == before {
                 cursor.advance();
             }
@@ -52,7 +53,7 @@ pub fn parse(text: &str) -> Result<Model, Error> {
     if problems.is_empty() { Ok(model) } else { Err(Error::Model(problems.into())) }
 }
 
-/// After a mistake: to the end of a declaration, or to a word that starts another.
+/// Recovers from an error: skips to the end of a declaration, or to a keyword that begins one.
 fn skip(cursor: &mut Cursor<'_>) {
     cursor.reset();
     loop {
@@ -81,7 +82,7 @@ fn part(
 ) -> Read<()> {
     let place = cursor.place();
     let Kind::Name(word) = cursor.peek() else { return Err(cursor.expected("a declaration")) };
-    let mut is_kind = |found: ModelKind| match kind.replace(found) {
+    let mut is_kind = |declared: ModelKind| match kind.replace(declared) {
         None => Ok(()),
         Some(_) => Err(Diagnostic::new("Q107", place, "the model has said before what it is")),
     };
@@ -131,7 +132,7 @@ fn constant(cursor: &mut Cursor<'_>, model: &mut Model) -> Read<()> {
     Ok(())
 }
 
-/// `const type name = value;`
+/// Parses `const type name = value;`.
 pub fn constant_declaration(cursor: &mut Cursor<'_>) -> Read<Constant> {
     cursor.advance();
     let kind = match cursor.peek() {
@@ -143,6 +144,7 @@ pub fn constant_declaration(cursor: &mut Cursor<'_>) -> Read<Constant> {
         },
         _ => None,
     };
+    // The default type is `int`.
     if kind.is_some() {
         cursor.advance();
     }
@@ -159,7 +161,7 @@ fn named(cursor: &mut Cursor<'_>, model: &mut Model) -> Read<()> {
     Ok(())
 }
 
-/// `label "name" = expression;`, `formula name = expression;`
+/// Parses `label "name" = expression;` or `formula name = expression;`.
 pub fn named_expression(cursor: &mut Cursor<'_>) -> Read<Named> {
     let is_label = cursor.is_word("label");
     cursor.advance();
@@ -217,12 +219,12 @@ fn module(cursor: &mut Cursor<'_>, model: &mut Model, problems: &mut Vec<Diagnos
         }
         cursor.need("]")?;
         cursor.need_word("endmodule")?;
-        let known = model.modules.iter().find(|module| module.name == original);
-        let Some(known) = known else {
+        let original_module = model.modules.iter().find(|module| module.name == original);
+        let Some(original_module) = original_module else {
             let text = format!("there is no module `{original}` above");
             return Err(Diagnostic::new("Q201", original_place, text));
         };
-        let module = rename::module(known, &name, place, &pairs, &model.formulas);
+        let module = rename::module(original_module, &name, place, &pairs, &model.formulas);
         model.modules.push(module);
         return Ok(());
     }
@@ -242,7 +244,7 @@ fn module(cursor: &mut Cursor<'_>, model: &mut Model, problems: &mut Vec<Diagnos
     Ok(())
 }
 
-/// A variable or a command.
+/// Parses a variable or a command.
 fn member(cursor: &mut Cursor<'_>, module: &mut Module) -> Read<()> {
     if cursor.is("[") {
         module.commands.push(command(cursor)?);
@@ -285,7 +287,7 @@ fn command(cursor: &mut Cursor<'_>) -> Read<Command> {
     Ok(Command { action, guard, updates, place })
 }
 
-/// Whether an update without probability follows: `true`, or `(name'=`.
+/// Returns `true` if an update without a probability follows: `true`, or `(name'=`.
 fn starts_assignments(cursor: &Cursor<'_>) -> bool {
     let is_true = cursor.is_word("true") && matches!(cursor.peek_at(1), Kind::Sign(";"));
     is_true || cursor.is("(") && matches!(cursor.peek_at(2), Kind::Sign("'"))

@@ -1,6 +1,7 @@
-//! A program to the successors of its states, by what its modules were seen to do.
+//! Generates successors from cached behaviours of the modules.
 //!
-//! This gives what the program itself does, in the same order, and leaves to it what goes wrong.
+//! Results and their order are those of [`Program`]. States in which an evaluation fails are delegated to the program,
+//! which reports the error.
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -14,62 +15,62 @@ use crate::explore::{Choices, Generator};
 use crate::mdp::dense;
 use crate::number::Number;
 use crate::prism::ast::ModelKind;
-use crate::prism::behaviour::{ACTIONS, Chosen, Module};
+use crate::prism::behaviour::{Chosen, MAX_ACTIONS, Module};
 use crate::prism::command::RewardItem;
 use crate::prism::memo::Memo;
 use crate::prism::model::{Program, UNNAMED};
-use crate::prism::run::{COMBINED, Sums, Values};
+use crate::prism::run::{MAX_COMBINED, Sums, Values};
 use crate::prism::state::Packed;
 
-/// A program that remembers what its modules do.
+/// A program with a cache of the behaviours of its modules.
 pub struct Remembered<'a, N> {
     program: &'a Program<N>,
-    /// None where a program is better run as it is.
+    /// `None` if a cache would not pay; then the program computes all successors.
     memory: Option<RefCell<Memory<N>>>,
 }
 
-/// What is remembered.
+/// The caches and working memory.
 struct Memory<N> {
     team: Team<N>,
     stops: Memo<bool>,
-    of_states: Memo<Sums<N>>,
-    of_actions: Rewards<N>,
-    lead: Lead<N>,
+    state_sums: Memo<Sums<N>>,
+    action_sums_cache: Rewards<N>,
+    combiner: Combiner<N>,
 }
 
-/// The modules, with what they do in the state at hand.
+/// The modules and their behaviours in the current state.
 struct Team<N> {
     modules: Vec<Module<N>>,
-    /// For each action its modules, with the position of the action in each.
+    /// For each action, its modules with the position of the action in each.
     actions: Vec<Vec<(usize, usize)>>,
-    /// The behaviour of each module.
+    /// The current behaviour of each module.
     behaviours: Vec<usize>,
-    /// The actions that some module prevents, as bits.
+    /// The actions that some module disables, as a bit set.
     prevented: u128,
 }
 
-/// Rewards of choices without action, and of each action.
+/// Caches of the rewards of choices: without an action, and by action.
 struct Rewards<N> {
     unnamed: Memo<Sums<N>>,
     named: Vec<Memo<Sums<N>>>,
 }
 
-/// States on the way to those that modules lead to together.
-struct Lead<N> {
+/// Buffers for the combination of updates of several modules: partial successors with their probabilities.
+struct Combiner<N> {
     open: Vec<(Packed, N)>,
     next: Vec<(Packed, N)>,
 }
 
-/// A module's commands of which one is taken.
+/// A module and its enabled commands, one of which is executed.
 type Part = (usize, std::ops::Range<Chosen>);
-/// The modules that move together.
+/// The modules that synchronise on an action.
 type Parts = SmallVec<[Part; 8]>;
 
 impl<'a, N: Number> Remembered<'a, N> {
-    /// Nothing yet of a program.
+    /// Creates an empty cache.
     pub fn new(program: &'a Program<N>) -> Self {
-        // A module that is alone has as many behaviours as there are states.
-        let pays = program.free.len() > 1 && program.actions.len() <= ACTIONS;
+        // A single module has as many behaviours as the model has states, so that caching them saves nothing.
+        let pays = program.free.len() > 1 && program.actions.len() <= MAX_ACTIONS;
         Self { program, memory: pays.then(|| RefCell::new(Memory::new(program))) }
     }
 }
@@ -111,20 +112,23 @@ impl<N: Number> Generator<N> for Remembered<'_, N> {
 
 impl<N: Number> Memory<N> {
     fn new(program: &Program<N>) -> Self {
-        let stop = |tell: &mut dyn FnMut(u32)| {
-            program.stop.iter().for_each(|condition| condition.each_variable(&mut |variable| tell(variable)));
+        let stop = |visit: &mut dyn FnMut(u32)| {
+            program
+                .stop
+                .iter()
+                .for_each(|condition| condition.each_variable(&mut |variable| visit(variable)));
         };
-        let of_states = |structure: &usize| &program.rewards[*structure].states;
+        let state_sums = |structure: &usize| &program.rewards[*structure].states;
         Self {
             team: Team::new(program),
             stops: Memo::new(&program.layout, &variables(stop)),
-            of_states: sums(program, of_states),
-            of_actions: Rewards::new(program),
-            lead: Lead { open: Vec::new(), next: Vec::new() },
+            state_sums: sums(program, state_sums),
+            action_sums_cache: Rewards::new(program),
+            combiner: Combiner { open: Vec::new(), next: Vec::new() },
         }
     }
 
-    /// Writes the choices of a state; none where something cannot be told.
+    /// Adds the choices of a state. Returns `None` if an evaluation fails.
     fn successors(
         &mut self,
         program: &Program<N>,
@@ -136,63 +140,69 @@ impl<N: Number> Memory<N> {
             && *self.stops.get(state, || Some(stop.holds(&values()).unwrap_or(false)))?
         {
             choices.to(state.clone(), N::one());
-            choices.end(UNNAMED, program.wanted.iter().map(|_| N::zero()));
+            choices.end(UNNAMED, program.computed_rewards.iter().map(|_| N::zero()));
             return Some(());
         }
-        self.team.meet(program, state, values)?;
+        self.team.load_state(program, state, values)?;
         match program.kind {
             ModelKind::Mdp => self.choices(program, state, choices),
             ModelKind::Dtmc => self.step(program, state, choices),
         }
     }
 
-    /// All choices of a state of a decision process.
+    /// Adds all choices of a state of a decision process.
     fn choices(
         &mut self,
         program: &Program<N>,
         state: &Packed,
         choices: &mut Choices<Packed, N>,
     ) -> Option<()> {
-        let Self { team, of_states, of_actions, lead, .. } = self;
-        let of_state = of_states.get(state, || program.state_rewards(&program.values_of(state)).ok())?;
-        team.each_meeting(|action, parts| {
-            let more = of_actions.get(program, action, state)?;
-            team.each_way(parts, |chosen| {
-                lead.go(team, state, parts, chosen, |next, probability| choices.to(next, probability));
-                choices.end(action, of_state.iter().zip(more).map(|(a, b)| a.plus(b)));
+        let Self { team, state_sums, action_sums_cache, combiner, .. } = self;
+        let sums_of_state =
+            state_sums.get(state, || program.state_rewards(&program.values_of(state)).ok())?;
+        team.each_action(|action, parts| {
+            let action_sums = action_sums_cache.get(program, action, state)?;
+            team.each_combination(parts, |chosen| {
+                combiner
+                    .combine(team, state, parts, chosen, |next, probability| choices.to(next, probability));
+                choices.end(action, sums_of_state.iter().zip(action_sums).map(|(a, b)| a.plus(b)));
             })
         })
     }
 
-    /// The one choice of a state of a Markov chain: each of the ways to go on with the same probability.
+    /// Adds the one choice of a state of a Markov chain: a uniform distribution over the enabled commands.
     fn step(&mut self, program: &Program<N>, state: &Packed, choices: &mut Choices<Packed, N>) -> Option<()> {
-        let Self { team, of_states, of_actions, lead, .. } = self;
-        let (mut ways, mut taken) = (0_usize, UNNAMED);
-        team.each_meeting(|action, parts| {
-            let own = parts.iter().fold(1, |ways: usize, (_, commands)| ways.saturating_mul(commands.len()));
-            ways = ways.saturating_add(own);
-            taken = action;
+        let Self { team, state_sums, action_sums_cache, combiner, .. } = self;
+        let (mut combinations, mut last_action) = (0_usize, UNNAMED);
+        team.each_action(|action, parts| {
+            let of_action = parts
+                .iter()
+                .fold(1, |combinations: usize, (_, commands)| combinations.saturating_mul(commands.len()));
+            combinations = combinations.saturating_add(of_action);
+            last_action = action;
             Some(())
         })?;
-        if ways == 0 {
+        if combinations == 0 {
             return Some(());
         }
-        let count = (ways > 1).then(|| N::from_rational(&BigRational::from(BigInt::from(ways))));
+        let count =
+            (combinations > 1).then(|| N::from_rational(&BigRational::from(BigInt::from(combinations))));
         let share = |number: &N| count.as_ref().map_or_else(|| number.clone(), |count| number.over(count));
-        let of_state = of_states.get(state, || program.state_rewards(&program.values_of(state)).ok())?;
-        let mut total = of_state.clone();
-        team.each_meeting(|action, parts| {
-            let more = of_actions.get(program, action, state)?;
-            team.each_way(parts, |chosen| {
-                for (sum, more) in total.iter_mut().zip(more) {
-                    *sum = sum.plus(&share(more));
+        let sums_of_state =
+            state_sums.get(state, || program.state_rewards(&program.values_of(state)).ok())?;
+        let mut total = sums_of_state.clone();
+        team.each_action(|action, parts| {
+            let reward = action_sums_cache.get(program, action, state)?;
+            team.each_combination(parts, |chosen| {
+                for (sum, reward) in total.iter_mut().zip(reward) {
+                    *sum = sum.plus(&share(reward));
                 }
-                lead.go(team, state, parts, chosen, |next, probability| {
+                combiner.combine(team, state, parts, chosen, |next, probability| {
                     choices.to(next, share(&probability));
                 });
             })
         })?;
-        choices.end(if ways == 1 { taken } else { UNNAMED }, total);
+        choices.end(if combinations == 1 { last_action } else { UNNAMED }, total);
         Some(())
     }
 }
@@ -209,26 +219,32 @@ impl<N: Number> Team<N> {
         Self { behaviours: vec![0; modules.len()], modules, actions, prevented: 0 }
     }
 
-    /// Finds what each module does in a state; none where that cannot be told.
-    fn meet(&mut self, program: &Program<N>, state: &Packed, values: impl Fn() -> Values) -> Option<()> {
+    /// Looks up the behaviours of all modules in a state. Returns `None` if an evaluation fails.
+    fn load_state(
+        &mut self,
+        program: &Program<N>,
+        state: &Packed,
+        values: impl Fn() -> Values,
+    ) -> Option<()> {
         self.prevented = 0;
-        for (number, (module, own)) in self.modules.iter_mut().zip(&mut self.behaviours).enumerate() {
-            *own = module.behaviour(program, number, state, &values)?;
-            self.prevented |= module.prevented(*own);
+        for (number, (module, behaviour)) in self.modules.iter_mut().zip(&mut self.behaviours).enumerate() {
+            *behaviour = module.behaviour(program, number, state, &values)?;
+            self.prevented |= module.prevented(*behaviour);
         }
         Some(())
     }
 
-    /// Tells what can happen, by action and the modules that take part; none where that says so.
-    fn each_meeting(&self, mut tell: impl FnMut(u32, &[Part]) -> Option<()>) -> Option<()> {
+    /// Calls `visit` with each enabled action and the participating modules. Returns `None` as soon as `visit` does.
+    fn each_action(&self, mut visit: impl FnMut(u32, &[Part]) -> Option<()>) -> Option<()> {
         for (number, module) in self.modules.iter().enumerate() {
             let commands = module.free(self.behaviours[number]);
             if !commands.is_empty() {
-                tell(UNNAMED, &[(number, commands)])?;
+                visit(UNNAMED, &[(number, commands)])?;
             }
         }
-        let all = u128::MAX.checked_shr(128_u32.saturating_sub(dense(self.actions.len()))).unwrap_or(0);
-        let mut possible = all & !self.prevented;
+        let all_actions =
+            u128::MAX.checked_shr(128_u32.saturating_sub(dense(self.actions.len()))).unwrap_or(0);
+        let mut possible = all_actions & !self.prevented;
         let mut parts = Parts::new();
         while possible != 0 {
             let action = possible.trailing_zeros();
@@ -237,37 +253,41 @@ impl<N: Number> Team<N> {
             parts.extend(self.actions[action as usize].iter().map(|(module, position)| {
                 (*module, self.modules[*module].acting(self.behaviours[*module], *position))
             }));
-            tell(action, &parts)?;
+            visit(action, &parts)?;
         }
         Some(())
     }
 
-    /// Tells each way to choose one command of each part, the first one's changes first; none where there are too many ends.
-    fn each_way(&self, parts: &[Part], mut way: impl FnMut(&[Chosen])) -> Option<()> {
+    /// Calls `visit` with each combination of one command per module; the command of the first module varies fastest.
+    /// Returns `None` if there are too many successors.
+    fn each_combination(&self, parts: &[Part], mut visit: impl FnMut(&[Chosen])) -> Option<()> {
         if let [(_, commands)] = parts {
-            commands.clone().for_each(|command| way(&[command]));
+            commands.clone().for_each(|command| visit(&[command]));
             return Some(());
         }
         let ends = parts.iter().map(|(module, commands)| self.modules[*module].count(commands.clone()));
-        if ends.fold(1, usize::saturating_mul) > COMBINED {
+        if ends.fold(1, usize::saturating_mul) > MAX_COMBINED {
             return None;
         }
         let mut chosen: SmallVec<[Chosen; 8]> = parts.iter().map(|(_, commands)| commands.start).collect();
         loop {
-            way(&chosen);
-            let next = chosen.iter().zip(parts).position(|(own, (_, all))| own.saturating_add(1) < all.end);
+            visit(&chosen);
+            let next = chosen
+                .iter()
+                .zip(parts)
+                .position(|(command, (_, range))| command.saturating_add(1) < range.end);
             let Some(changes) = next else { return Some(()) };
             chosen[changes] = chosen[changes].saturating_add(1);
-            for (own, (_, all)) in chosen.iter_mut().zip(parts).take(changes) {
-                *own = all.start;
+            for (command, (_, range)) in chosen.iter_mut().zip(parts).take(changes) {
+                *command = range.start;
             }
         }
     }
 }
 
-impl<N: Number> Lead<N> {
-    /// The states that a command of each part leads to; the updates of the last one change first.
-    fn go(
+impl<N: Number> Combiner<N> {
+    /// Calls `to` with each successor of a combination of commands; the update of the last module varies fastest.
+    fn combine(
         &mut self,
         team: &Team<N>,
         state: &Packed,
@@ -288,21 +308,22 @@ impl<N: Number> Lead<N> {
         self.open.push((state.clone(), N::one()));
         for at in 0..chosen.len() {
             let mut updates = updates(at);
+            // A single update is applied in place.
             if updates.len() == 1
                 && let Some((probability, edits)) = updates.next()
             {
-                for (next, together) in &mut self.open {
+                for (next, accumulated) in &mut self.open {
                     next.edit(edits);
-                    *together = product(together, probability);
+                    *accumulated = product(accumulated, probability);
                 }
                 continue;
             }
             self.next.clear();
-            for (before, together) in &self.open {
+            for (before, accumulated) in &self.open {
                 for (probability, edits) in team.modules[parts[at].0].updates(chosen[at]) {
                     let mut next = before.clone();
                     next.edit(edits);
-                    self.next.push((next, product(together, probability)));
+                    self.next.push((next, product(accumulated, probability)));
                 }
             }
             std::mem::swap(&mut self.open, &mut self.next);
@@ -311,7 +332,7 @@ impl<N: Number> Lead<N> {
     }
 }
 
-/// Most moves of modules are certain, and rationals are long to multiply.
+/// Multiplies two probabilities. Most are 1, and multiplying rationals is expensive.
 fn product<N: Number>(left: &N, right: &N) -> N {
     match (left.is_unit(), right.is_unit()) {
         (true, _) => right.clone(),
@@ -330,30 +351,30 @@ impl<N: Number> Rewards<N> {
         }
     }
 
-    /// The rewards of an action in a state; none where they cannot be told.
+    /// Returns the rewards of an action in a state, or `None` if their evaluation fails.
     fn get(&mut self, program: &Program<N>, action: u32, state: &Packed) -> Option<&Sums<N>> {
         let memo = self.named.get_mut(action as usize).unwrap_or(&mut self.unnamed);
         memo.get(state, || program.action_rewards(action, &program.values_of(state)).ok())
     }
 }
 
-/// Sums of some rewards of each structure that is wanted.
+/// Creates a cache of the sums of some reward items of each computed structure.
 fn sums<'a, N: Number>(
     program: &'a Program<N>,
     items: impl Fn(&usize) -> &'a Vec<RewardItem<N>>,
 ) -> Memo<Sums<N>> {
-    let each = |tell: &mut dyn FnMut(u32)| {
-        for item in program.wanted.iter().flat_map(&items) {
-            item.each_variable(&mut |variable| tell(variable));
+    let each = |visit: &mut dyn FnMut(u32)| {
+        for item in program.computed_rewards.iter().flat_map(&items) {
+            item.each_variable(&mut |variable| visit(variable));
         }
     };
     Memo::new(&program.layout, &variables(each))
 }
 
 fn variables(each: impl Fn(&mut dyn FnMut(u32))) -> BTreeSet<u32> {
-    let mut found = BTreeSet::new();
+    let mut numbers = BTreeSet::new();
     each(&mut |variable| {
-        found.insert(variable);
+        numbers.insert(variable);
     });
-    found
+    numbers
 }

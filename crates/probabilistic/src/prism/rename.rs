@@ -1,9 +1,9 @@
-//! `module B = A [x=y] endmodule` to a module of its own.
+//! Expands renamed modules: `module B = A [x=y] endmodule`.
 
 use crate::error::Place;
 use crate::prism::ast::{Command, Expr, ExprKind, Module, Named, Update, Variable};
 
-/// A copy of a module with other names. Formulas in it are written out first, because what they name changes, too.
+/// Copies a module under other names. Formulas are expanded first, because the names in them are replaced as well.
 pub fn module(
     original: &Module,
     name: &str,
@@ -11,14 +11,14 @@ pub fn module(
     pairs: &[(String, String)],
     formulas: &[Named],
 ) -> Module {
-    let new = |old: &str| pairs.iter().find(|(from, _)| from == old).map(|(_, to)| to.clone());
-    let known = |old: &str| new(old).unwrap_or_else(|| old.to_owned());
+    let target = |old: &str| pairs.iter().find(|(from, _)| from == old).map(|(_, to)| to.clone());
+    let renamed = |old: &str| target(old).unwrap_or_else(|| old.to_owned());
     let expression = |e: &Expr| {
-        let written_out = write_out(e, formulas, formulas.len());
-        written_out.replace(&|name| new(name).map(|name| Expr { kind: ExprKind::Name(name), place: e.place }))
+        let expanded = expand_formulas(e, formulas, formulas.len());
+        expanded.replace(&|name| target(name).map(|name| Expr { kind: ExprKind::Name(name), place: e.place }))
     };
     let variable = |v: &Variable| Variable {
-        name: known(&v.name),
+        name: renamed(&v.name),
         range: v.range.as_ref().map(|(least, greatest)| (expression(least), expression(greatest))),
         initial: v.initial.as_ref().map(expression),
         place,
@@ -28,11 +28,11 @@ pub fn module(
         assignments: u
             .assignments
             .iter()
-            .map(|(name, value, place)| (known(name), expression(value), *place))
+            .map(|(name, value, place)| (renamed(name), expression(value), *place))
             .collect(),
     };
     let command = |c: &Command| Command {
-        action: c.action.as_deref().map(known),
+        action: c.action.as_deref().map(renamed),
         guard: expression(&c.guard),
         updates: c.updates.iter().map(update).collect(),
         place: c.place,
@@ -45,11 +45,11 @@ pub fn module(
     }
 }
 
-/// An expression without names of formulas; `depth` stops at formulas that contain themselves.
-fn write_out(expression: &Expr, formulas: &[Named], depth: usize) -> Expr {
+/// Expands the formulas in an expression. `depth` ends the recursion for formulas that contain themselves.
+fn expand_formulas(expression: &Expr, formulas: &[Named], depth: usize) -> Expr {
     let Some(depth) = depth.checked_sub(1) else { return expression.clone() };
     expression.replace(&|name| {
         let formula = formulas.iter().find(|formula| formula.name == name)?;
-        Some(write_out(&formula.expression, formulas, depth))
+        Some(expand_formulas(&formula.expression, formulas, depth))
     })
 }

@@ -1,6 +1,6 @@
-//! The words that cannot be names.
+//! Reserved words of the PRISM language.
 
-/// The words that PRISM keeps for itself, and those that Storm does besides.
+/// Keywords of PRISM, and words that only Storm reserves.
 const RESERVED: [&str; 50] = [
     "A",
     "bool",
@@ -54,19 +54,19 @@ const RESERVED: [&str; 50] = [
     "true",
 ];
 
-/// More of them.
-const RESERVED_TOO: [&str; 10] =
+/// Further reserved words.
+const MORE_RESERVED: [&str; 10] =
     ["R", "S", "stochastic", "system", "U", "W", "smg", "ma", "player", "endplayer"];
 
-/// Functions, which PRISM takes as names where no bracket follows; other tools do not everywhere.
+/// Function names. PRISM accepts them as names if no parenthesis follows; other tools do not always.
 const FUNCTIONS: [&str; 6] = ["floor", "ceil", "round", "pow", "mod", "log"];
 
-/// Whether a word cannot be a name.
+/// Returns `true` if a word cannot be a name.
 pub fn is_keyword(word: &str) -> bool {
-    RESERVED.contains(&word) || RESERVED_TOO.contains(&word)
+    RESERVED.contains(&word) || MORE_RESERVED.contains(&word)
 }
 
-/// Whether a word should not be a name in a model that is written.
+/// Returns `true` if a word should not be a name in a model that is written for other tools.
 pub fn is_reserved(word: &str) -> bool {
     is_keyword(word) || FUNCTIONS.contains(&word)
 }

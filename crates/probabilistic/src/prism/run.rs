@@ -1,7 +1,7 @@
-//! A state of a program to its choices.
+//! Computes the choices of a state.
 //!
-//! Most commands stand alone, with probabilities that are constants: these write their successors straight into the packed
-//! state. Only commands of several modules that move together, and those of Markov chains, are combined first.
+//! Most commands do not synchronise and have constant probabilities: their successors are written directly as packed
+//! states. Only synchronised commands and Markov chains need combinations of commands.
 
 use num_bigint::BigInt;
 use num_rational::BigRational;
@@ -18,41 +18,41 @@ use crate::prism::command::{Command, RewardItem, Variable};
 use crate::prism::model::{Group, Program, UNNAMED};
 use crate::prism::state::{Packed, above_least};
 
-/// The values of the variables, of one state at a time.
+/// Values of the variables in one state.
 pub(super) type Values = SmallVec<[i64; 16]>;
-/// The rewards of a choice.
+/// The rewards of a choice, by structure.
 pub(super) type Sums<N> = SmallVec<[N; 4]>;
 
-/// Ends of the combined commands of an action in one state, at most.
-pub(super) const COMBINED: usize = 1_000_000;
+/// Upper limit on the successors of the combined commands of one action in one state.
+pub(super) const MAX_COMBINED: usize = 1_000_000;
 
-/// The enabled commands of one action, which move together: one of each module.
-struct Meeting<N> {
+/// The enabled commands of the modules that synchronise on an action. One command of each module is executed.
+struct JointStep<N> {
     action: u32,
-    /// Where the commands of each module begin.
+    /// Start of the commands of each module.
     modules: SmallVec<[u32; 4]>,
-    /// Where the updates of each command end.
+    /// End of the updates of each command.
     commands: SmallVec<[u32; 8]>,
-    /// The probability of each update that is possible, and where its changes end.
+    /// Probability of each update with a nonzero probability, and the end of its changes.
     updates: SmallVec<[(N, u32); 8]>,
-    /// Variables with their new values.
+    /// Variables and their new values.
     changes: SmallVec<[(u32, i64); 16]>,
 }
 
 impl<N: Number> Program<N> {
-    /// What modules can do together in a state; false if one of them has no enabled command.
-    fn meet(
+    /// Collects the enabled commands of synchronising modules. Returns `false` if a module has none.
+    fn synchronise(
         &self,
-        meeting: &mut Meeting<N>,
+        joint: &mut JointStep<N>,
         action: u32,
         groups: &[Group<N>],
         values: &[i64],
     ) -> Result<bool, Error> {
-        meeting.begin(action);
+        joint.begin(action);
         let mut commands: SmallVec<[&Command<N>; 8]> = SmallVec::new();
         for group in groups {
             let begin = commands.len();
-            meeting.modules.push(dense(begin));
+            joint.modules.push(dense(begin));
             for command in enabled(group, values) {
                 commands.push(command?);
             }
@@ -61,15 +61,17 @@ impl<N: Number> Program<N> {
             }
         }
         for command in &commands {
-            self.effects(meeting, command, values)?;
+            self.effects(joint, command, values)?;
         }
         let mut outcomes = 1_usize;
         for module in 0..groups.len() {
             let mut ends = 0_usize;
-            for at in meeting.of(module) {
-                ends = ends.saturating_add(outcomes.saturating_mul(meeting.updates_of(at).len()));
-                if ends > COMBINED && module > 0 {
-                    let text = format!("more than {COMBINED} ways in which modules move together in a state");
+            for at in joint.of(module) {
+                ends = ends.saturating_add(outcomes.saturating_mul(joint.updates_of(at).len()));
+                // A single module has no combinations.
+                if ends > MAX_COMBINED && module > 0 {
+                    let text =
+                        format!("more than {MAX_COMBINED} ways in which modules move together in a state");
                     return Err(Diagnostic::new("Q306", commands[at].place, text).into());
                 }
             }
@@ -78,22 +80,22 @@ impl<N: Number> Program<N> {
         Ok(true)
     }
 
-    /// Adds the updates of a command in a state.
-    fn effects(&self, meeting: &mut Meeting<N>, command: &Command<N>, values: &[i64]) -> Result<(), Error> {
+    /// Appends the updates of a command in a state.
+    fn effects(&self, joint: &mut JointStep<N>, command: &Command<N>, values: &[i64]) -> Result<(), Error> {
         for (update, probability) in command.updates.iter().zip(&*command.probabilities(values)?) {
             if probability.is_zero() {
                 continue;
             }
             for (variable, code, place) in &update.assignments {
-                meeting.changes.push((*variable, self.assigned(*variable, code, *place, values)?));
+                joint.changes.push((*variable, self.assigned(*variable, code, *place, values)?));
             }
-            meeting.updates.push((probability.clone(), dense(meeting.changes.len())));
+            joint.updates.push((probability.clone(), dense(joint.changes.len())));
         }
-        meeting.commands.push(dense(meeting.updates.len()));
+        joint.commands.push(dense(joint.updates.len()));
         Ok(())
     }
 
-    /// What an assignment makes of a variable, which must be in its range.
+    /// Evaluates an assignment. The value must be in the range of the variable.
     pub(super) fn assigned(
         &self,
         variable: u32,
@@ -110,31 +112,31 @@ impl<N: Number> Program<N> {
         Err(Diagnostic::new("Q305", place, text).into())
     }
 
-    /// The states that a choice of one command of each module leads to.
-    fn lead(&self, state: &Packed, meeting: &Meeting<N>, chosen: &[usize], mut to: impl FnMut(Packed, N)) {
-        let updates = |module: usize| meeting.updates_of(chosen[module]);
+    /// Calls `to` with each successor of a combination of one command per module.
+    fn expand(&self, state: &Packed, joint: &JointStep<N>, chosen: &[usize], mut to: impl FnMut(Packed, N)) {
+        let updates = |module: usize| joint.updates_of(chosen[module]);
         let mut at: SmallVec<[usize; 8]> = (0..chosen.len()).map(|module| updates(module).start).collect();
         if (0..chosen.len()).any(|module| updates(module).is_empty()) {
             return;
         }
         loop {
             let mut next = state.clone();
-            let mut together: Option<N> = None;
+            let mut accumulated: Option<N> = None;
             for update in &at {
-                let (probability, end) = &meeting.updates[*update];
-                let begin = update.checked_sub(1).map_or(0, |before| meeting.updates[before].1);
-                for (variable, value) in &meeting.changes[begin as usize..*end as usize] {
+                let (probability, end) = &joint.updates[*update];
+                let begin = update.checked_sub(1).map_or(0, |before| joint.updates[before].1);
+                for (variable, value) in &joint.changes[begin as usize..*end as usize] {
                     self.layout.set(&mut next, *variable, *value);
                 }
-                together = Some(match together {
+                accumulated = Some(match accumulated {
                     Some(before) => before.times(probability),
                     None => probability.clone(),
                 });
             }
-            if let Some(probability) = together {
+            if let Some(probability) = accumulated {
                 to(next, probability);
             }
-            // The updates of the last module change first.
+            // The update of the last module varies fastest.
             let Some(changes) =
                 (0..at.len()).rev().find(|module| at[*module].saturating_add(1) < updates(*module).end)
             else {
@@ -148,7 +150,7 @@ impl<N: Number> Program<N> {
     }
 }
 
-impl<N> Meeting<N> {
+impl<N> JointStep<N> {
     const fn new() -> Self {
         Self {
             action: UNNAMED,
@@ -159,7 +161,7 @@ impl<N> Meeting<N> {
         }
     }
 
-    /// Forgets what was, for another action.
+    /// Clears the lists for another action.
     fn begin(&mut self, action: u32) {
         self.action = action;
         self.modules.clear();
@@ -168,51 +170,52 @@ impl<N> Meeting<N> {
         self.changes.clear();
     }
 
-    /// The commands of a module, by position.
+    /// Returns the positions of the commands of a module.
     fn of(&self, module: usize) -> std::ops::Range<usize> {
         let end = self.modules.get(module.saturating_add(1)).map_or(self.commands.len(), |end| *end as usize);
         self.modules[module] as usize..end
     }
 
-    /// The updates of a command, by position.
+    /// Returns the positions of the updates of a command.
     fn updates_of(&self, command: usize) -> std::ops::Range<usize> {
         let begin = command.checked_sub(1).map_or(0, |before| self.commands[before]);
         begin as usize..self.commands[command] as usize
     }
 
-    /// In how many ways one command of each module can be chosen.
-    fn ways(&self) -> usize {
+    /// Number of combinations of one command per module.
+    fn combinations(&self) -> usize {
         (0..self.modules.len()).map(|module| self.of(module).len()).product()
     }
 
-    /// Each way to choose one command of each module.
-    fn each<E>(&self, mut way: impl FnMut(&[usize]) -> Result<(), E>) -> Result<(), E> {
+    /// Calls `visit` with each combination of one command per module.
+    fn each<E>(&self, mut visit: impl FnMut(&[usize]) -> Result<(), E>) -> Result<(), E> {
         let mut at: SmallVec<[usize; 8]> = self.modules.iter().map(|begin| *begin as usize).collect();
         loop {
-            way(&at)?;
-            // The command of the first module changes first.
-            let Some(changes) = (0..at.len()).find(|own| at[*own].saturating_add(1) < self.of(*own).end)
+            visit(&at)?;
+            // The command of the first module varies fastest.
+            let Some(changes) =
+                (0..at.len()).find(|module| at[*module].saturating_add(1) < self.of(*module).end)
             else {
                 return Ok(());
             };
             at[changes] = at[changes].saturating_add(1);
-            for (own, begin) in at.iter_mut().zip(&self.modules).take(changes) {
-                *own = *begin as usize;
+            for (command, begin) in at.iter_mut().zip(&self.modules).take(changes) {
+                *command = *begin as usize;
             }
         }
     }
 }
 
-/// The enabled commands of a group.
+/// Returns the enabled commands of a group, in the order of the model.
 pub(super) fn enabled<'a, N: Number>(
     group: &'a Group<N>,
     values: &'a [i64],
 ) -> impl Iterator<Item = Result<&'a Command<N>, Error>> {
-    let (listed, all): (&[u32], _) = match &group.index {
+    let (indexed, unindexed_count): (&[u32], _) = match &group.index {
         Some((variable, least, table)) => (&table[above_least(values[*variable as usize], *least)], 0),
         None => (&[], group.commands.len()),
     };
-    let candidates = listed.iter().map(|number| *number as usize).chain(0..all);
+    let candidates = indexed.iter().map(|number| *number as usize).chain(0..unindexed_count);
     candidates.filter_map(move |number| {
         let command = &group.commands[number];
         match command.guard.holds(values) {
@@ -224,18 +227,18 @@ pub(super) fn enabled<'a, N: Number>(
 }
 
 impl<N: Number> Program<N> {
-    /// The values of the variables in a state.
+    /// Returns the values of the variables in a state.
     pub(super) fn values_of(&self, state: &Packed) -> Values {
         self.layout.values(state).collect()
     }
 
-    /// The reward of a state alone, by the number of its structure.
+    /// Returns the state reward of a structure, by its number.
     pub(crate) fn state_reward(&self, structure: usize, values: &[i64]) -> Result<N, Error> {
         sum(&self.rewards[structure].states, values)
     }
 
     pub(super) fn state_rewards(&self, values: &[i64]) -> Result<Sums<N>, Error> {
-        self.wanted.iter().map(|structure| sum(&self.rewards[*structure].states, values)).collect()
+        self.computed_rewards.iter().map(|structure| sum(&self.rewards[*structure].states, values)).collect()
     }
 
     pub(super) fn action_rewards(&self, action: u32, values: &[i64]) -> Result<Sums<N>, Error> {
@@ -243,10 +246,10 @@ impl<N: Number> Program<N> {
             let structure = &self.rewards[*structure];
             structure.actions.get(action as usize).unwrap_or(&structure.unnamed)
         };
-        self.wanted.iter().map(|structure| sum(items(structure), values)).collect()
+        self.computed_rewards.iter().map(|structure| sum(items(structure), values)).collect()
     }
 
-    /// The actions that the values of single variables leave possible.
+    /// Returns the actions that no single variable rules out.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "words hold 64 actions, and there are as many words as the actions need; bits is not 0 where its last one is taken"
@@ -255,8 +258,8 @@ impl<N: Number> Program<N> {
         let words = self.actions.len().div_ceil(64);
         (0..words).flat_map(move |word| {
             let count = self.actions.len() - word * 64;
-            let all = if count >= 64 { u64::MAX } else { (1 << count) - 1 };
-            let mut bits = self.masks.iter().fold(all, |bits, mask| {
+            let all_actions = if count >= 64 { u64::MAX } else { (1 << count) - 1 };
+            let mut bits = self.masks.iter().fold(all_actions, |bits, mask| {
                 bits & mask.table[above_least(values[mask.variable as usize], mask.least)][word]
             });
             std::iter::from_fn(move || {
@@ -267,8 +270,8 @@ impl<N: Number> Program<N> {
         })
     }
 
-    /// Writes the successors of a command that stands alone.
-    fn alone(
+    /// Adds the successors of a command that does not synchronise.
+    fn single_command(
         &self,
         command: &Command<N>,
         state: &Packed,
@@ -288,41 +291,41 @@ impl<N: Number> Program<N> {
         Ok(())
     }
 
-    /// All choices of a state of a decision process.
+    /// Adds all choices of a state of a decision process.
     fn choices(
         &self,
         state: &Packed,
         values: &Values,
         choices: &mut Choices<Packed, N>,
     ) -> Result<(), Error> {
-        let of_state = self.state_rewards(values)?;
-        let rewards = |more: &Sums<N>| {
-            let sums: Sums<N> = of_state.iter().zip(more).map(|(a, b)| a.plus(b)).collect();
+        let state_sums = self.state_rewards(values)?;
+        let rewards = |action_sums: &Sums<N>| {
+            let sums: Sums<N> = state_sums.iter().zip(action_sums).map(|(a, b)| a.plus(b)).collect();
             sums
         };
         for group in &self.free {
             for command in enabled(group, values) {
-                self.alone(command?, state, values, choices)?;
+                self.single_command(command?, state, values, choices)?;
                 choices.end(UNNAMED, rewards(&self.action_rewards(UNNAMED, values)?));
             }
         }
-        let mut meeting = Meeting::new();
+        let mut joint = JointStep::new();
         for action in self.possible(values) {
             let number = dense(action);
             match &self.synchronised[action][..] {
                 [group] => {
                     for command in enabled(group, values) {
-                        self.alone(command?, state, values, choices)?;
+                        self.single_command(command?, state, values, choices)?;
                         choices.end(number, rewards(&self.action_rewards(number, values)?));
                     }
                 }
                 groups => {
-                    if !self.meet(&mut meeting, number, groups, values)? {
+                    if !self.synchronise(&mut joint, number, groups, values)? {
                         continue;
                     }
                     let sums = rewards(&self.action_rewards(number, values)?);
-                    meeting.each(|chosen| {
-                        self.lead(state, &meeting, chosen, |next, probability| choices.to(next, probability));
+                    joint.each(|chosen| {
+                        self.expand(state, &joint, chosen, |next, probability| choices.to(next, probability));
                         choices.end(number, sums.iter().cloned());
                         Ok::<(), Error>(())
                     })?;
@@ -332,40 +335,41 @@ impl<N: Number> Program<N> {
         Ok(())
     }
 
-    /// The one choice of a state of a Markov chain: each of the commands with the same probability.
+    /// Adds the one choice of a state of a Markov chain: a uniform distribution over the enabled commands.
     fn step(&self, state: &Packed, values: &Values, choices: &mut Choices<Packed, N>) -> Result<(), Error> {
-        let mut meetings: SmallVec<[Meeting<N>; 1]> = SmallVec::new();
-        let mut meet = |action: u32, groups: &[Group<N>]| {
-            let mut meeting = Meeting::new();
-            if self.meet(&mut meeting, action, groups, values)? {
-                meetings.push(meeting);
+        let mut joint_steps: SmallVec<[JointStep<N>; 1]> = SmallVec::new();
+        let mut collect = |action: u32, groups: &[Group<N>]| {
+            let mut joint = JointStep::new();
+            if self.synchronise(&mut joint, action, groups, values)? {
+                joint_steps.push(joint);
             }
             Ok::<(), Error>(())
         };
         for group in &self.free {
-            meet(UNNAMED, std::slice::from_ref(group))?;
+            collect(UNNAMED, std::slice::from_ref(group))?;
         }
         for action in self.possible(values) {
-            meet(dense(action), &self.synchronised[action])?;
+            collect(dense(action), &self.synchronised[action])?;
         }
-        let ways = meetings.iter().map(Meeting::ways).fold(0, usize::saturating_add);
-        if ways == 0 {
+        let combinations = joint_steps.iter().map(JointStep::combinations).fold(0, usize::saturating_add);
+        if combinations == 0 {
             return Ok(());
         }
-        let count = (ways > 1).then(|| N::from_rational(&BigRational::from(BigInt::from(ways))));
+        let count =
+            (combinations > 1).then(|| N::from_rational(&BigRational::from(BigInt::from(combinations))));
         let share = |number: &N| count.as_ref().map_or_else(|| number.clone(), |count| number.over(count));
         let mut total = self.state_rewards(values)?;
-        for meeting in &meetings {
-            let rewards = self.action_rewards(meeting.action, values)?;
-            meeting.each(|chosen| {
-                for (sum, more) in total.iter_mut().zip(&rewards) {
-                    *sum = sum.plus(&share(more));
+        for joint in &joint_steps {
+            let rewards = self.action_rewards(joint.action, values)?;
+            joint.each(|chosen| {
+                for (sum, reward) in total.iter_mut().zip(&rewards) {
+                    *sum = sum.plus(&share(reward));
                 }
-                self.lead(state, meeting, chosen, |next, probability| choices.to(next, share(&probability)));
+                self.expand(state, joint, chosen, |next, probability| choices.to(next, share(&probability)));
                 Ok::<(), Error>(())
             })?;
         }
-        choices.end(if ways == 1 { meetings[0].action } else { UNNAMED }, total);
+        choices.end(if combinations == 1 { joint_steps[0].action } else { UNNAMED }, total);
         Ok(())
     }
 }
@@ -382,7 +386,7 @@ impl<N: Number> Generator<N> for Program<N> {
     }
 
     fn rewards(&self) -> usize {
-        self.wanted.len()
+        self.computed_rewards.len()
     }
 
     fn codes(&self) -> Option<usize> {
@@ -395,9 +399,10 @@ impl<N: Number> Generator<N> for Program<N> {
 
     fn successors(&self, state: &Packed, choices: &mut Choices<Packed, N>) -> Result<(), Error> {
         let values = self.values_of(state);
+        // A state in which the condition has no value is expanded.
         if self.stop.as_ref().is_some_and(|stop| stop.holds(&values).unwrap_or(false)) {
             choices.to(state.clone(), N::one());
-            choices.end(UNNAMED, self.wanted.iter().map(|_| N::zero()));
+            choices.end(UNNAMED, self.computed_rewards.iter().map(|_| N::zero()));
             return Ok(());
         }
         match self.kind {
@@ -411,7 +416,7 @@ fn at(Fault(text): Fault, place: Place) -> Error {
     Diagnostic::new("Q303", place, text).into()
 }
 
-/// The sum of some rewards of a state.
+/// Sums the rewards of the items whose guards hold in a state.
 fn sum<N: Number>(items: &[RewardItem<N>], values: &[i64]) -> Result<N, Error> {
     let mut sum = N::zero();
     for item in items {

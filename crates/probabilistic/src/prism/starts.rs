@@ -1,17 +1,16 @@
-//! `init … endinit`: the states in which it holds.
+//! Enumerates the states that satisfy `init … endinit`.
 
 use crate::error::{Diagnostic, Place};
 use crate::prism::code::{Code, Fault};
 use crate::prism::command::Variable;
 use crate::prism::state::{Layout, Packed, Valuation};
 
-/// Values of variables that are tried at most.
-const TRIED: usize = 50_000_000;
+/// Upper limit on the number of values that are tried.
+const MAX_TRIED: usize = 50_000_000;
 
-/// All states in which a condition holds, by the values of the variables in their order.
+/// Returns the states that satisfy a condition, in lexicographic order of the values of the variables.
 ///
-/// Variables get their values one after the other, and each part of the condition is asked as soon as all of its variables
-/// have one.
+/// Backtracking over the variables: a conjunct is evaluated as soon as all of its variables have values.
 pub fn starts(
     condition: Code,
     place: Place,
@@ -20,7 +19,7 @@ pub fn starts(
 ) -> Result<Vec<Packed>, Diagnostic> {
     let parts = match condition {
         Code::All(parts) => parts,
-        other => vec![other],
+        conjunct => vec![conjunct],
     };
     let mut ready: Vec<Vec<&Code>> = vec![Vec::new(); variables.len().saturating_add(1)];
     for part in &parts {
@@ -35,21 +34,22 @@ pub fn starts(
         Ok(true)
     };
     let mut values: Valuation = variables.iter().map(|variable| variable.least).collect();
-    let (mut found, mut tried, mut at) = (Vec::new(), 0_usize, 0_usize);
+    let (mut states, mut tried_values, mut at) = (Vec::new(), 0_usize, 0_usize);
     if !holds(&ready[0], &values)? {
-        return Ok(found);
+        return Ok(states);
     }
-    // The variables before `at` have values that are fine; the one at `at` is to be tried as it is.
+    // The variables before `at` satisfy their conjuncts; the current value of the variable `at` is to be tried.
     loop {
-        tried = tried.saturating_add(1);
-        if tried > TRIED {
-            let text =
-                format!("more than {TRIED} combinations of values have to be tried to find where it starts");
+        tried_values = tried_values.saturating_add(1);
+        if tried_values > MAX_TRIED {
+            let text = format!(
+                "more than {MAX_TRIED} combinations of values have to be tried to find where it starts"
+            );
             return Err(Diagnostic::new("Q307", place, text));
         }
         let next = at.saturating_add(1);
         if at == variables.len() {
-            found.push(layout.pack(&values));
+            states.push(layout.pack(&values));
         } else if holds(&ready[next], &values)? {
             at = next;
             if let Some(variable) = variables.get(at) {
@@ -60,9 +60,9 @@ pub fn starts(
             values[at] = values[at].saturating_add(1);
             continue;
         }
-        // Back to the last variable that has another value.
+        // Backtrack to the last variable with an untried value.
         loop {
-            let Some(before) = at.checked_sub(1) else { return Ok(found) };
+            let Some(before) = at.checked_sub(1) else { return Ok(states) };
             at = before;
             if values[at] < variables[at].greatest {
                 values[at] = values[at].saturating_add(1);

@@ -1,46 +1,47 @@
-//! The values of all variables to a few machine words, and back.
+//! Bit-packed states.
 
 use std::collections::BTreeSet;
 use std::hash::{Hash, Hasher};
 
 use crate::mdp::dense;
 
-/// A state: the values of the variables, each in as many bits as its range needs.
+/// A state: the values of the variables, each in the number of bits that its range requires.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Packed(Words);
 
-// Exploration spends its time on copying, comparing and hashing these: two words are copied at once, without a look at their number.
+// Exploration spends its time on copying, comparing and hashing states. Two words are stored inline and copied
+// without a branch on their number.
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Words {
-    Few([u64; FEW]),
-    Many(Box<[u64]>),
+    Inline([u64; INLINE_WORDS]),
+    Boxed(Box<[u64]>),
 }
 
-/// Words that need no memory of their own.
-const FEW: usize = 2;
+/// Number of words that are stored without an allocation.
+const INLINE_WORDS: usize = 2;
 
 impl Default for Words {
     fn default() -> Self {
-        Self::Few([0; FEW])
+        Self::Inline([0; INLINE_WORDS])
     }
 }
 
 impl Packed {
     fn new(words: usize) -> Self {
-        Self(if words <= FEW { Words::default() } else { Words::Many(vec![0; words].into()) })
+        Self(if words <= INLINE_WORDS { Words::default() } else { Words::Boxed(vec![0; words].into()) })
     }
 
     fn words(&self) -> &[u64] {
         match &self.0 {
-            Words::Few(words) => words,
-            Words::Many(words) => words,
+            Words::Inline(words) => words,
+            Words::Boxed(words) => words,
         }
     }
 
     fn words_mut(&mut self) -> &mut [u64] {
         match &mut self.0 {
-            Words::Few(words) => words,
-            Words::Many(words) => words,
+            Words::Inline(words) => words,
+            Words::Boxed(words) => words,
         }
     }
 }
@@ -51,7 +52,7 @@ impl Hash for Packed {
     }
 }
 
-/// What becomes of a word of a state.
+/// A change of one word of a state: clears some bits, then sets some.
 #[derive(Debug, Clone, Copy)]
 pub struct Edit {
     word: u32,
@@ -60,12 +61,12 @@ pub struct Edit {
 }
 
 impl Edit {
-    /// Whether both change the same word.
+    /// Returns `true` if both edits change the same word.
     pub const fn joins(&self, other: &Self) -> bool {
         self.word == other.word
     }
 
-    /// Makes another change of the same word, too.
+    /// Appends a later edit of the same word.
     pub const fn join(&mut self, after: &Self) {
         self.clear |= after.clear;
         self.set = self.set & !after.clear | after.set;
@@ -73,7 +74,7 @@ impl Edit {
 }
 
 impl Packed {
-    /// Makes changes to it.
+    /// Applies edits.
     pub fn edit(&mut self, edits: &[Edit]) {
         let words = self.words_mut();
         for Edit { word, clear, set } in edits {
@@ -83,26 +84,26 @@ impl Packed {
     }
 }
 
-/// The places of some variables, which take no more than 64 bits.
+/// The positions of some variables whose values together fit in 64 bits.
 #[derive(Debug, Clone, Default)]
 pub struct Key {
     pieces: Vec<Piece>,
-    /// How many bits they take.
+    /// Number of bits of all values.
     pub bits: u32,
 }
 
-/// Bits that lie side by side.
+/// Contiguous bits of a word.
 #[derive(Debug, Clone, Copy)]
 struct Piece {
     word: u32,
     shift: u32,
     mask: u64,
-    /// Where they begin in the number that is made of them.
+    /// Position of the bits in the key.
     at: u32,
 }
 
 impl Key {
-    /// The values of the variables as a number.
+    /// Concatenates the values of the variables to a number.
     pub fn of(&self, packed: &Packed) -> u64 {
         let words = packed.words();
         self.pieces.iter().fold(0, |number, piece| {
@@ -111,28 +112,29 @@ impl Key {
     }
 }
 
-/// The values of the variables, truth values as 0 and 1.
+/// Values of the variables; truth values are 0 and 1.
 pub type Valuation = Vec<i64>;
 
-/// How far a value is above the least one of its range; more than there are positions in any list, where it is below.
+/// Distance of a value from the least value of its range; `usize::MAX`, which is no valid index, if the value is less.
 pub fn above_least(value: i64, least: i64) -> usize {
     if value < least { usize::MAX } else { usize::try_from(value.abs_diff(least)).unwrap_or(usize::MAX) }
 }
 
-/// Where each variable lies.
+/// The position of each variable in a packed state.
 #[derive(Debug, Clone, Default)]
 pub struct Layout {
     fields: Vec<Field>,
     words: usize,
+    /// Number of used bits in the last word.
     used: u32,
-    /// The variables, greatest range first.
+    /// The variables, by descending size of their ranges.
     order: Vec<u32>,
 }
 
 #[derive(Debug, Clone, Copy)]
 struct Field {
     least: i64,
-    /// Above the least one.
+    /// Greatest value minus least value.
     greatest: u64,
     word: u32,
     shift: u32,
@@ -161,7 +163,7 @@ impl Layout {
         self.order.sort_by_key(|number| std::cmp::Reverse(self.fields[*number as usize].greatest));
     }
 
-    /// Packs values, each in its range.
+    /// Packs values; each must be in its range.
     pub fn pack(&self, values: &[i64]) -> Packed {
         let mut packed = Packed::new(self.words);
         let words = packed.words_mut();
@@ -171,34 +173,35 @@ impl Layout {
         packed
     }
 
-    /// The values of all variables.
+    /// Returns the values of all variables.
     pub fn values(&self, packed: &Packed) -> impl Iterator<Item = i64> {
         self.fields.iter().map(|field| field.least.wrapping_add_unsigned(field.raw(packed)))
     }
 
-    /// Unpacks all values into a buffer.
+    /// Writes the values of all variables to a buffer.
     pub fn unpack(&self, packed: &Packed, values: &mut Valuation) {
         values.clear();
         values.extend(self.values(packed));
     }
 
-    /// Changes one variable.
+    /// Sets one variable.
     pub fn set(&self, packed: &mut Packed, variable: u32, value: i64) {
         packed.edit(&[self.edit(variable, value)]);
     }
 
-    /// A change of one variable.
+    /// Returns the edit that sets one variable.
     pub fn edit(&self, variable: u32, value: i64) -> Edit {
         let field = &self.fields[variable as usize];
         let set = value.abs_diff(field.least) << field.shift;
         Edit { word: field.word, clear: field.mask << field.shift, set }
     }
 
-    /// Where some variables lie; none where their values together take more than 64 bits.
+    /// Returns the key of some variables, or `None` if their values together need more than 64 bits.
     pub fn key(&self, variables: &BTreeSet<u32>) -> Option<Key> {
         let mut key = Key::default();
         for field in variables.iter().map(|variable| &self.fields[*variable as usize]) {
             let bits = field.mask.count_ones();
+            // Adjacent variables of one word are read together.
             if let Some(last) = key.pieces.last_mut()
                 && last.word == field.word
                 && last.shift.saturating_add(last.mask.count_ones()) == field.shift
@@ -213,12 +216,13 @@ impl Layout {
         (key.bits <= 64).then_some(key)
     }
 
-    /// How many combinations of values there are, if they can be counted.
+    /// Number of combinations of values, or `None` if it exceeds `usize`.
     pub fn codes(&self) -> Option<usize> {
         self.fields.iter().try_fold(1_usize, |product, field| product.checked_mul(field.size()?))
     }
 
-    /// The number of a combination, which means nothing where they cannot be counted; the variable with the greatest range weighs most.
+    /// Number of a state in mixed radix; the variable with the greatest range is the most significant digit.
+    /// Meaningless if [`Self::codes`] is `None`.
     pub fn code(&self, packed: &Packed) -> usize {
         self.order.iter().fold(0, |code, number| {
             let field = &self.fields[*number as usize];
@@ -233,7 +237,7 @@ impl Field {
         packed.words()[self.word as usize] >> self.shift & self.mask
     }
 
-    /// How many values there are.
+    /// Number of values in the range.
     fn size(&self) -> Option<usize> {
         usize::try_from(self.greatest).ok()?.checked_add(1)
     }

@@ -1,4 +1,4 @@
-//! A syntax tree to text that PRISM and Storm read.
+//! Writes models in the PRISM language.
 
 use std::fmt::Write as _;
 
@@ -9,7 +9,7 @@ use num_traits::{One, Signed};
 use crate::prism::ast::{Expr, ExprKind, Model, ModelKind, Variable};
 use crate::prism::reserved::is_reserved;
 
-/// A model as text.
+/// Formats a model as text that PRISM and Storm can read.
 pub fn write(model: &Model) -> String {
     let mut text = String::new();
     for line in model.remark.lines() {
@@ -89,42 +89,43 @@ fn variable(variable: &Variable) -> String {
     format!("{} : {range}{};", variable.name, initial.unwrap_or_default())
 }
 
-/// An expression as text, with parentheses where they are needed.
+/// Formats an expression, with parentheses where the precedence of operators requires them.
 pub fn expression(expression: &Expr) -> String {
-    strong(expression, 0)
+    operand(expression, 0)
 }
 
+/// Formats an expression as an operand of an operator with the given precedence.
 #[expect(clippy::arithmetic_side_effects, reason = "strengths are below 20")]
-fn strong(expression: &Expr, least: u8) -> String {
+fn operand(expression: &Expr, least: u8) -> String {
     let (text, strength) = match &expression.kind {
         ExprKind::Bool(value) => (value.to_string(), 20),
         ExprKind::Int(value) => (value.to_string(), if *value < 0 { 11 } else { 20 }),
         ExprKind::Number(value) => decimal(value),
         ExprKind::Name(name) => (name.clone(), 20),
         ExprKind::Label(label) => (format!("\"{label}\""), 20),
-        ExprKind::Not(inner) => (format!("!{}", strong(inner, 12)), 6),
-        ExprKind::Negative(inner) => (format!("-{}", strong(inner, 12)), 11),
+        ExprKind::Not(inner) => (format!("!{}", operand(inner, 12)), 6),
+        ExprKind::Negative(inner) => (format!("-{}", operand(inner, 12)), 11),
         ExprKind::Binary(op, left, right) => {
             let (sign, strength) = op.sign();
             let space = if strength <= 4 { " " } else { "" };
-            let left = strong(left, strength);
-            (format!("{left}{space}{sign}{space}{}", strong(right, strength + 1)), strength)
+            let left = operand(left, strength);
+            (format!("{left}{space}{sign}{space}{}", operand(right, strength + 1)), strength)
         }
         ExprKind::If(condition, then, otherwise) => {
-            let condition = strong(condition, 2);
-            (format!("{condition} ? {} : {}", strong(then, 2), strong(otherwise, 2)), 1)
+            let condition = operand(condition, 2);
+            (format!("{condition} ? {} : {}", operand(then, 2), operand(otherwise, 2)), 1)
         }
         ExprKind::Call(function, arguments) => {
-            let arguments: Vec<_> = arguments.iter().map(|argument| strong(argument, 0)).collect();
+            let arguments: Vec<_> = arguments.iter().map(|argument| operand(argument, 0)).collect();
             (format!("{}({})", function.name(), arguments.join(",")), 20)
         }
-        // They stand in no model.
+        // Models contain no properties.
         ExprKind::Property(_) | ExprKind::Temporal(_) => ("true".to_owned(), 20),
     };
     if strength < least { format!("({text})") } else { text }
 }
 
-/// A rational as a decimal if it is one, else as a fraction; with how strongly the text binds.
+/// Formats a rational as a decimal if it has at most 30 places, else as a fraction. Also returns the precedence of the text.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "at most 30 places, and digits are padded to more than there are places"
@@ -145,7 +146,7 @@ pub(crate) fn decimal(value: &BigRational) -> (String, u8) {
     (format!("{}/{}", value.numer(), value.denom()), 10)
 }
 
-/// A name that PRISM accepts, made from any name: other characters become `_`, and `_` is added to reserved words.
+/// Converts any name to a name that PRISM accepts: other characters become `_`, and `_` is added to reserved words.
 pub fn identifier(name: &str) -> String {
     let mut text: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
     if text.is_empty() || text.starts_with(|c: char| c.is_ascii_digit()) {

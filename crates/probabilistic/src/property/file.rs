@@ -1,53 +1,53 @@
-//! A file of properties to its properties, and what it declares.
+//! Parses files of properties with their declarations.
 
 use crate::error::{Error, Place};
 use crate::prism::ast::{Constant, Named, Property};
 use crate::prism::expression::{Cursor, Read};
 use crate::prism::lexer::{Kind, tokens};
 use crate::prism::{constant_declaration, named_expression};
-use crate::property::grammar::{BESIDES, property};
+use crate::property::grammar::{PROPERTY_SYNTAX, property};
 
-/// A file of properties: what it declares besides, and the properties in their order.
+/// A file of properties: its declarations, and its properties in order.
 #[derive(Debug, Clone, Default)]
 pub struct File {
-    /// Constants and labels, and which of the properties have names.
+    /// Constants, labels and named properties.
     pub declarations: Declarations,
     /// The properties.
     pub properties: Vec<Listed>,
 }
 
-/// What a file of properties declares, which its properties know besides what the model declares.
+/// Declarations of a property file, which its properties can use in addition to those of the model.
 #[derive(Debug, Clone, Default)]
 pub struct Declarations {
-    /// Constants, which may be left open.
+    /// Constants, possibly undefined.
     pub constants: Vec<Constant>,
     /// Labels.
     pub labels: Vec<Named>,
-    /// Properties with their names, which others may use as parts: `1 - "hit"`. A label that has the same name is meant before.
+    /// Named properties, which other properties can use: `1 - "hit"`. A label with the same name takes precedence.
     pub properties: Vec<(String, Property)>,
 }
 
 /// A property of a file.
 #[derive(Debug, Clone)]
 pub struct Listed {
-    /// Its name, if it has one.
+    /// The name, if it has one.
     pub name: Option<String>,
     /// The property.
     pub property: Property,
-    /// How it is written, without its name.
+    /// The text, without the name.
     pub text: String,
-    /// Where it starts.
+    /// Position of the property.
     pub place: Place,
 }
 
-/// Reads a file of properties, with its constants and labels.
+/// Parses a file of properties, constants and labels.
 ///
 /// # Errors
-/// All that is wrong with it; after a wrong property, reading goes on behind the next `;`. What is read, but not handled, is a property
-/// that is refused when it is checked.
+/// All syntax errors; after an error, parsing continues after the next `;`. A property of an unsupported kind is not an
+/// error: it becomes [`Property::Refused`], which is reported when the property is checked.
 pub fn parse_file(text: &str) -> Result<File, Error> {
     let tokens = tokens(text).map_err(|problems| Error::Property(problems.into()))?;
-    let mut cursor = Cursor::of_properties(&tokens, BESIDES);
+    let mut cursor = Cursor::for_properties(&tokens, PROPERTY_SYNTAX);
     let (mut file, mut problems) = (File::default(), Vec::new());
     while *cursor.peek() != Kind::End {
         if cursor.take(";") {
@@ -74,8 +74,8 @@ fn entry(cursor: &mut Cursor<'_>, text: &str, file: &mut File) -> Read<()> {
         return Ok(());
     }
     let mut name = None;
-    if let (Kind::Quoted(found), Kind::Sign(":")) = (cursor.peek(), cursor.peek_at(1)) {
-        name = Some(found.clone());
+    if let (Kind::Quoted(quoted), Kind::Sign(":")) = (cursor.peek(), cursor.peek_at(1)) {
+        name = Some(quoted.clone());
         cursor.advance();
         cursor.advance();
     }
@@ -85,23 +85,23 @@ fn entry(cursor: &mut Cursor<'_>, text: &str, file: &mut File) -> Read<()> {
     let property = match property(cursor) {
         Err(problem) if problem.code == "Q403" => {
             cursor.back_to(start);
-            leave_out(cursor);
+            skip_property(cursor);
             Property::Refused(problem)
         }
         read => read?,
     };
     let end = if *cursor.peek() == Kind::End { text.len() } else { position(text, cursor.place()) };
-    // A remark that stands between this property and the next is none of it.
-    let written = text[begin..end].split("//").next().unwrap_or("").trim().to_owned();
+    // A comment between this property and the next one is not part of it.
+    let source = text[begin..end].split("//").next().unwrap_or("").trim().to_owned();
     if let Some(name) = &name {
         file.declarations.properties.push((name.clone(), property.clone()));
     }
-    file.properties.push(Listed { name, property, text: written, place });
+    file.properties.push(Listed { name, property, text: source, place });
     Ok(())
 }
 
-/// Goes to the end of a property that is not handled: `;`, or brackets that close and something that goes on with nothing.
-fn leave_out(cursor: &mut Cursor<'_>) {
+/// Skips an unsupported property: to `;`, or to a closing bracket after which a new property begins.
+fn skip_property(cursor: &mut Cursor<'_>) {
     let mut open = 0_usize;
     loop {
         match cursor.peek() {
@@ -119,7 +119,7 @@ fn leave_out(cursor: &mut Cursor<'_>) {
     }
 }
 
-/// The position of a place in a text, in bytes.
+/// Converts a position to a byte offset.
 fn position(text: &str, place: Place) -> usize {
     let lines = text.split_inclusive('\n').take(place.line.saturating_sub(1));
     let before = lines.map(str::len).fold(0, usize::saturating_add);

@@ -1,20 +1,20 @@
-//! The text of a property to its syntax tree.
+//! Parses properties.
 
 use crate::error::{Diagnostic, Error, Place};
 use crate::prism::ast::{
     BinaryOp, Expr, ExprKind, Filter, Path, Property, Question, RewardPath, StepBound, Steps, Temporal,
 };
-use crate::prism::expression::{Besides, Cursor, Read};
+use crate::prism::expression::{Cursor, PropertySyntax, Read};
 use crate::prism::lexer::{Kind, tokens};
 use crate::solve::Direction;
 
-/// What is expected where a property begins.
+/// The description of a property in messages.
 const PROPERTY: &str = "a property (`Pmax=? [ F … ]`, `R{\"name\"}min=? [ F … ]`)";
 
-/// What properties have besides the expressions of models.
-pub const BESIDES: Besides = Besides { start, go_on };
+/// Parsers of the syntax of properties.
+pub const PROPERTY_SYNTAX: PropertySyntax = PropertySyntax { parse_prefix, parse_infix };
 
-/// The filters by their names.
+/// The filters by name; the last one is an alias.
 const FILTERS: [(&str, Filter); 15] = [
     ("min", Filter::Min),
     ("max", Filter::Max),
@@ -33,14 +33,14 @@ const FILTERS: [(&str, Filter); 15] = [
     ("average", Filter::Average),
 ];
 
-/// Reads a property.
+/// Parses a property.
 ///
 /// # Errors
-/// What is wrong with it.
+/// The first syntax error, or the first unsupported construct.
 pub fn parse(text: &str) -> Result<Property, Error> {
     let tokens = tokens(text).map_err(|problems| Error::Property(problems.into()))?;
-    let mut cursor = Cursor::of_properties(&tokens, BESIDES);
-    let read = property(&mut cursor).and_then(|property| {
+    let mut cursor = Cursor::for_properties(&tokens, PROPERTY_SYNTAX);
+    let result = property(&mut cursor).and_then(|property| {
         cursor.take(";");
         if *cursor.peek() == Kind::End {
             Ok(property)
@@ -48,10 +48,10 @@ pub fn parse(text: &str) -> Result<Property, Error> {
             Err(cursor.expected("the end of the property"))
         }
     });
-    read.map_err(|problem| Error::Property(problem.into()))
+    result.map_err(|problem| Error::Property(problem.into()))
 }
 
-/// Reads a property, up to what does not belong to it.
+/// Parses a property up to the first token that does not belong to it.
 pub fn property(cursor: &mut Cursor<'_>) -> Read<Property> {
     if !matches!(
         cursor.peek(),
@@ -60,9 +60,9 @@ pub fn property(cursor: &mut Cursor<'_>) -> Read<Property> {
         return Err(cursor.expected(PROPERTY));
     }
     let mut expression = cursor.expression()?;
-    // In a file the next property may begin with this letter; no property is of the operator.
+    // In a file, the next property may begin with `R`. No complete property is an operand of the operator `R`.
     if !cursor.is_word("R") {
-        expression = go_on(cursor, expression)?;
+        expression = parse_infix(cursor, expression)?;
     }
     Ok(match expression.kind {
         ExprKind::Property(property) => *property,
@@ -75,8 +75,8 @@ pub fn property(cursor: &mut Cursor<'_>) -> Read<Property> {
     })
 }
 
-/// A property, or a temporal operator with one side.
-fn start(cursor: &mut Cursor<'_>) -> Read<Option<ExprKind>> {
+/// Parses a property or a unary temporal operator.
+fn parse_prefix(cursor: &mut Cursor<'_>) -> Read<Option<ExprKind>> {
     let Kind::Name(word) = cursor.peek() else { return Ok(None) };
     let place = cursor.place();
     let property = match word.as_str() {
@@ -108,8 +108,8 @@ fn start(cursor: &mut Cursor<'_>) -> Read<Option<ExprKind>> {
     Ok(Some(ExprKind::Property(Box::new(property))))
 }
 
-/// An operator with two sides, of which the left one was read.
-fn go_on(cursor: &mut Cursor<'_>, left: Expr) -> Read<Expr> {
+/// Parses a binary temporal operator after its left operand.
+fn parse_infix(cursor: &mut Cursor<'_>, left: Expr) -> Read<Expr> {
     let letter = match cursor.peek() {
         Kind::Name(word) if word == "U" => 'U',
         Kind::Name(word) if word == "W" => 'W',
@@ -143,13 +143,13 @@ fn probability(cursor: &mut Cursor<'_>, suffix: &str) -> Read<Property> {
     cursor.advance();
     let question = question(cursor, suffix)?;
     cursor.need("[")?;
-    let written = cursor.expression()?;
-    let written = go_on(cursor, written)?;
-    let path = path(written)?;
+    let formula = cursor.expression()?;
+    let formula = parse_infix(cursor, formula)?;
+    let path = path(formula)?;
     filtered(cursor, Property::Probability(question, path), place)
 }
 
-/// The reward structure that is asked for, `{"name"}`, if one is.
+/// Parses the reward structure of a query, `{"name"}`, if there is one.
 fn reward_name(cursor: &mut Cursor<'_>) -> Read<Option<String>> {
     if !cursor.take("{") {
         return Ok(None);
@@ -173,7 +173,7 @@ fn reward(cursor: &mut Cursor<'_>, suffix: &str) -> Read<Property> {
     filtered(cursor, Property::Reward(question, name, path), place)
 }
 
-/// The end of an operator: `]`, and in the old form the states that are asked for, `{states}{min}]`.
+/// Parses the end of an operator: `]`, or the old form with a filter, `{states}{min}]`.
 fn filtered(cursor: &mut Cursor<'_>, property: Property, place: Place) -> Read<Property> {
     if !cursor.take("{") {
         cursor.need("]")?;
@@ -201,12 +201,12 @@ fn filter(cursor: &mut Cursor<'_>) -> Read<Property> {
     cursor.advance();
     cursor.need("(")?;
     let signs = [("+", Filter::Sum), ("&", Filter::ForAll), ("|", Filter::Exists)];
-    let known = match cursor.peek() {
+    let entry = match cursor.peek() {
         Kind::Name(word) => FILTERS.iter().find(|(name, _)| name == word),
         Kind::Sign(sign) => signs.iter().find(|(name, _)| name == sign),
         _ => None,
     };
-    let Some((_, filter)) = known else {
+    let Some((_, filter)) = entry else {
         let names: Vec<_> = FILTERS.iter().take(14).map(|(name, _)| *name).collect();
         return Err(cursor.expected(&format!("a filter ({})", names.join(", "))));
     };
@@ -248,7 +248,7 @@ fn question(cursor: &mut Cursor<'_>, suffix: &str) -> Read<Question> {
     Ok(Question { direction, bound: None })
 }
 
-/// The bounds of a temporal operator, if it has any.
+/// Parses the bounds of a temporal operator, if there are any.
 fn steps(cursor: &mut Cursor<'_>) -> Read<Option<Steps>> {
     if cursor.take("^") {
         cursor.need("{")?;
@@ -258,10 +258,10 @@ fn steps(cursor: &mut Cursor<'_>) -> Read<Option<Steps>> {
         }
         cursor.advance();
         let name = reward_name(cursor)?;
-        let found = one_sided(cursor, any_number)?;
+        let steps = one_sided(cursor, any_number)?;
         cursor.need("}")?;
-        let found = found.ok_or_else(|| cursor.expected("a bound (`<=10`)"))?;
-        return Ok(Some(Steps { reward: Some(name), ..found }));
+        let steps = steps.ok_or_else(|| cursor.expected("a bound (`<=10`)"))?;
+        return Ok(Some(Steps { reward: Some(name), ..steps }));
     }
     if cursor.take("[") {
         let least = cursor.expression()?;
@@ -290,12 +290,13 @@ fn one_sided(cursor: &mut Cursor<'_>, limit: impl Fn(&mut Cursor<'_>) -> Read<Ex
     Ok(None)
 }
 
-/// Any expression, where a bracket ends it.
+/// Parses a bound that ends at a bracket: any expression.
 fn any_number(cursor: &mut Cursor<'_>) -> Read<Expr> {
     cursor.expression()
 }
 
-/// `F<=10 "goal"`: the number ends before the state formula; in parentheses it can be any expression.
+/// Parses a bound on the number of steps, as in `F<=10 "goal"`. It ends before the state formula: a number or a name,
+/// or any expression in parentheses.
 fn number_of_steps(cursor: &mut Cursor<'_>) -> Read<Expr> {
     let place = cursor.place();
     match cursor.peek() {
@@ -315,13 +316,13 @@ fn number_of_steps(cursor: &mut Cursor<'_>) -> Read<Expr> {
     }
 }
 
-/// A path, of those that need no automaton.
-fn path(written: Expr) -> Read<Path> {
-    let place = written.place;
-    if !has_temporal(&written) {
-        return Ok(Path::State(written));
+/// Converts an expression to a path formula that needs no automaton.
+fn path(formula: Expr) -> Read<Path> {
+    let place = formula.place;
+    if !has_temporal(&formula) {
+        return Ok(Path::State(formula));
     }
-    match written.kind {
+    match formula.kind {
         ExprKind::Not(inner) => Ok(Path::Not(Box::new(path(*inner)?))),
         ExprKind::Temporal(temporal) => {
             let Temporal { letter, steps, left, right } = *temporal;
@@ -340,7 +341,7 @@ fn path(written: Expr) -> Read<Path> {
     }
 }
 
-/// `G F`, `F G`, and the same operator twice.
+/// Converts `G F`, `F G`, and two equal operators.
 fn nested(letter: char, steps: Option<&Steps>, right: Expr, place: Place) -> Read<Path> {
     let ExprKind::Temporal(inner) = right.kind else { return Err(ltl(place)) };
     if steps.is_some() || inner.steps.is_some() || has_temporal(&inner.right) {
@@ -361,7 +362,7 @@ fn ltl(place: Place) -> Diagnostic {
     Diagnostic::new("Q403", place, text)
 }
 
-/// Whether there is a temporal operator in an expression, apart from those in the brackets of a property in it.
+/// Returns `true` if an expression contains a temporal operator outside the properties in it.
 fn has_temporal(expression: &Expr) -> bool {
     match &expression.kind {
         ExprKind::Temporal(_) => true,
@@ -396,9 +397,9 @@ fn reward_path(cursor: &mut Cursor<'_>) -> Read<RewardPath> {
     if cursor.take_word("S") {
         return Ok(RewardPath::LongRun);
     }
-    let written = cursor.expression()?;
-    let written = go_on(cursor, written)?;
-    match path(written) {
+    let formula = cursor.expression()?;
+    let formula = parse_infix(cursor, formula)?;
+    match path(formula) {
         Ok(Path::Until(left, goal, None)) if left.kind == ExprKind::Bool(true) => Ok(RewardPath::Reach(goal)),
         _ => {
             let text =

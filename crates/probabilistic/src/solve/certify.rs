@@ -1,10 +1,10 @@
-//! The values that policy iteration found to how far they can be from the truth.
+//! Bounds the error of the values that policy iteration has found.
 //!
-//! Let w count the expected steps under the policies that are almost optimal. If v + δw does not increase by any
-//! choice's equation (greatest value), or v − δw does not decrease (least value), then it bounds the value from that
-//! side, because repeating the equation only improves it (the inductive argument of Hartmanns and Kaminski, Optimistic
-//! Value Iteration, CAV 2020). On the other side the found policy itself is a bound, and the same δw covers it. All is
-//! checked with rounding errors added; where the check fails, the error is infinite, which is honest if useless.
+//! Let w be the expected number of steps under the almost optimal policies. If no equation increases v + δw (greatest
+//! value) or decreases v − δw (least value), it bounds the value from that side, because repeated application only
+//! improves it (the inductive argument of Hartmanns and Kaminski, Optimistic Value Iteration, CAV 2020). From the other
+//! side, the policy itself is a bound, and the same δw covers it. All checks include rounding errors. If they fail, the
+//! error is infinite.
 
 use crate::mdp::dense;
 use crate::number::{Number, count};
@@ -13,18 +13,18 @@ use crate::solve::problem::Direction;
 use crate::solve::quotient::Quotient;
 use crate::solve::work::Work;
 
-/// Rounds of policy iteration for the longest way.
-const ROUNDS: usize = 200;
+/// Upper limit on the rounds of policy iteration for the greatest number of steps.
+const MAX_ROUNDS: usize = 200;
 
 /// Sweeps between two solutions of a chain.
 const SWEEPS: usize = 10;
 
-/// The relative error of evaluating a row that was made of so many transitions.
+/// Relative error of evaluating a row that was built from at most `widest` transitions.
 pub fn rounding(widest: usize) -> f64 {
     (64.0 + 3.0 * count(widest)) * f64::EPSILON
 }
 
-/// For each block how far its value can be from the truth, apart from errors outside the component.
+/// Bounds the absolute error of each block, apart from errors outside the component.
 pub fn certify<N: Number>(
     quotient: &Quotient<N>,
     policy: &[u32],
@@ -36,17 +36,17 @@ pub fn certify<N: Number>(
     let rows: Vec<f64> =
         (0..quotient.choices.len()).map(|row| quotient.rows.apply(row, values).to_f64()).collect();
     let relative = rounding(quotient.widest);
-    let own_error = |row: usize| relative * rows[row];
-    // How much worse a row is than the value that was found; negative where rounding makes it better.
+    let row_error = |row: usize| relative * rows[row];
+    // Loss of a row against the computed value of its block; negative if rounding makes the row better.
     let loss = |block: usize, row: usize| match direction {
         Direction::Min => rows[row] - v[block],
         Direction::Max => v[block] - rows[row],
     };
     if blocks == 1 {
-        // Each row is worth what it is worth alone; one that is better by less than rounding may not have been taken.
+        // With one block, each row has its own value. A row that is better by less than rounding may not have been selected.
         let (better, rounding) = (0..rows.len()).fold((0.0_f64, 0.0_f64), |(better, rounding), row| {
             let near = loss(0, row) <= v[0];
-            (better.max(-loss(0, row)), if near { rounding.max(own_error(row)) } else { rounding })
+            (better.max(-loss(0, row)), if near { rounding.max(row_error(row)) } else { rounding })
         });
         return vec![better + rounding];
     }
@@ -56,12 +56,12 @@ pub fn certify<N: Number>(
         };
         let near = (0..blocks).flat_map(|block| quotient.range(block).map(move |row| (block, row)));
         let near: Vec<bool> = near.map(|(block, row)| is_near(block, row)).collect();
-        let Some(steps) = longest(quotient, policy, &near) else { continue };
-        let own_rounding = |block: usize| 4.0 * f64::EPSILON * v[block];
+        let Some(steps) = greatest_steps(quotient, policy, &near) else { continue };
+        let value_rounding = |block: usize| 4.0 * f64::EPSILON * v[block];
         let mut delta = 0.0_f64;
         for (block, chosen) in policy.iter().enumerate() {
             for row in quotient.range(block).filter(|row| near[*row]) {
-                let rounding = own_error(row) + own_rounding(block);
+                let rounding = row_error(row) + value_rounding(block);
                 delta = delta.max(rounding - loss(block, row));
                 if *chosen as usize == row {
                     delta = delta.max(rounding + loss(block, row));
@@ -71,9 +71,10 @@ pub fn certify<N: Number>(
         delta *= 2.0;
         let holds = (0..blocks).all(|block| {
             quotient.range(block).all(|row| {
-                let after = after(quotient, row, &steps);
-                let growth = delta * (after - steps[block]) + delta * 1e-9 * (after + steps[block]);
-                loss(block, row) - own_error(row) - own_rounding(block) >= growth
+                let steps_after = steps_after(quotient, row, &steps);
+                let growth =
+                    delta * (steps_after - steps[block]) + delta * 1e-9 * (steps_after + steps[block]);
+                loss(block, row) - row_error(row) - value_rounding(block) >= growth
             })
         });
         if holds {
@@ -83,18 +84,18 @@ pub fn certify<N: Number>(
     vec![f64::INFINITY; blocks]
 }
 
-/// Expected steps after a row, where those of the blocks are known.
-fn after<N: Number>(quotient: &Quotient<N>, row: usize, steps: &[f64]) -> f64 {
+/// Expected number of steps after a row, given those from the blocks.
+fn steps_after<N: Number>(quotient: &Quotient<N>, row: usize, steps: &[f64]) -> f64 {
     let range = quotient.rows.range(row);
     let transitions = quotient.rows.columns[range.clone()].iter().zip(&quotient.rows.probabilities[range]);
     transitions.map(|(column, probability)| probability.to_f64() * steps[*column as usize]).sum()
 }
 
-/// Expected steps, at most, by rows that are near the best ones.
-fn longest<N: Number>(quotient: &Quotient<N>, policy: &[u32], near: &[bool]) -> Option<Vec<f64>> {
+/// Greatest expected number of steps with rows that are near the best ones.
+fn greatest_steps<N: Number>(quotient: &Quotient<N>, policy: &[u32], near: &[bool]) -> Option<Vec<f64>> {
     let rows = &quotient.rows;
     let mut policy = policy.to_vec();
-    for _ in 0..ROUNDS {
+    for _ in 0..MAX_ROUNDS {
         let chain = Chain { rows, policy: &policy, costs: Some(N::one()) };
         let steps = chain.solve(&mut Work::new(0))?.values;
         let mut steps: Vec<f64> = steps.iter().map(Number::to_f64).collect();
@@ -115,12 +116,13 @@ fn longest<N: Number>(quotient: &Quotient<N>, policy: &[u32], near: &[bool]) -> 
     None
 }
 
-/// Takes rows by which it takes longer, and writes how long; whether any was taken.
+/// Switches to rows with more steps, and writes their steps. Returns `true` if a row was switched.
 fn lengthen<N: Number>(quotient: &Quotient<N>, near: &[bool], policy: &mut [u32], steps: &mut [f64]) -> bool {
     let mut changed = false;
     for (block, chosen) in policy.iter_mut().enumerate() {
         for row in quotient.range(block).filter(|row| near[*row]) {
-            let longer = after(quotient, row, steps) + 1.0;
+            let longer = steps_after(quotient, row, steps) + 1.0;
+            // The margin prevents endless switches between rows that are equal up to rounding.
             if *chosen as usize != row && longer > steps[block] + 0.01 {
                 steps[block] = longer;
                 *chosen = dense(row);

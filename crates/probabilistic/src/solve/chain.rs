@@ -1,15 +1,15 @@
-//! A Markov chain with costs to the expected cost from each state, without iteration.
+//! Solves a Markov chain with costs directly: the expected cost from each state.
 //!
-//! x(i) = c(i) + Σ p(i,j) x(j). Components in topological order; inside one, states are eliminated one after the other.
-//! The pivot 1 − p(i,i) is the sum of what leaves the state (Grassmann, Taksar and Heyman, Operations Research
-//! 33(5), 1985), so nothing is ever subtracted: with doubles each result has a small *relative* error, however rarely
-//! the chain is left.
+//! x(i) = c(i) + Σ p(i,j) x(j). Components are solved in reverse topological order; inside a component, states are
+//! eliminated one after another. The pivot 1 − p(i,i) is computed as the sum of the probabilities of leaving the state
+//! (Grassmann, Taksar and Heyman, Operations Research 33(5), 1985), so nothing is ever subtracted: in doubles, each
+//! result has a small *relative* error, however small the probability of leaving the chain.
 //!
-//! How small follows from two facts. A step of elimination computes each entry of what remains by a few sums, products and
-//! quotients of positive numbers, so that it is the exact step from entries that are off by a factor near 1. And a value
-//! is a quotient of two polynomials with positive coefficients whose degree is the number of states that remain (the
-//! matrix-tree theorem; O'Cinneide, Numerische Mathematik 73, 1996), so that such factors come out once for each state, above and
-//! below.
+//! The bound on this error follows from two facts. An elimination step computes each remaining entry by a few sums,
+//! products and quotients of positive numbers, so that it is the exact step from entries that are perturbed by a factor
+//! near 1. And a value is a quotient of two polynomials with positive coefficients whose degree is the number of remaining
+//! states (the matrix-tree theorem; O'Cinneide, Numerische Mathematik 73, 1996). Each perturbation therefore occurs at
+//! most once per state in the numerator and once in the denominator.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -19,26 +19,26 @@ use crate::mdp::dense;
 use crate::number::{Number, count};
 use crate::solve::work::Work;
 
-/// No number.
+/// Marks the absence of a row, choice or state.
 pub const NONE: u32 = u32::MAX;
 
-/// Rows of a chain: where a state leads inside, what it costs, and with which probability it leaves for good.
+/// Rows of a chain: transitions inside the component, cost, and probability of leaving the component.
 #[derive(Debug, Clone, Default)]
 pub struct Rows<N> {
-    /// Where each row starts in `columns`, and the end.
+    /// Start of each row in `columns`, and the end.
     pub first: Vec<u32>,
-    /// Targets of the rows.
+    /// Targets of the transitions.
     pub columns: Vec<u32>,
-    /// Their probabilities.
+    /// Probabilities of the transitions.
     pub probabilities: Vec<N>,
-    /// The cost of each row, values of the states outside included.
+    /// Cost of each row, including the values of successors outside the component.
     pub constants: Vec<N>,
-    /// The probability of leaving for good.
+    /// Probability of leaving the component.
     pub leaving: Vec<N>,
 }
 
 impl<N: Number> Rows<N> {
-    /// No rows.
+    /// Creates an empty list of rows.
     pub fn new() -> Self {
         Self {
             first: vec![0],
@@ -52,12 +52,12 @@ impl<N: Number> Rows<N> {
         }
     }
 
-    /// How many rows there are.
+    /// Number of rows.
     pub fn len(&self) -> usize {
         self.constants.len()
     }
 
-    /// The entries of a row.
+    /// Returns the positions of the entries of a row.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "the start of the next one is there, because the end is listed, too"
@@ -66,26 +66,27 @@ impl<N: Number> Rows<N> {
         self.first[row] as usize..self.first[row + 1] as usize
     }
 
-    /// Ends the row that is being written.
+    /// Ends the current row.
     pub fn end(&mut self, constant: N, leaving: N) {
         self.first.push(dense(self.columns.len()));
         self.constants.push(constant);
         self.leaving.push(leaving);
     }
 
-    /// Writes a row, whose entries are told, in the place `to`, which is at or before its own, with the loop at `own` divided
-    /// out. False, and nothing is written, if it never leaves. Rows behind keep their ends, and not their beginnings.
-    pub fn keep_unlooped(
+    /// Moves a row with the given entries to position `to`, which is at or before its own, and divides the loop at column
+    /// `loop_column` out. Returns `false` and writes nothing if the row is never left. Later rows keep their ends, but not
+    /// their starts.
+    pub fn move_without_loop(
         &mut self,
         row: usize,
         entries: std::ops::Range<usize>,
         to: usize,
-        own: u32,
+        loop_column: u32,
     ) -> bool {
         let mut end = self.first[to] as usize;
         let (begin, mut loops, mut leaves) = (end, false, self.leaving[row].clone());
         for at in entries {
-            if self.columns[at] == own {
+            if self.columns[at] == loop_column {
                 loops = true;
                 continue;
             }
@@ -109,7 +110,7 @@ impl<N: Number> Rows<N> {
         true
     }
 
-    /// Forgets all but so many rows.
+    /// Removes all rows from position `rows` on.
     pub fn truncate(&mut self, rows: usize) {
         let end = self.first[rows] as usize;
         self.first.truncate(rows.saturating_add(1));
@@ -119,7 +120,7 @@ impl<N: Number> Rows<N> {
         self.leaving.truncate(rows);
     }
 
-    /// constant + Σ probability · value.
+    /// Evaluates a row: constant + Σ probability · value.
     pub fn apply(&self, row: usize, values: &[N]) -> N {
         self.range(row).fold(self.constants[row].clone(), |sum, at| {
             sum.plus(&self.probabilities[at].times(&values[self.columns[at] as usize]))
@@ -127,29 +128,29 @@ impl<N: Number> Rows<N> {
     }
 }
 
-/// Entries that elimination may touch in doubles before it is given up: chains that hang together in two dimensions fill
-/// up, and are better iterated.
-const ELIMINATION: u64 = 300_000_000;
+/// Upper limit on the entries that elimination in doubles touches. Chains with a two-dimensional structure have much
+/// fill-in and are better iterated.
+const MAX_ELIMINATION: u64 = 300_000_000;
 
 /// Values of a chain.
 pub struct Solved<N> {
-    /// For each state its value.
+    /// Value of each state.
     pub values: Vec<N>,
-    /// How far each can be from the truth, relative to the value, given rows whose entries are rounded once or twice; infinite
-    /// where products became too small for doubles, zero where arithmetic is exact.
+    /// Bound on the relative error of each value, given rows whose entries are rounded once or twice. Infinite if a product
+    /// has underflowed, 0 in exact arithmetic.
     pub relative: Vec<f64>,
 }
 
-/// Doubles below are so small that products of them lose digits.
-const LOST: f64 = 1e-290;
+/// A product of doubles below this value may have lost digits by underflow.
+const UNDERFLOW_LIMIT: f64 = 1e-290;
 
-/// A chain: the rows that a policy takes.
+/// A Markov chain: the rows that a policy selects.
 pub struct Chain<'a, N> {
     /// All rows.
     pub rows: &'a Rows<N>,
-    /// For each state its row, or [`NONE`] where nothing happens any more.
+    /// Row of each state, or [`NONE`] if the state has no successors and no cost.
     pub policy: &'a [u32],
-    /// The cost of each row, in place of what it says itself; all others cost nothing.
+    /// If set, the cost of every row, in place of its constant.
     pub costs: Option<N>,
 }
 
@@ -185,13 +186,13 @@ impl<N: Number> Chain<'_, N> {
         }
     }
 
-    /// Solves it; none if some state never leaves, or if elimination takes too long.
+    /// Solves the chain. Returns `None` if a state is never left, or if elimination exceeds its limit.
     pub fn solve(&self, work: &mut Work) -> Option<Solved<N>> {
         let order = components(self.policy.len(), |state| self.targets(state as usize));
         let mut values = vec![N::zero(); self.policy.len()];
         let mut relative = vec![0.0_f64; self.policy.len()];
         for component in order.iter() {
-            let before = if N::EXACT { 0.0 } else { self.worst_outside(component, &relative) };
+            let inherited = if N::EXACT { 0.0 } else { self.worst_outside(component, &relative) };
             if let [state] = component {
                 let state = *state as usize;
                 if self.targets(state).iter().all(|target| *target as usize != state) {
@@ -202,53 +203,54 @@ impl<N: Number> Chain<'_, N> {
                     });
                     work.spend(&value, width)?;
                     values[state] = value;
-                    relative[state] = before + rounding::<N>(1, width);
+                    relative[state] = inherited + rounding::<N>(1, width);
                     continue;
                 }
             }
             let Precision { widest, lost } = eliminate(self, component, &mut values, work)?;
-            let own = if lost { f64::INFINITY } else { rounding::<N>(component.len(), widest) };
+            let rounding_error = if lost { f64::INFINITY } else { rounding::<N>(component.len(), widest) };
             for state in component {
-                relative[*state as usize] = before + own;
+                relative[*state as usize] = inherited + rounding_error;
             }
         }
         Some(Solved { values, relative })
     }
 
-    /// The greatest relative error of what a component leads to.
+    /// Greatest relative error of the successors of a component.
     fn worst_outside(&self, component: &[u32], relative: &[f64]) -> f64 {
         let targets = component.iter().flat_map(|state| self.targets(*state as usize));
         targets.fold(0.0, |worst, target| worst.max(relative[*target as usize]))
     }
 }
 
-/// The relative error of eliminating so many states, in rows of so many entries.
+/// Bound on the relative error of eliminating `states` states in rows of at most `widest` entries.
 ///
-/// The step with m states left is off by a factor of 1 ± (w + 4)u in each entry, which a value has 2m times; all of them
-/// together are below n(n + 1)(w + 4)u, the rounding of the first entries and the way back below another 4n(w + 4)u. The unit
-/// u is half of the epsilon, so that this is twice as much.
+/// With m remaining states, an elimination step perturbs each entry by a factor of 1 ± (w + 4)u, and a value contains 2m
+/// such factors. All steps together are below n(n + 1)(w + 4)u. The rounding of the initial entries and the back
+/// substitution add less than 4n(w + 4)u. The unit roundoff u is half of the epsilon, so that the result is twice as large
+/// as required.
 fn rounding<N: Number>(states: usize, widest: usize) -> f64 {
     let n = count(states) + 4.0;
     if N::EXACT { 0.0 } else { n * n * (count(widest) + 8.0) * f64::EPSILON }
 }
 
-/// A state of the component under elimination.
+/// A row of the component under elimination.
 struct Row<N> {
-    /// Sorted by column (numbers inside the component).
+    /// Sorted by column, which is a local state number.
     entries: Vec<(u32, N)>,
     constant: N,
     leaving: N,
 }
 
-/// What an elimination's error depends on.
+/// The quantities that determine the error of an elimination.
 struct Precision {
-    /// The greatest number of entries that a row had.
+    /// The greatest number of entries of a row.
     widest: usize,
-    /// Whether products became too small for doubles.
+    /// `true` if a product has underflowed.
     lost: bool,
 }
 
-/// The values of a component.
+/// Solves a component by elimination.
 fn eliminate<N: Number>(
     chain: &Chain<'_, N>,
     component: &[u32],
@@ -284,11 +286,11 @@ fn eliminate<N: Number>(
         (0..dense(rows.len())).map(|state| Reverse((fill(&rows, &users, state), state))).collect();
     while let Some(Reverse((cost, pivot))) = queue.pop() {
         let p = pivot as usize;
-        // What was cheap may have become dear.
+        // The queued cost is outdated if other eliminations have changed the row or its users.
         users[p].retain(|user| !done[*user as usize]);
-        let now = fill(&rows, &users, pivot);
-        if now > cost {
-            queue.push(Reverse((now, pivot)));
+        let current_cost = fill(&rows, &users, pivot);
+        if current_cost > cost {
+            queue.push(Reverse((current_cost, pivot)));
             continue;
         }
         order.push(pivot);
@@ -307,12 +309,12 @@ fn eliminate<N: Number>(
             }
         }
         rows[p] = row;
-        if !N::EXACT && work > ELIMINATION {
+        if !N::EXACT && work > MAX_ELIMINATION {
             return None;
         }
     }
     budget.touch(work);
-    // What is left in a row refers to states that were eliminated later, whose values are known first.
+    // Back substitution: the remaining entries of a row refer to states that were eliminated later.
     for pivot in order.iter().rev() {
         let p = *pivot as usize;
         let row = &rows[p];
@@ -325,14 +327,15 @@ fn eliminate<N: Number>(
     Some(Precision { widest, lost })
 }
 
-/// The entries that eliminating a state touches (Markowitz, Management Science 3(3), 1957): those with the fewest go first.
+/// Number of entries that the elimination of a state touches (Markowitz, Management Science 3(3), 1957). States with the
+/// fewest are eliminated first.
 fn fill<N>(rows: &[Row<N>], users: &[Vec<u32>], state: u32) -> usize {
     rows[state as usize].entries.len().saturating_mul(users[state as usize].len())
 }
 
-/// Removes the loop of a row, and divides by what leaves it.
-fn normalise<N: Number>(row: &mut Row<N>, own: u32, budget: &mut Work) -> Option<()> {
-    let Ok(at) = row.entries.binary_search_by_key(&own, |(column, _)| *column) else { return Some(()) };
+/// Divides the loop of a row out.
+fn normalise<N: Number>(row: &mut Row<N>, diagonal: u32, budget: &mut Work) -> Option<()> {
+    let Ok(at) = row.entries.binary_search_by_key(&diagonal, |(column, _)| *column) else { return Some(()) };
     row.entries.remove(at);
     let leaves = row.entries.iter().fold(row.leaving.clone(), |sum, (_, p)| sum.plus(p));
     if leaves.is_zero() {
@@ -348,7 +351,7 @@ fn normalise<N: Number>(row: &mut Row<N>, own: u32, budget: &mut Work) -> Option
     Some(())
 }
 
-/// Puts a row in the place of its state in the row of `user`; whether a product became too small for doubles.
+/// Substitutes the row of an eliminated state in the row of `user`. Returns `true` if a product has underflowed.
 fn substitute<N: Number>(
     target: &mut Row<N>,
     pivot: u32,
@@ -364,16 +367,16 @@ fn substitute<N: Number>(
     let mut lost = false;
     target.constant = target.constant.plus(&factor.times(&row.constant));
     let leaving = factor.times(&row.leaving);
-    lost |= !N::EXACT && !row.leaving.is_zero() && leaving.to_f64() < LOST;
+    lost |= !N::EXACT && !row.leaving.is_zero() && leaving.to_f64() < UNDERFLOW_LIMIT;
     target.leaving = target.leaving.plus(&leaving);
     for (column, probability) in &row.entries {
-        let more = factor.times(probability);
-        lost |= !N::EXACT && more.to_f64() < LOST;
-        budget.spend(&more, 2)?;
-        match target.entries.binary_search_by_key(column, |(known, _)| *known) {
-            Ok(at) => target.entries[at].1 = target.entries[at].1.plus(&more),
+        let product = factor.times(probability);
+        lost |= !N::EXACT && product.to_f64() < UNDERFLOW_LIMIT;
+        budget.spend(&product, 2)?;
+        match target.entries.binary_search_by_key(column, |(existing, _)| *existing) {
+            Ok(at) => target.entries[at].1 = target.entries[at].1.plus(&product),
             Err(at) => {
-                target.entries.insert(at, (*column, more));
+                target.entries.insert(at, (*column, product));
                 users[*column as usize].push(user);
             }
         }

@@ -1,4 +1,4 @@
-//! The equations of one component with cycles to the values of its states: end components merged, policy iteration.
+//! Solves a component with cycles: merges end components, then iterates policies.
 
 use std::cmp::Reverse;
 use std::collections::VecDeque;
@@ -10,22 +10,22 @@ use crate::solve::doubles;
 use crate::solve::interval::Enclosed;
 use crate::solve::iterate::{Iterated, iterate, leave};
 use crate::solve::local::{EndComponents, Local, NONE, attractor, end_components};
-use crate::solve::problem::{Direction, Run, TINY};
+use crate::solve::problem::{Direction, Run, UNDERFLOW_BOUND};
 use crate::solve::quotient::Quotient;
 use crate::solve::users::Users;
 
 impl<N: Number> Run<'_, N> {
-    /// Solves a component of more than one state; none where exact arithmetic takes too long.
+    /// Solves a component of more than one state. Returns `None` if exact arithmetic exceeds its budget.
     pub fn component(&mut self, component: &[u32], local: &mut Local<N>) -> Option<()> {
-        let done = self.whole_component(component, local);
+        let outcome = self.solve_component(component, local);
         for state in component {
             self.position[*state as usize] = NONE;
         }
-        done
+        outcome
     }
 
-    fn whole_component(&mut self, component: &[u32], local: &mut Local<N>) -> Option<()> {
-        // States that were found at about the same time lie side by side, and those that were found last are left first.
+    fn solve_component(&mut self, component: &[u32], local: &mut Local<N>) -> Option<()> {
+        // States discovered at about the same time become adjacent; those discovered last, usually near an exit, come first.
         let mut component = component.to_vec();
         component.sort_unstable_by_key(|state| Reverse(*state));
         self.cut(&component, local, |_, _| true);
@@ -38,7 +38,7 @@ impl<N: Number> Run<'_, N> {
             }
         }
         let settled = self.problem.rewards.is_none() && self.sure_is_one();
-        let rest: Vec<u32> =
+        let unsolved: Vec<u32> =
             component_part(&local.states, &members, !settled, self.problem.rewards.is_some());
         for (state, sure) in local.states.iter().zip(&members) {
             if *sure {
@@ -51,22 +51,22 @@ impl<N: Number> Run<'_, N> {
         if settled {
             self.reach_surely(local, &members);
         }
-        if rest.is_empty() {
+        if unsolved.is_empty() {
             return Some(());
         }
         let must_be_sure = self.problem.rewards.is_some() && self.problem.direction == Direction::Min;
-        // What is sought for all is cut out already.
-        if must_be_sure || rest.len() < states {
-            self.cut(&rest, local, |run, choice| {
+        // Without excluded choices or states, the extraction above is reused.
+        if must_be_sure || unsolved.len() < states {
+            self.cut(&unsolved, local, |run, choice| {
                 let targets = run.problem.mdp.targets(choice);
                 !must_be_sure || targets.iter().all(|t| run.solution.sure.contains(*t as usize))
             });
         }
-        drop((rest, members));
+        drop((unsolved, members));
         self.values(local)
     }
 
-    /// The sure states among those of the component.
+    /// Returns the sure states of the component.
     fn sure_members(&mut self, local: &Local<N>) -> Vec<bool> {
         let outside_sure = |choice: usize| {
             self.problem.mdp.targets(local.choices[choice] as usize).iter().all(|target| {
@@ -76,7 +76,7 @@ impl<N: Number> Run<'_, N> {
         if self.sure_by_choice() {
             return attractor(local, outside_sure).0;
         }
-        // Not sure: where one can stay, leave for a state that is not sure, or get to such a state.
+        // A state is not sure if a policy can stay in an end component, leave for a state that is not sure, or reach such a state.
         let ends = end_components(local, |_| true);
         let mut unsure = ends.inside;
         let owners = local.owners();
@@ -96,7 +96,7 @@ impl<N: Number> Run<'_, N> {
         unsure.into_iter().map(|unsure| !unsure).collect()
     }
 
-    /// A policy for the states from which the goal is reached for sure.
+    /// Computes a policy for the states that reach a terminal state with probability 1.
     fn reach_surely(&mut self, local: &mut Local<N>, members: &[bool]) {
         let sure = component_part(&local.states, members, true, true);
         if sure.is_empty() {
@@ -113,7 +113,7 @@ impl<N: Number> Run<'_, N> {
         }
     }
 
-    /// Cuts states out of the process; `position` tells their numbers afterwards.
+    /// Extracts states from the process. Afterwards, `position` contains their local numbers.
     fn cut(&mut self, states: &[u32], local: &mut Local<N>, keep: impl Fn(&Self, usize) -> bool) {
         for state in &local.states {
             self.position[*state as usize] = NONE;
@@ -136,7 +136,7 @@ impl<N: Number> Run<'_, N> {
                     if position == NONE {
                         let value = &self.solution.values[target];
                         let part = probability.times(value);
-                        local.tiny |= !N::EXACT && !value.is_zero() && part.to_f64() < TINY;
+                        local.tiny |= !N::EXACT && !value.is_zero() && part.to_f64() < UNDERFLOW_BOUND;
                         constant = constant.plus(&part);
                         leaving = leaving.plus(probability);
                     } else {
@@ -152,61 +152,62 @@ impl<N: Number> Run<'_, N> {
         }
     }
 
+    /// Computes the values and the policy of the extracted states.
     fn values(&mut self, local: &mut Local<N>) -> Option<()> {
         let costs = self.problem.rewards.is_some();
         let mut ends = end_components(local, |choice| !costs || !local.paid[choice]);
         if !costs && self.problem.direction == Direction::Min && ends.inside.contains(&true) {
-            // Staying in an end component is worth 0, and nothing is worth less.
-            let mut rest = Vec::new();
+            // Staying in an end component has probability 0, the least possible value.
+            let mut remaining = Vec::new();
             for (number, state) in local.states.iter().enumerate() {
                 if ends.inside[number] {
                     self.solution.values[*state as usize] = N::zero();
                     self.solution.policy[*state as usize] = stay(local, &ends, number);
                 } else {
-                    rest.push(*state);
+                    remaining.push(*state);
                 }
             }
-            if rest.is_empty() {
+            if remaining.is_empty() {
                 return Some(());
             }
-            self.cut(&rest, local, |_, _| true);
+            self.cut(&remaining, local, |_, _| true);
             ends = end_components(local, |_| false);
         }
         let quotient = quotient(local, &ends);
         let start = self.start(local, &quotient);
         let direction = self.problem.direction;
-        let found = match iterate(&quotient, start, direction, &mut self.work) {
+        let enclosure = match iterate(&quotient, start, direction, &mut self.work) {
             None if N::EXACT => return None,
             Some(Iterated { policy, values, .. }) if N::EXACT || self.draft => {
                 Some(Enclosed { policy, values, errors: Vec::new() })
             }
             None if self.draft => None,
-            found => doubles::enclosed(&quotient, found, direction, &mut self.work),
+            iterated => doubles::enclosed(&quotient, iterated, direction, &mut self.work),
         };
-        let Some(Enclosed { policy, values, errors }) = found else {
-            self.unknown(local);
+        let Some(Enclosed { policy, values, errors }) = enclosure else {
+            self.mark_unknown(local);
             return Some(());
         };
         let small = |value: &N| !N::EXACT && !value.is_zero() && value.to_f64() < 1e-30;
-        let tiny = if local.tiny || values.iter().any(small) { TINY } else { 0.0 };
+        let tiny = if local.tiny || values.iter().any(small) { UNDERFLOW_BOUND } else { 0.0 };
         let outside = self.outside_error(local) + tiny;
         for (number, state) in local.states.iter().enumerate() {
             let (block, state) = (ends.block[number] as usize, *state as usize);
             self.solution.values[state] = values[block].clone();
             if !N::EXACT {
-                let own = if values[block].is_zero() {
+                let error = if values[block].is_zero() {
                     0.0
                 } else {
                     errors.get(block).copied().unwrap_or(f64::INFINITY)
                 };
-                self.solution.errors[state] = own + outside;
+                self.solution.errors[state] = error + outside;
             }
         }
         self.write_policy(local, &ends, &quotient, &policy);
         Some(())
     }
 
-    /// The greatest error of a state outside that a choice leads to.
+    /// Greatest error of a successor outside the component.
     fn outside_error(&self, local: &Local<N>) -> f64 {
         if N::EXACT {
             return 0.0;
@@ -217,14 +218,14 @@ impl<N: Number> Run<'_, N> {
             .fold(0.0, |error, target| error.max(self.solution.errors[*target as usize]))
     }
 
-    /// Nothing is known but what rewards and probabilities have in common.
-    fn unknown(&mut self, local: &Local<N>) {
+    /// Marks the values as unknown.
+    fn mark_unknown(&mut self, local: &Local<N>) {
         for state in &local.states {
             self.solution.errors[*state as usize] = f64::INFINITY;
         }
     }
 
-    /// The policy of the hint where there is one, else one that leaves the component for sure.
+    /// Returns the initial policy: the hint if it covers all blocks, else a policy that leaves the component surely.
     fn start(&self, local: &Local<N>, quotient: &Quotient<N>) -> Vec<u32> {
         let mut policy = vec![NONE; quotient.blocks()];
         if let Some(hint) = self.hint {
@@ -260,7 +261,7 @@ impl<N: Number> Run<'_, N> {
             queue.push(owner);
         }
         if ends.inside.contains(&true) {
-            to_exits(local, ends, &owners, &mut chosen, queue);
+            route_to_exits(local, ends, &owners, &mut chosen, queue);
         }
         for (number, state) in local.states.iter().enumerate() {
             self.solution.policy[*state as usize] = match chosen[number] {
@@ -271,8 +272,8 @@ impl<N: Number> Run<'_, N> {
     }
 }
 
-/// The other states of an end component go to the one that leaves it.
-fn to_exits<N: Number>(
+/// Extends the policy to the other states of an end component: they move towards the state that leaves it.
+fn route_to_exits<N: Number>(
     local: &Local<N>,
     ends: &EndComponents,
     owners: &[u32],
@@ -292,26 +293,26 @@ fn to_exits<N: Number>(
     }
 }
 
-/// The states of a component that are sure or not; where `all_sure_only` is false, the unsure ones.
-fn component_part(states: &[u32], members: &[bool], sure_too: bool, only_sure: bool) -> Vec<u32> {
-    let wanted = |sure: bool| if only_sure { sure } else { sure_too || !sure };
-    states.iter().zip(members).filter(|(_, sure)| wanted(**sure)).map(|(state, _)| *state).collect()
+/// Returns the sure states if `only_sure`; else the unsure states, or with `include_sure` all states.
+fn component_part(states: &[u32], members: &[bool], include_sure: bool, only_sure: bool) -> Vec<u32> {
+    let is_selected = |sure: bool| if only_sure { sure } else { include_sure || !sure };
+    states.iter().zip(members).filter(|(_, sure)| is_selected(**sure)).map(|(state, _)| *state).collect()
 }
 
-/// A choice that stays in the end component of a state.
+/// Returns a choice that stays in the end component of a state.
 fn stay<N: Number>(local: &Local<N>, ends: &EndComponents, state: usize) -> u32 {
     let mut choices = local.range(state);
     choices.find(|choice| ends.alive[*choice]).map_or(NONE, |choice| local.choices[choice])
 }
 
-/// Each state as a block of its own. The rows are taken from `local`, and only their own loops are divided out.
+/// Builds the equations with each state as its own block. Moves the rows out of `local`, and divides their loops out.
 fn unmerged<N: Number>(local: &mut Local<N>) -> Quotient<N> {
     let mut rows = std::mem::replace(&mut local.rows, Rows::new());
     let (mut first, mut choices, mut begin) = (vec![0], Vec::with_capacity(local.choices.len()), 0);
     for state in 0..local.states.len() {
         for choice in local.range(state) {
             let end = rows.first[choice.saturating_add(1)] as usize;
-            if rows.keep_unlooped(choice, begin..end, choices.len(), dense(state)) {
+            if rows.move_without_loop(choice, begin..end, choices.len(), dense(state)) {
                 choices.push(dense(choice));
             }
             begin = end;
@@ -322,7 +323,7 @@ fn unmerged<N: Number>(local: &mut Local<N>) -> Quotient<N> {
     Quotient { first, rows, choices, widest: local.widest }
 }
 
-/// The states of each block side by side: where each block starts, and the states.
+/// Sorts the states by block. Returns the start of each block, and the states.
 fn members(ends: &EndComponents) -> (Vec<u32>, Vec<u32>) {
     let mut starts = vec![0_u32; ends.blocks.saturating_add(1)];
     for block in &ends.block {
@@ -343,6 +344,7 @@ fn members(ends: &EndComponents) -> (Vec<u32>, Vec<u32>) {
     (starts, members)
 }
 
+/// Builds the equations of the blocks.
 fn quotient<N: Number>(local: &mut Local<N>, ends: &EndComponents) -> Quotient<N> {
     if !ends.inside.contains(&true) {
         return unmerged(local);
@@ -364,7 +366,7 @@ fn quotient<N: Number>(local: &mut Local<N>, ends: &EndComponents) -> Quotient<N
                     }
                     let probability = &local.rows.probabilities[at];
                     leaves = leaves.plus(probability);
-                    match entries.iter_mut().find(|(known, _)| *known == target) {
+                    match entries.iter_mut().find(|(column, _)| *column == target) {
                         Some((_, sum)) => *sum = sum.plus(probability),
                         None => entries.push((target, probability.clone())),
                     }

@@ -1,4 +1,4 @@
-//! What policy iteration found in doubles to values with bounds: by the first method that makes them tight.
+//! Bounds the result of policy iteration in doubles, by the first method whose bounds are tight.
 
 use num_rational::BigRational;
 
@@ -11,80 +11,85 @@ use crate::solve::problem::Direction;
 use crate::solve::quotient::Quotient;
 use crate::solve::work::{TIGHT, Work};
 
-/// What a component may cost in rationals, where doubles cannot tell enough of it; and the blocks that it may have.
-const RATIONAL: (u64, usize) = (1_000_000_000, 3000);
-/// What it may cost where they tell enough for most purposes.
-const TIGHTER: u64 = 100_000_000;
+/// Limits of the solution in rationals if the bounds in doubles are insufficient: work units, and number of blocks.
+const RATIONAL_LIMITS: (u64, usize) = (1_000_000_000, 3000);
+/// Work limit of the solution in rationals if the bounds in doubles are sufficient for most purposes.
+const IMPROVEMENT_LIMIT: u64 = 100_000_000;
 
-/// Bounds on the values of all blocks; none where no method finds any.
+/// Bounds the values of all blocks. Returns `None` if no method finds bounds.
 ///
-/// A chain's elimination has a small relative error by itself. Where there are choices, a certificate tells the error; a
-/// process that is left very rarely has none in doubles, and is solved in rationals. What elimination cannot solve at all is
-/// iterated from both sides.
+/// The elimination of a chain has a small relative error by itself. With choices, a certificate bounds the error. A
+/// process with a tiny probability of leaving has no certificate in doubles, and is solved in rationals. A component that
+/// elimination cannot solve is iterated from both sides.
 pub fn enclosed<N: Number>(
     quotient: &Quotient<N>,
-    found: Option<Iterated<N>>,
+    iterated: Option<Iterated<N>>,
     direction: Direction,
     work: &mut Work,
 ) -> Option<Enclosed<N>> {
     let tight = work.tight;
-    let Some(mut found) = found else { return interval::enclose(quotient, direction, tight) };
+    let Some(mut iterated) = iterated else { return interval::enclose(quotient, direction, tight) };
     let is_chain = (0..quotient.blocks()).all(|block| quotient.range(block).len() <= 1);
     if !is_chain {
-        // What they are off by is told of this policy only.
-        found.relative = Vec::new();
+        // These errors refer to the values of this policy, which may not be optimal.
+        iterated.relative = Vec::new();
     }
-    if quotient.blocks() > RATIONAL.1 && !is_level(quotient, &found.values, tight) {
-        let around = interval::around(quotient, &found.values, direction, tight);
+    if quotient.blocks() > RATIONAL_LIMITS.1 && !is_level(quotient, &iterated.values, tight) {
+        let around = interval::around(quotient, &iterated.values, direction, tight);
         if around.is_some() {
             return around;
         }
     }
     let mut errors: Vec<f64> = if is_chain {
-        found.values.iter().zip(&found.relative).map(|(value, relative)| value.to_f64() * relative).collect()
+        iterated
+            .values
+            .iter()
+            .zip(&iterated.relative)
+            .map(|(value, relative)| value.to_f64() * relative)
+            .collect()
     } else {
-        certify(quotient, &found.policy, &found.values, direction)
+        certify(quotient, &iterated.policy, &iterated.values, direction)
     };
-    if is_chain && !is_tight(&found.values, &errors, tight) {
-        let certified = certify(quotient, &found.policy, &found.values, direction);
+    if is_chain && !is_tight(&iterated.values, &errors, tight) {
+        let certified = certify(quotient, &iterated.policy, &iterated.values, direction);
         for (error, certified) in errors.iter_mut().zip(certified) {
             *error = error.min(certified);
         }
     }
-    let is_good = is_tight(&found.values, &errors, tight);
-    let rounded = Enclosed { policy: found.policy, values: found.values, errors };
+    let is_good = is_tight(&iterated.values, &errors, tight);
+    let rounded = Enclosed { policy: iterated.policy, values: iterated.values, errors };
     if is_good {
         return Some(rounded);
     }
-    // Bounds that are there, but wide, are made better while that is cheap, or because it was asked for.
+    // Wide bounds are improved if that is cheap, or if tighter ones were requested.
     let is_usual = tight >= TIGHT && rounded.errors.iter().all(|error| error.is_finite());
-    let most = if is_usual { TIGHTER } else { RATIONAL.0 };
-    let exact = (quotient.blocks() <= RATIONAL.1)
-        .then(|| work.spared(most, |work| in_rationals(quotient, &rounded.policy, direction, work)));
-    let found = exact.flatten();
+    let limit = if is_usual { IMPROVEMENT_LIMIT } else { RATIONAL_LIMITS.0 };
+    let exact = (quotient.blocks() <= RATIONAL_LIMITS.1)
+        .then(|| work.spared(limit, |work| in_rationals(quotient, &rounded.policy, direction, work)));
+    let improved = exact.flatten();
     if is_usual {
-        return found.or(Some(rounded));
+        return improved.or(Some(rounded));
     }
-    found
+    improved
         .or_else(|| interval::around(quotient, &rounded.values, direction, tight))
         .or_else(|| interval::enclose(quotient, direction, tight))
         .or(Some(rounded))
 }
 
-/// Whether one error for all blocks, which is what a certificate tells, can be tight for the least value, too.
+/// Returns `true` if a uniform error of all blocks, as in a certificate, can be tight for the least value.
 fn is_level<N: Number>(quotient: &Quotient<N>, values: &[N], tight: f64) -> bool {
     let values = values.iter().map(Number::to_f64).filter(|value| *value > 0.0);
-    let (least, most) =
-        values.fold((f64::INFINITY, 0.0_f64), |(least, most), value| (least.min(value), most.max(value)));
-    rounding(quotient.widest) * most <= tight * 0.5 * least
+    let (least, greatest) = values
+        .fold((f64::INFINITY, 0.0_f64), |(least, greatest), value| (least.min(value), greatest.max(value)));
+    rounding(quotient.widest) * greatest <= tight * 0.5 * least
 }
 
 fn is_tight<N: Number>(values: &[N], errors: &[f64], tight: f64) -> bool {
     values.iter().zip(errors).all(|(value, error)| value.is_zero() || *error <= tight * 0.5 * value.to_f64())
 }
 
-/// The best values of the rounded rows, exactly. Each entry of a row is off by a few roundings, and so a value by as many for
-/// each block, above and below (see `chain`), for whichever policy, and so for the best one.
+/// Solves the rounded rows exactly. Each entry of a row has a few rounding errors. A value has as many for each block, in
+/// the numerator and in the denominator (see `chain`), under every policy and therefore under the optimal one.
 fn in_rationals<N: Number>(
     quotient: &Quotient<N>,
     policy: &[u32],
@@ -107,9 +112,9 @@ fn in_rationals<N: Number>(
         choices: quotient.choices.clone(),
         widest: quotient.widest,
     };
-    let found = iterate(&rational, policy.to_vec(), direction, work)?;
+    let optimum = iterate(&rational, policy.to_vec(), direction, work)?;
     let relative = (count(quotient.blocks()) + 4.0) * 2.0 * (count(quotient.widest) + 8.0) * f64::EPSILON;
-    let values: Vec<N> = found.values.iter().map(N::from_rational).collect();
+    let values: Vec<N> = optimum.values.iter().map(N::from_rational).collect();
     let errors = values.iter().map(|value| value.to_f64() * relative).collect();
-    Some(Enclosed { policy: found.policy, values, errors })
+    Some(Enclosed { policy: optimum.policy, values, errors })
 }

@@ -1,10 +1,10 @@
-//! A component that is too large for elimination to values with bounds, by iteration from both sides.
+//! Interval iteration: bounds for components that are too large for elimination.
 //!
-//! From below, values are iterated from zero. They are then taken a little higher, and if no equation raises any of them
-//! any more they are upper bounds, because end components are merged (optimistic value iteration: Hartmanns and
-//! Kaminski, CAV 2020; see also Haddad and Monmege, TCS 735, 2018). Each evaluation of an equation is rounded towards its side, so
-//! that every value is a bound at any time, in whichever order the equations are taken: each uses what those before it in
-//! the same sweep have found (Gauss-Seidel), and the blocks that are left soonest come first.
+//! The lower bound is iterated from zero. Its values are then increased a little, and if no equation raises any of them
+//! further, they are upper bounds, because end components are merged (optimistic value iteration: Hartmanns and
+//! Kaminski, CAV 2020; see also Haddad and Monmege, TCS 735, 2018). Each evaluation of an equation is rounded towards its
+//! side, so that every value is a bound at any time, in any order of the equations. Each equation uses the values that
+//! were updated in the same sweep (Gauss-Seidel), and the blocks nearest to an exit come first.
 
 use std::collections::VecDeque;
 
@@ -15,24 +15,24 @@ use crate::solve::problem::Direction;
 use crate::solve::quotient::Quotient;
 use crate::solve::users::{Users, owners};
 
-/// Policies with values, and how far these can be from the truth.
+/// A policy, with values and their error bounds.
 pub struct Enclosed<N> {
     pub policy: Vec<u32>,
     pub values: Vec<N>,
-    /// Empty where arithmetic is exact.
+    /// Empty in exact arithmetic.
     pub errors: Vec<f64>,
 }
 
-/// Transitions that are looked at, at most.
-const WORK: u64 = 30_000_000_000;
-/// Sweeps from above before the values from below are made better.
+/// Upper limit on the number of evaluated transitions.
+const MAX_WORK: u64 = 30_000_000_000;
+/// Sweeps of a candidate upper bound before the lower bound is refined.
 const UPPER_SWEEPS: usize = 40;
-/// How far bounds are taken from values that are close already, as a share of the width that is asked for.
-const NEAR: f64 = 0.45;
+/// Distance of the initial bounds from approximate values, as a share of the required width.
+const INITIAL_SHARE: f64 = 0.45;
 /// Sweeps over the rows of one policy between two sweeps over all rows.
 const POLICY_SWEEPS: usize = 25;
 
-/// Bounds on the values of all blocks whose width is `width`, relative to the value; none where they do not get close in time.
+/// Bounds the values of all blocks to `width`, relative to the value. Returns `None` if the work limit is exceeded.
 pub fn enclose<N: Number>(quotient: &Quotient<N>, direction: Direction, width: f64) -> Option<Enclosed<N>> {
     let sorted = Sorted::new(quotient);
     let rows = sorted.rows(quotient, direction);
@@ -40,7 +40,7 @@ pub fn enclose<N: Number>(quotient: &Quotient<N>, direction: Direction, width: f
     Some(rows.enclosed(quotient, &lower, &upper))
 }
 
-/// The same around values that are close already; none where they are not close enough.
+/// Bounds the values of all blocks, starting from approximate values. Returns `None` if these are not close enough.
 pub fn around<N: Number>(
     quotient: &Quotient<N>,
     near: &[N],
@@ -52,24 +52,24 @@ pub fn around<N: Number>(
     Some(rows.enclosed(quotient, &lower, &upper))
 }
 
-/// Rows in the order in which they are swept.
+/// The rows in the order of the sweeps.
 struct Rows<'a, N> {
     direction: Direction,
-    /// The block at each place of the order, and the number of each row in the component; none where they are in their own order.
+    /// Block at each position of the order, and number of each row in the quotient; `None` for the order of the quotient.
     sorted: Option<(&'a [u32], &'a [u32])>,
-    /// For each place its first row, and the end.
+    /// First row of each position, and the end.
     blocks: &'a [u32],
-    /// For each row its first transition, and the end.
+    /// First transition of each row, and the end.
     first: &'a [u32],
-    /// Places that rows lead to.
+    /// Positions of the target blocks.
     columns: &'a [u32],
     probabilities: &'a [N],
     constants: &'a [N],
-    /// The relative error of evaluating one row.
+    /// Relative error of evaluating one row.
     rounding: f64,
 }
 
-/// Rows by the order in which blocks are left.
+/// A copy of the rows, sorted by the distance of their blocks from an exit.
 struct Sorted<N> {
     order: Vec<u32>,
     blocks: Vec<u32>,
@@ -83,9 +83,9 @@ struct Sorted<N> {
 impl<N: Number> Sorted<N> {
     fn new(quotient: &Quotient<N>) -> Self {
         let order = order(quotient);
-        let mut places = vec![0_u32; order.len()];
-        for (place, block) in order.iter().enumerate() {
-            places[*block as usize] = dense(place);
+        let mut positions = vec![0_u32; order.len()];
+        for (position, block) in order.iter().enumerate() {
+            positions[*block as usize] = dense(position);
         }
         let mut sorted = Self {
             blocks: vec![0],
@@ -99,7 +99,7 @@ impl<N: Number> Sorted<N> {
         for block in &order {
             for row in quotient.range(*block as usize) {
                 for at in quotient.rows.range(row) {
-                    sorted.columns.push(places[quotient.rows.columns[at] as usize]);
+                    sorted.columns.push(positions[quotient.rows.columns[at] as usize]);
                     sorted.probabilities.push(quotient.rows.probabilities[at].clone());
                 }
                 sorted.constants.push(quotient.rows.constants[row].clone());
@@ -131,7 +131,7 @@ fn rounding<N: Number>(quotient: &Quotient<N>) -> f64 {
 }
 
 impl<'a, N: Number> Rows<'a, N> {
-    /// The rows as they stand: states that were found last come first, and these are mostly left soonest.
+    /// The rows in the order of the quotient: states discovered last come first, and these are mostly left soonest.
     fn of(quotient: &'a Quotient<N>, direction: Direction) -> Self {
         Self {
             direction,
@@ -145,15 +145,15 @@ impl<'a, N: Number> Rows<'a, N> {
         }
     }
 
-    fn block(&self, place: usize) -> usize {
-        self.sorted.map_or(place, |(order, _)| order[place] as usize)
+    fn block(&self, position: usize) -> usize {
+        self.sorted.map_or(position, |(order, _)| order[position] as usize)
     }
 
     fn number(&self, row: u32) -> u32 {
         self.sorted.map_or(row, |(_, numbers)| numbers[row as usize])
     }
 
-    fn places(&self) -> usize {
+    fn positions(&self) -> usize {
         self.blocks.len().saturating_sub(1)
     }
 
@@ -166,11 +166,11 @@ impl<'a, N: Number> Rows<'a, N> {
         })
     }
 
-    /// The best row of a place with its value; places that nothing leaves are worth nothing.
+    /// Returns the best row of a position with its value; [`NONE`] and 0 for a block that is never left.
     #[expect(clippy::arithmetic_side_effects, reason = "the end is listed, too")]
-    fn best(&self, place: usize, values: &[f64]) -> (u32, f64) {
+    fn best(&self, position: usize, values: &[f64]) -> (u32, f64) {
         let mut best = (NONE, 0.0);
-        for row in self.blocks[place]..self.blocks[place + 1] {
+        for row in self.blocks[position]..self.blocks[position + 1] {
             let value = self.apply(row as usize, values);
             let better = match self.direction {
                 Direction::Min => value < best.1,
@@ -183,12 +183,13 @@ impl<'a, N: Number> Rows<'a, N> {
         best
     }
 
-    /// Bounds around values that are close already, by the same argument from both sides.
+    /// Bounds around approximate values; both bounds are checked with the inductive argument.
     fn around(&self, near: &[N], width: f64) -> Option<(Vec<f64>, Vec<f64>)> {
         let scaled = |scale: f64| -> Vec<f64> {
-            (0..self.places()).map(|place| near[self.block(place)].to_f64() * scale).collect()
+            (0..self.positions()).map(|position| near[self.block(position)].to_f64() * scale).collect()
         };
-        let (mut lower, mut upper) = (scaled(1.0 - width * NEAR), scaled(1.0 + width * NEAR));
+        let (mut lower, mut upper) =
+            (scaled(1.0 - width * INITIAL_SHARE), scaled(1.0 + width * INITIAL_SHARE));
         let settles = |values: &mut [f64], moves: &dyn Fn(&mut [f64]) -> bool| {
             (0..UPPER_SWEEPS).any(|_| !moves(values))
         };
@@ -201,34 +202,34 @@ impl<'a, N: Number> Rows<'a, N> {
     /// Bounds by iteration from zero.
     fn iterated(&self, width: f64) -> Option<(Vec<f64>, Vec<f64>)> {
         let (down, up) = (1.0 - self.rounding, 1.0 + self.rounding);
-        let all = self.columns.len().saturating_add(self.constants.len()) as u64;
-        let mut lower = vec![0.0_f64; self.places()];
-        let mut policy = vec![NONE; self.places()];
+        let sweep_work = self.columns.len().saturating_add(self.constants.len()) as u64;
+        let mut lower = vec![0.0_f64; self.positions()];
+        let mut policy = vec![NONE; self.positions()];
         let (mut work, mut threshold) = (0_u64, width * 0.05);
-        while work < WORK {
+        while work < MAX_WORK {
             loop {
                 let mut change = self.sweep(&mut lower, &mut policy, down);
-                work = work.saturating_add(all);
-                // Some policy is not better than the best one, and so its values are lower bounds where the greatest ones are asked for.
+                work = work.saturating_add(sweep_work);
+                // The values of any policy are lower bounds on the greatest values, and sweeps over one policy are cheaper.
                 if self.direction == Direction::Max && change > threshold {
                     for _ in 0..POLICY_SWEEPS {
-                        let (grown, looked) = self.follow(&mut lower, &policy, down);
-                        work = work.saturating_add(looked);
-                        change = grown;
-                        if change <= threshold || work >= WORK {
+                        let (growth, evaluated) = self.follow(&mut lower, &policy, down);
+                        work = work.saturating_add(evaluated);
+                        change = growth;
+                        if change <= threshold || work >= MAX_WORK {
                             break;
                         }
                     }
-                    // What other rows are worth is seen by the next sweep.
+                    // The next sweep over all rows may select other rows.
                     continue;
                 }
-                if change <= threshold || work >= WORK {
+                if change <= threshold || work >= MAX_WORK {
                     break;
                 }
             }
             let mut upper: Vec<f64> = lower.iter().map(|value| value * (1.0 + width * 0.5)).collect();
             for _ in 0..UPPER_SWEEPS {
-                work = work.saturating_add(all);
+                work = work.saturating_add(sweep_work);
                 if !self.raises(&mut upper, up) {
                     return Some((lower, upper));
                 }
@@ -238,90 +239,93 @@ impl<'a, N: Number> Rows<'a, N> {
         None
     }
 
-    /// All values once more, and the rows that give them; the greatest relative growth.
+    /// Updates all values and selects the rows that attain them. Returns the greatest relative growth.
     fn sweep(&self, values: &mut [f64], policy: &mut [u32], scale: f64) -> f64 {
         let mut change = 0.0_f64;
-        for (place, chosen) in policy.iter_mut().enumerate() {
-            let (row, value) = self.best(place, values);
+        for (position, chosen) in policy.iter_mut().enumerate() {
+            let (row, value) = self.best(position, values);
             *chosen = row;
-            change = change.max(grow(&mut values[place], value * scale));
+            change = change.max(grow(&mut values[position], value * scale));
         }
         change
     }
 
-    /// All values once more by the rows of a policy; the greatest relative growth, and how many transitions were looked at.
+    /// Updates all values with the rows of a policy. Returns the greatest relative growth, and the work, counted as two
+    /// transitions per row.
     fn follow(&self, values: &mut [f64], policy: &[u32], scale: f64) -> (f64, u64) {
-        let (mut change, mut looked) = (0.0_f64, 0_u64);
-        for (place, row) in policy.iter().enumerate().filter(|(_, row)| **row != NONE) {
+        let (mut change, mut work) = (0.0_f64, 0_u64);
+        for (position, row) in policy.iter().enumerate().filter(|(_, row)| **row != NONE) {
             let value = self.apply(*row as usize, values) * scale;
-            looked = looked.saturating_add(2);
-            change = change.max(grow(&mut values[place], value));
+            work = work.saturating_add(2);
+            change = change.max(grow(&mut values[position], value));
         }
-        (change, looked)
+        (change, work)
     }
 
-    /// All values once more from above; whether any is raised. If none is, they are upper bounds: each equation was taken with values that
-    /// are at least as great as those that are left.
+    /// Updates all values from above. Returns `true` if a value was raised. If none was, they are upper bounds: each equation
+    /// used values that are at least the final ones.
     fn raises(&self, values: &mut [f64], scale: f64) -> bool {
         let mut raised = false;
-        for place in 0..values.len() {
-            let value = self.best(place, values).1 * scale;
-            raised |= value > values[place];
-            values[place] = value;
+        for position in 0..values.len() {
+            let value = self.best(position, values).1 * scale;
+            raised |= value > values[position];
+            values[position] = value;
         }
         raised
     }
 
-    /// All values once more from below; whether any is lowered. If none is, they are lower bounds: no equation lowers them, and from the
-    /// rows that were taken, which are left for sure, they only grow towards what these are worth.
+    /// Updates all values from below. Returns `true` if a value was lowered. If none was, they are lower bounds: no equation
+    /// lowers them, and under the selected rows, which leave the component surely, they only grow towards the values of these
+    /// rows.
     fn lowers(&self, values: &mut [f64], scale: f64) -> bool {
         let mut lowered = false;
-        for place in 0..values.len() {
-            let value = self.best(place, values).1 * scale;
-            lowered |= value < values[place];
-            values[place] = value;
+        for position in 0..values.len() {
+            let value = self.best(position, values).1 * scale;
+            lowered |= value < values[position];
+            values[position] = value;
         }
         lowered
     }
 
     fn enclosed(&self, quotient: &Quotient<N>, lower: &[f64], upper: &[f64]) -> Enclosed<N> {
-        // The choices that keep a bound from getting worse have values that are within it.
-        let kept = if self.direction == Direction::Min { upper } else { lower };
+        // The choices that maintain this bound have values within it.
+        let maintained = if self.direction == Direction::Min { upper } else { lower };
         let blocks = quotient.blocks();
-        let mut found = Enclosed {
+        let mut result = Enclosed {
             policy: vec![NONE; blocks],
             values: vec![N::zero(); blocks],
             errors: vec![0.0; blocks],
         };
-        for place in 0..self.places() {
-            let block = self.block(place);
-            let (row, _) = self.best(place, kept);
-            found.policy[block] = if row == NONE { NONE } else { self.number(row) };
-            let middle = f64::midpoint(lower[place], upper[place]);
-            found.values[block] = N::from_f64(middle);
-            found.errors[block] = (upper[place] - lower[place]) * 0.5 + middle * 4.0 * f64::EPSILON;
+        for position in 0..self.positions() {
+            let block = self.block(position);
+            let (row, _) = self.best(position, maintained);
+            result.policy[block] = if row == NONE { NONE } else { self.number(row) };
+            let middle = f64::midpoint(lower[position], upper[position]);
+            result.values[block] = N::from_f64(middle);
+            result.errors[block] = (upper[position] - lower[position]) * 0.5 + middle * 4.0 * f64::EPSILON;
         }
-        found
+        result
     }
 }
 
-/// Writes a value; how much it has grown, relative to itself.
+/// Writes a value. Returns its growth, relative to the new value.
 fn grow(old: &mut f64, new: f64) -> f64 {
     let change = if new > *old { (new - *old) / new } else { 0.0 };
     *old = new;
     change
 }
 
-/// The blocks in the order in which they are left, by rows that lead out soonest; those that nothing leaves come last.
+/// Sorts the blocks by the number of rows on the shortest way out (breadth-first search). Blocks that are never left come
+/// last.
 fn order<N: Number>(quotient: &Quotient<N>) -> Vec<u32> {
     let blocks = quotient.blocks();
-    let mut seen = vec![false; blocks];
+    let mut visited = vec![false; blocks];
     let (owners, users) = (owners(&quotient.first), Users::new(&quotient.rows, blocks));
     let mut order = Vec::with_capacity(blocks);
     let mut queue = VecDeque::new();
-    for (block, seen) in seen.iter_mut().enumerate() {
+    for (block, visited) in visited.iter_mut().enumerate() {
         if quotient.range(block).any(|row| !quotient.rows.leaving[row].is_zero()) {
-            *seen = true;
+            *visited = true;
             queue.push_back(dense(block));
         }
     }
@@ -329,12 +333,12 @@ fn order<N: Number>(quotient: &Quotient<N>) -> Vec<u32> {
         order.push(block);
         for row in users.of(block) {
             let user = owners[*row as usize];
-            if !std::mem::replace(&mut seen[user as usize], true) {
+            if !std::mem::replace(&mut visited[user as usize], true) {
                 queue.push_back(user);
             }
         }
     }
-    order.extend((0..dense(blocks)).filter(|block| !seen[*block as usize]));
+    order.extend((0..dense(blocks)).filter(|block| !visited[*block as usize]));
     order
 }
 
@@ -345,7 +349,7 @@ mod tests {
     use crate::solve::chain;
     use crate::solve::work::Work;
 
-    /// A walk over a square with two choices in each place, which is left with probability 1/50 at each step.
+    /// A random walk on a square with two choices per place; each step leaves the square with probability 1/50.
     fn square(side: u32) -> Quotient<f64> {
         let mut quotient =
             Quotient { first: vec![0], rows: chain::Rows::new(), choices: Vec::new(), widest: 4 };
@@ -369,28 +373,28 @@ mod tests {
     }
 
     #[test]
-    fn bounds_enclose_what_elimination_finds() {
+    fn bounds_enclose_the_values_of_elimination() {
         for direction in [Direction::Min, Direction::Max] {
             let quotient = square(12);
-            let found = enclose(&quotient, direction, 1e-7).expect("it converges");
-            let chain = chain::Chain { rows: &quotient.rows, policy: &found.policy, costs: None };
+            let enclosed = enclose(&quotient, direction, 1e-7).expect("it converges");
+            let chain = chain::Chain { rows: &quotient.rows, policy: &enclosed.policy, costs: None };
             let values = chain.solve(&mut Work::new(0)).expect("each place is left").values;
-            let exact = certify(&quotient, &found.policy, &values, direction);
+            let exact = certify(&quotient, &enclosed.policy, &values, direction);
             let near = around(&quotient, &values, direction, 1e-7).expect("they are close");
-            for ((value, error), (known, rounding)) in
+            for ((value, error), (expected, rounding)) in
                 near.values.iter().zip(&near.errors).zip(values.iter().zip(&exact))
             {
-                assert!((value - known).abs() <= error + rounding, "{value} ± {error}, not {known}");
+                assert!((value - expected).abs() <= error + rounding, "{value} ± {error}, not {expected}");
                 assert!(*error <= 0.5e-7 * value, "{error} for {value}");
             }
             for factor in [0.99, 1.01] {
                 let far: Vec<f64> = values.iter().map(|value| value * factor).collect();
                 assert!(around(&quotient, &far, direction, 1e-7).is_none(), "values that are not close");
             }
-            for ((value, error), (known, rounding)) in
-                found.values.iter().zip(&found.errors).zip(values.iter().zip(exact))
+            for ((value, error), (expected, rounding)) in
+                enclosed.values.iter().zip(&enclosed.errors).zip(values.iter().zip(exact))
             {
-                assert!((value - known).abs() <= error + rounding, "{value} ± {error}, not {known}");
+                assert!((value - expected).abs() <= error + rounding, "{value} ± {error}, not {expected}");
                 assert!(*error <= 1e-7 * value, "{error} for {value}");
             }
         }

@@ -11,25 +11,25 @@ use crate::solve::quotient::Quotient;
 use crate::solve::users::{Users, owners};
 use crate::solve::work::Work;
 
-/// Rounds of policy iteration after which the best policy so far is taken; the certificate tells what it is worth.
-const ROUNDS: usize = 1000;
-/// Sweeps between two solutions of the chain, at least and at most, where components are large.
+/// Upper limit on the rounds of policy iteration. The certificate bounds the error of the policy that is reached by then.
+const MAX_ROUNDS: usize = 1000;
+/// Least and greatest number of sweeps between two solutions of the chain, in large components.
 const SWEEPS: (u64, u64) = (2, 40);
-/// How many entries a sweep looks at in the time in which elimination touches one.
-const SWEPT: u64 = 4;
-/// Blocks from which on sweeps pay off.
-const LARGE: usize = 200;
+/// Number of entries that a sweep evaluates in the time in which elimination touches one.
+const SWEEP_SPEED: u64 = 4;
+/// Number of blocks from which on several sweeps pay off.
+const SWEEP_MIN_BLOCKS: usize = 200;
 
-/// A policy that no row improves on, as far as can be told, with the values of its blocks.
+/// A policy that no row clearly improves, with the values of its blocks.
 pub struct Iterated<N> {
     pub policy: Vec<u32>,
     pub values: Vec<N>,
-    /// How far the values of this policy can be off, relative to each.
+    /// Bound on the relative error of each value of this policy.
     pub relative: Vec<f64>,
 }
 
-/// Policy iteration from a proper policy; none where the chain of a policy is too large to be solved, or exact arithmetic
-/// takes too long.
+/// Policy iteration from a proper policy. Returns `None` if the chain of a policy is too large to be solved, or if exact
+/// arithmetic exceeds its budget.
 pub fn iterate<N: Number>(
     quotient: &Quotient<N>,
     start: Vec<u32>,
@@ -39,11 +39,11 @@ pub fn iterate<N: Number>(
     let mut policy = start;
     let mut touched = work.touched();
     let Solved { mut values, mut relative } = chain(quotient, &policy, work)?;
-    let large = !N::EXACT && quotient.blocks() >= LARGE;
-    for _ in 0..ROUNDS {
+    let large = !N::EXACT && quotient.blocks() >= SWEEP_MIN_BLOCKS;
+    for _ in 0..MAX_ROUNDS {
         let mut improved = false;
-        // Sweeps are worth it for as long as elimination takes; where nothing fills up, that is not long.
-        let eliminated = work.touched().saturating_sub(touched).saturating_mul(SWEPT);
+        // Sweeps pay off for as long as elimination takes. Without fill-in, that is short.
+        let eliminated = work.touched().saturating_sub(touched).saturating_mul(SWEEP_SPEED);
         let sweeps =
             eliminated.checked_div(quotient.rows.columns.len() as u64).unwrap_or(0).clamp(SWEEPS.0, SWEEPS.1);
         for _ in 0..if large { sweeps } else { 1 } {
@@ -62,12 +62,13 @@ pub fn iterate<N: Number>(
     Some(Iterated { policy, values, relative })
 }
 
-/// The values of a policy.
+/// Values of a policy.
 fn chain<N: Number>(quotient: &Quotient<N>, policy: &[u32], work: &mut Work) -> Option<Solved<N>> {
     Chain { rows: &quotient.rows, policy, costs: None }.solve(work)
 }
 
-/// Takes the best row of each block; `sweep` writes its value, too. Whether any changed.
+/// Switches each block to its best row. With `sweep`, rows are evaluated with the values updated so far, otherwise with
+/// the old ones. Returns `true` if a row was switched.
 fn improve<N: Number>(
     quotient: &Quotient<N>,
     policy: &mut [u32],
@@ -99,7 +100,7 @@ fn improve<N: Number>(
     Some(changed)
 }
 
-/// A policy under which every block is left, by rows that get closer to the outside.
+/// Returns a policy that leaves every block, by rows that approach the outside (breadth-first search).
 pub fn leave<N: Number>(quotient: &Quotient<N>) -> Vec<u32> {
     let mut policy = vec![NONE; quotient.blocks()];
     let (owners, users) = (owners(&quotient.first), Users::new(&quotient.rows, quotient.blocks()));

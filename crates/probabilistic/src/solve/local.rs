@@ -1,5 +1,4 @@
-//! One strongly connected component of a process, cut out: its choices with what they lead to inside, and what
-//! they are worth outside; and its end components.
+//! Extracts a strongly connected component of a process, and computes its end components.
 
 use std::collections::VecDeque;
 
@@ -11,27 +10,27 @@ use crate::solve::users::{Users, owners};
 
 pub use crate::solve::chain::NONE;
 
-/// The choices of some states; local numbers count the states and the choices from 0.
+/// The choices of some states. Local numbers count these states and choices from 0.
 #[derive(Debug, Clone)]
 pub struct Local<N> {
-    /// The states' own numbers.
+    /// Global numbers of the states.
     pub states: Vec<u32>,
-    /// For each local state its first local choice, and the end.
+    /// First local choice of each state, and the end.
     pub first: Vec<u32>,
-    /// The choices' own numbers.
+    /// Global numbers of the choices.
     pub choices: Vec<u32>,
-    /// A row for each choice; columns are local states.
+    /// One row per choice; columns are local states.
     pub rows: Rows<N>,
-    /// Whether a choice has a positive reward.
+    /// `true` for choices with a positive reward.
     pub paid: Vec<bool>,
-    /// The most transitions of a choice, inside and outside.
+    /// Greatest number of transitions of a choice, inside and outside.
     pub widest: usize,
-    /// Whether products are so small that doubles lose their digits.
+    /// `true` if a product is so small that doubles lose digits.
     pub tiny: bool,
 }
 
 impl<N: Number> Local<N> {
-    /// Nothing.
+    /// Creates an empty component.
     pub fn new() -> Self {
         Self {
             states: vec![],
@@ -44,7 +43,7 @@ impl<N: Number> Local<N> {
         }
     }
 
-    /// Forgets everything, keeps the memory.
+    /// Removes the contents, but keeps the memory.
     pub fn clear(&mut self) {
         self.states.clear();
         self.first.truncate(1);
@@ -58,7 +57,7 @@ impl<N: Number> Local<N> {
         (self.widest, self.tiny) = (0, false);
     }
 
-    /// The local choices of a local state.
+    /// Returns the local choices of a local state.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "the start of the next one is there, because the end is listed, too"
@@ -67,33 +66,33 @@ impl<N: Number> Local<N> {
         self.first[state] as usize..self.first[state + 1] as usize
     }
 
-    /// Whether a choice stays inside for sure.
+    /// Returns `true` if a choice stays in the component with probability 1.
     pub fn is_closed(&self, choice: usize) -> bool {
         self.rows.leaving[choice].is_zero()
     }
 
-    /// For each choice the local state that it belongs to.
+    /// Returns the local state of each choice.
     pub fn owners(&self) -> Vec<u32> {
         owners(&self.first)
     }
 }
 
-/// The maximal end components among the choices that are eligible.
+/// The maximal end components of the eligible choices.
 #[derive(Debug, Clone)]
 pub struct EndComponents {
-    /// For each local state the number of its block; states outside end components are blocks of their own.
+    /// Block of each local state; a state outside end components is a block by itself.
     pub block: Vec<u32>,
-    /// How many blocks there are.
+    /// Number of blocks.
     pub blocks: usize,
-    /// Whether the state lies in an end component.
+    /// `true` for states in an end component.
     pub inside: Vec<bool>,
-    /// The choices of the end components.
+    /// `true` for choices of an end component.
     pub alive: Vec<bool>,
 }
 
-/// Maximal end components of the closed choices that `eligible` accepts (de Alfaro 1997): components of the graph,
-/// without the choices that leave one, until none does. Choices that lead to a state without choices go first, which is
-/// all of them in a component where nobody can stay.
+/// Computes the maximal end components of the closed choices that `eligible` accepts (de Alfaro 1997): decomposes the
+/// graph into components and removes the choices that leave one, until no choice is removed. Choices into dead ends are
+/// removed first; without end components, these are all choices.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "the start of the next one is there, because the end is listed, too"
@@ -121,8 +120,8 @@ pub fn end_components<N: Number>(local: &Local<N>, eligible: impl Fn(usize) -> b
             }
             starts.push(dense(edges.len()));
         }
-        let found = components(n, |s| &edges[starts[s as usize] as usize..starts[s as usize + 1] as usize]);
-        for (number, component) in found.iter().enumerate() {
+        let parts = components(n, |s| &edges[starts[s as usize] as usize..starts[s as usize + 1] as usize]);
+        for (number, component) in parts.iter().enumerate() {
             for state in component {
                 block[*state as usize] = dense(number);
             }
@@ -139,26 +138,27 @@ pub fn end_components<N: Number>(local: &Local<N>, eligible: impl Fn(usize) -> b
         }
         if !changed {
             let inside = (0..n).map(|state| local.range(state).any(|choice| alive[choice])).collect();
-            return EndComponents { block, blocks: found.len(), inside, alive };
+            return EndComponents { block, blocks: parts.len(), inside, alive };
         }
     }
 }
 
-/// Removes the choices that lead to states of which all choices are removed.
+/// Removes choices that lead to states without remaining choices.
 fn remove_dead_ends<N: Number>(local: &Local<N>, alive: &mut [bool]) {
     let (owners, users) = (local.owners(), Users::new(&local.rows, local.states.len()));
-    let mut left = vec![0_u32; local.states.len()];
+    let mut remaining = vec![0_u32; local.states.len()];
     for (choice, owner) in owners.iter().enumerate() {
-        left[*owner as usize] = left[*owner as usize].saturating_add(u32::from(alive[choice]));
+        remaining[*owner as usize] = remaining[*owner as usize].saturating_add(u32::from(alive[choice]));
     }
-    let mut dead: Vec<u32> = (0..dense(left.len())).filter(|state| left[*state as usize] == 0).collect();
+    let mut dead: Vec<u32> =
+        (0..dense(remaining.len())).filter(|state| remaining[*state as usize] == 0).collect();
     while let Some(state) = dead.pop() {
         for choice in users.of(state) {
             if std::mem::replace(&mut alive[*choice as usize], false) {
                 let owner = owners[*choice as usize];
-                let left = &mut left[owner as usize];
-                *left = left.saturating_sub(1);
-                if *left == 0 {
+                let remaining = &mut remaining[owner as usize];
+                *remaining = remaining.saturating_sub(1);
+                if *remaining == 0 {
                     dead.push(owner);
                 }
             }
@@ -166,7 +166,7 @@ fn remove_dead_ends<N: Number>(local: &Local<N>, alive: &mut [bool]) {
     }
 }
 
-/// The frequent case of free reconfiguration: the whole component is one end component.
+/// Returns the whole component if it is one end component, the frequent case of free reconfiguration. At most 64 states.
 fn whole<N: Number>(local: &Local<N>, alive: &[bool]) -> Option<EndComponents> {
     let n = local.states.len();
     if n > 64 {
@@ -181,17 +181,18 @@ fn whole<N: Number>(local: &Local<N>, alive: &[bool]) -> Option<EndComponents> {
             }
         }
     }
-    let all = (0..n).fold(0_u64, |all, state| all | 1 << state);
+    let all_states = (0..n).fold(0_u64, |all_states, state| all_states | 1 << state);
+    // Strongly connected: all states are reachable from state 0, forwards and backwards.
     let covers = |edges: &[u64; 64]| {
-        let (mut seen, mut open) = (1_u64, 1_u64);
+        let (mut visited, mut open) = (1_u64, 1_u64);
         while open != 0 {
             let state = open.trailing_zeros() as usize;
             open ^= 1 << state;
-            let new = edges[state] & !seen;
-            seen |= new;
+            let new = edges[state] & !visited;
+            visited |= new;
             open |= new;
         }
-        seen == all
+        visited == all_states
     };
     (covers(&forward) && covers(&backward)).then(|| EndComponents {
         block: vec![0; n],
@@ -201,10 +202,11 @@ fn whole<N: Number>(local: &Local<N>, alive: &[bool]) -> Option<EndComponents> {
     })
 }
 
-/// Which states can surely be left for good, and how: the greatest set of states in which each has a choice that
-/// stays in the set, or is left, and from which leaving is reachable by such choices.
+/// Computes the states from which the component can be left with probability 1, and a policy that does so: the greatest
+/// set of states that have a choice that stays in the set or leaves the component, and from which leaving is reachable by
+/// such choices.
 ///
-/// `fits` says of a choice whether what it leads to outside is good.
+/// `fits` returns `true` for choices with acceptable successors outside.
 pub fn attractor<N: Number>(local: &Local<N>, fits: impl Fn(usize) -> bool) -> (Vec<bool>, Vec<u32>) {
     let n = local.states.len();
     let owners = local.owners();

@@ -1,11 +1,14 @@
-//! A process and what is asked of it to the value of each state, with bounds, and a policy.
+//! Solves a problem on a process: the value of each state with bounds, and an optimal policy.
 //!
-//! The components of the graph are solved in reverse topological order, so that what an acyclic part (a battery
-//! that only falls) is worth comes from one exact sweep. Inside a component: first what holds by the shape of the
-//! graph alone (values 0, 1 and ∞; Forejt et al., "Automated Verification Techniques for Probabilistic Systems", SFM
-//! 2011, section 4), then end components are merged so that the equations have one solution (Haddad and Monmege,
-//! TCS 735, 2018; zero-reward end components: Bertsekas and Tsitsiklis, Math. OR 16(3), 1991), then policy
-//! iteration with direct solution of each chain, then a certificate of its error (`certify`).
+//! The components of the graph are solved in reverse topological order, so that the values of an acyclic part (a
+//! battery that only falls) result from one exact sweep. Inside a component:
+//!
+//! 1. Values 0, 1 and ∞ follow from the graph alone (Forejt et al., "Automated Verification Techniques for
+//!    Probabilistic Systems", SFM 2011, section 4).
+//! 2. End components are merged, so that the equations have a unique solution (Haddad and Monmege, TCS 735, 2018;
+//!    zero-reward end components: Bertsekas and Tsitsiklis, Math. OR 16(3), 1991).
+//! 3. Policy iteration solves the Markov chain of each policy directly.
+//! 4. A certificate bounds the error of the result (`certify`).
 
 pub(crate) mod certify;
 pub(crate) mod chain;
@@ -26,38 +29,38 @@ use crate::graph::visit_components;
 use crate::mdp::dense;
 use crate::number::{Number, is_whole};
 
-use problem::{Run, TINY};
+use problem::{Run, UNDERFLOW_BOUND};
 
 pub use local::NONE;
 pub use problem::{Direction, Problem, Solution};
 pub(crate) use work::Work;
 
-/// Exact arithmetic takes too long.
+/// Exact arithmetic exceeded its budget.
 struct TooMuchWork;
 
-/// Solves a problem; none where exact arithmetic takes too long.
+/// Solves a problem. Returns `None` if exact arithmetic exceeds its budget.
 ///
-/// `hint` is a policy to start from, as a solution in doubles has it.
+/// `hint` is an initial policy, for example the policy of a solution in doubles.
 pub fn solve<N: Number>(problem: Problem<'_, N>, hint: Option<&[u32]>) -> Option<Solution<N>> {
-    solve_within(problem, hint, &mut Work::new(work::MOST))
+    solve_within(problem, hint, &mut Work::new(work::DEFAULT_BUDGET))
 }
 
-/// Solves a problem within a budget of exact arithmetic; none where that does not suffice.
+/// Solves a problem within a budget of exact arithmetic. Returns `None` if the budget does not suffice.
 pub(crate) fn solve_within<N: Number>(
     problem: Problem<'_, N>,
     hint: Option<&[u32]>,
     work: &mut Work,
 ) -> Option<Solution<N>> {
     let mut run = Run { work: *work, ..begin(problem, hint) };
-    let done = run.all();
+    let outcome = run.solve_components();
     *work = run.work;
-    done.map(|()| run.solution)
+    outcome.map(|()| run.solution)
 }
 
-/// A good policy, which need not be the best one.
+/// Returns a good policy, which is not necessarily optimal.
 pub(crate) fn draft<N: Number>(problem: Problem<'_, N>) -> Option<Vec<u32>> {
     let mut run = Run { draft: true, ..begin(problem, None) };
-    run.all()?;
+    run.solve_components()?;
     Some(run.solution.policy)
 }
 
@@ -71,16 +74,22 @@ fn begin<'a, N: Number>(problem: Problem<'a, N>, hint: Option<&'a [u32]>) -> Run
         sure: problem.terminal.clone(),
         policy: vec![NONE; n],
     };
-    let mut run =
-        Run { problem, solution, hint, position: vec![NONE; n], work: Work::new(work::MOST), draft: false };
+    let mut run = Run {
+        problem,
+        solution,
+        hint,
+        position: vec![NONE; n],
+        work: Work::new(work::DEFAULT_BUDGET),
+        draft: false,
+    };
     run.solution.sure.grow(n);
     run
 }
 
 impl<N: Number> Run<'_, N> {
-    /// Solves all components, each after those that it leads to.
-    fn all(&mut self) -> Option<()> {
-        let (mut local, mut ways) = (local::Local::new(), ways::Ways::default());
+    /// Solves all components, each after its successors.
+    fn solve_components(&mut self) -> Option<()> {
+        let (mut local, mut path_buffers) = (local::Local::new(), ways::PathBuffers::default());
         let problem = self.problem;
         let successors = |state: u32| {
             if problem.is_sink(state as usize) { &[] } else { problem.mdp.successors(state as usize) }
@@ -89,7 +98,7 @@ impl<N: Number> Run<'_, N> {
             match component {
                 [state] if problem.is_sink(*state as usize) => self.sink(*state as usize),
                 [state] => self.single(*state as usize),
-                _ if self.ways(component, &mut ways) => {}
+                _ if self.shortest_paths(component, &mut path_buffers) => {}
                 _ => self.component(component, &mut local).ok_or(TooMuchWork)?,
             }
             if N::EXACT && self.work.is_spent() { Err(TooMuchWork) } else { Ok(()) }
@@ -97,30 +106,31 @@ impl<N: Number> Run<'_, N> {
         visited.ok()
     }
 
-    /// A state at which it ends, well or badly.
+    /// Solves a terminal or blocked state.
     fn sink(&mut self, state: usize) {
         if self.problem.rewards.is_some() && !self.problem.terminal.contains(state) {
             self.solution.infinite.insert(state);
         }
     }
 
-    /// A state that is a component by itself: at most loops, and everything else is known.
+    /// Solves a state that is a component by itself: apart from loops, all successors are solved.
     fn single(&mut self, state: usize) {
-        let (mut sure, mut all_sure) = (NONE, true);
+        let (mut sure_choice, mut all_sure) = (NONE, true);
         for choice in self.problem.choices(state) {
             let mut leaves = false;
-            let good = self.problem.mdp.targets(choice).iter().all(|target| {
+            let targets_sure = self.problem.mdp.targets(choice).iter().all(|target| {
                 leaves |= *target as usize != state;
                 *target as usize == state || self.solution.sure.contains(*target as usize)
             });
-            match good && leaves {
-                true if sure == NONE => sure = dense(choice),
+            // A choice that only loops never reaches a terminal state.
+            match targets_sure && leaves {
+                true if sure_choice == NONE => sure_choice = dense(choice),
                 true => {}
                 false => all_sure = false,
             }
         }
         let by_choice = self.sure_by_choice();
-        let is_sure = sure != NONE && (by_choice || all_sure);
+        let is_sure = sure_choice != NONE && (by_choice || all_sure);
         if is_sure {
             self.solution.sure.insert(state);
         } else if self.problem.rewards.is_some() {
@@ -129,7 +139,7 @@ impl<N: Number> Run<'_, N> {
         }
         if is_sure && self.sure_is_one() {
             self.solution.values[state] = N::one();
-            self.solution.policy[state] = sure;
+            self.solution.policy[state] = sure_choice;
             return;
         }
         let must_be_sure = by_choice && self.problem.rewards.is_some();
@@ -139,26 +149,26 @@ impl<N: Number> Run<'_, N> {
         for choice in problem.choices(state) {
             if let Some((value, spread)) = self.single_choice(state, choice, must_be_sure) {
                 error = error.max(spread);
-                let better = best.as_ref().is_none_or(|(known, ..)| match self.problem.direction {
-                    Direction::Min => value < *known,
-                    Direction::Max => value > *known,
+                let better = best.as_ref().is_none_or(|(incumbent, ..)| match self.problem.direction {
+                    Direction::Min => value < *incumbent,
+                    Direction::Max => value > *incumbent,
                 });
                 if better {
                     best = Some((value, dense(choice), spread));
                 }
             }
         }
-        if let Some((value, choice, own)) = best {
+        if let Some((value, choice, spread)) = best {
             if !N::EXACT {
-                // Nothing is less than zero, so that only the error of what is zero counts there.
-                self.solution.errors[state] = if value.is_zero() { own } else { error };
+                // Values are never negative. At 0, only the error of the selected choice counts.
+                self.solution.errors[state] = if value.is_zero() { spread } else { error };
             }
             self.solution.values[state] = value;
             self.solution.policy[state] = choice;
         }
     }
 
-    /// What a choice is worth, with the error of that; none for one that is never made.
+    /// Evaluates a choice of a single state: value and error. Returns `None` for a choice that is never selected.
     fn single_choice(&mut self, state: usize, choice: usize, must_be_sure: bool) -> Option<(N, f64)> {
         let mdp = self.problem.mdp;
         let (mut sum, mut leaving, mut looping) = (self.problem.reward(choice), N::zero(), false);
@@ -182,26 +192,26 @@ impl<N: Number> Run<'_, N> {
                 tiny |= !value.is_zero();
                 whole &= is_whole(value.to_f64());
             }
-            // What the budget does not pay for is noticed when the state is done.
+            // An exhausted budget is detected after the state.
             let _ = self.work.spend(&sum, 2);
         }
         if leaving.is_zero() {
-            // It stays for ever: worth nothing where that is allowed.
+            // The state is never left. Without rewards this is allowed, and the value is 0.
             return self.problem.rewards.is_none().then(|| (N::zero(), 0.0));
         }
         if looping {
             sum = sum.over(&leaving);
             error /= leaving.to_f64();
         }
-        // Probabilities that are rounded may sum to a little more than one.
+        // The rounded probabilities may sum to slightly more than 1.
         error *= 1.0 + terms * f64::EPSILON;
         error += if error > 0.0 || unsure { f64::MIN_POSITIVE } else { 0.0 };
         let size = sum.to_f64();
-        // Deterministic choices with whole rewards carry no error of their own.
+        // A deterministic choice with an integral reward and an integral value is exact.
         if whole && error == 0.0 && terms < 7.0 && !looping && is_whole(size) {
             return Some((sum, 0.0));
         }
-        error += if tiny && size < TINY { TINY } else { 0.0 };
+        error += if tiny && size < UNDERFLOW_BOUND { UNDERFLOW_BOUND } else { 0.0 };
         Some((sum, error + terms * f64::EPSILON * size))
     }
 }

@@ -1,4 +1,4 @@
-//! What is asked of a process, what is found, and what is at hand while it is being solved.
+//! Problems, solutions, and the state of the solver.
 
 use fixedbitset::FixedBitSet;
 
@@ -6,34 +6,34 @@ use crate::mdp::Mdp;
 use crate::number::{Number, enclosing};
 use crate::solve::work::Work;
 
-/// Which policy is looked for.
+/// Direction of optimisation over all policies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Direction {
-    /// The one with the least value.
+    /// The least value.
     Min,
-    /// The one with the greatest value.
+    /// The greatest value.
     Max,
 }
 
-/// What is asked of a process.
+/// A query on a process.
 ///
-/// Without rewards: the expected value of the first terminal state that is reached, 0 if none is. With rewards: the
-/// expected sum of rewards until then, infinite if one may never be reached.
+/// Without rewards, the value of a state is the expected value of the first terminal state that is reached, or 0 on paths
+/// that reach none. With rewards, it is the expected sum of rewards until then, infinite if possibly none is reached.
 #[derive(Debug)]
 pub struct Problem<'a, N> {
     /// The process.
     pub mdp: &'a Mdp<N>,
-    /// Least or greatest.
+    /// Direction of optimisation.
     pub direction: Direction,
-    /// For each choice its reward, at least zero.
+    /// Reward of each choice, at least 0.
     pub rewards: Option<&'a [N]>,
-    /// The states at which it ends.
+    /// The terminal states.
     pub terminal: &'a FixedBitSet,
-    /// What they are worth, for each state; otherwise 1 without rewards, and 0 with them.
+    /// Value of each terminal state, by state. The default is 1 without rewards, and 0 with rewards.
     pub terminal_values: Option<&'a [N]>,
-    /// States that must not be entered: nothing that comes after them counts.
+    /// States that count as failures: nothing after them counts.
     pub blocked: Option<&'a FixedBitSet>,
-    /// The choices that may be made; all of them otherwise. Each state that is not terminal needs one.
+    /// The allowed choices; `None` allows all. Each nonterminal state needs an allowed choice.
     pub allowed: Option<&'a FixedBitSet>,
 }
 
@@ -46,7 +46,7 @@ impl<N> Clone for Problem<'_, N> {
 impl<N> Copy for Problem<'_, N> {}
 
 impl<'a, N> Problem<'a, N> {
-    /// The plain question: terminal states are worth what they are without more being said, and every choice may be made.
+    /// Creates a problem with default terminal values, in which all choices are allowed.
     pub const fn new(
         mdp: &'a Mdp<N>,
         direction: Direction,
@@ -82,22 +82,22 @@ impl<N: Number> Problem<'_, N> {
 /// The values of all states.
 #[derive(Debug, Clone)]
 pub struct Solution<N> {
-    /// For each state its value; 0 where it is infinite.
+    /// Value of each state; 0 if the value is infinite.
     pub values: Vec<N>,
-    /// How far a value can be from the truth; empty where arithmetic is exact.
+    /// Bound on the absolute error of each value; empty in exact arithmetic.
     pub errors: Vec<f64>,
     /// The states whose value is infinite.
     pub infinite: FixedBitSet,
-    /// The states from which a terminal state is reached with probability 1: by some policy where the best one is
-    /// looked for (greatest probability, least reward), else by all.
+    /// The states from which a terminal state is reached with probability 1: under some policy for the greatest probability
+    /// and the least reward, under all policies otherwise.
     pub sure: FixedBitSet,
-    /// For each state the number of its choice, [`NONE`](crate::solve::NONE) where nothing is to be chosen.
+    /// Choice of each state, or [`NONE`](crate::solve::NONE) if the state needs no choice.
     pub policy: Vec<u32>,
 }
 
 impl<N: Number> Solution<N> {
-    /// Bounds on the value of a state, none if it is infinite. They enclose the true value; as doubles also where
-    /// arithmetic is exact.
+    /// Bounds that enclose the true value of a state; the enclosing doubles in exact arithmetic. `None` if the value is
+    /// infinite.
     pub fn bounds(&self, state: usize) -> Option<(f64, f64)> {
         if self.infinite.contains(state) {
             return None;
@@ -111,30 +111,30 @@ impl<N: Number> Solution<N> {
     }
 }
 
-/// Products of positive doubles below lose digits; values that are made of them get this error on top.
-pub(super) const TINY: f64 = 1e-280;
+/// Products of positive doubles below this value lose digits. It is added to the error of values that depend on them.
+pub(super) const UNDERFLOW_BOUND: f64 = 1e-280;
 
-/// What the components share while a problem is solved.
+/// State of the solver, shared by all components.
 pub(crate) struct Run<'a, N> {
     pub problem: Problem<'a, N>,
     pub solution: Solution<N>,
-    /// A policy to start from.
+    /// An initial policy.
     pub hint: Option<&'a [u32]>,
-    /// For each state its number in the component at work.
+    /// Number of each state in the current component, or `NONE`.
     pub position: Vec<u32>,
-    /// What exact arithmetic may still cost.
+    /// Remaining budget of exact arithmetic.
     pub work: Work,
-    /// Whether a policy is all that is wanted, which need not be the best one: nothing is certified.
+    /// `true` if only a good policy is needed: nothing is certified.
     pub draft: bool,
 }
 
 impl<N: Number> Run<'_, N> {
-    /// Whether the sure states are those of the best policy, or those of all policies.
+    /// Returns `true` if sure states are defined by the best policy, `false` if by all policies.
     pub fn sure_by_choice(&self) -> bool {
         self.problem.rewards.is_some() == (self.problem.direction == Direction::Min)
     }
 
-    /// Whether the value of sure states is 1 for that reason alone.
+    /// Returns `true` if sure states have value 1 without further computation.
     pub fn sure_is_one(&self) -> bool {
         self.problem.rewards.is_none() && self.problem.terminal_values.is_none()
     }

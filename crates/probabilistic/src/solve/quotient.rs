@@ -1,22 +1,22 @@
-//! A component with cycles as the equations of its blocks.
+//! Equations of the blocks of a component with cycles.
 
 use crate::number::Number;
 use crate::solve::chain::Rows;
 
 /// A component with its end components merged into blocks.
 pub struct Quotient<N> {
-    /// For each block its first row, and the end.
+    /// First row of each block, and the end.
     pub first: Vec<u32>,
-    /// What each choice that leaves its block leads to; columns are blocks, own loops are divided out.
+    /// One row per choice that leaves its block; columns are blocks, and loops are divided out.
     pub rows: Rows<N>,
-    /// For each row its local choice.
+    /// Local choice of each row.
     pub choices: Vec<u32>,
-    /// The most transitions that a row was made of.
+    /// Greatest number of transitions that a row was built from.
     pub widest: usize,
 }
 
 impl<N: Number> Quotient<N> {
-    /// How many blocks there are.
+    /// Number of blocks.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "the end is listed, too, so that the list is never empty"
@@ -25,7 +25,7 @@ impl<N: Number> Quotient<N> {
         self.first.len() - 1
     }
 
-    /// The rows of a block.
+    /// Returns the rows of a block.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "the start of the next one is there, because the end is listed, too"

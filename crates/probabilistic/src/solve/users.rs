@@ -1,17 +1,17 @@
-//! Which rows lead to a column.
+//! Index from columns to rows.
 
 use crate::mdp::dense;
 use crate::solve::chain::Rows;
 
-/// For each column the rows with an entry there, in ascending order, once for each entry.
+/// For each column, the rows with an entry in it, in ascending order, once per entry.
 pub struct Users {
-    /// Where each column starts in `rows`, and the end.
+    /// Start of each column in `rows`, and the end.
     starts: Vec<u32>,
     rows: Vec<u32>,
 }
 
 impl Users {
-    /// The rows that lead to each of so many columns.
+    /// Creates the index for a number of columns.
     pub fn new<N>(rows: &Rows<N>, columns: usize) -> Self {
         let mut starts = vec![0_u32; columns.saturating_add(1)];
         for column in &rows.columns {
@@ -22,7 +22,7 @@ impl Users {
             end = end.saturating_add(*start);
             *start = end;
         }
-        // From behind, so that each start gets to the first row of its column.
+        // Rows are inserted from last to first, so that each start moves down to the first row of its column.
         let mut users = vec![0_u32; rows.columns.len()];
         for (row, window) in rows.first.windows(2).enumerate().rev() {
             for column in &rows.columns[window[0] as usize..window[1] as usize] {
@@ -34,19 +34,19 @@ impl Users {
         Self { starts, rows: users }
     }
 
-    /// The rows that lead to a column.
+    /// Returns the rows with an entry in a column.
     pub fn of(&self, column: u32) -> &[u32] {
         let next = (column as usize).saturating_add(1);
         &self.rows[self.starts[column as usize] as usize..self.starts[next] as usize]
     }
 }
 
-/// For each row the place that it belongs to; `first` has the first row of each place, and the end.
+/// Returns the owner of each row. `first` contains the first row of each owner, and the end.
 pub fn owners(first: &[u32]) -> Vec<u32> {
     let rows = first.last().copied().unwrap_or(0);
     let mut owners = vec![0; rows as usize];
-    for (place, window) in first.windows(2).enumerate() {
-        owners[window[0] as usize..window[1] as usize].fill(dense(place));
+    for (owner, window) in first.windows(2).enumerate() {
+        owners[window[0] as usize..window[1] as usize].fill(dense(owner));
     }
     owners
 }

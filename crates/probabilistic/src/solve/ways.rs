@@ -1,31 +1,31 @@
-//! A small component whose choices either leave it or lead to one of its states for sure, to its values: by shortest ways.
+//! Solves small components by shortest paths: each choice leaves the component, or leads to one of its states.
 //!
-//! Reconfigurations that work, or that are tried until they work, are of this kind, and they are nearly all of the
-//! components of a co-adaptation process. The best value spreads from the choices that leave (Dijkstra 1959), so that no
-//! equations have to be solved, and the only errors are those of a few sums.
+//! Reconfigurations that succeed, or that are repeated until they succeed, have this form, and they are nearly all of the
+//! components of a co-adaptation process. The best value spreads from the choices that leave (Dijkstra 1959). No equations
+//! have to be solved, and the only errors are those of a few sums.
 
 use crate::mdp::dense;
 use crate::number::{Number, count, is_whole};
 use crate::solve::local::NONE;
 use crate::solve::problem::{Direction, Run};
 
-/// States up to which the next best state is looked for one by one.
-const SMALL: usize = 64;
+/// Upper limit on the number of states; the next best state is found by linear search.
+const MAX_STATES: usize = 64;
 
-/// Buffers.
+/// Buffers of the algorithm.
 #[derive(Debug)]
-pub struct Ways<N> {
-    /// The best value so far, and the choice, for each state of the component.
+pub struct PathBuffers<N> {
+    /// Best known value and its choice, for each state of the component.
     best: Vec<Option<(N, u32)>>,
     settled: Vec<bool>,
     steps: Vec<Step<N>>,
-    /// Choices that leave: state, choice, whether they do so for good.
+    /// Leaving choices: state, choice, and `true` if all successors are sure.
     exits: Vec<(u32, u32, bool)>,
-    /// The greatest error of what leaving choices are worth.
+    /// Greatest error of the value of a leaving choice.
     error: f64,
-    /// The greatest one among those that are worth nothing.
+    /// Greatest error of a leaving choice of value 0.
     zero_error: f64,
-    /// Whether all sums are of whole numbers.
+    /// `true` if all terms are integers, so that sums are exact.
     whole: bool,
 }
 
@@ -35,11 +35,11 @@ struct Step<N> {
     to: u32,
     choice: u32,
     cost: N,
-    /// Whether the cost was divided, and so perhaps rounded.
+    /// `true` if the cost was divided, and so possibly rounded.
     divided: bool,
 }
 
-impl<N> Default for Ways<N> {
+impl<N> Default for PathBuffers<N> {
     fn default() -> Self {
         Self {
             best: Vec::new(),
@@ -54,17 +54,17 @@ impl<N> Default for Ways<N> {
 }
 
 impl<N: Number> Run<'_, N> {
-    /// Solves a component of this kind; false, and nothing is done, if it is of another kind.
-    pub fn ways(&mut self, component: &[u32], ways: &mut Ways<N>) -> bool {
+    /// Solves a component of this form. Returns `false` and does nothing if it has another form.
+    pub fn shortest_paths(&mut self, component: &[u32], buffers: &mut PathBuffers<N>) -> bool {
         let by_choice = self.sure_by_choice();
-        // Where choices are restricted, the component may not hang together by those that are left.
-        if component.len() > SMALL || !by_choice && self.problem.allowed.is_some() {
+        // The allowed choices alone may not connect the component.
+        if component.len() > MAX_STATES || !by_choice && self.problem.allowed.is_some() {
             return false;
         }
         for (number, state) in component.iter().enumerate() {
             self.position[*state as usize] = dense(number);
         }
-        let fits = self.scan(component, ways);
+        let fits = self.scan(component, buffers);
         for state in component {
             self.position[*state as usize] = NONE;
         }
@@ -72,14 +72,15 @@ impl<N: Number> Run<'_, N> {
             return false;
         }
         match (self.problem.rewards.is_some(), by_choice) {
-            (false, true) => self.greatest_probability(component, ways),
-            (true, true) => self.least_reward(component, ways),
-            // One can go round for ever, from each state.
+            (false, true) => self.greatest_probability(component, buffers),
+            (true, true) => self.least_reward(component, buffers),
+            // Some policy never leaves the component, from each state.
             (true, false) => component.iter().for_each(|state| {
                 self.solution.infinite.insert(*state as usize);
             }),
+            // Staying in the component has probability 0, the least possible value.
             (false, false) => {
-                for step in &ways.steps {
+                for step in &buffers.steps {
                     self.solution.policy[component[step.from as usize] as usize] = step.choice;
                 }
             }
@@ -87,10 +88,10 @@ impl<N: Number> Run<'_, N> {
         true
     }
 
-    /// Sorts the choices; false if one is of another kind.
-    fn scan(&self, component: &[u32], ways: &mut Ways<N>) -> bool {
-        ways.steps.clear();
-        ways.exits.clear();
+    /// Classifies the choices. Returns `false` if one has another form.
+    fn scan(&self, component: &[u32], buffers: &mut PathBuffers<N>) -> bool {
+        buffers.steps.clear();
+        buffers.exits.clear();
         for (from, state) in component.iter().enumerate() {
             for choice in self.problem.choices(*state as usize) {
                 let (mut to, mut leaves, mut sure) = (NONE, false, true);
@@ -108,11 +109,17 @@ impl<N: Number> Run<'_, N> {
                 }
                 match (to, leaves) {
                     (NONE, false) => {} // It stays where it is.
-                    (NONE, true) => ways.exits.push((dense(from), dense(choice), sure)),
+                    (NONE, true) => buffers.exits.push((dense(from), dense(choice), sure)),
                     (_, true) => return false,
                     (to, false) => {
                         let (cost, divided) = self.step_cost(*state, choice);
-                        ways.steps.push(Step { from: dense(from), to, choice: dense(choice), cost, divided });
+                        buffers.steps.push(Step {
+                            from: dense(from),
+                            to,
+                            choice: dense(choice),
+                            cost,
+                            divided,
+                        });
                     }
                 }
             }
@@ -120,91 +127,91 @@ impl<N: Number> Run<'_, N> {
         true
     }
 
-    /// What it takes to get along a step that is tried until it works; whether that was divided.
+    /// Expected cost of a step that is repeated until it succeeds; `true` if it was divided.
     fn step_cost(&self, state: u32, choice: usize) -> (N, bool) {
         let reward = self.problem.reward(choice);
         if reward.is_zero() || self.problem.mdp.targets(choice).len() == 1 {
             return (reward, false);
         }
-        let works = self.problem.mdp.transitions(choice).find(|(target, _)| *target != state as usize);
-        (works.map_or(reward.clone(), |(_, probability)| reward.over(probability)), true)
+        let success = self.problem.mdp.transitions(choice).find(|(target, _)| *target != state as usize);
+        (success.map_or(reward.clone(), |(_, probability)| reward.over(probability)), true)
     }
 
-    fn greatest_probability(&mut self, component: &[u32], ways: &mut Ways<N>) {
-        ways.begin(component.len());
-        for (from, choice, sure) in &ways.exits {
+    fn greatest_probability(&mut self, component: &[u32], buffers: &mut PathBuffers<N>) {
+        buffers.begin(component.len());
+        for (from, choice, sure) in &buffers.exits {
             if *sure {
-                ways.best[*from as usize] = Some((N::one(), *choice));
+                buffers.best[*from as usize] = Some((N::one(), *choice));
             }
         }
-        if ways.best.iter().any(Option::is_some) {
-            ways.spread(Direction::Max);
-            let known = self.sure_is_one();
-            for (state, best) in component.iter().zip(&ways.best) {
+        if buffers.best.iter().any(Option::is_some) {
+            buffers.spread(Direction::Max);
+            let is_one = self.sure_is_one();
+            for (state, best) in component.iter().zip(&buffers.best) {
                 let Some((_, choice)) = best else { continue };
                 self.solution.sure.insert(*state as usize);
-                if known {
+                if is_one {
                     self.solution.values[*state as usize] = N::one();
                     self.solution.policy[*state as usize] = *choice;
                 }
             }
-            if known && ways.best.iter().all(Option::is_some) {
+            if is_one && buffers.best.iter().all(Option::is_some) {
                 return;
             }
-            if known {
-                // The rest cannot get to what is sure.
-                ways.exits.retain(|(from, ..)| ways.best[*from as usize].is_none());
-                ways.steps.retain(|step| ways.best[step.from as usize].is_none());
+            if is_one {
+                // The remaining states cannot reach a sure exit.
+                buffers.exits.retain(|(from, ..)| buffers.best[*from as usize].is_none());
+                buffers.steps.retain(|step| buffers.best[step.from as usize].is_none());
             }
         }
-        ways.begin(component.len());
-        self.leave(component, ways, false);
-        ways.spread(Direction::Max);
-        self.write(component, ways);
+        buffers.begin(component.len());
+        self.leave(component, buffers, false);
+        buffers.spread(Direction::Max);
+        self.write(component, buffers);
     }
 
-    fn least_reward(&mut self, component: &[u32], ways: &mut Ways<N>) {
-        ways.begin(component.len());
-        self.leave(component, ways, true);
-        ways.spread(Direction::Min);
-        for (state, best) in component.iter().zip(&ways.best) {
+    fn least_reward(&mut self, component: &[u32], buffers: &mut PathBuffers<N>) {
+        buffers.begin(component.len());
+        self.leave(component, buffers, true);
+        buffers.spread(Direction::Min);
+        for (state, best) in component.iter().zip(&buffers.best) {
             match best {
                 Some(_) => self.solution.sure.insert(*state as usize),
                 None => self.solution.infinite.insert(*state as usize),
             }
         }
-        self.write(component, ways);
+        self.write(component, buffers);
     }
 
-    /// What the choices that leave are worth.
-    fn leave(&mut self, component: &[u32], ways: &mut Ways<N>, must_be_sure: bool) {
-        for (from, choice, _) in &ways.exits {
+    /// Evaluates the leaving choices.
+    fn leave(&mut self, component: &[u32], buffers: &mut PathBuffers<N>, must_be_sure: bool) {
+        for (from, choice, _) in &buffers.exits {
             let state = component[*from as usize] as usize;
             let Some((value, error)) = self.single_choice(state, *choice as usize, must_be_sure) else {
                 continue;
             };
-            ways.error = ways.error.max(error);
+            buffers.error = buffers.error.max(error);
             if value.is_zero() {
-                ways.zero_error = ways.zero_error.max(error);
+                buffers.zero_error = buffers.zero_error.max(error);
             }
-            ways.whole &= !N::EXACT && is_whole(value.to_f64());
-            let best = &mut ways.best[*from as usize];
-            if best.as_ref().is_none_or(|(known, _)| better(self.problem.direction, &value, known)) {
+            buffers.whole &= !N::EXACT && is_whole(value.to_f64());
+            let best = &mut buffers.best[*from as usize];
+            if best.as_ref().is_none_or(|(incumbent, _)| better(self.problem.direction, &value, incumbent)) {
                 *best = Some((value, *choice));
             }
         }
     }
 
-    fn write(&mut self, component: &[u32], ways: &Ways<N>) {
-        for (state, best) in component.iter().zip(&ways.best) {
+    fn write(&mut self, component: &[u32], buffers: &PathBuffers<N>) {
+        for (state, best) in component.iter().zip(&buffers.best) {
             let Some((value, choice)) = best else { continue };
             let state = *state as usize;
             if !N::EXACT {
-                // Each step of the way adds once, and may divide and round its cost.
+                // Each step of a path adds once, and may divide and round its cost.
                 let sums = 3.0 * count(component.len()) * f64::EPSILON * value.to_f64();
-                let rounding = if ways.whole { 0.0 } else { sums };
+                let rounding = if buffers.whole { 0.0 } else { sums };
                 self.solution.errors[state] =
-                    if value.is_zero() { ways.zero_error } else { ways.error + rounding };
+                    if value.is_zero() { buffers.zero_error } else { buffers.error + rounding };
             }
             self.solution.values[state] = value.clone();
             self.solution.policy[state] = *choice;
@@ -212,31 +219,31 @@ impl<N: Number> Run<'_, N> {
     }
 }
 
-fn better<N: Number>(direction: Direction, value: &N, known: &N) -> bool {
+fn better<N: Number>(direction: Direction, value: &N, incumbent: &N) -> bool {
     match direction {
-        Direction::Min => value < known,
-        Direction::Max => value > known,
+        Direction::Min => value < incumbent,
+        Direction::Max => value > incumbent,
     }
 }
 
-impl<N: Number> Ways<N> {
+impl<N: Number> PathBuffers<N> {
     fn begin(&mut self, states: usize) {
         self.best.clear();
         self.best.resize(states, None);
         self.settled.clear();
         self.settled.resize(states, false);
         (self.error, self.zero_error) = (0.0, 0.0);
-        let whole = |step: &Step<N>| !step.divided && is_whole(step.cost.to_f64() * count(SMALL));
+        let whole = |step: &Step<N>| !step.divided && is_whole(step.cost.to_f64() * count(MAX_STATES));
         self.whole = !N::EXACT && self.steps.iter().all(whole);
     }
 
-    /// Lets the best values spread along the steps, best first.
+    /// Propagates the best values along the steps, best state first.
     fn spread(&mut self, direction: Direction) {
         loop {
             let mut next: Option<(usize, &N)> = None;
             for (number, best) in self.best.iter().enumerate() {
                 let Some((value, _)) = best.as_ref().filter(|_| !self.settled[number]) else { continue };
-                if next.is_none_or(|(_, known)| better(direction, value, known)) {
+                if next.is_none_or(|(_, incumbent)| better(direction, value, incumbent)) {
                     next = Some((number, value));
                 }
             }
@@ -248,7 +255,8 @@ impl<N: Number> Ways<N> {
                     continue;
                 }
                 let value = if step.cost.is_zero() { value.clone() } else { value.plus(&step.cost) };
-                if self.best[from].as_ref().is_none_or(|(known, _)| better(direction, &value, known)) {
+                if self.best[from].as_ref().is_none_or(|(incumbent, _)| better(direction, &value, incumbent))
+                {
                     self.best[from] = Some((value, step.choice));
                 }
             }

@@ -1,76 +1,76 @@
-//! What exact arithmetic may cost.
+//! Budgets of exact arithmetic.
 
 use crate::number::Number;
 
-/// How much exact arithmetic may cost, in units of about a nanosecond, before it is given up.
-pub const MOST: u64 = 3_000_000_000;
+/// Default budget of exact arithmetic, in units of about a nanosecond.
+pub const DEFAULT_BUDGET: u64 = 3_000_000_000;
 
-/// How wide bounds in doubles may be, relative to the value, unless it is said.
+/// Default width of bounds in doubles, relative to the value.
 pub const TIGHT: f64 = 1e-7;
 
-/// What is left of a budget of exact arithmetic, and how tight bounds in doubles have to be. Doubles cost nothing.
+/// Remaining budget of exact arithmetic, and required width of bounds in doubles. Doubles cost nothing.
 #[derive(Debug, Clone, Copy)]
 pub struct Work {
-    left: u64,
-    /// How wide bounds may be, relative to the value; no more is done once they are within.
+    remaining: u64,
+    /// Required width of bounds, relative to the value; tighter bounds are not computed.
     pub tight: f64,
-    /// What may still be spent on components that doubles cannot tell enough of.
+    /// Remaining budget for components whose bounds in doubles are insufficient.
     spare: u64,
-    /// Entries that elimination has touched so far, in doubles, too.
+    /// Entries that elimination has touched, including elimination in doubles.
     touched: u64,
 }
 
-/// Bits of a numerator and a denominator that fit into a word each, mostly.
-const SHORT: u64 = 126;
+/// Size of a fraction whose numerator and denominator usually fit into a word each, in bits.
+const SHORT_BITS: u64 = 126;
 
-/// What may be spent on such components, all together.
-const SPARE: u64 = 1_000_000_000;
+/// Budget for components whose bounds in doubles are insufficient, all of them together.
+const SPARE_BUDGET: u64 = 1_000_000_000;
 
 impl Work {
-    /// A budget of so many units.
-    pub const fn new(left: u64) -> Self {
-        Self { left, tight: TIGHT, spare: SPARE, touched: 0 }
+    /// Creates a budget.
+    pub const fn new(remaining: u64) -> Self {
+        Self { remaining, tight: TIGHT, spare: SPARE_BUDGET, touched: 0 }
     }
 
-    /// Pays for so many operations whose results are about as long as this one; none where the budget is spent.
+    /// Pays for operations whose results are about as long as `result`. Returns `None` if the budget is exhausted.
     ///
-    /// Fractions are reduced, which takes the square of their length; the constant part is for the memory that long ones take.
+    /// Fractions are reduced, which takes quadratic time. The constant part is the cost of allocating long ones.
     pub fn spend<N: Number>(&mut self, result: &N, operations: usize) -> Option<()> {
         if !N::EXACT {
             return Some(());
         }
         let bits = result.size();
-        let one = if bits <= SHORT {
+        let unit_cost = if bits <= SHORT_BITS {
             40
         } else {
             bits.saturating_mul((bits / 64).saturating_add(1)).saturating_add(200)
         };
-        let cost = one.saturating_mul(u64::try_from(operations).unwrap_or(u64::MAX));
-        self.left = self.left.saturating_sub(cost);
+        let cost = unit_cost.saturating_mul(u64::try_from(operations).unwrap_or(u64::MAX));
+        self.remaining = self.remaining.saturating_sub(cost);
         if self.is_spent() { None } else { Some(()) }
     }
 
-    /// Notes that elimination touched so many entries.
+    /// Adds to the number of entries that elimination has touched.
     pub const fn touch(&mut self, entries: u64) {
         self.touched = self.touched.saturating_add(entries);
     }
 
-    /// Entries that elimination has touched so far.
+    /// Number of entries that elimination has touched.
     pub const fn touched(self) -> u64 {
         self.touched
     }
 
-    /// Does something in rationals within a part of what is spare.
-    pub fn spared<T>(&mut self, most: u64, what: impl FnOnce(&mut Self) -> T) -> T {
-        let given = self.spare.min(most);
-        let mut work = Self::new(given);
-        let result = what(&mut work);
-        self.spare = self.spare.saturating_sub(given.saturating_sub(work.left));
+    /// Runs an operation in rationals within a part of the spare budget, of at most `limit` units.
+    pub fn spared<T>(&mut self, limit: u64, operation: impl FnOnce(&mut Self) -> T) -> T {
+        let granted = self.spare.min(limit);
+        let mut work = Self::new(granted);
+        let result = operation(&mut work);
+        self.spare = self.spare.saturating_sub(granted.saturating_sub(work.remaining));
         result
     }
 
-    /// Whether nothing is left.
+    /// Returns `true` if the budget is exhausted.
     pub const fn is_spent(self) -> bool {
-        self.left == 0
+        self.remaining == 0
     }
 }
