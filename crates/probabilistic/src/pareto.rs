@@ -210,6 +210,7 @@ impl<'a, N: Number> Pareto<'a, N> {
         let mut open = vec![last];
         let mut at = first;
         while let Some(next) = open.last() {
+            // The normal of the segment between two vertices: a point beyond the segment has a smaller weighted loss.
             let weights = [at.losses[1].minus(&next.losses[1]), next.losses[0].minus(&at.losses[0])];
             let flat = weights.iter().any(|w| !clearly_positive(w));
             let between = if flat || done.len().saturating_add(open.len()) > MAX_VERTICES {

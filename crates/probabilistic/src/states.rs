@@ -144,6 +144,7 @@ impl<S: Eq + Hash> States<S> {
         let next = dense(self.list.len());
         match &mut self.numbers {
             Numbers::Table(table) => {
+                // The state may have been inserted after the probe.
                 let number = &mut table[probe.key];
                 if let Some(number) = number.checked_sub(1) {
                     return Some(number);

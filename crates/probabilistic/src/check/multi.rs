@@ -24,7 +24,7 @@ impl<N: Number> Query<'_, N> {
         }
         let objectives = [self.objective(first)?, self.objective(second)?];
         let Ok(pareto) = Pareto::new(self.mdp(), &objectives) else { return Err(Stop::TooMuchWork) };
-        let shown = |number: usize, loss: &N, error: f64| {
+        let answer_of = |number: usize, loss: &N, error: f64| {
             let value = match objectives[number].rewards {
                 Some(_) => loss.clone(),
                 None => N::one().minus(loss),
@@ -36,18 +36,18 @@ impl<N: Number> Query<'_, N> {
             let bound = N::from_rational(&self.constant(bound)?);
             let limit = if objectives[1].rewards.is_some() { bound } else { N::one().minus(&bound) };
             let Ok(optimum) = pareto.constrained(&limit) else { return Err(Stop::TooMuchWork) };
-            let shown = |bounded: Bounded<N>| {
+            let constrained_answer = |bounded: Bounded<N>| {
                 if N::EXACT {
-                    return shown(0, &bounded.value, 0.0);
+                    return answer_of(0, &bounded.value, 0.0);
                 }
                 let answer = Answer::between(bounded.value.to_f64(), [bounded.lower, bounded.upper]);
                 if objectives[0].rewards.is_none() { answer.complement() } else { answer }
             };
-            return Ok(constrained(optimum, shown));
+            return Ok(constrained(optimum, constrained_answer));
         }
         let Ok(vertices) = pareto.vertices(None) else { return Err(Stop::TooMuchWork) };
         let pairs = vertices.iter().map(|vertex| {
-            let pair = [0, 1].map(|number| shown(number, &vertex.losses[number], vertex.errors[number]));
+            let pair = [0, 1].map(|number| answer_of(number, &vertex.losses[number], vertex.errors[number]));
             if swapped {
                 let [a, b] = pair;
                 [b, a]
@@ -93,7 +93,10 @@ fn bound_of(property: &Property) -> Option<&(BinaryOp, Expr)> {
     }
 }
 
-fn constrained<N: Number>(optimum: Option<Constrained<N>>, shown: impl Fn(Bounded<N>) -> Answer) -> Outcome {
+fn constrained<N: Number>(
+    optimum: Option<Constrained<N>>,
+    answer_of: impl Fn(Bounded<N>) -> Answer,
+) -> Outcome {
     match optimum {
         None => Outcome::Constrained {
             randomised: Answer::Undefined,
@@ -103,8 +106,8 @@ fn constrained<N: Number>(optimum: Option<Constrained<N>>, shown: impl Fn(Bounde
         Some(optimum) => {
             let proved = optimum.deterministic.as_ref().is_some_and(|(_, proved)| *proved);
             Outcome::Constrained {
-                randomised: shown(optimum.randomised),
-                deterministic: optimum.deterministic.map_or(Answer::Undefined, |(value, _)| shown(value)),
+                randomised: answer_of(optimum.randomised),
+                deterministic: optimum.deterministic.map_or(Answer::Undefined, |(value, _)| answer_of(value)),
                 proved,
             }
         }

@@ -113,6 +113,7 @@ impl<N: Number> Program<N> {
                 Err(problem) => problems.push(problem),
             }
         }
+        // Further errors would be consequences of missing variables.
         if !problems.is_empty() {
             return Err(Error::Model(problems.into()));
         }
@@ -263,6 +264,7 @@ impl<N: Number> Program<N> {
                     .filter(|fixed| fixed.iter().any(|(fixed_variable, _)| *fixed_variable == variable))
                     .count()
             };
+            // Of equally frequent variables, the first one is taken, for reproducible results.
             let best =
                 (0..dense(variables.len())).max_by_key(|variable| (count(*variable), Reverse(*variable)));
             let Some(best) = best.filter(|best| count(*best) > 0) else { continue };

@@ -150,6 +150,7 @@ impl Layout {
     pub fn push(&mut self, least: i64, greatest: i64) {
         let size = greatest.abs_diff(least);
         let bits = size.checked_ilog2().map_or(0, |log| log + 1);
+        // A value never crosses the boundary of a word.
         if self.words == 0 || self.used + bits > 64 {
             self.words += 1;
             self.used = 0;

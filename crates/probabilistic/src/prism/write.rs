@@ -99,6 +99,7 @@ pub fn expression(expression: &Expr) -> String {
 fn operand(expression: &Expr, least: u8) -> String {
     let (text, strength) = match &expression.kind {
         ExprKind::Bool(value) => (value.to_string(), 20),
+        // A negative number binds like a unary minus.
         ExprKind::Int(value) => (value.to_string(), if *value < 0 { 11 } else { 20 }),
         ExprKind::Number(value) => decimal(value),
         ExprKind::Name(name) => (name.clone(), 20),

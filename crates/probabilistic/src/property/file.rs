@@ -83,6 +83,7 @@ fn entry(cursor: &mut Cursor<'_>, text: &str, file: &mut File) -> Read<()> {
     let begin = position(text, place);
     let start = cursor.position();
     let property = match property(cursor) {
+        // An unsupported property is skipped, so that the others can be checked.
         Err(problem) if problem.code == "Q403" => {
             cursor.back_to(start);
             skip_property(cursor);

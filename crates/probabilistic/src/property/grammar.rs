@@ -83,6 +83,7 @@ fn parse_prefix(cursor: &mut Cursor<'_>) -> Read<Option<ExprKind>> {
         "multi" if matches!(cursor.peek_at(1), Kind::Sign("(")) => multi(cursor)?,
         "P" | "Pmin" | "Pmax" => probability(cursor, &word[1..])?,
         "R" | "Rmin" | "Rmax" => reward(cursor, &word[1..])?,
+        // `S` before a closing bracket is the long-run average of a reward, as in `R=? [ S ]`.
         "S" | "Smin" | "Smax" if !matches!(cursor.peek_at(1), Kind::Sign(")" | "]")) => {
             cursor.advance();
             let question = question(cursor, &word[1..])?;

@@ -50,6 +50,7 @@ pub fn certify<N: Number>(
         });
         return vec![better + rounding];
     }
+    // A smaller threshold gives a smaller w, but leaves less slack for the rows beyond it.
     for threshold in [1e-8, 1e-12] {
         let is_near = |block: usize, row: usize| {
             loss(block, row) <= threshold * v[block].max(1e-12) || policy[block] as usize == row
@@ -68,6 +69,7 @@ pub fn certify<N: Number>(
                 }
             }
         }
+        // The check needs a margin over the least δ that covers the rounding errors.
         delta *= 2.0;
         let holds = (0..blocks).all(|block| {
             quotient.range(block).all(|row| {

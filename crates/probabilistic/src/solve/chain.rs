@@ -275,6 +275,7 @@ fn eliminate<N: Number>(
                 row.leaving = row.leaving.plus(probability);
             }
         }
+        // Sorted rows allow binary search for a column.
         row.entries.sort_unstable_by_key(|(column, _)| *column);
         rows.push(row);
     }
@@ -296,6 +297,7 @@ fn eliminate<N: Number>(
         order.push(pivot);
         done[p] = true;
         normalise(&mut rows[p], pivot, budget)?;
+        // The row is moved out, because the rows of its users change while it is read.
         let row = std::mem::replace(
             &mut rows[p],
             Row { entries: Vec::new(), constant: N::zero(), leaving: N::zero() },

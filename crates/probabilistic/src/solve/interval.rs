@@ -234,6 +234,7 @@ impl<'a, N: Number> Rows<'a, N> {
                     return Some((lower, upper));
                 }
             }
+            // The lower bound was not close enough for its increase to be an upper bound.
             threshold *= 0.1;
         }
         None
@@ -315,7 +316,7 @@ fn grow(old: &mut f64, new: f64) -> f64 {
     change
 }
 
-/// Sorts the blocks by the number of rows on the shortest way out (breadth-first search). Blocks that are never left come
+/// Orders the blocks by the number of rows on the shortest way out (breadth-first search). Blocks that are never left come
 /// last.
 fn order<N: Number>(quotient: &Quotient<N>) -> Vec<u32> {
     let blocks = quotient.blocks();

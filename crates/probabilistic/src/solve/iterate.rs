@@ -67,7 +67,7 @@ fn chain<N: Number>(quotient: &Quotient<N>, policy: &[u32], work: &mut Work) -> 
     Chain { rows: &quotient.rows, policy, costs: None }.solve(work)
 }
 
-/// Switches each block to its best row. With `sweep`, rows are evaluated with the values updated so far, otherwise with
+/// Switches each block to its best row. With `sweep`, rows are evaluated with the updated values, otherwise with
 /// the old ones. Returns `true` if a row was switched.
 fn improve<N: Number>(
     quotient: &Quotient<N>,
@@ -86,6 +86,7 @@ fn improve<N: Number>(
             }
             let value = quotient.rows.apply(row, old.as_deref().unwrap_or(values));
             work.spend(&value, quotient.rows.range(row).len())?;
+            // Only clear improvements count, so that rounding cannot cause cycles of policies.
             let better = match direction {
                 Direction::Min => value.clearly_less(&values[block]),
                 Direction::Max => values[block].clearly_less(&value),

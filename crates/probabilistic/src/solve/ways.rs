@@ -233,6 +233,7 @@ impl<N: Number> PathBuffers<N> {
         self.settled.clear();
         self.settled.resize(states, false);
         (self.error, self.zero_error) = (0.0, 0.0);
+        // A path has less than `MAX_STATES` steps, so that its sum remains an exact integer.
         let whole = |step: &Step<N>| !step.divided && is_whole(step.cost.to_f64() * count(MAX_STATES));
         self.whole = !N::EXACT && self.steps.iter().all(whole);
     }
