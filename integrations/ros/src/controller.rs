@@ -27,23 +27,23 @@ use crate::node::{Node, Severity};
 use crate::perform::{End, Progress};
 use crate::performer::{ExecutePlans, PlanVersion};
 use crate::planner::{
-    Chosen, DOMAIN, Found, Joint, NoPlan, PROBLEM, Request, Told, on_a_thread, plan_message, solve,
+    Chosen, DOMAIN, Found, Joint, NoPlan, PROBLEM, PlanPublisher, Request, on_a_thread, plan_message, solve,
 };
 
 /// Timeout for requests to the experts.
-const PATIENCE: Duration = Duration::from_secs(10);
+const EXPERT_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Pause before the next attempt, unless the knowledge base changes.
-const PAUSE: Duration = Duration::from_secs(5);
+const RETRY_PAUSE: Duration = Duration::from_secs(5);
 
 /// Pause after a failure.
-const BREATH: Duration = Duration::from_secs(1);
+const FAILURE_PAUSE: Duration = Duration::from_secs(1);
 
 /// Polling interval of the knowledge base.
-const LOOK: Duration = Duration::from_millis(50);
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Number of consecutive failures after which the controller gives up.
-const MOST_FAILURES: usize = 5;
+const MAX_FAILURES: usize = 5;
 
 /// Options of the controller.
 #[derive(Debug, Clone)]
@@ -68,7 +68,7 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
         manner: Chosen::declare(node)?,
         joint: Joint::listen(node, setup.mission)?,
         executes: ExecutePlans::new(node, "execute_plan", options.version),
-        told: Told::new(node)?,
+        told: PlanPublisher::new(node)?,
     };
     smol::block_on(controller.control(stop)).map_err(Errors::from)
 }
@@ -78,7 +78,7 @@ struct Controller {
     manner: Arc<Chosen>,
     joint: Arc<Joint>,
     executes: ExecutePlans,
-    told: Told,
+    told: PlanPublisher,
 }
 
 /// Outcome of executing a plan.
@@ -96,14 +96,14 @@ impl Controller {
         while !stop.load(Ordering::Relaxed) {
             let stopped = async {
                 while !stop.load(Ordering::Relaxed) {
-                    Timer::after(LOOK).await;
+                    Timer::after(POLL_INTERVAL).await;
                 }
                 None
             };
             let solution = match smol::future::or(stopped, async { Some(self.find().await) }).await {
                 Some(Some(solution)) => solution,
                 Some(None) => {
-                    self.pause(PAUSE, stop).await;
+                    self.pause(RETRY_PAUSE, stop).await;
                     continue;
                 }
                 None => return Ok(()),
@@ -128,11 +128,11 @@ impl Controller {
                 Outcome::Failed(because) => {
                     failures += 1;
                     self.node.log(Severity::Error, &because);
-                    if failures == MOST_FAILURES {
+                    if failures == MAX_FAILURES {
                         let text = format!("{failures} plans on end have failed, the last one so: {because}");
                         return Err(Message::error("N150", text));
                     }
-                    self.pause(BREATH, stop).await;
+                    self.pause(FAILURE_PAUSE, stop).await;
                 }
             }
         }
@@ -141,7 +141,7 @@ impl Controller {
 
     /// Returns the best plan for PlanSys2's current problem. Without a plan, publishes the reason.
     async fn find(&self) -> Option<Found> {
-        match self.ask().await {
+        match self.request_problem().await {
             Ok((domain, problem)) => self.plan(domain, problem).await.ok(),
             Err(because) => {
                 self.node.log(Severity::Warn, &because);
@@ -151,13 +151,17 @@ impl Controller {
     }
 
     /// Requests the current domain and problem from PlanSys2.
-    async fn ask(&self) -> Result<(String, String), String> {
+    async fn request_problem(&self) -> Result<(String, String), String> {
         let domain = self.node.caller::<GetDomain>("domain_expert/get_domain");
-        let domain =
-            domain.call(GetDomainRequest::default(), PATIENCE).await.map_err(|error| error.to_string())?;
+        let domain = domain
+            .call(GetDomainRequest::default(), EXPERT_TIMEOUT)
+            .await
+            .map_err(|error| error.to_string())?;
         let problem = self.node.caller::<GetProblem>("problem_expert/get_problem");
-        let problem =
-            problem.call(GetProblemRequest::default(), PATIENCE).await.map_err(|error| error.to_string())?;
+        let problem = problem
+            .call(GetProblemRequest::default(), EXPERT_TIMEOUT)
+            .await
+            .map_err(|error| error.to_string())?;
         match (domain.success, problem.success) {
             (true, true) => Ok((domain.domain, problem.problem)),
             (false, _) => Err(format!("PlanSys2 has no domain: {}", domain.error_info)),
@@ -176,7 +180,7 @@ impl Controller {
             .map_err(|error| NoPlan::None(format!("there is no further thread: {error}")))?;
         let outcome =
             receiver.recv().await.unwrap_or_else(|_| Err(NoPlan::Fault("the planner has ended".to_owned())));
-        self.told.tell(&outcome);
+        self.told.publish_result(&outcome);
         outcome
     }
 
@@ -189,11 +193,12 @@ impl Controller {
         loop {
             let progress = async { Some(running.next().await) };
             let look = async {
-                Timer::after(LOOK).await;
+                Timer::after(POLL_INTERVAL).await;
                 None
             };
             match smol::future::or(progress, look).await {
-                Some(Progress::Feedback { completion, text }) => self.tell(completion, &text),
+                Some(Progress::Feedback { completion, text }) => self.log_progress(completion, &text),
+                // An end after our own cancellation is not a failure.
                 Some(Progress::Ended(_)) if stopped => return Outcome::Stopped,
                 Some(Progress::Ended(End::Succeeded)) => return Outcome::Done,
                 Some(Progress::Ended(_)) if !lost.is_empty() => return Outcome::Lost(lost),
@@ -216,7 +221,7 @@ impl Controller {
         }
     }
 
-    fn tell(&self, completion: Option<f32>, text: &str) {
+    fn log_progress(&self, completion: Option<f32>, text: &str) {
         let done = completion.map(|part| format!("{:.0} %: ", part * 100.0)).unwrap_or_default();
         self.node.log(Severity::Debug, &(done + text));
     }
@@ -225,7 +230,7 @@ impl Controller {
     async fn pause(&self, time: Duration, stop: &AtomicBool) {
         let (begun, available) = (Instant::now(), self.joint.available());
         while begun.elapsed() < time && !stop.load(Ordering::Relaxed) && self.joint.available() == available {
-            Timer::after(LOOK).await;
+            Timer::after(POLL_INTERVAL).await;
         }
     }
 }

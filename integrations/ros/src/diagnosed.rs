@@ -32,7 +32,7 @@ impl Diagnosed {
     /// Subscribes to diagnostics and calls `waits` when the first status becomes pending. Repeated
     /// statuses are ignored. An unused status at level WARN or above is reported once, with a rule
     /// that would use it.
-    pub(crate) fn hear(
+    pub(crate) fn subscribe(
         node: &Arc<Node>,
         rules: &[DiagnosticRule],
         waits: impl Fn() + Send + 'static,

@@ -127,18 +127,18 @@ pub struct Performance {
 impl Performance {
     /// Reports intermediate feedback.
     pub fn feedback(&self, completion: Option<f32>, text: impl Into<String>) {
-        self.tell(Progress::Feedback { completion, text: text.into() });
+        self.forward(Progress::Feedback { completion, text: text.into() });
     }
 
     /// Forwards a message.
-    pub(crate) fn tell(&self, progress: Progress) {
+    pub(crate) fn forward(&self, progress: Progress) {
         // The receiver may have been dropped.
         let _ = self.progress.try_send(progress);
     }
 
     /// Reports the end of the action.
     pub fn end(self, end: End) {
-        self.tell(Progress::Ended(end));
+        self.forward(Progress::Ended(end));
     }
 
     /// Waits for a request to cancel, possibly forever.

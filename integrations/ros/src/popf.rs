@@ -40,7 +40,7 @@ impl Said {
 
 /// Parsed arguments.
 #[derive(Debug)]
-struct Asked {
+struct Invocation {
     domain: PathBuf,
     problem: PathBuf,
     mission: Option<PathBuf>,
@@ -55,18 +55,22 @@ pub fn run(
     arguments: impl IntoIterator<Item = String>,
     environment: impl Fn(&str) -> Option<String>,
 ) -> Said {
-    let asked = match asked(arguments, environment) {
-        Ok(asked) => asked,
+    let invocation = match invocation(arguments, environment) {
+        Ok(invocation) => invocation,
         Err(text) => return Said::reason(&text),
     };
-    let mut said = match solve(&asked) {
+    let mut output = match solve(&invocation) {
         Ok(out) => Said { out, error: String::new() },
         Err(text) => Said::reason(&text),
     };
-    if !asked.ignored.is_empty() {
-        let _ = writeln!(said.error, "arguments of POPF that mean nothing here: {}", asked.ignored.join(" "));
+    if !invocation.ignored.is_empty() {
+        let _ = writeln!(
+            output.error,
+            "arguments of POPF that mean nothing here: {}",
+            invocation.ignored.join(" ")
+        );
     }
-    said
+    output
 }
 
 const USAGE: &str = "usage: popf [--metric EXPRESSION] [--mission MANIFEST] [--time-limit SECONDS] [--overlap yes|no] DOMAIN PROBLEM";
@@ -74,7 +78,7 @@ const USAGE: &str = "usage: popf [--metric EXPRESSION] [--mission MANIFEST] [--t
 fn asked(
     arguments: impl IntoIterator<Item = String>,
     environment: impl Fn(&str) -> Option<String>,
-) -> Result<Asked, String> {
+) -> Result<Invocation, String> {
     let mut metric = environment("METAPLAN_METRIC");
     let mut mission = environment("METAPLAN_MISSION");
     let mut time_limit = environment("METAPLAN_TIME_LIMIT");
@@ -114,7 +118,7 @@ fn asked(
     match files.len().checked_sub(2).map(|first| files.split_off(first)).as_deref() {
         Some([domain, problem]) => {
             ignored.extend(files.iter().map(|file| file.display().to_string()));
-            Ok(Asked { domain: domain.clone(), problem: problem.clone(), mission, manner, ignored })
+            Ok(Invocation { domain: domain.clone(), problem: problem.clone(), mission, manner, ignored })
         }
         _ => Err(USAGE.to_owned()),
     }
@@ -127,17 +131,18 @@ fn seconds(text: &str) -> Result<Duration, String> {
 }
 
 /// Returns the text for the plugin, or the reason why there is no plan.
-fn solve(asked: &Asked) -> Result<String, String> {
-    let domain = read(&asked.domain, DOMAIN)?;
-    let problem = read(&asked.problem, PROBLEM)?;
+fn solve(invocation: &Invocation) -> Result<String, String> {
+    let domain = read(&invocation.domain, DOMAIN)?;
+    let problem = read(&invocation.problem, PROBLEM)?;
     if is_void(problem.text()) {
         let wrong = |messages: Errors| NoPlan::Input(messages).text();
         return planner::check_domain(&domain).map(|()| popf_text(&[])).map_err(wrong);
     }
-    let setup = asked.mission.as_deref().map(Setup::read).transpose().map_err(|messages| all(&messages))?;
+    let setup =
+        invocation.mission.as_deref().map(Setup::read).transpose().map_err(|messages| all(&messages))?;
     let joint = setup.as_ref().map(|setup| &setup.mission);
     let request = Request { domain, problem, joint };
-    let solution = planner::solve(request, &asked.manner).map_err(|reason| reason.text())?;
+    let solution = planner::solve(request, &invocation.manner).map_err(|reason| reason.text())?;
     let mut text = format!("; cost {}\n; {}\n", solution.cost, solution.verdict.replace('\n', "\n; "));
     let best = solution.plans.first().map(Vec::as_slice).unwrap_or_default();
     if best.is_empty() {

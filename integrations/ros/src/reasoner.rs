@@ -28,15 +28,15 @@ use memory::MemoryFile;
 use network::Network;
 
 /// Time limit of a design selection.
-const LIMIT: std::time::Duration = std::time::Duration::from_secs(1);
+const SELECTION_TIME_LIMIT: std::time::Duration = std::time::Duration::from_secs(1);
 
 /// Options of the reasoner.
 #[derive(Debug, Clone)]
 pub struct Options {
     /// Manifest of the mission, of which only the knowledge base is used.
     pub mission: PathBuf,
-    /// Names of functions and designs on the robot; by default a file `ros.toml` beside the
-    /// mission.
+    /// Names of functions and designs on the robot; by default a file `ros.toml` in the directory
+    /// of the mission.
     pub settings: Option<PathBuf>,
     /// Directory of the state that must survive a restart.
     pub journal: Option<PathBuf>,
@@ -60,7 +60,7 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
         node.log(Severity::Warn, warning.text().trim_end());
     }
     let configurator = Configurator::new(knowledge, Wishes::default())?;
-    let keeping = Keeping::new(Keeper::new(configurator, Some(LIMIT)), settings.functions);
+    let keeping = Keeping::new(Keeper::new(configurator, Some(SELECTION_TIME_LIMIT)), settings.functions);
     let memory = options.journal.as_deref().map(MemoryFile::open).transpose().map_err(to_errors)?;
     Network::connect(node, keeping, &settings.diagnostics, memory)?.run(stop).map_err(to_errors)
 }

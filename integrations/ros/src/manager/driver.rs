@@ -26,17 +26,17 @@ use crate::performer::performers;
 const PERIOD: Duration = Duration::from_secs(1);
 
 /// Limit on the number of inputs that are kept while the manager is inactive.
-const KEPT: usize = 100_000;
+const MAX_DELAYED_INPUTS: usize = 100_000;
 
 /// Time of a single search for the functions.
-const LOOK: Duration = Duration::from_millis(200);
+const SEARCH_TIME: Duration = Duration::from_millis(200);
 
 /// Time after which a task that is requested while functions are missing is refused. SUAVE's
 /// mission node waits for five seconds.
-const ASKED: Duration = Duration::from_secs(4);
+const TASK_WAIT: Duration = Duration::from_secs(4);
 
 /// Period of log messages about missing parts of the graph.
-const GRAPH: Duration = Duration::from_secs(5);
+const GRAPH_LOG_PERIOD: Duration = Duration::from_secs(5);
 
 /// Options of the manager.
 #[derive(Debug, Clone)]
@@ -83,7 +83,7 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
         clock: Instant::now(),
         begun,
     };
-    driver.meet(&sender, &inputs, stop)?;
+    driver.wait_for_functions(&sender, &inputs, stop)?;
     driver.drive(&inputs, stop).map_err(Errors::from)
 }
 
@@ -116,26 +116,27 @@ struct Driver {
 
 impl Driver {
     /// Waits for the functions and logs the missing ones periodically. Task requests wait as well.
-    fn meet(
+    fn wait_for_functions(
         &mut self,
         sender: &Sender<Input>,
         inputs: &Receiver<Input>,
         stop: &AtomicBool,
     ) -> Result<(), Message> {
-        let (mut delayed, mut asked, mut said) = (Vec::new(), Vec::new(), Instant::now());
+        let (mut delayed, mut task_requests, mut last_log) = (Vec::new(), Vec::new(), Instant::now());
         let mut next_diagnostic = Instant::now();
         loop {
             if Instant::now() >= next_diagnostic {
                 next_diagnostic = Instant::now() + PERIOD;
                 self.diagnose();
             }
-            let missing = smol::block_on(self.robot.wait(LOOK));
+            let missing = smol::block_on(self.robot.wait(SEARCH_TIME));
             // The writer of diagnostics may start later, because no mode is changed before its
             // first message.
             let is_there = missing.iter().all(|text| text.contains("/diagnostics"));
             while let Ok(input) = inputs.try_recv() {
+                // Clients of tasks wait for a reply, so their requests are kept with the time of arrival.
                 match input {
-                    Input::Request(..) | Input::Cancel(..) => asked.push((Instant::now(), input)),
+                    Input::Request(..) | Input::Cancel(..) => task_requests.push((Instant::now(), input)),
                     other => delayed.push(other),
                 }
             }
@@ -147,18 +148,19 @@ impl Driver {
             }
             // A client that waits too long for its task treats it as refused, so the task must then
             // be refused.
-            let (late, waiting) = asked.into_iter().partition(|(since, _)| since.elapsed() >= ASKED);
-            asked = waiting;
+            let (late, waiting) =
+                task_requests.into_iter().partition(|(since, _)| since.elapsed() >= TASK_WAIT);
+            task_requests = waiting;
             let late: Vec<(Instant, Input)> = late;
             late.into_iter().try_for_each(|(_, input)| self.handle(input))?;
-            if said.elapsed() >= GRAPH {
-                said = Instant::now();
+            if last_log.elapsed() >= GRAPH_LOG_PERIOD {
+                last_log = Instant::now();
                 let text = format!("waits for the robot: {}", missing.join("; "));
                 self.robot.event(&json!({"answer": "waiting", "missing": missing}));
                 self.node.log(Severity::Warn, &text);
             }
         }
-        delayed.extend(asked.into_iter().map(|(_, input)| input));
+        delayed.extend(task_requests.into_iter().map(|(_, input)| input));
         self.fits()?;
         let modes = smol::block_on(self.robot.modes());
         for (function, mode) in &modes {
@@ -204,7 +206,7 @@ impl Driver {
         while !stop.load(Ordering::Relaxed) {
             let wait = next.saturating_duration_since(Instant::now()).min(Duration::from_millis(100));
             if !self.active.load(Ordering::Relaxed) {
-                self.rest(inputs)?;
+                self.wait_for_activation(inputs)?;
                 continue;
             }
             match inputs.recv_timeout(wait) {
@@ -215,7 +217,7 @@ impl Driver {
             if Instant::now() >= next {
                 next = Instant::now() + PERIOD;
                 self.handle(Input::Tick)?;
-                self.robot.greet();
+                self.robot.request_new_modes();
                 self.diagnose();
             }
         }
@@ -223,9 +225,9 @@ impl Driver {
     }
 
     /// While the node is inactive, refuses tasks and keeps other inputs.
-    fn rest(&mut self, inputs: &Receiver<Input>) -> Result<(), Message> {
+    fn wait_for_activation(&mut self, inputs: &Receiver<Input>) -> Result<(), Message> {
         let mut delayed = Vec::new();
-        while !self.active.load(Ordering::Relaxed) && delayed.len() < KEPT {
+        while !self.active.load(Ordering::Relaxed) && delayed.len() < MAX_DELAYED_INPUTS {
             match inputs.recv_timeout(Duration::from_millis(50)) {
                 Ok(Input::Request(number, _) | Input::Cancel(number, _)) => self.robot.reply(number, false),
                 Ok(input) => delayed.push(input),

@@ -31,11 +31,11 @@ use crate::node::{CallError, Caller, Node, Publisher, Responder, depth, is_lyric
 use crate::perform::{Call, End, Perform, Progress, Running};
 
 /// Timeout of a function's reply with its mode.
-const LOOK: Duration = Duration::from_secs(2);
+const MODE_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// Number of mode requests to a new server, one per period: the first ones may be lost before it
 /// has discovered this node.
-const GREETINGS: u32 = 3;
+const MAX_MODE_REQUESTS: u32 = 3;
 
 /// Services of a function.
 struct Function {
@@ -73,15 +73,15 @@ impl Robot {
         performers: BTreeMap<String, Box<dyn Perform>>,
         inputs: Sender<Input>,
     ) -> Result<Self, Message> {
-        let heard = inputs.clone();
+        let queue = inputs.clone();
         let diagnosed =
-            Diagnosed::hear(node, &settings.diagnostics, move || drop(heard.send(Input::Diagnosed)))?;
-        let mut own = BTreeMap::new();
+            Diagnosed::subscribe(node, &settings.diagnostics, move || drop(queue.send(Input::Diagnosed)))?;
+        let mut services = BTreeMap::new();
         for function in functions {
-            hear_function(node, settings, function, &inputs)?;
+            subscribe_function(node, settings, function, &inputs)?;
             let system = settings.functions.system(function);
             let service = |name: &str| format!("/{system}/{name}");
-            own.insert(
+            services.insert(
                 function.clone(),
                 Function {
                     change: Arc::new(node.caller(&service("change_mode"))),
@@ -93,7 +93,7 @@ impl Robot {
                 },
             );
         }
-        hear_parameters(node, settings, functions, inputs.clone())?;
+        subscribe_parameters(node, settings, functions, inputs.clone())?;
         if let Some(autopilot) = &settings.autopilot {
             let inputs = inputs.clone();
             node.subscribe::<mavros_msgs::msg::State>(&autopilot.topic, depth(10), move |state| {
@@ -105,7 +105,7 @@ impl Robot {
         Ok(Self {
             node: Arc::clone(node),
             inputs,
-            functions: own,
+            functions: services,
             performers,
             performing: HashMap::new(),
             diagnosed,
@@ -134,7 +134,7 @@ impl Robot {
     pub(super) async fn modes(&self) -> Vec<(String, Option<String>)> {
         let look = |(name, function): (&String, &Function)| {
             let (name, look) = (name.clone(), Arc::clone(&function.look));
-            async move { (name, look.call(GetModeRequest::default(), LOOK).await) }
+            async move { (name, look.call(GetModeRequest::default(), MODE_TIMEOUT).await) }
         };
         let answers = futures::future::join_all(self.functions.iter().map(look)).await;
         let logged = |(name, answer): (String, Result<GetModeResponse, CallError>)| match answer {
@@ -155,7 +155,7 @@ impl Robot {
             let service = format!("/{}/get_available_modes", settings.functions.system(name));
             let (name, caller) = (name.clone(), self.node.caller::<GetAvailableModes>(&service));
             async move {
-                let answer = caller.call(GetAvailableModesRequest::default(), LOOK).await.ok();
+                let answer = caller.call(GetAvailableModesRequest::default(), MODE_TIMEOUT).await.ok();
                 answer.map(|answer| (name, answer.available_modes))
             }
         };
@@ -181,12 +181,12 @@ impl Robot {
 
     /// Requests the modes of functions with new servers, because a restarted server has lost its
     /// mode.
-    pub(super) fn greet(&mut self) {
+    pub(super) fn request_new_modes(&mut self) {
         let mut names = Vec::new();
         for (name, function) in &mut self.functions {
             let servers = function.look.servers();
             if !function.servers.is_empty() && !servers.is_subset(&function.servers) {
-                function.greetings = GREETINGS;
+                function.greetings = MAX_MODE_REQUESTS;
             }
             if !servers.is_empty() {
                 function.servers = servers;
@@ -206,7 +206,7 @@ impl Robot {
         let Some(function) = self.functions.get_mut(name) else { return };
         let (look, inputs, name) = (Arc::clone(&function.look), self.inputs.clone(), name.to_owned());
         function.looking = Some(smol::spawn(async move {
-            if let Ok(answer) = look.call(GetModeRequest::default(), LOOK).await {
+            if let Ok(answer) = look.call(GetModeRequest::default(), MODE_TIMEOUT).await {
                 let _ = inputs.send(Input::Mode(name, answer.current_mode));
             }
         }));
@@ -220,7 +220,7 @@ impl Robot {
         let (inputs, name) = (self.inputs.clone(), name.to_owned());
         smol::spawn(async move {
             Timer::after(after).await;
-            let answers = match look.call(GetModeRequest::default(), LOOK).await {
+            let answers = match look.call(GetModeRequest::default(), MODE_TIMEOUT).await {
                 Ok(_) => true,
                 Err(CallError::Absent { .. }) => change.is_served(),
                 Err(_) => false,
@@ -252,10 +252,10 @@ impl Robot {
             return;
         };
         let running = performer.start(call);
-        let (heard, inputs) = (running.clone(), self.inputs.clone());
+        let (events, inputs) = (running.clone(), self.inputs.clone());
         let task = smol::spawn(async move {
             loop {
-                let input = match heard.next().await {
+                let input = match events.next().await {
                     Progress::Feedback { completion: Some(done), .. } => {
                         Input::Progress(number, f64::from(done))
                     }
@@ -311,7 +311,7 @@ impl Robot {
 }
 
 /// Subscribes to the mode manager's messages about a function, and to the lifecycle of its node.
-fn hear_function(
+fn subscribe_function(
     node: &Arc<Node>,
     settings: &Settings,
     function: &str,
@@ -333,7 +333,7 @@ fn hear_function(
 }
 
 /// Subscribes to parameter changes of a function's node.
-fn hear_parameters(
+fn subscribe_parameters(
     node: &Arc<Node>,
     settings: &Settings,
     functions: &[String],

@@ -80,15 +80,15 @@ struct FunctionSettings {
 }
 
 impl Settings {
-    /// Reads the settings file, by default a file `ros.toml` beside the mission, if it exists.
+    /// Reads the settings file; by default a file `ros.toml` in the directory of the mission, if it exists.
     ///
     /// # Errors
     /// The file cannot be read or is invalid.
     pub fn read(file: Option<&Path>, mission: &Path) -> Result<Self, Message> {
-        let beside = mission.with_file_name("ros.toml");
+        let default_file = mission.with_file_name("ros.toml");
         let file = match file {
             Some(file) => file,
-            None if beside.is_file() => &beside,
+            None if default_file.is_file() => &default_file,
             None => return Ok(Self::default()),
         };
         let name = file.display().to_string();

@@ -26,10 +26,10 @@ use crate::node::{Node, Severity, client_name, dds_type, latched, not_made, qos}
 pub use caller::{Accepted, ActionCaller, GoalError, Pursued};
 
 /// Polling interval, because the client library has no stream of all events of an action server.
-const POLL: Duration = Duration::from_millis(2);
+const POLL_INTERVAL: Duration = Duration::from_millis(2);
 
 /// Lifetime of a result for later requests, as in `rcl_action`.
-const KEPT: Duration = Duration::from_secs(15 * 60);
+const RESULT_LIFETIME: Duration = Duration::from_secs(15 * 60);
 
 type Server<A> = ActionServer<<A as Action>::Goal, <A as Action>::Result, <A as Action>::Feedback>;
 
@@ -130,7 +130,7 @@ impl<A: Action> Goals<A> {
             Known { accepted, status: GoalStatusEnum::Executing, result: None, asked: Vec::new() };
         self.goals().insert(wanted.goal, goal_state);
         self.answer(wanted, true, accepted);
-        self.tell();
+        self.publish_status();
         wanted.goal
     }
 
@@ -169,7 +169,7 @@ impl<A: Action> Goals<A> {
         }
         let code = if will_be { CancelGoalResponseEnum::None } else { CancelGoalResponseEnum::Rejected };
         self.answer_cancel(request.request, code, goals_canceling);
-        self.tell();
+        self.publish_status();
     }
 
     fn answer_cancel(&self, request: RmwRequestId, code: CancelGoalResponseEnum, goals: Vec<GoalInfo>) {
@@ -197,9 +197,9 @@ impl<A: Action> Goals<A> {
         for request in std::mem::take(&mut known.asked) {
             self.send_result(request, known);
         }
-        goals.retain(|_, own| own.result.as_ref().is_none_or(|(_, ended)| ended.elapsed() < KEPT));
+        goals.retain(|_, own| own.result.as_ref().is_none_or(|(_, ended)| ended.elapsed() < RESULT_LIFETIME));
         drop(goals);
-        self.tell();
+        self.publish_status();
     }
 
     fn send_result(&self, request: RmwRequestId, known: &Known<A::Result>) {
@@ -210,7 +210,7 @@ impl<A: Action> Goals<A> {
     }
 
     /// Publishes the status of all goals.
-    fn tell(&self) {
+    fn publish_status(&self) {
         let status = |(goal_id, known): (&GoalId, &Known<A::Result>)| GoalStatus {
             goal_info: GoalInfo { goal_id: *goal_id, stamp: known.accepted },
             status: known.status,
@@ -287,21 +287,23 @@ impl<A: Action> Goals<A> {
             self.answer_cancel(request, CancelGoalResponseEnum::UnknownGoal, Vec::new());
             return;
         };
-        let (wanted, stamp) = (cancel.goal_info.goal_id.uuid, cancel.goal_info.stamp);
+        let (requested, stamp) = (cancel.goal_info.goal_id.uuid, cancel.goal_info.stamp);
         let until = i128::from(stamp.sec) * 1_000_000_000 + i128::from(stamp.nanosec);
         let nanoseconds = |time: Time| i128::from(ros2_client::ros_time::ROSTime::from(time).to_nanos());
-        let (any, always) = (wanted == [0; 16], until == 0);
-        let is_meant = |(goal, known): &(&GoalId, &Known<A::Result>)| {
-            let is_it = goal.uuid.into_bytes() == wanted;
+        // An id of zeros selects all goals, and a time of 0 does not restrict them.
+        let (any, always) = (requested == [0; 16], until == 0);
+        let is_selected = |(goal, known): &(&GoalId, &Known<A::Result>)| {
+            let is_requested = goal.uuid.into_bytes() == requested;
             let is_before = nanoseconds(known.accepted) <= until;
-            known.result.is_none() && if any { always || is_before } else { is_it || (!always && is_before) }
+            known.result.is_none()
+                && if any { always || is_before } else { is_requested || (!always && is_before) }
         };
         let goals = self.goals();
-        let meant: Vec<(GoalId, Time)> =
-            goals.iter().filter(is_meant).map(|(goal, known)| (*goal, known.accepted)).collect();
-        let is_known = any || goals.keys().any(|goal| goal.uuid.into_bytes() == wanted);
+        let selected: Vec<(GoalId, Time)> =
+            goals.iter().filter(is_selected).map(|(goal, known)| (*goal, known.accepted)).collect();
+        let is_known = any || goals.keys().any(|goal| goal.uuid.into_bytes() == requested);
         drop(goals);
-        if meant.is_empty() {
+        if selected.is_empty() {
             let code = match (is_known, any) {
                 (true, false) => CancelGoalResponseEnum::GoalTerminated,
                 (true, true) => CancelGoalResponseEnum::Rejected,
@@ -309,7 +311,7 @@ impl<A: Action> Goals<A> {
             };
             self.answer_cancel(request, code, Vec::new());
         }
-        for (goal, info) in meant {
+        for (goal, info) in selected {
             take(GoalEvent::Cancel(goal, CancelRequest { request, info, goal }));
         }
     }
@@ -389,7 +391,7 @@ impl Node {
                 if weak.strong_count() == 0 {
                     return;
                 }
-                Timer::after(POLL).await;
+                Timer::after(POLL_INTERVAL).await;
             }
         });
         Ok(goals)

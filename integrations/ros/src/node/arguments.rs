@@ -214,16 +214,17 @@ fn parameter_value(value: &Value) -> Option<ParameterValue> {
         },
         Value::String(text) => ParameterValue::String(text.clone()),
         Value::Sequence(list) => {
-            let all = |of: fn(&Value) -> bool| list.iter().all(of);
-            if list.is_empty() || all(Value::is_string) {
+            let all_items = |of: fn(&Value) -> bool| list.iter().all(of);
+            if list.is_empty() || all_items(Value::is_string) {
                 ParameterValue::StringArray(
                     list.iter().filter_map(Value::as_str).map(str::to_owned).collect(),
                 )
-            } else if all(Value::is_bool) {
+            } else if all_items(Value::is_bool) {
                 ParameterValue::BooleanArray(list.iter().filter_map(Value::as_bool).collect())
-            } else if all(Value::is_i64) {
+            // A list of integers and fractions is a list of doubles.
+            } else if all_items(Value::is_i64) {
                 ParameterValue::IntegerArray(list.iter().filter_map(Value::as_i64).collect())
-            } else if all(Value::is_number) {
+            } else if all_items(Value::is_number) {
                 ParameterValue::DoubleArray(list.iter().filter_map(Value::as_f64).collect())
             } else {
                 return None;
@@ -278,8 +279,8 @@ mod tests {
         let names: Vec<&str> = values.iter().map(|(name, _)| name.as_str()).collect();
         assert_eq!(names, ["a", "b.c", "d"]);
         assert_eq!(values[1].1, ParameterValue::DoubleArray(vec![1.5, 2.0]));
-        let other = ros.node("metaplan");
-        assert!(ros.parameters(&other).iter().all(|(_, value)| *value != ParameterValue::Integer(2)));
+        let global_node = ros.node("metaplan");
+        assert!(ros.parameters(&global_node).iter().all(|(_, value)| *value != ParameterValue::Integer(2)));
     }
 
     #[test]

@@ -15,21 +15,21 @@ use smol::{Task, Timer};
 use crate::node::rmw::{Mapping, Rmw, Vendor};
 
 /// Polling interval while waiting for discovery.
-const LOOK: Duration = Duration::from_millis(10);
+const POLL_INTERVAL: Duration = Duration::from_millis(10);
 
 /// Time to wait for further participants if all discovered ones support both mappings.
-const PATIENCE: Duration = Duration::from_secs(1);
+const DISCOVERY_WAIT: Duration = Duration::from_secs(1);
 
 /// State of the graph.
 #[derive(Debug)]
 pub(crate) struct Graph {
     rmw: Rmw,
-    own: [u8; 12],
-    seen: Mutex<Seen>,
+    own_prefix: [u8; 12],
+    state: Mutex<GraphState>,
 }
 
 #[derive(Debug, Default)]
-struct Seen {
+struct GraphState {
     /// Participants by GUID prefix, and the time of the first discovery.
     participants: BTreeMap<[u8; 12], Vendor>,
     first: Option<Instant>,
@@ -90,10 +90,14 @@ struct Endpoint {
 impl Graph {
     /// Starts to watch discovery until the task is dropped. The status of the participant must have
     /// no other listener.
-    pub(crate) fn watch(participant: &DomainParticipant, own: [u8; 12], rmw: Rmw) -> (Arc<Self>, Task<()>) {
+    pub(crate) fn watch(
+        participant: &DomainParticipant,
+        own_prefix: [u8; 12],
+        rmw: Rmw,
+    ) -> (Arc<Self>, Task<()>) {
         // A given mapping is valid before the first participant is discovered.
-        let seen = Seen { mapping: rmw.fixed(), ..Seen::default() };
-        let graph = Arc::new(Self { rmw, own, seen: Mutex::new(seen) });
+        let state = GraphState { mapping: rmw.fixed(), ..GraphState::default() };
+        let graph = Arc::new(Self { rmw, own_prefix, state: Mutex::new(state) });
         let (listener, watching) = (participant.status_listener(), Arc::clone(&graph));
         let task = smol::spawn(async move {
             let mut events = listener.as_async_status_stream();
@@ -104,8 +108,8 @@ impl Graph {
         (graph, task)
     }
 
-    fn seen(&self) -> MutexGuard<'_, Seen> {
-        self.seen.lock().unwrap_or_else(PoisonError::into_inner)
+    fn state(&self) -> MutexGuard<'_, GraphState> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn take(&self, event: DomainParticipantStatusEvent) {
@@ -113,13 +117,13 @@ impl Graph {
         match event {
             Event::ParticipantDiscovered { dpd } => {
                 let prefix = prefix(dpd.guid);
-                if prefix != self.own {
-                    self.seen().met(prefix, Vendor::new(dpd.vendor_id.as_bytes()));
+                if prefix != self.own_prefix {
+                    self.state().met(prefix, Vendor::new(dpd.vendor_id.as_bytes()));
                 }
             }
             Event::ParticipantLost { id, .. } => {
                 let lost: &[u8] = id.as_ref();
-                let mut state = self.seen();
+                let mut state = self.state();
                 state.participants.retain(|prefix, _| prefix != lost);
                 state.endpoints.retain(|guid, _| &guid[..12] != lost);
                 state.matched_readers.retain(|guid| &guid[..12] != lost);
@@ -127,12 +131,12 @@ impl Graph {
             Event::ReaderDetected { reader } => self.found(true, reader),
             Event::WriterDetected { writer } => self.found(false, writer),
             Event::ReaderLost { guid, .. } | Event::WriterLost { guid, .. } => {
-                let mut state = self.seen();
+                let mut state = self.state();
                 state.endpoints.remove(&bytes(guid));
                 state.matched_readers.remove(&bytes(guid));
             }
             Event::RemoteReaderMatched { remote_reader, .. } => {
-                self.seen().matched_readers.insert(bytes(remote_reader));
+                self.state().matched_readers.insert(bytes(remote_reader));
             }
             Event::RemoteReaderQosIncompatible { remote_reader, .. } => self.incompatible(remote_reader),
             Event::RemoteWriterQosIncompatible { remote_writer, .. } => self.incompatible(remote_writer),
@@ -142,19 +146,19 @@ impl Graph {
 
     fn found(&self, is_reader: bool, description: EndpointDescription) {
         let guid = bytes(description.guid);
-        if guid[..12] == self.own {
+        if guid[..12] == self.own_prefix {
             return;
         }
         let EndpointDescription { topic_name: topic, type_name, user_data, .. } = description;
         let endpoint = Endpoint { is_reader, topic, type_name, hash: type_hash(&user_data) };
-        let mut state = self.seen();
+        let mut state = self.state();
         let complaint = state.expected.get(&endpoint.topic).and_then(|expected| endpoint.complaint(expected));
         state.complaints.extend(complaint);
         state.endpoints.insert(guid, endpoint);
     }
 
     fn incompatible(&self, guid: GUID) {
-        let mut state = self.seen();
+        let mut state = self.state();
         let topic = state.endpoints.get(&bytes(guid)).map(|endpoint| endpoint.topic.clone());
         if let Some(topic) = topic {
             state
@@ -165,7 +169,7 @@ impl Graph {
 
     /// Sets the expected type of a topic. Endpoints with another type are reported and ignored.
     pub(crate) fn expect(&self, topic: String, expected: Expected) {
-        let mut state = self.seen();
+        let mut state = self.state();
         let complaints: Vec<String> = state
             .endpoints
             .values()
@@ -178,14 +182,14 @@ impl Graph {
 
     /// Returns the problems since the last call, each once.
     pub(crate) fn complaints(&self) -> Vec<String> {
-        let mut state = self.seen();
+        let mut state = self.state();
         let new = std::mem::take(&mut state.complaints);
         new.into_iter().filter(|complaint| state.reported.insert(complaint.clone())).collect()
     }
 
     /// Returns `true` if this writer has another type than expected.
     pub(crate) fn is_unfit(&self, writer: Gid) -> bool {
-        let state = self.seen();
+        let state = self.state();
         state.endpoints.get(&writer.to_bytes16()).is_some_and(|endpoint| {
             state.expected.get(&endpoint.topic).is_some_and(|expected| endpoint.complaint(expected).is_some())
         })
@@ -193,16 +197,17 @@ impl Graph {
 
     /// Returns `true` if a topic, given by its DDS name, has a writer.
     pub(crate) fn has_writer(&self, topic: &str) -> bool {
-        self.seen().endpoints.values().any(|endpoint| !endpoint.is_reader && endpoint.topic == topic)
+        self.state().endpoints.values().any(|endpoint| !endpoint.is_reader && endpoint.topic == topic)
     }
 
     /// Returns the server of a service if there is one. An endpoint with another type name is an error. A differing type hash is
     /// not: DDS has matched the type names, and the warning has been logged.
     pub(crate) fn server(&self, topics: &Topics) -> Option<Result<Server, String>> {
-        let state = self.seen();
+        let state = self.state();
         let endpoint = |topic: &str, is_reader: bool| {
-            let is_it = |own: &(&[u8; 16], &Endpoint)| own.1.is_reader == is_reader && own.1.topic == topic;
-            state.endpoints.iter().find(is_it)
+            let fits =
+                |entry: &(&[u8; 16], &Endpoint)| entry.1.is_reader == is_reader && entry.1.topic == topic;
+            state.endpoints.iter().find(fits)
         };
         let ((guid, reader), (_, writer)) =
             (endpoint(&topics.requests, true)?, endpoint(&topics.replies, false)?);
@@ -224,7 +229,7 @@ impl Graph {
     /// bytes that are no GUID, so that every participant that writes requests must have as many reply readers matched.
     pub(crate) fn can_reply(&self, topics: &Topics, client: Gid) -> bool {
         let client = client.to_bytes16();
-        let state = self.seen();
+        let state = self.state();
         let is_known = state.participants.keys().any(|prefix| *prefix == client[..12]);
         if is_known && is_reader(client) {
             return state.matched_readers.contains(&client);
@@ -245,7 +250,7 @@ impl Graph {
 
     /// Returns the readers of a topic, given by its DDS name.
     pub(crate) fn readers(&self, topic: &str) -> BTreeSet<[u8; 16]> {
-        let state = self.seen();
+        let state = self.state();
         let is_it = |endpoint: &Endpoint| endpoint.is_reader && endpoint.topic == topic;
         state.endpoints.iter().filter(|(_, endpoint)| is_it(endpoint)).map(|(guid, _)| *guid).collect()
     }
@@ -257,15 +262,15 @@ impl Graph {
             if let Some(mapping) = self.decide() {
                 return mapping;
             }
-            Timer::after(LOOK).await;
+            Timer::after(POLL_INTERVAL).await;
         }
     }
 
     fn decide(&self) -> Option<Mapping> {
-        let mut state = self.seen();
+        let mut state = self.state();
         if state.mapping.is_none() {
             let met = state.participants.values().find_map(|vendor| vendor.mapping());
-            let waited = state.first.is_some_and(|first| first.elapsed() >= PATIENCE);
+            let waited = state.first.is_some_and(|first| first.elapsed() >= DISCOVERY_WAIT);
             state.mapping = met.or_else(|| waited.then_some(Mapping::Enhanced));
         }
         state.mapping
@@ -279,24 +284,24 @@ impl Graph {
                 Some(found) => return Some(found),
                 None if Instant::now() >= until => return None,
                 None => {
-                    Timer::after(LOOK).await;
+                    Timer::after(POLL_INTERVAL).await;
                 }
             }
         }
     }
 }
 
-impl Seen {
+impl GraphState {
     fn met(&mut self, prefix: [u8; 12], vendor: Vendor) {
         self.first.get_or_insert_with(Instant::now);
         let is_new = self.participants.insert(prefix, vendor).is_none();
-        if let (true, Some(own), Some(other)) = (is_new, self.mapping, vendor.mapping())
-            && own != other
+        if let (true, Some(own_mapping), Some(other_mapping)) = (is_new, self.mapping, vendor.mapping())
+            && own_mapping != other_mapping
         {
             self.complaints.push(format!(
-                "a participant with {other} was discovered, and our services are mapped as by {own}: it cannot call them; `--rmw {}` \
+                "a participant with {other_mapping} was discovered, and our services are mapped as by {own_mapping}: it cannot call them; `--rmw {}` \
                  maps them the other way",
-                own.other()
+                own_mapping.other()
             ));
         }
     }

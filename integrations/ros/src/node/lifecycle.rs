@@ -28,7 +28,7 @@ pub enum Phase {
 }
 
 /// Transition between primary states.
-struct Way {
+struct PhaseChange {
     id: u8,
     label: &'static str,
     from: Phase,
@@ -37,8 +37,8 @@ struct Way {
     via: (u8, &'static str),
 }
 
-const WAYS: [Way; 7] = [
-    way(
+const PHASE_CHANGES: [PhaseChange; 7] = [
+    phase_change(
         Transition::TRANSITION_CONFIGURE,
         "configure",
         Phase::Unconfigured,
@@ -46,10 +46,31 @@ const WAYS: [Way; 7] = [
         10,
         "configuring",
     ),
-    way(Transition::TRANSITION_CLEANUP, "cleanup", Phase::Inactive, Phase::Unconfigured, 11, "cleaningup"),
-    way(Transition::TRANSITION_ACTIVATE, "activate", Phase::Inactive, Phase::Active, 13, "activating"),
-    way(Transition::TRANSITION_DEACTIVATE, "deactivate", Phase::Active, Phase::Inactive, 14, "deactivating"),
-    way(
+    phase_change(
+        Transition::TRANSITION_CLEANUP,
+        "cleanup",
+        Phase::Inactive,
+        Phase::Unconfigured,
+        11,
+        "cleaningup",
+    ),
+    phase_change(
+        Transition::TRANSITION_ACTIVATE,
+        "activate",
+        Phase::Inactive,
+        Phase::Active,
+        13,
+        "activating",
+    ),
+    phase_change(
+        Transition::TRANSITION_DEACTIVATE,
+        "deactivate",
+        Phase::Active,
+        Phase::Inactive,
+        14,
+        "deactivating",
+    ),
+    phase_change(
         Transition::TRANSITION_UNCONFIGURED_SHUTDOWN,
         "shutdown",
         Phase::Unconfigured,
@@ -57,7 +78,7 @@ const WAYS: [Way; 7] = [
         12,
         "shuttingdown",
     ),
-    way(
+    phase_change(
         Transition::TRANSITION_INACTIVE_SHUTDOWN,
         "shutdown",
         Phase::Inactive,
@@ -65,7 +86,7 @@ const WAYS: [Way; 7] = [
         12,
         "shuttingdown",
     ),
-    way(
+    phase_change(
         Transition::TRANSITION_ACTIVE_SHUTDOWN,
         "shutdown",
         Phase::Active,
@@ -75,8 +96,15 @@ const WAYS: [Way; 7] = [
     ),
 ];
 
-const fn way(id: u8, label: &'static str, from: Phase, to: Phase, via: u8, name: &'static str) -> Way {
-    Way { id, label, from, to, via: (via, name) }
+const fn phase_change(
+    id: u8,
+    label: &'static str,
+    from: Phase,
+    to: Phase,
+    via: u8,
+    name: &'static str,
+) -> PhaseChange {
+    PhaseChange { id, label, from, to, via: (via, name) }
 }
 
 impl Phase {
@@ -91,7 +119,7 @@ impl Phase {
     }
 }
 
-impl Way {
+impl PhaseChange {
     fn transition(&self) -> Transition {
         Transition { id: self.id, label: self.label.to_owned() }
     }
@@ -172,7 +200,7 @@ impl Lifecycle {
         });
         let lifecycle = Arc::clone(&served);
         node.serve::<ChangeState>("~/change_state", move |request, answer| {
-            answer.send(ChangeStateResponse { success: lifecycle.take(&request.transition) });
+            answer.send(ChangeStateResponse { success: lifecycle.change_state(&request.transition) });
         })?;
         let lifecycle = Arc::clone(&served);
         node.serve::<GetState>("~/get_state", move |_, answer| {
@@ -183,9 +211,10 @@ impl Lifecycle {
             let unknown = State { id: State::PRIMARY_STATE_UNKNOWN, label: "unknown".to_owned() };
             let mut available_states = vec![unknown];
             available_states.extend(phases.map(Phase::state));
-            for way in &WAYS {
-                if !available_states.contains(&way.via()) {
-                    available_states.push(way.via());
+            for phase_change in &PHASE_CHANGES {
+                // Several transitions share a transition state.
+                if !available_states.contains(&phase_change.via()) {
+                    available_states.push(phase_change.via());
                 }
             }
             answer.send(GetAvailableStatesResponse { available_states });
@@ -193,7 +222,7 @@ impl Lifecycle {
         let lifecycle = Arc::clone(&served);
         node.serve::<GetAvailableTransitions>("~/get_available_transitions", move |_, answer| {
             let phase = lifecycle.phase();
-            answer.send(described(|way| way.from == phase));
+            answer.send(described(|phase_change| phase_change.from == phase));
         })?;
         node.serve::<GetAvailableTransitions>("~/get_transition_graph", |_, answer| {
             answer.send(described(|_| true));
@@ -210,37 +239,46 @@ impl Lifecycle {
     /// fails.
     pub fn go(&self, to: Phase) -> bool {
         let from = self.phase();
-        WAYS.iter().find(|way| way.from == from && way.to == to).is_some_and(|way| self.walk(way))
+        PHASE_CHANGES
+            .iter()
+            .find(|phase_change| phase_change.from == from && phase_change.to == to)
+            .is_some_and(|phase_change| self.perform(phase_change))
     }
 
-    fn take(&self, wanted: &Transition) -> bool {
+    fn change_state(&self, requested: &Transition) -> bool {
         let from = self.phase();
         // As in rcl_lifecycle, a label is used if there is no id, and every id of a shutdown has
         // the label of the current state.
-        let is_it = |way: &&Way| {
-            way.from == from && if wanted.id == 0 { way.label == wanted.label } else { way.id == wanted.id }
+        let is_requested = |phase_change: &&PhaseChange| {
+            phase_change.from == from
+                && if requested.id == 0 {
+                    phase_change.label == requested.label
+                } else {
+                    phase_change.id == requested.id
+                }
         };
-        let Some(way) = WAYS.iter().find(is_it) else {
-            let text = format!("no transition {} ({}) from {}", wanted.id, wanted.label, from.state().label);
+        let Some(phase_change) = PHASE_CHANGES.iter().find(is_requested) else {
+            let text =
+                format!("no transition {} ({}) from {}", requested.id, requested.label, from.state().label);
             if let Some(node) = self.node.upgrade() {
                 node.log(Severity::Warn, &text);
             }
             return false;
         };
-        self.walk(way)
+        self.perform(phase_change)
     }
 
-    fn walk(&self, way: &Way) -> bool {
-        self.tell(way, way.from.state(), way.via());
-        let success = (self.change)(way.to);
-        let end = if success { way.to } else { way.from };
+    fn perform(&self, phase_change: &PhaseChange) -> bool {
+        self.publish(phase_change, phase_change.from.state(), phase_change.via());
+        let success = (self.change)(phase_change.to);
+        let end = if success { phase_change.to } else { phase_change.from };
         *self.phase.lock().unwrap_or_else(PoisonError::into_inner) = end;
-        self.tell(way, way.via(), end.state());
+        self.publish(phase_change, phase_change.via(), end.state());
         success
     }
 
-    fn tell(&self, way: &Way, start_state: State, goal_state: State) {
-        let (stamp, transition) = (now(), way.transition());
+    fn publish(&self, phase_change: &PhaseChange, start_state: State, goal_state: State) {
+        let (stamp, transition) = (now(), phase_change.transition());
         match &self.events {
             Events::Nanoseconds(events) => {
                 let timestamp =
@@ -254,13 +292,13 @@ impl Lifecycle {
     }
 }
 
-fn described(wanted: impl Fn(&&Way) -> bool) -> GetAvailableTransitionsResponse {
-    let describe = |way: &Way| TransitionDescription {
-        transition: way.transition(),
-        start_state: way.from.state(),
-        goal_state: way.to.state(),
+fn described(is_selected: impl Fn(&&PhaseChange) -> bool) -> GetAvailableTransitionsResponse {
+    let describe = |phase_change: &PhaseChange| TransitionDescription {
+        transition: phase_change.transition(),
+        start_state: phase_change.from.state(),
+        goal_state: phase_change.to.state(),
     };
     GetAvailableTransitionsResponse {
-        available_transitions: WAYS.iter().filter(wanted).map(describe).collect(),
+        available_transitions: PHASE_CHANGES.iter().filter(is_selected).map(describe).collect(),
     }
 }

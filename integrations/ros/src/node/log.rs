@@ -12,7 +12,7 @@ use ros2_client::rosout::RosoutRaw as _;
 use crate::node::Node;
 
 /// Maximum number of remembered warnings, which are printed once each.
-const WARNED: usize = 1000;
+const MAX_WARNED: usize = 1000;
 
 /// Severity of a log message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -73,7 +73,7 @@ impl Node {
     /// Logs a warning unless it was logged before.
     pub(crate) fn warn_once(&self, text: &str) {
         let mut warned = self.warned.lock().unwrap_or_else(PoisonError::into_inner);
-        if warned.len() >= WARNED {
+        if warned.len() >= MAX_WARNED {
             warned.clear();
         }
         if warned.insert(text.to_owned()) {

@@ -92,9 +92,10 @@ impl Node {
             Message::error("N120", text)
         };
         let participant = network.participant().build().map_err(|error| failed(&error))?;
-        let own = ros2_client::dds::rustdds::RTPSEntity::guid(&participant).to_bytes();
+        let guid = ros2_client::dds::rustdds::RTPSEntity::guid(&participant).to_bytes();
+        // The prefix identifies the participant: the graph ignores its own endpoints.
         let mut prefix = [0; 12];
-        prefix.copy_from_slice(&own[..12]);
+        prefix.copy_from_slice(&guid[..12]);
         let (graph, watching) = Graph::watch(&participant, prefix, rmw);
         let context = Context::from_domain_participant(participant).map_err(|error| failed(&error))?;
         let node_name = NodeName::new(name.namespace(), name.name()).map_err(|error| {

@@ -87,9 +87,9 @@ mod tests {
         let value = |name: &str| {
             variables.iter().find(|(known, _)| *known == name).map(|(_, value)| (*value).to_owned())
         };
-        let found = Network::from_environment(value).ok();
-        let found = found.map(|(network, warnings)| (network.domain, network.loopback, warnings.len()));
-        assert_eq!(found, expected, "{variables:?}");
+        let summary = Network::from_environment(value).ok();
+        let summary = summary.map(|(network, warnings)| (network.domain, network.loopback, warnings.len()));
+        assert_eq!(summary, expected, "{variables:?}");
     }
 
     #[test]

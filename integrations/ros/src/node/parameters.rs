@@ -124,22 +124,22 @@ impl Node {
         seconds: f64,
     ) -> Result<Arc<AtomicU64>, Errors> {
         let time = Arc::new(AtomicU64::new(0));
-        let own = Arc::clone(&time);
+        let shared = Arc::clone(&time);
         let set = move |value: &ParameterValue| {
             if let ParameterValue::Double(seconds) = value
                 && let Ok(duration) = Duration::try_from_secs_f64(*seconds)
             {
-                own.store(u64::try_from(duration.as_millis()).unwrap_or(u64::MAX), Ordering::Relaxed);
+                shared.store(u64::try_from(duration.as_millis()).unwrap_or(u64::MAX), Ordering::Relaxed);
             }
         };
         let value = ParameterValue::Double(seconds);
         set(&value);
-        let hear = set.clone();
+        let on_set = set.clone();
         let warnings = self.declare(
             vec![Declared { name, description, value, is_dynamic: true, check: duration }],
             move |set, value| {
                 if set == name {
-                    hear(value);
+                    on_set(value);
                 }
             },
         )?;
@@ -212,19 +212,20 @@ impl Node {
         parameters: Vec<msg::Parameter>,
     ) -> Result<(), String> {
         let mut table = table.lock().unwrap_or_else(PoisonError::into_inner);
+        // All values are checked before the first one is set.
         let mut values = Vec::new();
         for msg::Parameter { name, value } in parameters {
-            let own = table.get(&name).ok_or_else(|| format!("there is no parameter `{name}`"))?;
-            if !own.is_dynamic {
+            let declared = table.get(&name).ok_or_else(|| format!("there is no parameter `{name}`"))?;
+            if !declared.is_dynamic {
                 return Err(format!("`{name}` cannot be set while the node runs"));
             }
             let value = parameter(value).ok_or_else(|| format!("`{name}` cannot be deleted"))?;
-            let value = own.accept(value).map_err(|text| format!("`{name}` {text}"))?;
+            let value = declared.accept(value).map_err(|text| format!("`{name}` {text}"))?;
             values.push((name, value));
         }
         for (name, value) in values {
-            if let Some(own) = table.get_mut(&name) {
-                own.value = value.clone();
+            if let Some(declared) = table.get_mut(&name) {
+                declared.value = value.clone();
             }
             // This also publishes on `/parameter_events`.
             self.inner().set_parameter(&name, value.clone())?;
@@ -234,17 +235,17 @@ impl Node {
     }
 }
 
-/// Converts a value to the type of `own`. An integer is accepted for a double.
-fn fitting(own: &ParameterValue, value: ParameterValue) -> Result<ParameterValue, String> {
-    match (own, value) {
+/// Converts a value to the type of `current`. An integer is accepted for a double.
+fn fitting(current: &ParameterValue, value: ParameterValue) -> Result<ParameterValue, String> {
+    match (current, value) {
         (ParameterValue::Double(_), ParameterValue::Integer(whole)) => {
             Ok(ParameterValue::Double(whole as f64))
         }
         (ParameterValue::StringArray(_), ParameterValue::StringArray(list)) => {
             Ok(ParameterValue::StringArray(list))
         }
-        (own, value) if raw(own.clone()).r#type == raw(value.clone()).r#type => Ok(value),
-        (own, _) => Err(format!("has another type; it is {}", kind(own))),
+        (current, value) if raw(current.clone()).r#type == raw(value.clone()).r#type => Ok(value),
+        (current, _) => Err(format!("has another type; it is {}", kind(current))),
     }
 }
 

@@ -76,7 +76,7 @@ impl<T> ReplyGate<T> {
         Some((id, request))
     }
 
-    /// Completes when waiting requests should be checked again; never if there are none.
+    /// Completes when waiting requests should be checked again; never if no request waits.
     pub(crate) fn recheck(&self) -> impl Future<Output = ()> + Send + use<T> {
         let is_empty = self.waiting.is_empty();
         async move {

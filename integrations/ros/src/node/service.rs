@@ -22,7 +22,7 @@ use crate::node::{Node, Severity, client_name, dds_type, not_made};
 
 /// Time after the discovery of a server during which it discovers this client. Its earlier replies
 /// would be lost.
-const MATCHING: Duration = Duration::from_millis(100);
+const MATCHING_TIME: Duration = Duration::from_millis(100);
 
 /// Sender of the reply to a request. If it is dropped, the client receives no reply.
 pub struct Responder<S: Service> {
@@ -177,7 +177,7 @@ impl<S: Service> Caller<S> {
         };
         let connected = connection.insert((server, client));
         if is_new {
-            Timer::after(MATCHING.min(within)).await;
+            Timer::after(MATCHING_TIME.min(within)).await;
         }
         Ok(connected)
     }

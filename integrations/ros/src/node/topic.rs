@@ -15,10 +15,10 @@ use crate::node::graph::Expected;
 use crate::node::{Node, Severity, client_name, dds_type, not_made};
 
 /// Number of invalid samples of a topic per log message.
-const RUBBISH: u64 = 1000;
+const INVALID_PER_LOG_MESSAGE: u64 = 1000;
 
 /// Time after its creation during which a subscription checks the age of samples.
-const OLD: Duration = Duration::from_secs(5);
+const AGE_CHECK_PERIOD: Duration = Duration::from_secs(5);
 
 /// Filter of samples that were published before the subscription existed. Writers keep the samples
 /// that a killed reader has not acknowledged, and send them to the next reader although it has not
@@ -102,10 +102,10 @@ impl Node {
                 let Some(node) = weak.upgrade() else { return };
                 match sample {
                     Ok((_, info)) if node.graph.is_unfit(info.publisher_gid()) => {}
-                    Ok((_, info)) if begun.elapsed() < OLD && old.is_old(&info) => {}
+                    Ok((_, info)) if begun.elapsed() < AGE_CHECK_PERIOD && old.is_old(&info) => {}
                     Ok((message, _)) => take(message),
                     Err(error) => {
-                        if wrong % RUBBISH == 0 {
+                        if wrong % INVALID_PER_LOG_MESSAGE == 0 {
                             let text = format!("what was heard on {full} is not a {}: {error}", M::TYPE);
                             node.log(Severity::Warn, &text);
                         }

@@ -18,18 +18,18 @@ use crate::perform::{Call, End, Perform, Performance, Progress, Running};
 use crate::performer::{feedback, part};
 
 /// Timeout for a server, and for its answer to a goal.
-pub(super) const PATIENCE: Duration = Duration::from_secs(10);
+pub(super) const SERVER_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Mapping of an action of a plan to a ROS action.
 pub(super) trait Meaning: Action + Sized + 'static {
     /// Settings that a goal needs in addition to the arguments.
     type Settings: Clone + Send + Sync + 'static;
 
-    /// Creates the goal of a call. The error is the reason why there is none.
+    /// Creates the goal of a call. The error is the reason why no goal can be created.
     fn goal(settings: &Self::Settings, call: &Call) -> Result<Self::Goal, String>;
 
     /// Converts feedback.
-    fn progress(call: &Call, heard: &Self::Feedback) -> Progress;
+    fn progress(call: &Call, feedback: &Self::Feedback) -> Progress;
 
     /// Returns the reason why a goal that succeeded according to its server has not achieved its
     /// purpose.
@@ -80,7 +80,7 @@ async fn follow<A: Meaning>(
     call: &Call,
     performance: &Performance,
 ) -> End {
-    let pursued = match caller.pursue(goal, PATIENCE).await {
+    let pursued = match caller.pursue(goal, SERVER_TIMEOUT).await {
         Ok(pursued) => pursued,
         Err(error) => return End::Failed(error.to_string()),
     };
@@ -99,7 +99,7 @@ pub(super) async fn pursue_on<A: Action>(
         let mut canceled = Box::pin(performance.canceled()).fuse();
         futures::select! {
             event = event => match event {
-                Ok(Accepted::Feedback(heard)) => performance.tell(progress(&heard)),
+                Ok(Accepted::Feedback(message)) => performance.forward(progress(&message)),
                 Ok(Accepted::Ended(GoalEnd::Succeeded, result)) => {
                     return shortfall(&result).map_or(End::Succeeded, End::Failed);
                 }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use crate::interfaces::system_modes_msgs::srv::{ChangeMode as Service, ChangeModeRequest};
 use crate::node::Node;
 use crate::perform::{Call, End, Perform, Running};
-use crate::performer::action::PATIENCE;
+use crate::performer::action::SERVER_TIMEOUT;
 use crate::performer::settings::argument;
 
 /// Positions of the function and the design among the arguments.
@@ -38,7 +38,7 @@ impl Perform for ChangeMode {
                 let caller = self.node.caller::<Service>(&format!("/{function}/change_mode"));
                 let request = ChangeModeRequest { mode_name: design.to_owned() };
                 smol::spawn(async move {
-                    let end = match caller.call(request, PATIENCE).await {
+                    let end = match caller.call(request, SERVER_TIMEOUT).await {
                         Ok(answer) if answer.success => End::Succeeded,
                         Ok(_) => End::Failed(format!("{} has refused it", caller.service())),
                         Err(error) => End::Failed(error.to_string()),

@@ -10,7 +10,7 @@ use crate::interfaces::plansys2_msgs::action as newer;
 use crate::interfaces::plansys2_msgs::msg::{ActionExecutionInfo, Plan};
 use crate::node::{ActionCaller, Node};
 use crate::perform::{End, Progress, Running};
-use crate::performer::action::{PATIENCE, pursue_on};
+use crate::performer::action::{SERVER_TIMEOUT, pursue_on};
 use crate::performer::{feedback, part};
 
 /// Versions of PlanSys2 with different executors.
@@ -52,9 +52,9 @@ impl ExecutePlans {
             Caller::Older(caller) => {
                 let caller = Arc::clone(caller);
                 smol::spawn(async move {
-                    let end = match caller.pursue(older::ExecutePlanGoal::default(), PATIENCE).await {
+                    let end = match caller.pursue(older::ExecutePlanGoal::default(), SERVER_TIMEOUT).await {
                         Ok(pursued) => {
-                            pursue_on(&pursued, &performance, told_older, |result| {
+                            pursue_on(&pursued, &performance, progress_older, |result| {
                                 let because = || format!("PlanSys2 has failed: {}", result.error_info);
                                 (!result.success).then(because)
                             })
@@ -69,12 +69,12 @@ impl ExecutePlans {
             Caller::Newer(caller) => {
                 let caller = Arc::clone(caller);
                 smol::spawn(async move {
-                    let end = match caller.pursue(newer::ExecutePlanGoal { plan }, PATIENCE).await {
+                    let end = match caller.pursue(newer::ExecutePlanGoal { plan }, SERVER_TIMEOUT).await {
                         Ok(pursued) => {
                             pursue_on(
                                 &pursued,
                                 &performance,
-                                |heard| told(&heard.action_execution_status),
+                                |message| progress(&message.action_execution_status),
                                 |result| {
                                     let because = || failed(&result.action_execution_status);
                                     (!result.success).then(because)
@@ -93,13 +93,13 @@ impl ExecutePlans {
     }
 }
 
-fn told_older(heard: &older::ExecutePlanFeedback) -> Progress {
-    let done = heard.seq_action as f32 + heard.progress_current_action;
-    feedback(part(done, heard.total_actions as f32), heard.current_action.clone())
+fn progress_older(message: &older::ExecutePlanFeedback) -> Progress {
+    let done = message.seq_action as f32 + message.progress_current_action;
+    feedback(part(done, message.total_actions as f32), message.current_action.clone())
 }
 
 /// Progress of a plan: a completed action counts as 1, a running one by its completed share.
-fn told(actions: &[ActionExecutionInfo]) -> Progress {
+fn progress(actions: &[ActionExecutionInfo]) -> Progress {
     let done = |action: &ActionExecutionInfo| match action.status {
         ActionExecutionInfo::SUCCEEDED => 1.0,
         ActionExecutionInfo::EXECUTING => action.completion.clamp(0.0, 1.0),
@@ -136,8 +136,8 @@ mod tests {
             info(ActionExecutionInfo::FAILED, 0.5, "(c)"),
             info(ActionExecutionInfo::NOT_EXECUTED, 0.0, "(d)"),
         ];
-        assert_eq!(told(&actions), feedback(Some(0.375), "(b)"));
-        assert_eq!(told(&[]), feedback(None, ""));
+        assert_eq!(progress(&actions), feedback(Some(0.375), "(b)"));
+        assert_eq!(progress(&[]), feedback(None, ""));
         assert_eq!((failed(&actions), failed(&[])), ("(c): stuck".into(), "PlanSys2 has failed".into()));
     }
 }

@@ -22,13 +22,13 @@ use crate::perform::{Call, End, Perform, Performance, Progress, Running};
 use crate::performer::feedback;
 
 /// Queue depth in PlanSys2.
-pub(super) const DEPTH: usize = 100;
+pub(super) const QUEUE_DEPTH: usize = 100;
 
 /// Period of the requests for a performer.
-const AGAIN: Duration = Duration::from_secs(1);
+const REQUEST_PERIOD: Duration = Duration::from_secs(1);
 
 /// Timeout of the search for a performer.
-const PATIENCE: Duration = Duration::from_secs(30);
+const SEARCH_TIMEOUT: Duration = Duration::from_secs(30);
 
 /// The topic and its listeners.
 pub(super) struct Hub {
@@ -40,13 +40,13 @@ pub(super) struct Hub {
 impl Hub {
     pub(super) fn new(node: &Arc<Node>) -> Result<Arc<Self>, Message> {
         let listeners = Arc::new(Mutex::new(Vec::<Sender<ActionExecution>>::new()));
-        let heard = Arc::clone(&listeners);
-        node.subscribe::<ActionExecution>("actions_hub", depth(DEPTH), move |message| {
-            let mut listeners = heard.lock().unwrap_or_else(PoisonError::into_inner);
+        let registered = Arc::clone(&listeners);
+        node.subscribe::<ActionExecution>("actions_hub", depth(QUEUE_DEPTH), move |message| {
+            let mut listeners = registered.lock().unwrap_or_else(PoisonError::into_inner);
             // Listeners that were dropped are removed.
             listeners.retain(|listener| listener.try_send(message.clone()).is_ok());
         })?;
-        let publisher = node.publisher("actions_hub", depth(DEPTH))?;
+        let publisher = node.publisher("actions_hub", depth(QUEUE_DEPTH))?;
         let full = node.full_name();
         let name = full.rsplit('/').next().unwrap_or(&full).to_owned();
         Ok(Arc::new(Self { name, publisher, listeners }))
@@ -57,7 +57,7 @@ impl Hub {
         &self.name
     }
 
-    pub(super) fn say(&self, message: ActionExecution) {
+    pub(super) fn send(&self, message: ActionExecution) {
         self.publisher.publish(message);
     }
 
@@ -71,7 +71,7 @@ impl Hub {
 
 /// Request of an action, from the view of the executor.
 #[derive(Debug)]
-struct Asking {
+struct Negotiation {
     executor: String,
     action: String,
     arguments: Vec<String>,
@@ -80,14 +80,14 @@ struct Asking {
 
 /// Reaction to a message.
 #[derive(Debug, PartialEq)]
-enum Heard {
+enum Reaction {
     Nothing,
     Reply(ActionExecution),
     Progress(Progress),
     End(End),
 }
 
-impl Asking {
+impl Negotiation {
     fn message(&self, r#type: i16, node_id: &str) -> ActionExecution {
         ActionExecution {
             r#type,
@@ -102,26 +102,27 @@ impl Asking {
         self.message(ActionExecution::REQUEST, &self.executor)
     }
 
-    fn hear(&mut self, message: &ActionExecution) -> Heard {
+    fn react(&mut self, message: &ActionExecution) -> Reaction {
         if message.action != self.action || message.arguments != self.arguments {
-            return Heard::Nothing;
+            return Reaction::Nothing;
         }
         let sender = &message.node_id;
         let is_ours = self.performer.as_ref() == Some(sender);
         match message.r#type {
+            // A repeated response of our performer means that the confirmation was lost.
             ActionExecution::RESPONSE if self.performer.is_none() || is_ours => {
                 self.performer = Some(sender.clone());
-                Heard::Reply(self.message(ActionExecution::CONFIRM, sender))
+                Reaction::Reply(self.message(ActionExecution::CONFIRM, sender))
             }
-            ActionExecution::RESPONSE => Heard::Reply(self.message(ActionExecution::REJECT, sender)),
+            ActionExecution::RESPONSE => Reaction::Reply(self.message(ActionExecution::REJECT, sender)),
             ActionExecution::FEEDBACK if is_ours => {
-                Heard::Progress(feedback(Some(message.completion), message.status.clone()))
+                Reaction::Progress(feedback(Some(message.completion), message.status.clone()))
             }
-            ActionExecution::FINISH if is_ours && message.success => Heard::End(End::Succeeded),
+            ActionExecution::FINISH if is_ours && message.success => Reaction::End(End::Succeeded),
             ActionExecution::FINISH if is_ours => {
-                Heard::End(End::Failed(format!("{sender} has failed: {}", message.status)))
+                Reaction::End(End::Failed(format!("{sender} has failed: {}", message.status)))
             }
-            _ => Heard::Nothing,
+            _ => Reaction::Nothing,
         }
     }
 }
@@ -129,15 +130,15 @@ impl Asking {
 impl Perform for Arc<Hub> {
     fn start(&self, call: Call) -> Running {
         let (running, performance) = Running::pair();
-        let (hub, heard) = (Arc::clone(self), self.listen());
-        let asking = Asking {
+        let (hub, messages) = (Arc::clone(self), self.listen());
+        let negotiation = Negotiation {
             executor: self.name.clone(),
             action: call.action,
             arguments: call.arguments,
             performer: None,
         };
         smol::spawn(async move {
-            let end = ask(&hub, asking, &heard, &performance).await;
+            let end = negotiate(&hub, negotiation, &messages, &performance).await;
             performance.end(end);
         })
         .detach();
@@ -145,53 +146,54 @@ impl Perform for Arc<Hub> {
     }
 }
 
-async fn ask(
+async fn negotiate(
     hub: &Hub,
-    mut asking: Asking,
-    heard: &Receiver<ActionExecution>,
+    mut negotiation: Negotiation,
+    messages: &Receiver<ActionExecution>,
     performance: &Performance,
 ) -> End {
     /// The next event.
     enum Next {
-        Heard(Option<ActionExecution>),
+        Message(Option<ActionExecution>),
         Canceled,
         Time,
     }
     let begun = Instant::now();
-    hub.say(asking.request());
+    hub.send(negotiation.request());
     let mut last_request = Instant::now();
     loop {
-        let hears = async { Next::Heard(heard.recv().await.ok()) };
+        let received = async { Next::Message(messages.recv().await.ok()) };
         let canceled = async {
             performance.canceled().await;
             Next::Canceled
         };
         let time = async {
-            smol::Timer::after(AGAIN.saturating_sub(last_request.elapsed())).await;
+            smol::Timer::after(REQUEST_PERIOD.saturating_sub(last_request.elapsed())).await;
             Next::Time
         };
-        match smol::future::or(hears, smol::future::or(canceled, time)).await {
-            Next::Heard(None) => return End::Failed("actions_hub is heard no more".to_owned()),
-            Next::Heard(Some(message)) => match asking.hear(&message) {
-                Heard::Nothing => {}
-                Heard::Reply(reply) => hub.say(reply),
-                Heard::Progress(progress) => performance.tell(progress),
-                Heard::End(end) => return end,
+        match smol::future::or(received, smol::future::or(canceled, time)).await {
+            Next::Message(None) => return End::Failed("actions_hub is heard no more".to_owned()),
+            Next::Message(Some(message)) => match negotiation.react(&message) {
+                Reaction::Nothing => {}
+                Reaction::Reply(reply) => hub.send(reply),
+                Reaction::Progress(progress) => performance.forward(progress),
+                Reaction::End(end) => return end,
             },
             Next::Canceled => {
-                let performer = asking.performer.clone().unwrap_or_default();
-                hub.say(asking.message(ActionExecution::CANCEL, &performer));
+                let performer = negotiation.performer.clone().unwrap_or_default();
+                hub.send(negotiation.message(ActionExecution::CANCEL, &performer));
                 return End::Canceled;
             }
+            // A performer that starts later has not received the earlier requests.
             Next::Time => {
                 last_request = Instant::now();
-                if asking.performer.is_none() {
-                    if begun.elapsed() > PATIENCE {
-                        let seconds = PATIENCE.as_secs();
+                if negotiation.performer.is_none() {
+                    if begun.elapsed() > SEARCH_TIMEOUT {
+                        let seconds = SEARCH_TIMEOUT.as_secs();
                         let text = format!("no performer of PlanSys2 has answered for {seconds} s");
                         return End::Failed(text);
                     }
-                    hub.say(asking.request());
+                    hub.send(negotiation.request());
                 }
             }
         }
@@ -202,8 +204,8 @@ async fn ask(
 mod tests {
     use super::*;
 
-    fn asking() -> Asking {
-        Asking {
+    fn negotiation() -> Negotiation {
+        Negotiation {
             executor: "metaplan".to_owned(),
             action: "move".to_owned(),
             arguments: vec!["r".to_owned(), "a".to_owned()],
@@ -211,42 +213,46 @@ mod tests {
         }
     }
 
-    fn said(r#type: i16, node_id: &str) -> ActionExecution {
-        asking().message(r#type, node_id)
+    fn message_from(r#type: i16, node_id: &str) -> ActionExecution {
+        negotiation().message(r#type, node_id)
     }
 
     #[test]
     fn the_first_responder_is_confirmed_and_others_are_rejected() {
-        let mut asking = asking();
-        assert_eq!(asking.hear(&said(ActionExecution::FINISH, "one")), Heard::Nothing);
-        let confirmed = Heard::Reply(said(ActionExecution::CONFIRM, "one"));
-        assert_eq!(asking.hear(&said(ActionExecution::RESPONSE, "one")), confirmed);
-        let rejected = Heard::Reply(said(ActionExecution::REJECT, "two"));
-        assert_eq!(asking.hear(&said(ActionExecution::RESPONSE, "two")), rejected);
+        let mut negotiation = negotiation();
+        assert_eq!(negotiation.react(&message_from(ActionExecution::FINISH, "one")), Reaction::Nothing);
+        let confirmed = Reaction::Reply(message_from(ActionExecution::CONFIRM, "one"));
+        assert_eq!(negotiation.react(&message_from(ActionExecution::RESPONSE, "one")), confirmed);
+        let rejected = Reaction::Reply(message_from(ActionExecution::REJECT, "two"));
+        assert_eq!(negotiation.react(&message_from(ActionExecution::RESPONSE, "two")), rejected);
         // A lost confirmation is repeated.
-        assert_eq!(asking.hear(&said(ActionExecution::RESPONSE, "one")), confirmed);
-        let told = ActionExecution {
+        assert_eq!(negotiation.react(&message_from(ActionExecution::RESPONSE, "one")), confirmed);
+        let progress = ActionExecution {
             completion: 0.5,
             status: "half".to_owned(),
-            ..said(ActionExecution::FEEDBACK, "one")
+            ..message_from(ActionExecution::FEEDBACK, "one")
         };
-        let other = ActionExecution { node_id: "two".to_owned(), ..told.clone() };
-        assert_eq!(asking.hear(&told), Heard::Progress(feedback(Some(0.5), "half")));
-        assert_eq!(asking.hear(&other), Heard::Nothing);
-        let failed = ActionExecution { status: "stuck".to_owned(), ..said(ActionExecution::FINISH, "one") };
-        assert_eq!(asking.hear(&failed), Heard::End(End::Failed("one has failed: stuck".to_owned())));
+        let from_other = ActionExecution { node_id: "two".to_owned(), ..progress.clone() };
+        assert_eq!(negotiation.react(&progress), Reaction::Progress(feedback(Some(0.5), "half")));
+        assert_eq!(negotiation.react(&from_other), Reaction::Nothing);
+        let failed =
+            ActionExecution { status: "stuck".to_owned(), ..message_from(ActionExecution::FINISH, "one") };
+        assert_eq!(
+            negotiation.react(&failed),
+            Reaction::End(End::Failed("one has failed: stuck".to_owned()))
+        );
         let done = ActionExecution { success: true, ..failed };
-        assert_eq!(asking.hear(&done), Heard::End(End::Succeeded));
+        assert_eq!(negotiation.react(&done), Reaction::End(End::Succeeded));
     }
 
     #[test]
     fn messages_about_other_actions_are_ignored() {
-        let mut asking = asking();
-        let response = said(ActionExecution::RESPONSE, "one");
+        let mut negotiation = negotiation();
+        let response = message_from(ActionExecution::RESPONSE, "one");
         let arguments = ActionExecution { arguments: vec!["r".to_owned()], ..response.clone() };
         let action = ActionExecution { action: "stay".to_owned(), ..response };
-        for message in [arguments, action, said(ActionExecution::REQUEST, "executor")] {
-            assert_eq!(asking.hear(&message), Heard::Nothing);
+        for message in [arguments, action, message_from(ActionExecution::REQUEST, "executor")] {
+            assert_eq!(negotiation.react(&message), Reaction::Nothing);
         }
     }
 }

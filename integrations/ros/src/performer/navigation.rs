@@ -51,7 +51,7 @@ impl Navigation {
 }
 
 /// Travelled share of the route, estimated from the times.
-fn told(elapsed: i32, remaining: i32, distance: f32, recoveries: i16) -> Progress {
+fn progress_of(elapsed: i32, remaining: i32, distance: f32, recoveries: i16) -> Progress {
     let (elapsed, remaining) = (elapsed as f32, remaining as f32);
     let recovered = if recoveries > 0 { format!(", {recoveries} recoveries") } else { String::new() };
     let text = format!("{distance:.2} m left{recovered}");
@@ -78,9 +78,9 @@ macro_rules! meaning {
                 Ok($($path)::+::action::NavigateToPoseGoal { pose: settings.pose(call)?, behavior_tree })
             }
 
-            fn progress(_: &Call, heard: &$($path)::+::action::NavigateToPoseFeedback) -> Progress {
-                let (gone, left) = (heard.navigation_time.sec, heard.estimated_time_remaining.sec);
-                told(gone, left, heard.distance_remaining, heard.number_of_recoveries)
+            fn progress(_: &Call, message: &$($path)::+::action::NavigateToPoseFeedback) -> Progress {
+                let (elapsed, remaining) = (message.navigation_time.sec, message.estimated_time_remaining.sec);
+                progress_of(elapsed, remaining, message.distance_remaining, message.number_of_recoveries)
             }
 
             fn shortfall($result: &$($path)::+::action::NavigateToPoseResult) -> Option<String> {

@@ -11,14 +11,14 @@ use crate::interfaces::builtin_interfaces::msg::Time;
 use crate::interfaces::plansys2_msgs::msg::{ActionExecution, ActionPerformerStatus};
 use crate::node::{Node, Publisher, Severity, depth};
 use crate::perform::{Call, End, Perform, Progress, Running};
-use crate::performer::hub::{DEPTH, Hub};
+use crate::performer::hub::{Hub, QUEUE_DEPTH};
 use crate::performer::{Offered, Poses, performers};
 
 /// Period of the heartbeat.
 const HEARTBEAT: Duration = Duration::from_secs(1);
 
 /// Time after which a silent executor is assumed to have chosen another performer.
-const SILENCE: Duration = Duration::from_secs(5);
+const EXECUTOR_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// State of a performer.
 enum Stage {
@@ -51,8 +51,8 @@ pub fn offer(
     performer: Arc<dyn Perform>,
 ) -> Result<(), Message> {
     let hub = Hub::new(node)?;
-    let status = node.publisher("performers_status", depth(DEPTH))?;
-    let heard = hub.listen();
+    let status = node.publisher("performers_status", depth(QUEUE_DEPTH))?;
+    let messages = hub.listen();
     let stage = Mutex::new(Stage::Idle);
     let offer = Arc::new(Offer { hub, action: action.to_owned(), specialized, performer, stage, status });
     let beating = Arc::downgrade(&offer);
@@ -66,9 +66,9 @@ pub fn offer(
     .detach();
     let weak = Arc::downgrade(node);
     smol::spawn(async move {
-        while let Ok(message) = heard.recv().await {
+        while let Ok(message) = messages.recv().await {
             let Some(node) = weak.upgrade() else { return };
-            offer.hear(&message, &node);
+            offer.handle(&message, &node);
         }
     })
     .detach();
@@ -119,20 +119,22 @@ impl Offer {
     }
 
     fn is_ours(&self, message: &ActionExecution) -> bool {
-        let fits = |(wanted, given): (&String, &String)| wanted.is_empty() || wanted == given;
+        let fits = |(required, actual): (&String, &String)| required.is_empty() || required == actual;
         message.action == self.action && self.specialized.iter().zip(&message.arguments).all(fits)
     }
 
-    fn hear(self: &Arc<Self>, message: &ActionExecution, node: &Node) {
+    fn handle(self: &Arc<Self>, message: &ActionExecution, node: &Node) {
         let mut stage = self.stage();
         let is_for_us = message.node_id == self.hub.name();
         match (message.r#type, &*stage) {
+            // A busy performer does not respond.
             (ActionExecution::REQUEST, Stage::Running(..)) => {}
+            // A response to one executor is binding, until its request counts as abandoned.
             (ActionExecution::REQUEST, Stage::Committed(other, since))
-                if *other != message.arguments && since.elapsed() < SILENCE => {}
+                if *other != message.arguments && since.elapsed() < EXECUTOR_TIMEOUT => {}
             (ActionExecution::REQUEST, _) if self.is_ours(message) => {
                 *stage = Stage::Committed(message.arguments.clone(), Instant::now());
-                self.hub.say(self.message(ActionExecution::RESPONSE, &message.arguments));
+                self.hub.send(self.message(ActionExecution::RESPONSE, &message.arguments));
             }
             (ActionExecution::CONFIRM, Stage::Committed(arguments, _))
                 if is_for_us && *arguments == message.arguments =>
@@ -147,7 +149,7 @@ impl Offer {
                 let running = self.performer.start(call);
                 *stage = Stage::Running(message.arguments.clone(), running.clone());
                 let offer = Arc::clone(self);
-                smol::spawn(async move { offer.tell(&running).await }).detach();
+                smol::spawn(async move { offer.report_progress(&running).await }).detach();
             }
             (ActionExecution::REJECT, Stage::Committed(arguments, _))
                 if is_for_us && *arguments == message.arguments =>
@@ -165,7 +167,7 @@ impl Offer {
     }
 
     /// Reports the progress to the executor until the action ends.
-    async fn tell(&self, running: &Running) {
+    async fn report_progress(&self, running: &Running) {
         loop {
             let progress = running.next().await;
             let mut stage = self.stage();
@@ -174,7 +176,7 @@ impl Offer {
                 Progress::Feedback { completion, text } => {
                     let (completion, status) = (completion.unwrap_or_default(), text);
                     let message = self.message(ActionExecution::FEEDBACK, arguments);
-                    self.hub.say(ActionExecution { completion, status, ..message });
+                    self.hub.send(ActionExecution { completion, status, ..message });
                     continue;
                 }
                 Progress::Ended(End::Succeeded) => (1.0, "done".to_owned(), true),
@@ -186,7 +188,7 @@ impl Offer {
                 }
             };
             let message = self.message(ActionExecution::FINISH, arguments);
-            self.hub.say(ActionExecution { success, completion, status, ..message });
+            self.hub.send(ActionExecution { success, completion, status, ..message });
             *stage = Stage::Idle;
             return;
         }

@@ -33,12 +33,12 @@ impl Awaited {
 impl Perform for Awaited {
     fn start(&self, _: Call) -> Running {
         let (running, performance) = Running::pair();
-        let (sender, heard) = smol::channel::bounded(1);
+        let (sender, receiver) = smol::channel::bounded(1);
         self.waiting.lock().unwrap_or_else(PoisonError::into_inner).push(sender);
         smol::spawn(async move {
             let end = {
-                let heard = async {
-                    match heard.recv().await {
+                let received = async {
+                    match receiver.recv().await {
                         Ok(()) => End::Succeeded,
                         Err(_) => End::Failed("the topic is heard no more".to_owned()),
                     }
@@ -47,7 +47,7 @@ impl Perform for Awaited {
                     performance.canceled().await;
                     End::Canceled
                 };
-                smol::future::or(heard, canceled).await
+                smol::future::or(received, canceled).await
             };
             performance.end(end);
         })

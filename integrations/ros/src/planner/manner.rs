@@ -10,46 +10,46 @@ use crate::node::{Declared, Node, Severity, any_value};
 use crate::planner::Manner;
 
 /// Default timeout in seconds, that of PlanSys2.
-const TIMEOUT: f64 = 15.0;
+const DEFAULT_TIMEOUT: f64 = 15.0;
 
 /// Share of the timeout for planning. The reply must arrive before the client's timeout.
-const SHARE: f64 = 0.9;
+const PLANNING_SHARE: f64 = 0.9;
 
 /// Number of alternative plans in the reply of `get_plan_array`.
-const ALTERNATIVES: usize = 3;
+const DEFAULT_ALTERNATIVES: usize = 3;
 
 fn declared() -> Vec<Declared> {
-    let one =
+    let parameter =
         |name, description, value, check| Declared { name, description, value, is_dynamic: true, check };
     vec![
-        one(
+        parameter(
             "plan_solver_timeout",
             "how long whoever asks for a plan waits for it, in seconds",
-            ParameterValue::Double(TIMEOUT),
+            ParameterValue::Double(DEFAULT_TIMEOUT),
             timeout,
         ),
-        one(
+        parameter(
             "plan_solver_plugins",
             "accepted, as PlanSys2's parameter files have it; there are no plugins here",
             ParameterValue::StringArray(Vec::new()),
             any_value,
         ),
-        one(
+        parameter(
             "metric",
             "what is minimised where the problem has no metric, as PlanSys2's problems have none: `(cost)`, `total-time`",
             ParameterValue::String(String::new()),
             any_value,
         ),
-        one(
+        parameter(
             "overlap",
             "whether durative actions may overlap: `yes`, `no`, or `auto`: unless a knowledge base joins in",
             ParameterValue::String("auto".to_owned()),
             overlap,
         ),
-        one(
+        parameter(
             "alternatives",
             "up to so many further plans that are as good, in the answer of get_plan_array",
-            ParameterValue::Integer(ALTERNATIVES as i64),
+            ParameterValue::Integer(DEFAULT_ALTERNATIVES as i64),
             alternatives,
         ),
     ]
@@ -94,8 +94,12 @@ impl Chosen {
     /// # Errors
     /// The command line gives a value of another type.
     pub(crate) fn declare(node: &Arc<Node>) -> Result<Arc<Self>, Errors> {
-        let manner =
-            Manner { metric: None, time_limit: Duration::ZERO, overlap: None, alternatives: ALTERNATIVES };
+        let manner = Manner {
+            metric: None,
+            time_limit: Duration::ZERO,
+            overlap: None,
+            alternatives: DEFAULT_ALTERNATIVES,
+        };
         let chosen = Arc::new(Self { manner: Mutex::new(manner) });
         let listener = Arc::clone(&chosen);
         let changed = move |name: &str, value: &ParameterValue| listener.set(name, value);
@@ -124,7 +128,7 @@ impl Chosen {
         match (name, value) {
             ("plan_solver_timeout", ParameterValue::Double(seconds)) => {
                 if let Ok(timeout) = Duration::try_from_secs_f64(*seconds) {
-                    manner.time_limit = timeout.mul_f64(SHARE);
+                    manner.time_limit = timeout.mul_f64(PLANNING_SHARE);
                 }
             }
             ("metric", ParameterValue::String(text)) => {

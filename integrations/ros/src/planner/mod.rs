@@ -12,4 +12,4 @@ pub use node::{Options, run, serve};
 pub(crate) use node::{on_a_thread, plan_message};
 pub(crate) use solve::{DOMAIN, PROBLEM, check_domain};
 pub use solve::{Found, Manner, NoPlan, Request, solve};
-pub(crate) use told::Told;
+pub(crate) use told::PlanPublisher;

@@ -25,13 +25,13 @@ use crate::performer;
 use crate::planner::joint::Joint;
 use crate::planner::manner::Chosen;
 use crate::planner::solve::{DOMAIN, Found, Manner, NoPlan, PROBLEM, Request, check_domain, solve};
-use crate::planner::told::Told;
+use crate::planner::told::PlanPublisher;
 
 /// Stack size of planning threads: syntax trees may be deeply nested.
-const STACK: usize = 64 << 20;
+const STACK_SIZE: usize = 64 << 20;
 
 /// Limit on concurrent requests. Further requests are refused.
-const MOST: usize = 8;
+const MAX_REQUESTS: usize = 8;
 
 /// The planner behind the services.
 struct Planner {
@@ -41,7 +41,7 @@ struct Planner {
     /// Mission whose knowledge base restricts the designs.
     joint: Option<Arc<Joint>>,
     manner: Arc<Chosen>,
-    told: Told,
+    told: PlanPublisher,
 }
 
 /// Serves as PlanSys2's planner. The node must have no parameters yet. Returns its lifecycle, which
@@ -57,7 +57,7 @@ pub fn serve(node: &Arc<Node>, setup: Option<Setup>) -> Result<Arc<Lifecycle>, E
         busy: AtomicUsize::new(0),
         joint,
         manner,
-        told: Told::new(node)?,
+        told: PlanPublisher::new(node)?,
     });
     let to_errors = |message: Message| vec![message];
     let lifecycle = Lifecycle::serve(node, |_| true).map_err(to_errors)?;
@@ -75,7 +75,7 @@ pub struct Options {
 }
 
 /// Polling interval of the stop flag.
-const LOOK: Duration = Duration::from_millis(50);
+const STOP_POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Serves as PlanSys2's planner until `stop` is set, and performs the actions that the settings
 /// offer.
@@ -90,14 +90,14 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
     let settings = match (&options.settings, &options.mission) {
         (None, None) => Settings::default(),
         (file, mission) => {
-            let beside = mission.clone().unwrap_or_default();
-            Settings::read(file.as_deref(), &beside)?
+            let location = mission.clone().unwrap_or_default();
+            Settings::read(file.as_deref(), &location)?
         }
     };
     serve(node, setup)?;
     performer::offers(node, &settings.offers, &settings.poses)?;
     while !stop.load(Ordering::Relaxed) {
-        std::thread::sleep(LOOK);
+        std::thread::sleep(STOP_POLL_INTERVAL);
     }
     Ok(())
 }
@@ -149,9 +149,10 @@ impl Planner {
         if !is_ready {
             return Err(NoPlan::None(UNCONFIGURED.to_owned()));
         }
-        if self.busy.fetch_add(1, Ordering::Relaxed) >= MOST {
+        // Requests are counted before the comparison, so that concurrent ones cannot exceed the limit together.
+        if self.busy.fetch_add(1, Ordering::Relaxed) >= MAX_REQUESTS {
             self.busy.fetch_sub(1, Ordering::Relaxed);
-            return Err(NoPlan::None(format!("{MOST} other plans are being looked for")));
+            return Err(NoPlan::None(format!("{MAX_REQUESTS} other plans are being looked for")));
         }
         let planned = self.plan_now(domain, problem, alternatives);
         self.busy.fetch_sub(1, Ordering::Relaxed);
@@ -167,7 +168,7 @@ impl Planner {
             joint: joint.as_ref(),
         };
         let planned = solve(request, &manner);
-        self.told.tell(&planned);
+        self.told.publish_result(&planned);
         planned
     }
 }
@@ -177,7 +178,7 @@ impl Planner {
 /// # Errors
 /// The thread cannot be created.
 pub(crate) fn on_a_thread(name: &str, work: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
-    std::thread::Builder::new().name(name.to_owned()).stack_size(STACK).spawn(work).map(|_| ())
+    std::thread::Builder::new().name(name.to_owned()).stack_size(STACK_SIZE).spawn(work).map(|_| ())
 }
 
 const UNCONFIGURED: &str = "the planner is not configured; `ros2 lifecycle set /planner configure` does it";

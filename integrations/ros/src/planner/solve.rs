@@ -1,4 +1,4 @@
-//! Planning for PlanSys2: domain and problem to the best plan, or to the reason why there is none.
+//! Planning for PlanSys2: computes the best plan of a domain and a problem, or the reason why no plan exists.
 //!
 //! PlanSys2's problems have no metric, so a default metric can be given. Durative actions may
 //! overlap, as in POPF, and the makespan is minimised if there is no metric. If no such plan is
@@ -150,7 +150,7 @@ fn one_line(messages: &[Message]) -> String {
 
 /// Share of the time for plans with overlapping actions. The remaining time is for sequential
 /// plans.
-const SHARE: f64 = 0.7;
+const OVERLAPPING_SHARE: f64 = 0.7;
 
 /// Computes a plan.
 ///
@@ -174,20 +174,20 @@ fn solve_or_panic(Request { domain, problem, joint }: Request<'_>, manner: &Mann
     }
     let durative = |body: &ActionBody| matches!(body, ActionBody::Durative { .. });
     let is_durative = mission.domain().actions.iter().any(|action| durative(&action.body));
-    let task = Asked { mission: &mission, problem: &problem, manner };
+    let task = FilledMission { mission: &mission, problem: &problem, manner };
     let mut overlapping = None;
     if manner.overlap.unwrap_or(is_durative && mission.knowledge().is_none()) {
-        let limits = Limits::none().with_time(manner.time_limit.mul_f64(SHARE));
+        let limits = Limits::none().with_time(manner.time_limit.mul_f64(OVERLAPPING_SHARE));
         overlapping = task.overlapping(&limits)?;
     }
-    let (solution, others) = match overlapping {
+    let (solution, other_plans) = match overlapping {
         Some(solution) => (solution, Vec::new()),
         None => task.sequence(Limits::none().with_time(manner.time_limit.saturating_sub(begun.elapsed())))?,
     };
     let plan = solution.plan.as_ref().ok_or_else(|| task.reason(&solution))?;
     let written = |plan: &Plan| plan_lines(&mission.written(plan.clone()));
     Ok(Found {
-        plans: std::iter::once(plan).chain(&others).map(written).collect(),
+        plans: std::iter::once(plan).chain(&other_plans).map(written).collect(),
         configuration: plan.steps.iter().map(|step: &Step| step.configuration.clone()).collect(),
         cost: plan.cost.clone(),
         proved: solution.status == Status::Optimal,
@@ -197,14 +197,14 @@ fn solve_or_panic(Request { domain, problem, joint }: Request<'_>, manner: &Mann
 }
 
 /// A mission with its completed problem.
-struct Asked<'a> {
+struct FilledMission<'a> {
     mission: &'a Mission,
     problem: &'a Problem,
     manner: &'a Manner,
 }
 
-impl Asked<'_> {
-    /// Computes a plan with overlapping actions, or a proof that there is none. Returns `None` on
+impl FilledMission<'_> {
+    /// Computes a plan with overlapping actions, or a proof that no plan exists. Returns `None` on
     /// timeout or for unsupported features.
     fn overlapping(&self, limits: &Limits) -> Result<Option<Solution>, NoPlan> {
         let separation = instant();
@@ -239,17 +239,18 @@ impl Asked<'_> {
         }
         let reading = Reading::sequential(task.is_timed());
         let max_alternatives = self.manner.alternatives;
-        let found = if max_alternatives > 0 {
+        let same_cost = if max_alternatives > 0 {
             alternatives(&task, &solution, max_alternatives, &config)
         } else {
             None
         };
         solution.plan =
             solution.plan.map(|plan| self.confirmed(plan, &reading, &config.limits)).transpose()?;
-        let others = found.into_iter().flat_map(|found| found.plans);
-        let others =
-            others.map(|plan| self.confirmed(plan, &reading, &config.limits)).collect::<Result<_, _>>()?;
-        Ok((solution, others))
+        let other_plans = same_cost.into_iter().flat_map(|same_cost| same_cost.plans);
+        let other_plans = other_plans
+            .map(|plan| self.confirmed(plan, &reading, &config.limits))
+            .collect::<Result<_, _>>()?;
+        Ok((solution, other_plans))
     }
 
     /// Computes a plan of a task whose numbers exceed the range of the SAT encoding.
@@ -292,13 +293,13 @@ impl Asked<'_> {
 /// # Errors
 /// All errors of the domain.
 pub(crate) fn check_domain(domain: &Source) -> Result<(), Errors> {
-    let (tree, mut found) = pddl::parse_domain(domain);
+    let (tree, mut diagnostics) = pddl::parse_domain(domain);
     if let Some(tree) = &tree {
-        found.extend(pddl::check_domain(tree, domain));
+        diagnostics.extend(pddl::check_domain(tree, domain));
     }
-    found.retain(|diagnostic| diagnostic.severity == pddl::Severity::Error);
+    diagnostics.retain(|diagnostic| diagnostic.severity == pddl::Severity::Error);
     match tree {
-        Some(_) if found.is_empty() => Ok(()),
-        _ => Err(Message::from_pddl(&found, &[domain]).into()),
+        Some(_) if diagnostics.is_empty() => Ok(()),
+        _ => Err(Message::from_pddl(&diagnostics, &[domain]).into()),
     }
 }

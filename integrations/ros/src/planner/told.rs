@@ -11,12 +11,12 @@ use crate::planner::{Found, NoPlan};
 
 /// Publisher of planning results.
 #[derive(Debug)]
-pub(crate) struct Told {
+pub(crate) struct PlanPublisher {
     node: Arc<Node>,
     plans: Publisher<Text>,
 }
 
-impl Told {
+impl PlanPublisher {
     /// Creates the topic.
     ///
     /// # Errors
@@ -26,8 +26,8 @@ impl Told {
         Ok(Self { node: Arc::clone(node), plans })
     }
 
-    /// Publishes a plan, or the reason why there is none.
-    pub(crate) fn tell(&self, found: &Result<Found, NoPlan>) {
+    /// Publishes a plan, or the reason why no plan was found.
+    pub(crate) fn publish_result(&self, found: &Result<Found, NoPlan>) {
         match found {
             Ok(found) => {
                 let actions = found.plans.first().map_or(0, Vec::len);

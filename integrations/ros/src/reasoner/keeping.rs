@@ -15,10 +15,10 @@ use crate::manager::Functions;
 use crate::reasoner::memory::{Memory, Remembered};
 
 /// Delay until a refused design is retried.
-const REFUSED: Duration = Duration::from_secs(60);
+const REFUSED_DELAY: Duration = Duration::from_secs(60);
 
 /// Initial delay until a design without a reply is retried; doubled with each attempt.
-const SILENT: Duration = Duration::from_secs(2);
+const SILENT_DELAY: Duration = Duration::from_secs(2);
 
 /// Output of the reasoner.
 #[derive(Debug, Clone, PartialEq)]
@@ -81,7 +81,7 @@ pub(super) struct Keeping {
     /// Last event by subject.
     reports: BTreeMap<String, String>,
     /// Designs of functions from before a restart.
-    had: BTreeMap<String, String>,
+    restored: BTreeMap<String, String>,
     outputs: Vec<Output>,
     count: u64,
 }
@@ -96,7 +96,7 @@ impl Keeping {
             failed: BTreeMap::new(),
             measured: BTreeMap::new(),
             reports: BTreeMap::new(),
-            had: BTreeMap::new(),
+            restored: BTreeMap::new(),
             outputs: Vec::new(),
             count: 0,
         }
@@ -119,12 +119,12 @@ impl Keeping {
 
     /// Returns the state that must survive a restart.
     pub(super) fn memory(&self) -> Memory {
-        let goal = |(goal, own): (&GoalId, &Pursued)| Remembered {
+        let goal = |(goal, pursued): (&GoalId, &Pursued)| Remembered {
             goal: goal.uuid.into_bytes(),
-            wanted: QoS { objective_id: own.objective.clone(), ..own.wanted.clone() },
-            design: own.design.clone(),
+            wanted: QoS { objective_id: pursued.objective.clone(), ..pursued.wanted.clone() },
+            design: pursued.design.clone(),
         };
-        let goals = self.goals.iter().filter(|(_, own)| !own.cancelling).map(goal).collect();
+        let goals = self.goals.iter().filter(|(_, pursued)| !pursued.cancelling).map(goal).collect();
         Memory::new(self.reports.clone(), goals)
     }
 
@@ -132,19 +132,19 @@ impl Keeping {
     /// requested again. `modes` are the modes found on the robot, if known.
     pub(super) fn remember(&mut self, memory: Memory, goals: &[GoalId], modes: &BTreeMap<String, String>) {
         for line in memory.reports.values() {
-            self.hear(line);
+            self.handle_line(line);
         }
         for (Remembered { wanted, design, .. }, goal) in memory.goals.into_iter().zip(goals) {
             let function = wanted.objective_type.clone();
             if let Some(design) = design {
                 let mode = self.functions.mode(&function, &design);
                 if modes.get(&function).is_none_or(|found| found == mode) {
-                    self.had.insert(function, design);
+                    self.restored.insert(function, design);
                 }
             }
             self.pursue(*goal, &wanted);
         }
-        self.had.clear();
+        self.restored.clear();
     }
 
     /// Returns the reason why a goal must be rejected, if there is one.
@@ -168,7 +168,7 @@ impl Keeping {
     pub(super) fn pursue(&mut self, goal: GoalId, wanted: &QoS) {
         self.count += 1;
         let requested = wanted.objective_id.trim();
-        let is_taken = self.goals.values().any(|own| own.objective == requested);
+        let is_taken = self.goals.values().any(|pursued| pursued.objective == requested);
         let objective = if requested.is_empty() || is_taken {
             format!("obj_{}_{}", wanted.objective_type, self.count)
         } else {
@@ -195,8 +195,8 @@ impl Keeping {
             wanted: wanted.clone(),
         };
         self.goals.insert(goal, pursued);
-        self.hear(&line);
-        self.tell(goal);
+        self.handle_line(&line);
+        self.publish_status(goal);
     }
 
     /// Cancels a goal. Its function is released first.
@@ -208,16 +208,16 @@ impl Keeping {
         pursued.cancelling = true;
         let function = pursued.function.clone();
         let mode = self.functions.unground(&function).to_owned();
-        self.ask(Wanted { function, mode, effect: None }, None);
+        self.request_mode(Wanted { function, mode, effect: None }, None);
     }
 
-    fn ask(&mut self, wanted: Wanted, design: Option<String>) {
+    fn request_mode(&mut self, wanted: Wanted, design: Option<String>) {
         self.pending.insert(wanted.function.clone(), (wanted.clone(), design));
         self.outputs.push(Output::Configure(wanted));
     }
 
     /// Handles a line of events in the format of the loop.
-    pub(super) fn hear(&mut self, line: &str) {
+    pub(super) fn handle_line(&mut self, line: &str) {
         let observation = Observation::parse(line);
         for event in observation.events.iter().flatten() {
             if let Event::Measured { attribute, .. } = event
@@ -233,10 +233,10 @@ impl Keeping {
             self.reports.insert(about.clone(), event.to_json().to_string());
         }
         let answers = self.keeper.handle(&observation);
-        self.take(answers);
+        self.handle_answers(answers);
     }
 
-    fn take(&mut self, answers: Vec<KeeperAnswer>) {
+    fn handle_answers(&mut self, answers: Vec<KeeperAnswer>) {
         for answer in answers {
             // Serialisation cannot fail: answers consist of texts and numbers.
             self.outputs.push(Output::Event(serde_json::to_value(&answer).unwrap_or_default()));
@@ -247,12 +247,13 @@ impl Keeping {
                     effect,
                     ..
                 }) => {
-                    if self.had.get(&function) == Some(&to) {
+                    // The robot still has the design from before the restart.
+                    if self.restored.get(&function) == Some(&to) {
                         self.has(&function, &to, Some(effect));
                         continue;
                     }
                     let mode = self.functions.mode(&function, &to).to_owned();
-                    self.ask(Wanted { function, mode, effect: Some(effect) }, Some(to));
+                    self.request_mode(Wanted { function, mode, effect: Some(effect) }, Some(to));
                 }
                 KeeperAnswer::Service(Service::Unserved { objective, because, .. }) => {
                     let text = format!("no design serves {objective} now: {}", because.join("; "));
@@ -268,14 +269,14 @@ impl Keeping {
 
     /// Handles the outcome of a request.
     pub(super) fn answered(&mut self, wanted: &Wanted, outcome: Outcome, now: Duration) {
-        let is_awaited = self.pending.get(&wanted.function).is_some_and(|(own, _)| own == wanted);
+        let is_awaited = self.pending.get(&wanted.function).is_some_and(|(pending, _)| pending == wanted);
         let Some((_, design)) = is_awaited.then(|| self.pending.remove(&wanted.function)).flatten() else {
             return;
         };
         let goals: Vec<GoalId> = self
             .goals
             .iter()
-            .filter(|(_, own)| own.function == wanted.function)
+            .filter(|(_, pursued)| pursued.function == wanted.function)
             .map(|(goal, _)| *goal)
             .collect();
         match (outcome, design) {
@@ -289,8 +290,8 @@ impl Keeping {
             (outcome, None) => {
                 self.complain(wanted, &outcome);
                 for goal in goals {
-                    if let Some(own) = self.goals.get_mut(&goal).filter(|own| own.cancelling) {
-                        own.cancelling = false;
+                    if let Some(pursued) = self.goals.get_mut(&goal).filter(|pursued| pursued.cancelling) {
+                        pursued.cancelling = false;
                         self.outputs.push(Output::Cancelled(goal, false));
                     }
                 }
@@ -302,24 +303,28 @@ impl Keeping {
     fn has(&mut self, function: &str, design: &str, effect: Option<u64>) {
         self.failed.remove(design);
         if let Some(effect) = effect {
-            self.hear(&Event::Acknowledged { effect }.to_json().to_string());
+            self.handle_line(&Event::Acknowledged { effect }.to_json().to_string());
         }
-        let goals: Vec<GoalId> =
-            self.goals.iter().filter(|(_, own)| own.function == function).map(|(goal, _)| *goal).collect();
+        let goals: Vec<GoalId> = self
+            .goals
+            .iter()
+            .filter(|(_, pursued)| pursued.function == function)
+            .map(|(goal, _)| *goal)
+            .collect();
         for goal in goals {
-            if let Some(own) = self.goals.get_mut(&goal) {
-                own.design = Some(design.to_owned());
+            if let Some(pursued) = self.goals.get_mut(&goal) {
+                pursued.design = Some(design.to_owned());
             }
-            self.tell(goal);
+            self.publish_status(goal);
         }
     }
 
     fn end(&mut self, goal: GoalId) {
-        if self.goals.get(&goal).is_some_and(|own| own.cancelling)
-            && let Some(own) = self.goals.remove(&goal)
+        if self.goals.get(&goal).is_some_and(|pursued| pursued.cancelling)
+            && let Some(pursued) = self.goals.remove(&goal)
         {
             self.outputs.push(Output::Cancelled(goal, true));
-            self.hear(&Event::ObjectiveRemoved { objective: own.objective }.to_json().to_string());
+            self.handle_line(&Event::ObjectiveRemoved { objective: pursued.objective }.to_json().to_string());
         }
     }
 
@@ -339,16 +344,18 @@ impl Keeping {
         self.complain(wanted, outcome);
         let times = self.failed.get(design).map_or(0, |(_, times)| *times);
         let (wait, times) = match outcome {
-            Outcome::Failed(_) => (SILENT.saturating_mul(1 << times.min(5)), times.saturating_add(1)),
-            Outcome::Done | Outcome::Refused => (REFUSED, 0),
+            Outcome::Failed(_) => (SILENT_DELAY.saturating_mul(1 << times.min(5)), times.saturating_add(1)),
+            Outcome::Done | Outcome::Refused => (REFUSED_DELAY, 0),
         };
         self.failed.insert(design.to_owned(), (now + wait, times));
-        self.hear(&Event::Design { design: design.to_owned(), realisable: false }.to_json().to_string());
+        self.handle_line(
+            &Event::Design { design: design.to_owned(), realisable: false }.to_json().to_string(),
+        );
         if !self.pending.contains_key(&wanted.function)
             && let Some(effect) = wanted.effect
         {
             // No alternative exists: the function keeps its former design.
-            self.hear(&Event::ReconfigurationFailed { effect }.to_json().to_string());
+            self.handle_line(&Event::ReconfigurationFailed { effect }.to_json().to_string());
         }
     }
 
@@ -364,31 +371,32 @@ impl Keeping {
             if let Some((again, _)) = self.failed.get_mut(&design) {
                 *again = Duration::MAX;
             }
-            self.hear(&Event::Design { design, realisable: true }.to_json().to_string());
+            self.handle_line(&Event::Design { design, realisable: true }.to_json().to_string());
         }
         let goals: Vec<GoalId> = self.goals.keys().copied().collect();
         for goal in goals {
-            self.tell(goal);
+            self.publish_status(goal);
         }
     }
 
     /// Publishes the status of an objective in MROS's format.
-    fn tell(&mut self, goal: GoalId) {
-        let Some(own) = self.goals.get(&goal) else { return };
+    fn publish_status(&mut self, goal: GoalId) {
+        let Some(pursued) = self.goals.get(&goal) else { return };
         let objectives = self.keeper.configurator().objectives();
         let status = objectives
             .iter()
-            .find(|objective| objective.individual.name == own.objective)
+            .find(|objective| objective.individual.name == pursued.objective)
             .and_then(|objective| objective.statuses.first().cloned())
             .unwrap_or_else(|| "IN_PROGRESS".to_owned());
-        let mode = own.design.as_ref().map(|design| self.functions.mode(&own.function, design).to_owned());
+        let mode =
+            pursued.design.as_ref().map(|design| self.functions.mode(&pursued.function, design).to_owned());
         let pair = |(key, value): (&String, &String)| KeyValue { key: key.clone(), value: value.clone() };
         let status = QoS {
-            objective_id: own.objective.clone(),
-            objective_type: own.function.clone(),
+            objective_id: pursued.objective.clone(),
+            objective_type: pursued.function.clone(),
             objective_status: status,
             selected_mode: mode.unwrap_or_default(),
-            always_improve: own.always_improve,
+            always_improve: pursued.always_improve,
             qos: self.measured.iter().map(pair).collect(),
         };
         self.outputs.push(Output::Feedback(goal, status));

@@ -24,10 +24,10 @@ use crate::reasoner::keeping::{Keeping, Outcome, Output, Wanted};
 use crate::reasoner::memory::{MemoryFile, Remembered};
 
 /// Timeout of a mode change.
-const TIMEOUT: Duration = Duration::from_secs(5);
+const CHANGE_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// Timeout of a function's reply with its mode.
-const LOOK: Duration = Duration::from_secs(2);
+const MODE_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// Input of the reasoner.
 enum Input {
@@ -72,16 +72,17 @@ impl Network {
             1.5,
         )?;
         let (sender, inputs) = mpsc::channel();
-        let heard = sender.clone();
+        let diagnostic_sender = sender.clone();
         let diagnosed =
-            Diagnosed::hear(node, rules, move || drop(heard.send(Input::Diagnosed))).map_err(to_errors)?;
-        let heard = sender.clone();
+            Diagnosed::subscribe(node, rules, move || drop(diagnostic_sender.send(Input::Diagnosed)))
+                .map_err(to_errors)?;
+        let goal_sender = sender.clone();
         let goals = node.serve_action::<ControlQos>("/mros/objective", move |event| {
             let input = match event {
                 GoalEvent::Wanted(offer, goal) => Input::Wanted(offer, goal.qos_expected),
                 GoalEvent::Cancel(goal, request) => Input::Cancel(goal, request),
             };
-            let _ = heard.send(input);
+            let _ = goal_sender.send(input);
         });
         let systems = keeping.functions().into_iter().map(|function| {
             let service = format!("/{}/change_mode", keeping.system(&function));
@@ -92,7 +93,7 @@ impl Network {
         let bridge = Arc::new(node.caller::<MetacontrolFD>("/mros/request_configuration"));
         let client = Arc::clone(&bridge);
         // Connects in advance, so that the first call need not wait for discovery.
-        smol::spawn(async move { while client.ready(TIMEOUT).await.is_err() {} }).detach();
+        smol::spawn(async move { while client.ready(CHANGE_TIMEOUT).await.is_err() {} }).detach();
         let active = Lifecycle::activated(node).map_err(to_errors)?;
         Ok(Self {
             node: Arc::clone(node),
@@ -157,7 +158,7 @@ impl Network {
             let service = format!("/{}/get_mode", self.keeping.system(&function));
             let caller = self.node.caller::<GetMode>(&service);
             async move {
-                let answer = caller.call(GetModeRequest::default(), LOOK).await.ok()?;
+                let answer = caller.call(GetModeRequest::default(), MODE_TIMEOUT).await.ok()?;
                 Some((function, answer.current_mode))
             }
         };
@@ -185,7 +186,7 @@ impl Network {
             }
             Input::Diagnosed => {
                 let line = self.diagnosed.line();
-                self.keeping.hear(&line);
+                self.keeping.handle_line(&line);
             }
             Input::Answered(wanted, outcome) => self.keeping.answered(&wanted, outcome, now),
         }
@@ -226,9 +227,12 @@ impl Network {
             let answer: Result<bool, CallError> = if bridge.is_served() || !system.is_served() {
                 let request =
                     MetacontrolFDRequest { required_function_name: function, required_fd_name: mode };
-                bridge.call(request, TIMEOUT).await.map(|answer| answer.success)
+                bridge.call(request, CHANGE_TIMEOUT).await.map(|answer| answer.success)
             } else {
-                system.call(ChangeModeRequest { mode_name: mode }, TIMEOUT).await.map(|answer| answer.success)
+                system
+                    .call(ChangeModeRequest { mode_name: mode }, CHANGE_TIMEOUT)
+                    .await
+                    .map(|answer| answer.success)
             };
             let outcome = match answer {
                 Ok(true) => Outcome::Done,

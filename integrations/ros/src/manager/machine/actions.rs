@@ -11,7 +11,7 @@ impl Machine {
     pub(super) fn begin(&mut self) {
         let beliefs = self.control.beliefs();
         let has = |(function, design): &(String, String)| {
-            beliefs.configuration().get(function).is_some_and(|own| own == design)
+            beliefs.configuration().get(function).is_some_and(|current| current == design)
         };
         let is_ready = beliefs.running().is_some_and(|(_, step)| step.configuration.iter().all(has))
             && !beliefs.suspended()
@@ -33,9 +33,9 @@ impl Machine {
         }
         self.action = None;
         match ended {
-            Ended::Succeeded => self.say(&Event::Succeeded { action: number }),
-            Ended::Cancelled => self.say(&Event::Cancelled { action: number }),
-            Ended::Failed(reason) => self.say(&Event::Failed { action: number, reason: reason.clone() }),
+            Ended::Succeeded => self.queue(&Event::Succeeded { action: number }),
+            Ended::Cancelled => self.queue(&Event::Cancelled { action: number }),
+            Ended::Failed(reason) => self.queue(&Event::Failed { action: number, reason: reason.clone() }),
         }
         format!("action {number} has ended")
     }

@@ -9,25 +9,25 @@ use crate::manager::machine::Machine;
 use crate::manager::machine::io::{Change, Outcome, Output, State};
 
 /// Number of attempts of a call without a reply.
-const TRIES: u32 = 2;
+const MAX_ATTEMPTS: u32 = 2;
 
 /// Initial delay before a function without a reply is probed; doubled with each failure.
-const PROBE: Duration = Duration::from_secs(1);
+const INITIAL_PROBE_DELAY: Duration = Duration::from_secs(1);
 
 /// Maximum delay of a probe.
-const LONGEST_PROBE: Duration = Duration::from_secs(60);
+const MAX_PROBE_DELAY: Duration = Duration::from_secs(60);
 
 /// Minimum delay until the designs of a function without a reply are retried.
-const AGAIN: Duration = Duration::from_secs(2);
+const SILENT_RETRY_DELAY: Duration = Duration::from_secs(2);
 
 /// Delay until a refused design is retried.
-const REFUSED: Duration = Duration::from_secs(60);
+const REFUSED_RETRY_DELAY: Duration = Duration::from_secs(60);
 
 /// Time during which a granted mode is believed although the mode manager reports another one.
 ///
 /// `system_modes` answers `change_mode` before the node has changed, and `get_mode` returns the old mode until its observer has noticed
 /// the change. A manager that believes the old mode requests the new one again, which causes the next report.
-const GRANT: Duration = Duration::from_secs(2);
+const GRANT_PERIOD: Duration = Duration::from_secs(2);
 
 /// A mode that was granted recently.
 #[derive(Debug)]
@@ -71,11 +71,11 @@ impl Machine {
                 self.trouble.entry(function.clone()).or_default().silences = 0;
                 match effect {
                     Some(effect) => self.acknowledge(effect),
-                    None => self.say(&Event::Observed { function: function.clone(), design: None }),
+                    None => self.queue(&Event::Observed { function: function.clone(), design: None }),
                 }
                 format!("{function} has the mode {mode}")
             }
-            Outcome::Failed(because) if attempt < TRIES => {
+            Outcome::Failed(because) if attempt < MAX_ATTEMPTS => {
                 self.complain(&function, &mode, &because);
                 self.change(Change { attempt: attempt + 1, ..change });
                 because
@@ -84,7 +84,8 @@ impl Machine {
                 self.complain(&function, &mode, &because);
                 let trouble = self.trouble.entry(function.clone()).or_default();
                 trouble.silences = trouble.silences.saturating_add(1);
-                let wait = PROBE.saturating_mul(1 << trouble.silences.min(6)).min(LONGEST_PROBE);
+                let wait =
+                    INITIAL_PROBE_DELAY.saturating_mul(1 << trouble.silences.min(6)).min(MAX_PROBE_DELAY);
                 self.outputs.push(Output::Probe(function.clone(), wait));
                 self.failed(&function, effect, None);
                 because
@@ -92,7 +93,7 @@ impl Machine {
             Outcome::Refused => {
                 let because = format!("{function} has refused the mode {mode}");
                 self.complain(&function, &mode, &because);
-                self.failed(&function, effect, Some(self.now + REFUSED));
+                self.failed(&function, effect, Some(self.now + REFUSED_RETRY_DELAY));
                 because
             }
         }
@@ -111,10 +112,16 @@ impl Machine {
     pub(super) fn failed(&mut self, function: &str, effect: Option<u64>, again: Option<Duration>) {
         self.pending.remove(function);
         let Some(effect) = effect else { return };
-        let outstanding = self.control.beliefs().outstanding().find(|own| own.number == effect);
-        if let Some(Command::Reconfigure { to, .. }) = outstanding.map(|own| own.command.clone()) {
+        let outstanding = self
+            .control
+            .beliefs()
+            .outstanding()
+            .find(|effect_in_progress| effect_in_progress.number == effect);
+        if let Some(Command::Reconfigure { to, .. }) =
+            outstanding.map(|effect_in_progress| effect_in_progress.command.clone())
+        {
             self.trouble.entry(function.to_owned()).or_default().designs.insert(to, again);
-            self.say(&Event::ReconfigurationFailed { effect });
+            self.queue(&Event::ReconfigurationFailed { effect });
         }
         self.outputs.push(Output::Look(function.to_owned()));
     }
@@ -127,7 +134,7 @@ impl Machine {
             _ => Vec::new(),
         };
         earlier.extend(before);
-        let grant = Grant { until: self.now + GRANT, earlier, is_contradicted: false };
+        let grant = Grant { until: self.now + GRANT_PERIOD, earlier, is_contradicted: false };
         self.grants.insert(function.to_owned(), grant);
     }
 
@@ -152,7 +159,7 @@ impl Machine {
     pub(super) fn mode(&mut self, function: &str, mode: &str) -> String {
         let because = format!("{function} was seen with the mode {mode}");
         if let Some(change) = self.pending.get(function).cloned() {
-            if change.mode == mode && change.attempt >= TRIES {
+            if change.mode == mode && change.attempt >= MAX_ATTEMPTS {
                 // The reply was lost, but the mode shows that the call succeeded.
                 return self.changed(change, Outcome::Done);
             }
@@ -168,18 +175,18 @@ impl Machine {
             return format!("{because}, which may be the mode before the change");
         }
         self.modes.insert(function.to_owned(), mode.to_owned());
-        self.came_late(function, mode);
+        self.changed_late(function, mode);
         self.observe(function, mode);
         because
     }
 
     /// Handles a requested mode that is reported after the timeout of its call.
-    pub(super) fn came_late(&mut self, function: &str, mode: &str) {
+    pub(super) fn changed_late(&mut self, function: &str, mode: &str) {
         let designs = self.control.beliefs().mission().designs_of(function);
         let Some(design) = self.settings.functions.design(function, mode, &designs) else { return };
-        let trouble = self.trouble.get_mut(function).and_then(|own| own.designs.remove(&design));
+        let trouble = self.trouble.get_mut(function).and_then(|trouble| trouble.designs.remove(&design));
         if trouble.is_some() {
-            self.say(&Event::Design { design, realisable: true });
+            self.queue(&Event::Design { design, realisable: true });
         }
     }
 
@@ -189,15 +196,15 @@ impl Machine {
         let design = self.settings.functions.design(function, mode, &designs);
         let believed = self.control.beliefs().configuration().get(function);
         if believed != design.as_ref() {
-            self.say(&Event::Observed { function: function.to_owned(), design });
+            self.queue(&Event::Observed { function: function.to_owned(), design });
         }
     }
 
     pub(super) fn probed(&mut self, function: &str, answers: bool) -> String {
         let trouble = self.trouble.entry(function.to_owned()).or_default();
         if !answers {
-            let wait = PROBE.saturating_mul(1 << trouble.silences.min(6)).min(LONGEST_PROBE);
-            self.outputs.push(Output::Probe(function.to_owned(), wait.min(AGAIN)));
+            let wait = INITIAL_PROBE_DELAY.saturating_mul(1 << trouble.silences.min(6)).min(MAX_PROBE_DELAY);
+            self.outputs.push(Output::Probe(function.to_owned(), wait.min(SILENT_RETRY_DELAY)));
             return format!("{function} does not answer");
         }
         let back: Vec<String> = trouble
@@ -208,7 +215,7 @@ impl Machine {
             .collect();
         trouble.designs.retain(|_, again| again.is_some());
         for design in back {
-            self.say(&Event::Design { design, realisable: true });
+            self.queue(&Event::Design { design, realisable: true });
         }
         self.outputs.push(Output::Look(function.to_owned()));
         format!("{function} answers again")
@@ -226,7 +233,7 @@ impl Machine {
             trouble.designs.retain(|_, again| !due(again));
         }
         for design in back {
-            self.say(&Event::Design { design, realisable: true });
+            self.queue(&Event::Design { design, realisable: true });
         }
         self.grants.retain(|function, grant| {
             let is_over = grant.until <= now;
@@ -237,7 +244,7 @@ impl Machine {
         });
         let is_due = self.control.due().is_some_and(|due| due <= self.now);
         if is_due && self.state == State::Execute {
-            self.say(&Event::Tick);
+            self.queue(&Event::Tick);
         }
         "time has passed".to_owned()
     }

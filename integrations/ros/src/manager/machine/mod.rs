@@ -26,7 +26,7 @@ use functions::Grant;
 pub(super) use io::{Change, Ended, Input, Outcome, Output, State};
 
 /// Goal without a task.
-const NOTHING: &str = "(and)";
+const EMPTY_GOAL: &str = "(and)";
 
 /// An action that the loop has requested.
 #[derive(Debug, Clone)]
@@ -95,8 +95,8 @@ impl Machine {
     pub(super) fn new(control: Loop, journal: Option<Journal>, settings: Settings) -> Self {
         let mission = control.beliefs().mission();
         let functions = mission.functions();
-        let task = control.beliefs().goal().filter(|goal| *goal != NOTHING).and_then(|goal| {
-            settings.tasks.iter().find(|(_, own)| own.goal == goal).map(|(name, _)| name.clone())
+        let task = control.beliefs().goal().filter(|goal| *goal != EMPTY_GOAL).and_then(|goal| {
+            settings.tasks.iter().find(|(_, task)| task.goal == goal).map(|(name, _)| name.clone())
         });
         Self {
             control,
@@ -152,6 +152,7 @@ impl Machine {
     pub(super) fn handle(&mut self, input: Input, now: Duration) -> Result<Vec<Output>, Message> {
         self.now = now;
         let is_over = self.deferred.as_ref().is_some_and(|deferred| deferred.until <= now);
+        // Deferred work precedes new requests.
         if is_over || matches!(input, Input::Request(..) | Input::Cancel(..)) {
             self.catch_up();
             self.settle()?;
@@ -159,7 +160,7 @@ impl Machine {
         let is_news = matches!(input, Input::Line(_));
         let because = match input {
             Input::Ready(modes) => self.ready(modes)?,
-            Input::Line(line) => self.told(line),
+            Input::Line(line) => self.queue_line(line),
             Input::Request(number, task) => self.request(number, &task),
             Input::Cancel(number, task) => self.cancel(Some(number), &task),
             Input::Changed(change, outcome) => self.changed(change, outcome),
@@ -178,6 +179,7 @@ impl Machine {
             Input::Tick | Input::Diagnosed => self.tick(),
         };
         self.settle()?;
+        // The line may contain the diagnostics for which deferred work waits.
         if is_news {
             self.catch_up();
             self.settle()?;
@@ -190,12 +192,13 @@ impl Machine {
 
     /// Passes all pending lines to the loop.
     fn settle(&mut self) -> Result<(), Message> {
+        // The loop starts once the modes of the functions are known.
         if self.state == State::WaitGraph {
             return Ok(());
         }
         while let Some(line) = self.lines.pop_front() {
             let answers = self.hand(&line)?;
-            self.take(answers);
+            self.handle_answers(answers);
         }
         Ok(())
     }
@@ -209,7 +212,7 @@ impl Machine {
         }
     }
 
-    fn say(&mut self, event: &Event) {
+    fn queue(&mut self, event: &Event) {
         self.lines.push_back(event.to_json().to_string());
     }
 
@@ -247,20 +250,20 @@ impl Machine {
     fn note(&mut self, way: &[String], because: &str) -> Result<(), Message> {
         let text = format!("{}: {because}", way.join(" -> "));
         let answers = self.hand(&Event::Note { text }.to_json().to_string())?;
-        self.take(answers);
+        self.handle_answers(answers);
         let event = json!({"answer": "state", "state": way.last(), "way": way, "because": because, "task": self.task});
         self.outputs.push(Output::Event(event));
         Ok(())
     }
 
-    fn told(&mut self, line: String) -> String {
+    fn queue_line(&mut self, line: String) -> String {
         let because = "what is known has changed".to_owned();
         self.lines.push_back(line);
         because
     }
 
     /// Handles the answers of the loop.
-    fn take(&mut self, answers: Vec<Answer>) {
+    fn handle_answers(&mut self, answers: Vec<Answer>) {
         for answer in answers {
             self.outputs.push(Output::Event(answer.to_json()));
             match answer {
@@ -315,7 +318,7 @@ impl Machine {
                 match &self.action {
                     // The performer reports the end.
                     Some(action) if action.begun => self.outputs.push(Output::Stop(action.number)),
-                    _ => self.say(&Event::Cancelled { action: effect.action }),
+                    _ => self.queue(&Event::Cancelled { action: effect.action }),
                 }
             }
             // Functions keep their modes, and nodes keep the results of their work.
@@ -324,7 +327,7 @@ impl Machine {
     }
 
     fn acknowledge(&mut self, effect: u64) {
-        self.say(&Event::Acknowledged { effect });
+        self.queue(&Event::Acknowledged { effect });
     }
 }
 

@@ -10,7 +10,7 @@ use crate::manager::machine::io::{Output, State};
 use crate::manager::machine::{Action, Deferred, Machine, call, unwritten};
 
 /// Time to wait for diagnostics before the modes found after a restart are evaluated with old data.
-const AGAIN: Duration = Duration::from_secs(3);
+const DIAGNOSTICS_WAIT: Duration = Duration::from_secs(3);
 
 impl Machine {
     /// Handles the modes of the robot after the start, and the answers that the loop repeats.
@@ -31,7 +31,7 @@ impl Machine {
             }
         }
         self.restore_action();
-        let until = if is_first { self.now } else { self.now + AGAIN };
+        let until = if is_first { self.now } else { self.now + DIAGNOSTICS_WAIT };
         self.deferred = Some(Deferred { answers, modes: self.modes.clone(), until });
         if until == self.now {
             self.catch_up();
@@ -48,7 +48,7 @@ impl Machine {
             self.control.beliefs().outstanding().map(|effect| effect.number).collect();
         // The other requests have been replaced.
         answers.retain(|answer| answer.effect().is_none_or(|effect| outstanding.contains(&effect.number)));
-        self.take(answers);
+        self.handle_answers(answers);
         self.deferred = None;
         for (function, mode) in modes {
             if !self.pending.contains_key(&function) {

@@ -5,7 +5,7 @@ use metaplan::message::did_you_mean;
 use serde_json::json;
 
 use crate::manager::machine::io::{Output, State};
-use crate::manager::machine::{Machine, NOTHING};
+use crate::manager::machine::{EMPTY_GOAL, Machine};
 
 impl Machine {
     /// Replies to requests whose result is known.
@@ -43,9 +43,9 @@ impl Machine {
             self.task = Some(task.to_owned());
             for (name, value) in &settings.facts {
                 let value = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
-                self.say(&Event::Fact { name: name.clone(), value });
+                self.queue(&Event::Fact { name: name.clone(), value });
             }
-            self.say(&Event::Goal { goal: settings.goal });
+            self.queue(&Event::Goal { goal: settings.goal });
         }
         format!("the task {task} is requested")
     }
@@ -62,7 +62,7 @@ impl Machine {
             self.refuse(&because);
             return because;
         }
-        if self.task.as_deref().is_some_and(|own| own != task) {
+        if self.task.as_deref().is_some_and(|current| current != task) {
             // Another task is running, so the cancelled task is already ended.
             self.outputs.extend(number.map(|number| Output::Reply(number, true)));
             return format!("the task {task} is not under way");
@@ -73,13 +73,13 @@ impl Machine {
             self.outputs.push(Output::Reply(waiting, false));
         }
         if self.task.take().is_some() {
-            self.say(&Event::Goal { goal: NOTHING.to_owned() });
+            self.queue(&Event::Goal { goal: EMPTY_GOAL.to_owned() });
         }
         if let Some(action) = self.action.take() {
             self.outputs.push(Output::Stop(action.number));
         }
         if let Some((action, _)) = self.control.beliefs().running() {
-            self.say(&Event::Cancelled { action });
+            self.queue(&Event::Cancelled { action });
         }
         for function in self.functions.clone() {
             self.unground(&function);
@@ -97,8 +97,8 @@ impl Machine {
         for number in std::mem::take(&mut self.waiting) {
             self.outputs.push(Output::Reply(number, true));
         }
-        if self.control.beliefs().goal().is_some_and(|goal| goal != NOTHING) {
-            self.say(&Event::Goal { goal: NOTHING.to_owned() });
+        if self.control.beliefs().goal().is_some_and(|goal| goal != EMPTY_GOAL) {
+            self.queue(&Event::Goal { goal: EMPTY_GOAL.to_owned() });
         }
         for function in self.functions.clone() {
             self.unground(&function);
@@ -106,7 +106,7 @@ impl Machine {
     }
 
     pub(super) fn autopilot(&mut self, mode: &str) -> String {
-        let obeys = self.settings.autopilot.as_ref().is_some_and(|own| own.mode == mode);
+        let obeys = self.settings.autopilot.as_ref().is_some_and(|autopilot| autopilot.mode == mode);
         let was = std::mem::replace(&mut self.obeyed, obeys);
         let because = format!("the autopilot is in the mode {mode}");
         match self.task.clone() {

@@ -43,27 +43,27 @@ impl Robot {
             machine.functions().iter().map(|name| (name.clone(), Some(mode(name).to_owned()))).collect();
         let mut robot = Self { machine, now: Duration::ZERO };
         assert_eq!(robot.machine.state(), State::WaitGraph);
-        robot.hear(Input::Ready(modes));
+        robot.handle(Input::Ready(modes));
         robot
     }
 
     /// Handles an input and returns the outputs other than events and plans.
-    fn hear(&mut self, input: Input) -> Vec<Output> {
+    fn handle(&mut self, input: Input) -> Vec<Output> {
         self.now += Duration::from_millis(10);
         let outputs = self.machine.handle(input, self.now).expect("a journal that can be written");
-        outputs.into_iter().filter(|own| !matches!(own, Output::Event(_) | Output::Plan(_))).collect()
+        outputs.into_iter().filter(|output| !matches!(output, Output::Event(_) | Output::Plan(_))).collect()
     }
 
     /// Answers a change.
     fn answer(&mut self, output: &Output, outcome: Outcome) -> Vec<Output> {
         let Output::Change(change) = output else { panic!("{output:?} is not a change") };
-        self.hear(Input::Changed(change.clone(), outcome))
+        self.handle(Input::Changed(change.clone(), outcome))
     }
 
     /// Answers all changes with success, including those that follow from them.
     fn obey(&mut self, outputs: Vec<Output>) -> Vec<Output> {
         let mut open = outputs;
-        while let Some(at) = open.iter().position(|own| matches!(own, Output::Change(_))) {
+        while let Some(at) = open.iter().position(|output| matches!(output, Output::Change(_))) {
             let change = open.remove(at);
             open.extend(self.answer(&change, Outcome::Done));
         }
@@ -71,11 +71,13 @@ impl Robot {
     }
 
     fn request(&mut self, task: &str) -> Vec<Output> {
-        self.hear(Input::Request(7, task.to_owned()))
+        self.handle(Input::Request(7, task.to_owned()))
     }
 
     fn measure(&mut self, attribute: &str, value: &str) -> Vec<Output> {
-        self.hear(Input::Line(format!(r#"{{"event":"measured","attribute":"{attribute}","value":{value}}}"#)))
+        self.handle(Input::Line(format!(
+            r#"{{"event":"measured","attribute":"{attribute}","value":{value}}}"#
+        )))
     }
 }
 
@@ -114,7 +116,7 @@ fn a_task_is_granted_when_its_functions_have_their_designs() {
     assert!(last.contains(&Output::Reply(7, true)), "{last:?}");
     assert_eq!(robot.machine.state(), State::Execute);
     // The end of the task withdraws all designs. The client receives the reply when this is done.
-    let outputs = robot.hear(Input::Cancel(8, "search_pipeline".to_owned()));
+    let outputs = robot.handle(Input::Cancel(8, "search_pipeline".to_owned()));
     assert_eq!(changes(&outputs), [(PATH, "fd_unground"), (MOTION, "fd_unground")]);
     let outputs = robot.obey(outputs);
     assert!(outputs.contains(&Output::Reply(8, true)), "{outputs:?}");
@@ -159,20 +161,20 @@ fn a_design_that_is_refused_is_replaced_and_tried_again_a_minute_later() {
     let outputs = robot.request("search_pipeline");
     let path = outputs
         .iter()
-        .position(|own| matches!(own, Output::Change(own) if own.function == PATH))
+        .position(|output| matches!(output, Output::Change(output) if output.function == PATH))
         .expect("a change");
     let next = robot.answer(&outputs[path], Outcome::Refused);
     assert_eq!(changes(&next), [(PATH, "fd_spiral_medium")]);
     assert!(next.contains(&Output::Look(PATH.to_owned())), "{next:?}");
-    let mut rest: Vec<Output> =
-        outputs.into_iter().enumerate().filter(|(at, _)| *at != path).map(|(_, own)| own).collect();
-    rest.extend(next);
-    let outputs = robot.obey(rest);
+    let mut remaining: Vec<Output> =
+        outputs.into_iter().enumerate().filter(|(at, _)| *at != path).map(|(_, output)| output).collect();
+    remaining.extend(next);
+    let outputs = robot.obey(remaining);
     assert!(outputs.contains(&Output::Reply(7, true)), "{outputs:?}");
     robot.now += Duration::from_secs(59);
-    assert_eq!(changes(&robot.hear(Input::Tick)), []);
+    assert_eq!(changes(&robot.handle(Input::Tick)), []);
     robot.now += Duration::from_secs(2);
-    assert_eq!(changes(&robot.hear(Input::Tick)), [(PATH, "fd_spiral_high")]);
+    assert_eq!(changes(&robot.handle(Input::Tick)), [(PATH, "fd_spiral_high")]);
 }
 
 #[test]
@@ -184,18 +186,18 @@ fn a_function_without_reply_is_called_twice_and_again_once_it_replies() {
     let silent = || Outcome::Failed("no answer".to_owned());
     let second = robot.answer(&first[0], silent());
     assert_eq!(changes(&second), [(PATH, "fd_spiral_low")]);
-    let again = second.iter().find(|own| matches!(own, Output::Change(_))).expect("once more").clone();
+    let again = second.iter().find(|output| matches!(output, Output::Change(_))).expect("once more").clone();
     let third = robot.answer(&again, silent());
     assert_eq!(changes(&third), [], "no other spiral can be flown in the dark");
-    let probe = third.iter().find_map(|own| match own {
+    let probe = third.iter().find_map(|output| match output {
         Output::Probe(function, wait) => Some((function.clone(), *wait)),
         _ => None,
     });
     assert_eq!(probe, Some((PATH.to_owned(), Duration::from_secs(2))));
     assert_eq!(robot.machine.state(), State::Degraded);
-    let outputs = robot.hear(Input::Probed(PATH.to_owned(), false));
+    let outputs = robot.handle(Input::Probed(PATH.to_owned(), false));
     assert!(matches!(&outputs[..], [Output::Probe(..)]), "{outputs:?}");
-    let outputs = robot.hear(Input::Probed(PATH.to_owned(), true));
+    let outputs = robot.handle(Input::Probed(PATH.to_owned(), true));
     assert_eq!(changes(&outputs), [(PATH, "fd_spiral_low")]);
 }
 
@@ -207,9 +209,9 @@ fn a_late_mode_report_is_accepted() {
     let first = robot.measure("water_visibility", "2.3");
     let silent = || Outcome::Failed("no answer".to_owned());
     let second = robot.answer(&first[0], silent());
-    let again = second.iter().find(|own| matches!(own, Output::Change(_))).expect("once more").clone();
+    let again = second.iter().find(|output| matches!(output, Output::Change(_))).expect("once more").clone();
     // The function reports its mode although it has not replied.
-    let outputs = robot.hear(Input::Mode(PATH.to_owned(), "fd_spiral_medium".to_owned()));
+    let outputs = robot.handle(Input::Mode(PATH.to_owned(), "fd_spiral_medium".to_owned()));
     assert_eq!(changes(&outputs), []);
     assert_eq!(robot.machine.state(), State::Execute);
     assert_eq!(robot.answer(&again, Outcome::Done), [], "it is late");
@@ -221,21 +223,21 @@ fn modes_set_by_other_clients_are_adopted_or_reverted() {
     let outputs = robot.request("search_pipeline");
     robot.obey(outputs);
     // A requested mode is no news.
-    assert_eq!(robot.hear(Input::Mode(PATH.to_owned(), "fd_spiral_high".to_owned())), []);
-    let outputs = robot.hear(Input::ModeRequested(PATH.to_owned(), "fd_spiral_low".to_owned()));
+    assert_eq!(robot.handle(Input::Mode(PATH.to_owned(), "fd_spiral_high".to_owned())), []);
+    let outputs = robot.handle(Input::ModeRequested(PATH.to_owned(), "fd_spiral_low".to_owned()));
     assert_eq!(
         changes(&outputs),
         [(PATH, "fd_spiral_high")],
         "it costs more, and nothing is said of a minimum"
     );
     robot.obey(outputs);
-    let outputs = robot.hear(Input::Touched(MOTION.to_owned()));
+    let outputs = robot.handle(Input::Touched(MOTION.to_owned()));
     assert_eq!(outputs, [Output::Look(MOTION.to_owned())]);
     robot.now += Duration::from_secs(2);
-    let outputs = robot.hear(Input::Mode(MOTION.to_owned(), "fd_unground".to_owned()));
+    let outputs = robot.handle(Input::Mode(MOTION.to_owned(), "fd_unground".to_owned()));
     assert_eq!(changes(&outputs), [(MOTION, "fd_all_thrusters")], "it is needed");
     // A mode without a design counts as no design.
-    let outputs = robot.hear(Input::Mode(RECHARGE.to_owned(), "inactive".to_owned()));
+    let outputs = robot.handle(Input::Mode(RECHARGE.to_owned(), "inactive".to_owned()));
     assert_eq!(changes(&outputs), []);
 }
 
@@ -248,15 +250,15 @@ fn a_granted_mode_is_requested_once_although_the_old_one_is_reported() {
     assert_eq!(changes(&outputs), [(PATH, "fd_spiral_medium")]);
     robot.obey(outputs);
     // Each change of the node causes an event, after which the observer of `system_modes` still has the old mode.
-    let seen = |mode: &str| Input::Mode(PATH.to_owned(), mode.to_owned());
+    let reported_mode = |mode: &str| Input::Mode(PATH.to_owned(), mode.to_owned());
     for _ in 0..20 {
-        assert_eq!(robot.hear(seen("fd_spiral_high")), []);
+        assert_eq!(robot.handle(reported_mode("fd_spiral_high")), []);
     }
     let late = Input::ModeRequested(PATH.to_owned(), "fd_spiral_high".to_owned());
-    assert_eq!(robot.hear(late), [], "our own request before this one");
+    assert_eq!(robot.handle(late), [], "our own request before this one");
     robot.now += Duration::from_secs(2);
-    assert_eq!(robot.hear(Input::Tick), [Output::Look(PATH.to_owned())], "asked again after the period");
-    let outputs = robot.hear(seen("fd_spiral_high"));
+    assert_eq!(robot.handle(Input::Tick), [Output::Look(PATH.to_owned())], "asked again after the period");
+    let outputs = robot.handle(reported_mode("fd_spiral_high"));
     assert_eq!(changes(&outputs), [(PATH, "fd_spiral_medium")], "it really has another mode");
 }
 
@@ -265,7 +267,7 @@ fn a_request_of_another_client_is_believed_at_once() {
     let mut robot = Robot::new(None);
     let outputs = robot.request("search_pipeline");
     robot.obey(outputs);
-    let outputs = robot.hear(Input::ModeRequested(MOTION.to_owned(), "fd_recover_thrusters".to_owned()));
+    let outputs = robot.handle(Input::ModeRequested(MOTION.to_owned(), "fd_recover_thrusters".to_owned()));
     assert_eq!(changes(&outputs), [(MOTION, "fd_all_thrusters")]);
 }
 
@@ -275,19 +277,19 @@ fn the_battery_comes_first() {
     let outputs = robot.request("search_pipeline");
     robot.obey(outputs);
     let outputs = robot.measure("battery_level", "0.2");
-    let Some(Output::Stop(action)) = outputs.iter().find(|own| matches!(own, Output::Stop(_))) else {
+    let Some(Output::Stop(action)) = outputs.iter().find(|output| matches!(output, Output::Stop(_))) else {
         panic!("{outputs:?}")
     };
-    let outputs = robot.hear(Input::Performed(*action, Ended::Cancelled));
+    let outputs = robot.handle(Input::Performed(*action, Ended::Cancelled));
     assert_eq!(changes(&outputs), [(PATH, "fd_unground"), (RECHARGE, "normal")]);
     let outputs = robot.obey(outputs);
     assert_eq!(performed(&outputs), ["recharge"]);
-    let outputs = robot.hear(Input::Performed(2, Ended::Succeeded));
+    let outputs = robot.handle(Input::Performed(2, Ended::Succeeded));
     assert_eq!(changes(&outputs), [(PATH, "fd_spiral_high"), (RECHARGE, "fd_unground")]);
     let outputs = robot.obey(outputs);
     assert_eq!(performed(&outputs), ["search_pipeline"]);
     // The goal is reached: no function is needed any more.
-    let outputs = robot.hear(Input::Performed(3, Ended::Succeeded));
+    let outputs = robot.handle(Input::Performed(3, Ended::Succeeded));
     assert_eq!(changes(&outputs), [(PATH, "fd_unground"), (MOTION, "fd_unground")]);
     robot.obey(outputs);
     assert_eq!((robot.machine.state(), robot.machine.task()), (State::Idle, None));
@@ -298,8 +300,8 @@ fn a_task_ends_when_the_autopilot_does_not_obey_any_more() {
     let mut robot = Robot::new(None);
     let outputs = robot.request("search_pipeline");
     robot.obey(outputs);
-    assert_eq!(robot.hear(Input::Autopilot("GUIDED".to_owned())), []);
-    let outputs = robot.hear(Input::Autopilot("MANUAL".to_owned()));
+    assert_eq!(robot.handle(Input::Autopilot("GUIDED".to_owned())), []);
+    let outputs = robot.handle(Input::Autopilot("MANUAL".to_owned()));
     assert_eq!(changes(&outputs), [(PATH, "fd_unground"), (MOTION, "fd_unground")]);
     robot.obey(outputs);
     assert_eq!(robot.machine.state(), State::Idle);
@@ -331,9 +333,9 @@ fn a_restart_repeats_no_fulfilled_request() {
     // Another client has chosen a lower altitude, which the visibility does not require. This is
     // evaluated after a time without diagnostics.
     let mut robot = Robot::found(Some(directory.path()), mode("fd_spiral_low"));
-    assert_eq!(changes(&robot.hear(Input::Tick)), []);
+    assert_eq!(changes(&robot.handle(Input::Tick)), []);
     robot.now += Duration::from_secs(4);
-    assert_eq!(changes(&robot.hear(Input::Tick)), [(PATH, "fd_spiral_medium")]);
+    assert_eq!(changes(&robot.handle(Input::Tick)), [(PATH, "fd_spiral_medium")]);
     drop(robot);
     // The water has become darker, and another client has already adapted the mode.
     let mut robot = Robot::found(Some(directory.path()), mode("fd_spiral_low"));

@@ -12,16 +12,16 @@ use ros2_client::request_id::RmwRequestId;
 use smol::{Timer, channel};
 
 use crate::interfaces::Action;
-use crate::node::action::{GoalEnd, POLL, expect_action};
+use crate::node::action::{GoalEnd, POLL_INTERVAL, expect_action};
 use crate::node::graph::{Graph, Server, Topics};
 use crate::node::rmw::Mapping;
 use crate::node::{Node, client_name, latched, not_made, qos};
 
 /// Time after the discovery of a server during which it discovers this client.
-const MATCHING: Duration = Duration::from_millis(100);
+const MATCHING_TIME: Duration = Duration::from_millis(100);
 
 /// Number of consecutive failed look-ups after which a server counts as lost.
-const GONE: u32 = 250;
+const MAX_FAILED_LOOKUPS: u32 = 250;
 
 type Client<A> = ActionClient<<A as Action>::Goal, <A as Action>::Result, <A as Action>::Feedback>;
 
@@ -156,7 +156,7 @@ impl<A: Action + 'static> ActionCaller<A> {
         if connection.as_ref().is_none_or(|connected| connected.server != server) {
             let client = self.client(server.mapping).map_err(|message| message.message.clone())?;
             // Answers that precede the server's discovery of this client are lost.
-            Timer::after(MATCHING.min(within)).await;
+            Timer::after(MATCHING_TIME.min(within)).await;
             *connection = Some(Arc::new(Connection { server, client, goals: Mutex::default() }));
         }
         connection.as_ref().ok_or_else(String::new)
@@ -199,7 +199,7 @@ impl<A: Action + 'static> Connection<A> {
         loop {
             self.poll();
             absent = if graph.server(&topics).is_some() { 0 } else { absent + 1 };
-            if absent > GONE {
+            if absent > MAX_FAILED_LOOKUPS {
                 for followed in std::mem::take(&mut *self.goals()).into_values() {
                     let because = format!("nobody serves {full} any more");
                     let _ = followed.events.try_send(Accepted::Lost(because));
@@ -208,7 +208,7 @@ impl<A: Action + 'static> Connection<A> {
             if self.goals().is_empty() {
                 return;
             }
-            Timer::after(POLL).await;
+            Timer::after(POLL_INTERVAL).await;
         }
     }
 

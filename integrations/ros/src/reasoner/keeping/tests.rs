@@ -29,23 +29,24 @@ fn wanted(function: &str) -> QoS {
 }
 
 /// Requested modes; other outputs are discarded.
-fn asked(keeping: &mut Keeping) -> Vec<Wanted> {
-    let mut asked = Vec::new();
+fn requested_modes(keeping: &mut Keeping) -> Vec<Wanted> {
+    let mut requested = Vec::new();
     for output in keeping.outputs() {
         if let Output::Configure(wanted) = output {
-            asked.push(wanted);
+            requested.push(wanted);
         }
     }
-    asked
+    requested
 }
 
-fn modes(asked: &[Wanted]) -> Vec<&str> {
-    asked.iter().map(|wanted| wanted.mode.as_str()).collect()
+fn modes(requested: &[Wanted]) -> Vec<&str> {
+    requested.iter().map(|wanted| wanted.mode.as_str()).collect()
 }
 
 fn see(keeping: &mut Keeping, metres: &str) -> Vec<Wanted> {
-    keeping.hear(&format!(r#"{{"event":"measured","attribute":"water_visibility","value":{metres}}}"#));
-    asked(keeping)
+    keeping
+        .handle_line(&format!(r#"{{"event":"measured","attribute":"water_visibility","value":{metres}}}"#));
+    requested_modes(keeping)
 }
 
 const NOW: Duration = Duration::from_secs(100);
@@ -56,22 +57,22 @@ fn an_objective_gets_the_best_design_and_loses_it_with_its_end() {
     assert!(keeping.refused(&wanted("f_fly")).is_some_and(|text| text.contains("`f_fly`")));
     assert_eq!(keeping.refused(&wanted(PATH)), None);
     keeping.pursue(goal, &wanted(PATH));
-    let first = asked(&mut keeping);
+    let first = requested_modes(&mut keeping);
     assert_eq!(modes(&first), ["fd_spiral_high"]);
     keeping.answered(&first[0], Outcome::Done, NOW);
-    let told = keeping.outputs();
-    let is_told = |output: &Output| matches!(output, Output::Feedback(_, told) if told.selected_mode == "fd_spiral_high");
-    assert!(told.iter().any(is_told), "{told:?}");
+    let outputs = keeping.outputs();
+    let is_selected = |output: &Output| matches!(output, Output::Feedback(_, feedback) if feedback.selected_mode == "fd_spiral_high");
+    assert!(outputs.iter().any(is_selected), "{outputs:?}");
     let darker = see(&mut keeping, "2.3");
     assert_eq!(modes(&darker), ["fd_spiral_medium"]);
     keeping.answered(&darker[0], Outcome::Done, NOW);
     keeping.cancel(goal);
-    let end = asked(&mut keeping);
+    let end = requested_modes(&mut keeping);
     assert_eq!(modes(&end), ["fd_unground"]);
     keeping.answered(&end[0], Outcome::Refused, NOW);
     assert!(keeping.outputs().contains(&Output::Cancelled(goal, false)), "it keeps its design");
     keeping.cancel(goal);
-    let end = asked(&mut keeping);
+    let end = requested_modes(&mut keeping);
     keeping.answered(&end[0], Outcome::Done, NOW);
     assert!(keeping.outputs().contains(&Output::Cancelled(goal, true)));
     assert_eq!(see(&mut keeping, "4"), [], "an unused function must not be reconfigured");
@@ -81,15 +82,15 @@ fn an_objective_gets_the_best_design_and_loses_it_with_its_end() {
 fn a_design_that_is_refused_is_replaced_and_tried_again() {
     let mut keeping = keeping();
     keeping.pursue(GoalId::new_random(), &wanted(PATH));
-    let first = asked(&mut keeping);
+    let first = requested_modes(&mut keeping);
     keeping.answered(&first[0], Outcome::Refused, NOW);
-    let next = asked(&mut keeping);
+    let next = requested_modes(&mut keeping);
     assert_eq!(modes(&next), ["fd_spiral_medium"]);
     keeping.answered(&next[0], Outcome::Done, NOW);
     keeping.tick(NOW + Duration::from_secs(59));
-    assert_eq!(asked(&mut keeping), []);
+    assert_eq!(requested_modes(&mut keeping), []);
     keeping.tick(NOW + Duration::from_secs(61));
-    assert_eq!(modes(&asked(&mut keeping)), ["fd_spiral_high"]);
+    assert_eq!(modes(&requested_modes(&mut keeping)), ["fd_spiral_high"]);
 }
 
 #[test]
@@ -99,7 +100,7 @@ fn a_restart_repeats_no_fulfilled_request() {
     let (mut before, goal) = (keeping(), GoalId::new_random());
     see(&mut before, "2.3");
     before.pursue(goal, &wanted(PATH));
-    let first = asked(&mut before);
+    let first = requested_modes(&mut before);
     assert_eq!(modes(&first), ["fd_spiral_medium"]);
     before.answered(&first[0], Outcome::Done, NOW);
     file.write(before.memory()).expect("written");
@@ -111,17 +112,17 @@ fn a_restart_repeats_no_fulfilled_request() {
         keeping
     };
     let mut after = again("fd_spiral_medium");
-    assert_eq!(asked(&mut after), []);
+    assert_eq!(requested_modes(&mut after), []);
     assert_eq!(modes(&see(&mut after, "4")), ["fd_spiral_high"], "it goes on");
     // Another client has changed the mode, so the right one is requested.
-    assert_eq!(modes(&asked(&mut again("fd_spiral_low"))), ["fd_spiral_medium"]);
+    assert_eq!(modes(&requested_modes(&mut again("fd_spiral_low"))), ["fd_spiral_medium"]);
     // Reports are restored even without goals.
     let mut alone = keeping();
     see(&mut alone, "1.3");
     file.write(alone.memory()).expect("written");
     let mut after = again("fd_unground");
     after.pursue(goal, &wanted(PATH));
-    assert_eq!(modes(&asked(&mut after)), ["fd_spiral_low"]);
+    assert_eq!(modes(&requested_modes(&mut after)), ["fd_spiral_low"]);
     // A damaged file is reported.
     std::fs::write(directory.path().join("reasoner.json"), "{").expect("written");
     let message = MemoryFile::open(directory.path()).expect_err("it is damaged");
