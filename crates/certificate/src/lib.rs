@@ -14,7 +14,7 @@
 //! bound on the number of steps. [`verification_conditions`] exports the first proof to SMT
 //! solvers.
 //!
-//! Not here: planner code. The crate links no grounder, no search and no SAT solver.
+//! Absent: planner code. The crate links no grounder, no search and no SAT solver.
 //!
 //! \[1\] S. Eriksson, G. Röger, M. Helmert: Unsolvability certificates for classical planning,
 //! ICAPS 2017 (inductive sets); labels as in M. Desrochers, F. Soumis, INFOR 26(3), 1988.

@@ -246,10 +246,11 @@ fn attributes(knowledge: &Knowledge) -> Vec<Message> {
     for quality in view.actions().into_iter().flat_map(|action| action.quality) {
         let attribute = quality.bounds.attribute.as_str();
         if !estimated.contains(attribute) {
-            let meant = nearest(attribute, estimated.iter().copied());
-            let meant = meant.map_or_else(String::new, |meant| format!("; did you mean `{meant}`?"));
+            let suggestion = nearest(attribute, estimated.iter().copied());
+            let suggestion =
+                suggestion.map_or_else(String::new, |suggestion| format!("; did you mean `{suggestion}`?"));
             let text = format!(
-                "<{}> bounds `{attribute}`, of which no design has an estimation, so every design meets it{meant}",
+                "<{}> bounds `{attribute}`, of which no design has an estimation, so every design meets it{suggestion}",
                 quality.individual.iri
             );
             doubts.push(doubt_about(knowledge, "M210", &quality.individual.iri, text));

@@ -24,11 +24,11 @@ const LARGEST: u64 = 1 << 28;
 /// # Errors
 /// The file cannot be read, is not regular, or exceeds the size limit.
 pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
-    let found = std::fs::metadata(path)?;
-    if found.is_dir() {
+    let metadata = std::fs::metadata(path)?;
+    if metadata.is_dir() {
         return Err(io::Error::other("is a directory"));
     }
-    if !found.is_file() {
+    if !metadata.is_file() {
         return Err(io::Error::other("it is not a regular file"));
     }
     let mut bytes = Vec::new();

@@ -38,14 +38,14 @@ pub(crate) fn layout(places: usize, ways: &[(usize, usize)]) -> Vec<(f64, f64)> 
 
 /// Returns the connected components, each in ascending order.
 fn components(neighbours: &[Vec<usize>]) -> Vec<Vec<usize>> {
-    let mut seen = vec![false; neighbours.len()];
+    let mut visited = vec![false; neighbours.len()];
     let mut groups = Vec::new();
     for first in 0..neighbours.len() {
-        if !seen[first] {
+        if !visited[first] {
             let reached = distances(first, neighbours);
             let group: Vec<usize> = (0..neighbours.len()).filter(|place| reached[*place].is_some()).collect();
             for place in &group {
-                seen[*place] = true;
+                visited[*place] = true;
             }
             groups.push(group);
         }

@@ -120,8 +120,8 @@ fn titled(marked: &[&Happening]) -> String {
         .iter()
         .take(NAMED)
         .map(|happening| format!("{} s: {}", number(happening.time), happening.text));
-    let more = (marked.len() > NAMED).then(|| format!("and {} more", marked.len() - NAMED));
-    named.chain(more).collect::<Vec<_>>().join("\n")
+    let remainder = (marked.len() > NAMED).then(|| format!("and {} more", marked.len() - NAMED));
+    named.chain(remainder).collect::<Vec<_>>().join("\n")
 }
 
 fn list(listed: &[&Happening]) -> Markup {

@@ -71,8 +71,9 @@ pub(crate) fn shown(name: &str, canvases: &[Canvas], draw: &dyn Fn(Canvas) -> Pi
     let columns = columns.map(|(canvas, class)| (fits(canvas.width).unwrap_or(drawn.len() - 1), class));
     let columns: Vec<(usize, &str)> = columns.collect();
     let classes = |number: usize| {
-        let own = columns.iter().filter(|(shown, _)| *shown == number).map(|(_, class)| *class);
-        own.collect::<Vec<_>>().join(" ")
+        let column_classes =
+            columns.iter().filter(|(drawing, _)| *drawing == number).map(|(_, class)| *class);
+        column_classes.collect::<Vec<_>>().join(" ")
     };
     html! {
         @if let Some((_, first)) = drawn.first() {

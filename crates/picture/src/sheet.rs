@@ -153,14 +153,14 @@ fn label(
     let (x, y): (f64, f64) = (x.parse().ok()?, y.parse().ok()?);
     let text = fit(text, 200.0);
     let wide = crate::scale::width(&text);
-    let left = (x + 7.0).min(right - wide);
+    let start = (x + 7.0).min(right - wide);
     let place = [y - 6.0, y + 14.0, y - 20.0, y + 28.0].into_iter().find(|line| {
         let apart =
-            |own: &(f64, f64, f64)| own.1 <= left || left + wide <= own.0 || (own.2 - line).abs() >= 13.0;
+            |own: &(f64, f64, f64)| own.1 <= start || start + wide <= own.0 || (own.2 - line).abs() >= 13.0;
         *line > 24.0 && taken.iter().all(apart)
     })?;
-    taken.push((left, left + wide, place));
-    Some((left, place, text))
+    taken.push((start, start + wide, place));
+    Some((start, place, text))
 }
 
 /// Number of axis ticks that fit.

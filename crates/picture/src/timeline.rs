@@ -117,11 +117,11 @@ fn draw_lane(
     (plan, palette): (&Plan, &Palette),
     frame: &Frame,
 ) -> Markup {
-    let left = frame.canvas.left;
+    let left_edge = frame.canvas.left;
     let place = frame.canvas.name_place(top, top + lane.height() / 2.0 + 4.0);
     html! {
         g class="lane" data-lane=(lane.name) {
-            rect class="track" x=(px(left)) y=(px(top)) width=(px(frame.scale.at(frame.end) - left)) height=(px(lane.height())) {}
+            rect class="track" x=(px(left_edge)) y=(px(top)) width=(px(frame.scale.at(frame.end) - left_edge)) height=(px(lane.height())) {}
             text class="label" x=(px(place.x)) y=(px(place.y)) text-anchor=(place.anchor) {
                 title { (lane.name) }
                 (fit(lane.name, place.room))

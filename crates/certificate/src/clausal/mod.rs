@@ -91,7 +91,7 @@ pub fn check_refutation(
     let formula = encoding::encode(&model, &cost, steps, LITERAL_LIMIT);
     let (formula_checked, proof_checked) = match formula {
         Ok(formula) => {
-            let same = formula.compare(written, legend).map(|()| {
+            let comparison = formula.compare(written, legend).map(|()| {
                 format!(
                     "what the task comes to for {steps} steps: {} variables, {} clauses",
                     formula.variables(),
@@ -100,7 +100,7 @@ pub fn check_refutation(
             });
             let refuted = proof::check(formula.clauses(), formula.variables(), proof, hints)
                 .map(|count| format!("it has no model: {count} clauses follow, the last is empty"));
-            (same, refuted)
+            (comparison, refuted)
         }
         Err(reason) => (Err(reason), Err("there is no formula to refute".to_owned())),
     };

@@ -115,12 +115,12 @@ impl<'l> Layers<'l> {
         self.costs = next;
     }
 
-    /// Minimal cost of the steps so far.
+    /// Minimal cost of the counted steps.
     fn spent(&self) -> Option<Integer> {
         self.costs.iter().flatten().min().cloned()
     }
 
-    /// Minimal cost of a plan that has not reached the goal yet: steps so far plus potential.
+    /// Minimal cost of a plan that has not reached the goal yet: cost of the counted steps plus potential.
     fn least(&self) -> Option<Integer> {
         let rows = self.costs.iter().enumerate();
         rows.filter_map(|(row, cost)| Some(cost.as_ref()? + self.table.at_row(row)?)).min()

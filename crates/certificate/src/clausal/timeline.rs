@@ -82,8 +82,8 @@ impl Timeline {
         for (variable, values) in (0..).zip(&next) {
             for (value, after) in (0..).zip(values) {
                 let before = Self::fact(&self.values, (variable, value));
-                let made = makers.get(&(variable, value)).into_iter().flatten().copied();
-                formula.clause(&[-*after, before].into_iter().chain(made).collect::<Vec<_>>());
+                let achievers = makers.get(&(variable, value)).into_iter().flatten().copied();
+                formula.clause(&[-*after, before].into_iter().chain(achievers).collect::<Vec<_>>());
             }
         }
         self.values = next;

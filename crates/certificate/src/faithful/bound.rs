@@ -90,8 +90,8 @@ fn collect<'w>(
 ) -> Result<(), Cause> {
     match condition {
         Condition::And(parts) => {
-            let others = others.iter().copied().chain(parts).take(CONJUNCT_LIMIT).collect();
-            parts.iter().try_for_each(|part| collect(world, rule, part, (variables, &others), occurrences))
+            let conjuncts = others.iter().copied().chain(parts).take(CONJUNCT_LIMIT).collect();
+            parts.iter().try_for_each(|part| collect(world, rule, part, (variables, &conjuncts), occurrences))
         }
         Condition::Or(parts) => {
             parts.iter().try_for_each(|part| collect(world, rule, part, (variables, others), occurrences))

@@ -44,20 +44,20 @@ impl Formula {
 
     /// Creates a simplified conjunction (or disjunction).
     pub(super) fn junction(parts: impl IntoIterator<Item = Self>, all: bool) -> Self {
-        let mut kept = Vec::new();
+        let mut simplified = Vec::new();
         for part in parts {
             match part {
                 part if part.is(!all) => return part,
-                Self::All(more) if all => kept.extend(more),
-                Self::Any(more) if !all => kept.extend(more),
+                Self::All(inner) if all => simplified.extend(inner),
+                Self::Any(inner) if !all => simplified.extend(inner),
                 part if part.is(all) => {}
-                part => kept.push(part),
+                part => simplified.push(part),
             }
         }
-        match kept.len() {
-            1 => kept.swap_remove(0),
-            _ if all => Self::All(kept),
-            _ => Self::Any(kept),
+        match simplified.len() {
+            1 => simplified.swap_remove(0),
+            _ if all => Self::All(simplified),
+            _ => Self::Any(simplified),
         }
     }
 

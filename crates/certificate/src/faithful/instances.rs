@@ -41,7 +41,7 @@ pub(super) fn of(
     while !open.is_empty() {
         // The atom with the fewest unbound parameters comes next, so that the join does not
         // become a Cartesian product.
-        let known = |atom: &Atom| {
+        let join_cost = |atom: &Atom| {
             let names = partial.first();
             let unknown = |term: &&Term| match term {
                 Term::Variable(identifier) => names.is_none_or(|own| !own.contains_key(&identifier.name)),
@@ -52,7 +52,7 @@ pub(super) fn of(
             let rows = world.symbol(&atom.predicate.name).map_or(0, |symbol| world.rows(symbol, None).len());
             (!connected, unknown, rows)
         };
-        let best = (0..open.len()).min_by_key(|at| known(open[*at])).unwrap_or(0);
+        let best = (0..open.len()).min_by_key(|at| join_cost(open[*at])).unwrap_or(0);
         let atom = open.swap_remove(best);
         let mut longer = Vec::new();
         for binding in &partial {
@@ -104,8 +104,8 @@ fn extend<'b>(
     longer: &mut Vec<Binding<'b>>,
 ) -> Result<(), Cause> {
     let predicate = world.symbol(&atom.predicate.name)?;
-    let known = |term: &Term| world.bound(term, binding);
-    let place = atom.arguments.iter().enumerate().find_map(|(place, term)| Some((place, known(term)?)));
+    let object_of = |term: &Term| world.bound(term, binding);
+    let place = atom.arguments.iter().enumerate().find_map(|(place, term)| Some((place, object_of(term)?)));
     'rows: for row in world.rows(predicate, place) {
         if row.len() != atom.arguments.len() {
             continue;
@@ -113,7 +113,7 @@ fn extend<'b>(
         let mut next = binding.clone();
         for (term, object) in atom.arguments.iter().zip(row) {
             match (world.bound(term, &next), term) {
-                (Some(own), _) if own == *object => {}
+                (Some(bound), _) if bound == *object => {}
                 (None, Term::Variable(identifier)) => {
                     next.insert(&identifier.name, *object);
                 }

@@ -209,9 +209,9 @@ impl Invariant {
             .effects
             .iter()
             .filter(|(guard, _, holds)| *holds && case.known.decide(structure, guard) != Some(false));
-        let gone =
+        let deleted =
             |key: &Key| case.effects.iter().any(|(guard, own, holds)| own == key && !holds && guard.is(true));
-        let at_start = case.truths.iter().filter(move |(key, holds)| **holds && !gone(key));
+        let at_start = case.truths.iter().filter(move |(key, holds)| **holds && !deleted(key));
         at_end.map(|(_, key, _)| key).chain(at_start.map(|(key, _)| key))
     }
 

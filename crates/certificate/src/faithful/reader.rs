@@ -153,7 +153,7 @@ impl<'r> Reader<'r> {
         parts: impl Iterator<Item = (&'r Condition, bool)>,
         all: bool,
     ) -> Result<Formula, Cause> {
-        let mut kept = Vec::new();
+        let mut formulas = Vec::new();
         // Parts without derived atoms come first: they may decide the junction without any
         // unfolding.
         let (later, sooner): (Vec<_>, Vec<_>) = parts.partition(|(part, _)| self.is_derived(part));
@@ -162,9 +162,9 @@ impl<'r> Reader<'r> {
             if part.is(!all) {
                 return Ok(part);
             }
-            kept.push(part);
+            formulas.push(part);
         }
-        Ok(Formula::junction(kept, all))
+        Ok(Formula::junction(formulas, all))
     }
 
     /// Returns `true` if a condition mentions a derived predicate.
@@ -187,14 +187,14 @@ impl<'r> Reader<'r> {
         holds: bool,
         all: bool,
     ) -> Result<Formula, Cause> {
-        let mut kept = Vec::new();
-        self.each(bound, within, &mut |own| {
-            let part = own.formula(inner, holds)?;
+        let mut formulas = Vec::new();
+        self.each(bound, within, &mut |reader| {
+            let part = reader.formula(inner, holds)?;
             let decided = part.is(!all);
-            kept.push(part);
+            formulas.push(part);
             Ok(!decided)
         })?;
-        Ok(Formula::junction(kept, all))
+        Ok(Formula::junction(formulas, all))
     }
 
     /// Calls `visit` with every binding of the variables `bound` until it returns `false`.

@@ -31,7 +31,7 @@ pub struct Knowledge {
     pub(super) runtime: Runtime,
     /// Cached queries, kept consistent with `runtime`.
     pub(super) catalogue: OnceLock<Arc<Catalogue>>,
-    /// Reports without inferred consequences so far.
+    /// Reports that have had no inferred consequences yet.
     pub(super) waiting: Waiting,
     /// State after reading. Shares all unchanged data with `runtime`.
     origin: Runtime,

@@ -217,8 +217,8 @@ impl Comparison<'_> {
         } else {
             let names: Vec<&str> =
                 functions.individuals.iter().map(|individual| individual.name.as_str()).collect();
-            let meant = pairs(&names, &[function.as_str()]);
-            Some(match suggested(&meant) {
+            let candidates = pairs(&names, &[function.as_str()]);
+            Some(match suggested(&candidates) {
                 Some(entries) => format!(
                     "the knowledge base knows no function `{function}`; name it as the knowledge base does, or write in \
                      `[bindings.names]`: {entries}"

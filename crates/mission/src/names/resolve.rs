@@ -164,13 +164,13 @@ impl<'a> Resolving<'a> {
         let classes: Vec<&str> = roles.iter().map(|role| role.class.as_str()).collect();
         let types = roles.iter().flat_map(|role| &role.types.alternatives);
         let types: Vec<&str> = types.map(|r#type| r#type.name.as_str()).collect();
-        let given: Vec<&str> =
+        let object_types: Vec<&str> =
             object.r#type.alternatives.iter().map(|alternative| alternative.name.as_str()).collect();
         // PDDL types an object without a type as `object`.
-        let given = if given.is_empty() { vec!["object"] } else { given };
+        let object_types = if object_types.is_empty() { vec!["object"] } else { object_types };
         Err(format!(
             "`{name}` is of type {}, but `{}` is a {}; an object of type {} would be right",
-            list(&given),
+            list(&object_types),
             individual.name,
             classes.join(" and "),
             list(&types)

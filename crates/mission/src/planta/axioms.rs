@@ -104,10 +104,11 @@ impl Terms {
                 let classes: Option<Vec<&Iri>> = classes.iter().map(named).collect();
                 self.disjoint(&classes.ok_or("DisjointClasses of expressions")?)?;
             }
-            Axiom::ObjectPropertyCharacteristic(Characteristic::Functional, own) => {
-                let own = property(own).ok_or("FunctionalObjectProperty of an inverse")?;
+            Axiom::ObjectPropertyCharacteristic(Characteristic::Functional, functional_property) => {
+                let functional_property =
+                    property(functional_property).ok_or("FunctionalObjectProperty of an inverse")?;
                 // The translation is that of `OWLToPDDL`, see docs/decisions/planta-form.md.
-                self.functional(own, Condition::Equal(y, z, Span::default()))?;
+                self.functional(functional_property, Condition::Equal(y, z, Span::default()))?;
             }
             Axiom::FunctionalDataProperty(own) => {
                 let equal = Condition::Equal(y, z, Span::default());

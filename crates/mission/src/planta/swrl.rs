@@ -111,12 +111,12 @@ fn condition(
         [term(left, variables, terms), term(right, variables, terms)]
     };
     let condition = match stated {
-        Atom::Class(ClassExpression::Class(class), own) => {
-            let own = term(own, variables, terms);
+        Atom::Class(ClassExpression::Class(class), individual) => {
+            let individual = term(individual, variables, terms);
             if is_top(class) {
                 return Ok(None);
             }
-            terms.inferred(class, vec![own])?
+            terms.inferred(class, vec![individual])?
         }
         Atom::ObjectProperty(ObjectPropertyExpression::Property(property), own, other)
         | Atom::ObjectProperty(ObjectPropertyExpression::Inverse(property), other, own)
@@ -159,9 +159,9 @@ fn comparison(iri: &str, left: &Term, right: &Term) -> Result<Condition, String>
             Condition::Or(vec![identical, relation(EQUAL, left, right)])
         }
         "notEqual" => {
-            let same = Condition::Equal(left.clone(), right.clone(), Span::default());
-            let either = [same, relation(EQUAL, left, right)];
-            Condition::And(either.map(|own| Condition::Not(Box::new(own))).into())
+            let identical = Condition::Equal(left.clone(), right.clone(), Span::default());
+            let either = [identical, relation(EQUAL, left, right)];
+            Condition::And(either.map(|condition| Condition::Not(Box::new(condition))).into())
         }
         "lessThanOrEqual" => Condition::Or(vec![relation(LESS, left, right), relation(EQUAL, left, right)]),
         "greaterThanOrEqual" => {

@@ -85,23 +85,24 @@ pub fn compile<'t>(
             is_exact: true,
         });
     }
-    let asked = asked(if objectives.is_empty() { problem.metric.as_slice() } else { objectives });
+    let used_preferences =
+        preferences_in(if objectives.is_empty() { problem.metric.as_slice() } else { objectives });
     let objects = Objects::of(domain, problem, limits);
     let mut monitors = Monitors::new(domain, problem, &objects, course);
     let mut errors = Vec::new();
     for (file, constraint) in constraints(domain, problem) {
-        if constraint.preference.as_ref().is_none_or(|name| asked.contains(&name.name)) {
+        if constraint.preference.as_ref().is_none_or(|name| used_preferences.contains(&name.name)) {
             errors.extend(monitors.add_constraint(file, constraint).err());
         }
     }
     for preference in domain.actions.iter().flat_map(|action| &action.preferences) {
-        if asked.contains(&preference.name.name) {
+        if used_preferences.contains(&preference.name.name) {
             let place = (File::Domain, preference.span);
             errors.extend(monitors.is_defined(&preference.condition, place).err());
         }
     }
     let has_events = problem.init.iter().any(|element| matches!(element, InitialElement::Timed(..)));
-    if has_events && !asked.is_empty() && matches!(course, PlanSemantics::Sequence) {
+    if has_events && !used_preferences.is_empty() && matches!(course, PlanSemantics::Sequence) {
         errors.push(unsupported(
             "a preference beside timed initial literals",
             "a plan that waits for a literal after its last action would be judged too late",
@@ -120,11 +121,11 @@ pub fn compile<'t>(
     for metric in task.1.metric.iter_mut().chain(&mut objectives) {
         name_violations(&mut metric.expression);
     }
-    if !asked.is_empty() {
+    if !used_preferences.is_empty() {
         // The preconditions of preferences of an action count as reads.
         let mut preferences = task.0.actions.iter().flat_map(|action| &action.preferences);
-        is_exact &= !preferences.any(|own| asked.contains(&own.name.name));
-        preferences::install(&mut task.0, &mut task.1, (wanted, &asked), course);
+        is_exact &= !preferences.any(|preference| used_preferences.contains(&preference.name.name));
+        preferences::install(&mut task.0, &mut task.1, (wanted, &used_preferences), course);
     }
     for action in &mut task.0.actions {
         action.preferences.clear();
@@ -155,7 +156,7 @@ fn violation(expression: &Expression) -> Option<&Name> {
 }
 
 /// Returns the preferences that some objectives use, without duplicates.
-fn asked(objectives: &[Metric]) -> Vec<Name> {
+fn preferences_in(objectives: &[Metric]) -> Vec<Name> {
     fn walk(expression: &Expression, found: &mut Vec<Name>) {
         if let Some(name) = violation(expression).filter(|name| !found.contains(name)) {
             found.push(name.clone());

@@ -42,16 +42,16 @@ fn violate(preference: &Name) -> Effect {
 pub(super) fn install(
     domain: &mut Domain,
     problem: &mut Problem,
-    (wanted, asked): (Vec<PreferenceInstance>, &[Name]),
+    (wanted, used_preferences): (Vec<PreferenceInstance>, &[Name]),
     course: PlanSemantics<'_>,
 ) {
-    for name in asked {
+    for name in used_preferences {
         let function = count(name);
         domain.functions.push(Declaration { identifier: function.predicate.clone(), parameters: Vec::new() });
         problem.init.push(InitialElement::Value(function, BigRational::zero(), Span::default()));
     }
     for action in &mut domain.actions {
-        count_preferences(action, asked);
+        count_preferences(action, used_preferences);
     }
     if matches!(course, PlanSemantics::Overlapping(_)) {
         look_up(domain, problem.name.span, wanted);
@@ -105,9 +105,11 @@ fn look_up(domain: &mut Domain, span: Span, wanted: Vec<PreferenceInstance>) {
 }
 
 /// Makes an action count the violations of its own preferences.
-fn count_preferences(action: &mut Action, asked: &[Name]) {
+fn count_preferences(action: &mut Action, used_preferences: &[Name]) {
     let preferences = std::mem::take(&mut action.preferences);
-    for preference in preferences.into_iter().filter(|own| asked.contains(&own.name.name)) {
+    for preference in
+        preferences.into_iter().filter(|preference| used_preferences.contains(&preference.name.name))
+    {
         let condition = not(preference.condition);
         let counted = Effect::When(condition, Box::new(violate(&preference.name.name)));
         let effect = if preference.variables.is_empty() {

@@ -129,18 +129,18 @@ impl<'t> Monitors<'t> {
                 let each = instances.map(|binding| self.trajectory(body, binding, hard, place));
                 Ok(all(each.collect::<Result<Vec<_>, _>>()?))
             }
-            Trajectory::AtEnd(what) => ground(what),
-            Trajectory::Always(what) => {
-                let what = ground(what)?;
-                self.always(&what, hard, place)
+            Trajectory::AtEnd(condition) => ground(condition),
+            Trajectory::Always(condition) => {
+                let condition = ground(condition)?;
+                self.always(&condition, hard, place)
             }
-            Trajectory::Sometime(what) => {
-                let what = ground(what)?;
-                self.sometime(&what, place)
+            Trajectory::Sometime(condition) => {
+                let condition = ground(condition)?;
+                self.sometime(&condition, place)
             }
-            Trajectory::AtMostOnce(what) => {
-                let what = ground(what)?;
-                self.at_most_once(&what, hard, place)
+            Trajectory::AtMostOnce(condition) => {
+                let condition = ground(condition)?;
+                self.at_most_once(&condition, hard, place)
             }
             Trajectory::SometimeAfter(first, second) => {
                 let (first, second) = (ground(first)?, ground(second)?);
@@ -150,17 +150,17 @@ impl<'t> Monitors<'t> {
                 let (first, second) = (ground(first)?, ground(second)?);
                 self.sometime_before(&first, &second, hard, place)
             }
-            Trajectory::Within(time, what) => {
-                let what = ground(what)?;
-                self.within(time, &what, place)
+            Trajectory::Within(time, condition) => {
+                let condition = ground(condition)?;
+                self.within(time, &condition, place)
             }
-            Trajectory::HoldDuring(from, until, what) => {
-                let what = ground(what)?;
-                self.hold((from, Some(until)), &what, hard, place)
+            Trajectory::HoldDuring(from, until, condition) => {
+                let condition = ground(condition)?;
+                self.hold((from, Some(until)), &condition, hard, place)
             }
-            Trajectory::HoldAfter(from, what) => {
-                let what = ground(what)?;
-                self.hold((from, None), &what, hard, place)
+            Trajectory::HoldAfter(from, condition) => {
+                let condition = ground(condition)?;
+                self.hold((from, None), &condition, hard, place)
             }
             Trajectory::AlwaysWithin(time, first, second) => {
                 let (first, second) = (ground(first)?, ground(second)?);

@@ -9,12 +9,12 @@ pub fn begin(lifted: &mut Lifted) {
     for (event, phase) in lifted.events.iter().take_while(|event| !event.time.is_positive()).zip(phases) {
         let before: (_, Arguments) = (lifted.time.phase, [phase].into());
         let after: (_, Arguments) = (lifted.time.phase, [ObjectId(phase.0 + 1)].into());
-        let own = event
+        let changes = event
             .changes
             .iter()
             .map(|(predicate, arguments, holds)| ((*predicate, arguments.clone()), *holds));
-        for (fact, holds) in own.chain([(before, false), (after, true)]) {
-            lifted.facts.retain(|known| *known != fact);
+        for (fact, holds) in changes.chain([(before, false), (after, true)]) {
+            lifted.facts.retain(|stated| *stated != fact);
             if holds {
                 lifted.facts.push(fact);
             }

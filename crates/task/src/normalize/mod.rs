@@ -123,9 +123,9 @@ fn schema(names: &mut Names, longest: Option<bool>, action: &ast::Action, index:
         ast::ActionBody::Durative { duration, conditions, effects } => {
             let mut middle = Vec::new();
             let (mut over_all, mut at_end) = (Vec::new(), Vec::new());
-            let own = (&action.identifier.name, schema.parameters.len());
+            let signature = (&action.identifier.name, schema.parameters.len());
             let (chosen, mut start) =
-                duration::duration(names, (duration, action.span), own, longest, &mut scope);
+                duration::duration(names, (duration, action.span), signature, longest, &mut scope);
             schema.duration = Some(chosen);
             schema.is_chosen = matches!(scope.duration, Duration::Open) && longest == Some(false);
             for (time, condition) in conditions {

@@ -169,9 +169,9 @@ fn guarded(formula: &Formula, guards: &Guards) -> Formula {
 
 /// Returns the conditions that all functions in an expression have values.
 fn values_of(expression: &Expression, guards: &Guards) -> Vec<Formula> {
-    let mut all = Vec::new();
-    functions(expression, &mut |function, terms| all.extend(has_value(function, terms, guards)));
-    all
+    let mut conditions = Vec::new();
+    functions(expression, &mut |function, terms| conditions.extend(has_value(function, terms, guards)));
+    conditions
 }
 
 fn has_value(function: FunctionId, terms: &[Term], guards: &Guards) -> Option<Formula> {

@@ -97,8 +97,10 @@ fn range(expression: &Expression, known: &dyn Fn(FunctionId) -> Range) -> Range 
             })
         }
         Expression::Product(parts, _) => {
-            let one = Rational::from_integer(1);
-            parts.iter().try_fold((one.clone(), one), |own, part| product(own, range(part, known)?))
+            let unit = Rational::from_integer(1);
+            parts
+                .iter()
+                .try_fold((unit.clone(), unit), |accumulated, part| product(accumulated, range(part, known)?))
         }
         Expression::Quotient(left, right, _) => {
             let ((low, high), (least, most)) = (range(left, known)?, range(right, known)?);

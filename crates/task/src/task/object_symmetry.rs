@@ -162,23 +162,24 @@ impl Exchange {
             parts.facts.get(&image).copied()
         };
         let mut facts = Vec::with_capacity(task.variables.len());
-        for own in limits.watch(&parts.words) {
-            let own = own?;
-            let images: Option<Vec<Fact>> = own.iter().flatten().map(exchanged).collect();
+        for atoms in limits.watch(&parts.words) {
+            let atoms = atoms?;
+            let images: Option<Vec<Fact>> = atoms.iter().flatten().map(exchanged).collect();
             let Some(images) = images else { return Ok(None) };
             let Some(target) = images.first().map(|image| image.variable) else { return Ok(None) };
-            let others = &parts.words[target.index()];
-            if images.iter().any(|image| image.variable != target) || others.len() != own.len() {
+            let target_atoms = &parts.words[target.index()];
+            if images.iter().any(|image| image.variable != target) || target_atoms.len() != atoms.len() {
                 return Ok(None);
             }
-            let none = others.iter().zip(0..).find(|(atom, _)| atom.is_none()).map(|(_, value)| value);
+            let value_without_atom =
+                target_atoms.iter().zip(0..).find(|(atom, _)| atom.is_none()).map(|(_, value)| value);
             let mut images = images.into_iter();
             let image = |atom: &Option<Vec<usize>>| match atom {
                 Some(_) => images.next(),
-                None => Some(Fact { variable: target, value: none? }),
+                None => Some(Fact { variable: target, value: value_without_atom? }),
             };
-            let Some(own) = own.iter().map(image).collect() else { return Ok(None) };
-            facts.push(own);
+            let Some(atoms) = atoms.iter().map(image).collect() else { return Ok(None) };
+            facts.push(atoms);
         }
         Ok(Some(Self { objects: (a, b), facts }))
     }

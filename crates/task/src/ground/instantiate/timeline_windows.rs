@@ -159,7 +159,7 @@ impl<'t> TimelineWindow<'t> {
         let start = self.start();
         let mut end = start.clone();
         end.quantity.add(self.duration);
-        let mut less = |earlier: &Linear<Rational>, mut later: Linear<Rational>, strict: bool| {
+        let mut require_order = |earlier: &Linear<Rational>, mut later: Linear<Rational>, strict: bool| {
             later.add(&earlier.clone().negated());
             conditions.push(
                 constant_comparison(&later, strict).unwrap_or(Residual::Compare { linear: later, strict }),
@@ -169,18 +169,18 @@ impl<'t> TimelineWindow<'t> {
         if self.from < events.len() {
             // After the last event every start can be delayed.
             if !matches!(self.start, Start::Free | Start::Later) {
-                less(&Linear::variable(*clock), start.clone(), false);
+                require_order(&Linear::variable(*clock), start.clone(), false);
             }
-            less(&start, time(self.from), true);
+            require_order(&start, time(self.from), true);
             if matches!(self.start, Start::Later | Start::LaterByEnd) {
-                less(&time(self.from - 1), start.clone(), true);
+                require_order(&time(self.from - 1), start.clone(), true);
             }
         }
         if self.to > self.from && self.end == End::Inside {
-            less(&time(self.to - 1), end.clone(), true);
+            require_order(&time(self.to - 1), end.clone(), true);
         }
         if self.to < events.len() {
-            less(&end, time(self.to), true);
+            require_order(&end, time(self.to), true);
         }
         conditions
     }
@@ -259,11 +259,11 @@ impl Conflicts {
         (start, at_start): (&Reads, &SimultaneousEffects),
         (end, at_end): (&Reads, &SimultaneousEffects),
     ) -> Self {
-        let all = |reads: &Reads, moment: &SimultaneousEffects| {
+        let per_event = |reads: &Reads, moment: &SimultaneousEffects| {
             let events = timeline.events.iter();
             events.map(|(_, changes)| interference(world, changes, reads, moment)).collect()
         };
-        Self { start: all(start, at_start), end: all(end, at_end) }
+        Self { start: per_event(start, at_start), end: per_event(end, at_end) }
     }
 }
 
