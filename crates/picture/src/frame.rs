@@ -136,6 +136,7 @@ impl Frame {
             Axis::Time => "time",
             Axis::Steps => "step",
         };
+        // A plan with many steps widens the picture instead of becoming illegible.
         let inner = (span.steps as f64 * canvas.step).min(WIDEST).max(canvas.inner());
         let scale = Scale::new((0.0, span.until), (canvas.left, canvas.left + inner));
         let width = canvas.left + inner + RIGHT;

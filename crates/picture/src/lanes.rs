@@ -9,6 +9,7 @@ pub(crate) fn rows(intervals: &[(f64, f64)]) -> Vec<usize> {
     let mut rows = vec![0; intervals.len()];
     for index in order {
         let (start, end) = intervals[index];
+        // The tolerance admits rounded times of consecutive intervals.
         let row = ends.iter().position(|taken| *taken <= start + 1e-6).unwrap_or(ends.len());
         if row == ends.len() {
             ends.push(end);

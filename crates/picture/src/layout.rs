@@ -22,6 +22,7 @@ pub(crate) fn layout(places: usize, ways: &[(usize, usize)]) -> Vec<(f64, f64)> 
         neighbours[other].push(one);
     }
     let mut points = vec![(0.0, 0.0); places];
+    // Components are placed side by side.
     let mut right = 0.0_f64;
     for component in components(&neighbours) {
         let component_points = placed(&component, &neighbours);
@@ -80,6 +81,7 @@ fn placed(group: &[usize], neighbours: &[Vec<usize>]) -> Vec<(f64, f64)> {
             .max_by(|left, right| distances[*left].total_cmp(&distances[*right]).then(right.cmp(left)));
         order.unwrap_or(0)
     };
+    // Both ends of a long path, and a place far from both: their distances span two dimensions.
     let first = farthest(&of(group[0]));
     let from_first = of(group[first]);
     let from_last = of(group[farthest(&from_first)]);
@@ -141,6 +143,7 @@ fn turned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
             (dx * cos + dy * sin, dy * cos - dx * sin)
         })
         .collect();
+    // The tolerances prevent rounding from mirroring a symmetric layout.
     let (flip_x, flip_y) = (turned[0].0 > 1e-9, turned[0].1 < -1e-9);
     for point in &mut turned {
         *point = (if flip_x { -point.0 } else { point.0 }, if flip_y { -point.1 } else { point.1 });
@@ -159,6 +162,7 @@ pub(crate) fn spread(points: &mut [(f64, f64)], same: f64, apart: f64) {
         }
     }
     for ((x, y), group) in groups.iter().filter(|(_, group)| group.len() > 1) {
+        // Neighbours on a ring of this radius are `apart` from each other (chord length).
         let part = std::f64::consts::PI / group.len() as f64;
         let radius = apart / 2.0 / part.sin();
         for (index, number) in group.iter().zip(0..) {

@@ -198,6 +198,7 @@ fn number(
 ) -> Option<Point> {
     let Shape { arrow, along, outwards, .. } = leg.shape;
     let (half_width, half_height) = (width(&numbers(leg)) / 2.0 + 1.0, LINE / 2.0 + 1.0);
+    // A move in the opposite direction has its numbers on the other side.
     let is_one_way = !legs.iter().any(|other| (other.from, other.to) == (leg.to, leg.from));
     let sides: &[f64] = if is_one_way && leg.from != leg.to { &[1.0, -1.0] } else { &[1.0] };
     let reach = outwards.0.abs() * half_width + outwards.1.abs() * half_height + SIDE + 1.0;
@@ -236,6 +237,7 @@ fn names(
         (used[leg.from], used[leg.to]) = (true, true);
     }
     let mut order: Vec<usize> = (0..points.len()).collect();
+    // Ends of the route first, then places on it; ties in a fixed order, for a reproducible picture.
     order.sort_by_key(|place| (!is_end(*place), !used[*place], *place));
     let mut labels = vec![None; points.len()];
     for place in order {
@@ -260,6 +262,7 @@ fn draw_leg(leg: &Leg, map: &Map, palette: &Palette, number: Option<Point>) -> M
     let about: Vec<String> =
         about.map(|(step, name)| format!("step {step}, from {from} to {to}: {name}")).collect();
     let steps: Vec<String> = leg.steps.iter().map(ToString::to_string).collect();
+    // Each configuration draws one dash per period, so that the colours alternate along the line.
     let dash = format!("{} {}", px(DASH), px(DASH * names.len().saturating_sub(1) as f64));
     let last = names.last().map_or_else(String::new, |name| (*name).clone());
     let Shape { line: ((x1, y1), (x2, y2)), centre, arrow: (x, y), along: (dx, dy), .. } = leg.shape;

@@ -28,6 +28,7 @@ impl Scale {
             return Vec::new();
         }
         let step = round_step((self.from.1 - self.from.0) / most as f64);
+        // The tolerance keeps a tick at the end of the range despite rounding.
         let (first, last) = ((self.from.0 / step).ceil(), (self.from.1 / step + 1e-9).floor());
         let count = if last >= first { (last - first) as usize + 1 } else { 0 };
         (0..count.min(1000)).map(|index| (first + index as f64) * step).collect()
@@ -61,6 +62,7 @@ pub(crate) fn number(value: f64) -> String {
     let digits = 9 - value.abs().max(1.0).log10().floor() as i32;
     let text = format!("{value:.*}", digits.clamp(0, 9) as usize);
     let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    // A tiny negative number rounds to -0.
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
@@ -72,6 +74,7 @@ pub(crate) fn compact(value: f64) -> String {
 
 /// Width of a text in pixels.
 pub(crate) fn width(text: &str) -> f64 {
+    // Characters of East Asian scripts are about twice as wide.
     text.chars().map(|character| if character.is_ascii() { CHARACTER } else { 2.0 * CHARACTER }).sum()
 }
 
@@ -88,6 +91,7 @@ pub(crate) fn fit(text: &str, room: f64) -> String {
             break;
         }
     }
+    // A single letter with an ellipsis is not informative.
     if short.chars().count() < 2 { String::new() } else { short + "…" }
 }
 

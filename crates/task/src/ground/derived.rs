@@ -20,6 +20,7 @@ use crate::number::dense;
 pub fn simplify(task: &mut GroundTask<'_>) -> Result<(), Interrupted> {
     let limits = task.world.limits;
     let mut axioms = std::mem::take(&mut task.axioms);
+    // A duplicate would prevent the inlining of an atom with a single rule.
     let mut distinct = FxHashSet::default();
     axioms.retain(|axiom| distinct.insert(axiom.clone()));
     fold(task, &mut axioms)?;
@@ -52,6 +53,7 @@ fn retain<T>(
     let (mut pulse, mut outcome) = (limits.pulse(), Ok(()));
     items.retain_mut(|item| {
         outcome = outcome.and_then(|()| pulse.beat());
+        // After an interruption, the remaining items are kept unchanged.
         outcome.is_err() || keep(item)
     });
     outcome
@@ -73,6 +75,7 @@ fn fold(task: &mut GroundTask<'_>, axioms: &mut Vec<GroundAxiom>) -> Result<(), 
                 truth_values.insert(axiom.head, true);
             }
         }
+        // An atom without a rule is false.
         for atom in derived.iter().filter(|atom| !has_rule.contains(*atom)) {
             truth_values.entry(*atom).or_insert(false);
         }
@@ -139,6 +142,7 @@ fn single_bodies(
         let [only] = component?[..] else { continue };
         if let Some(axiom) = rules.get(&only) {
             let mut body = axiom.body.clone();
+            // The body of a recursive rule cannot replace its atom.
             let depends_on_itself = body.atoms().any(|atom| atom == only);
             if !depends_on_itself && inline(&mut body, &bodies) {
                 bodies.insert(only, body);
@@ -153,6 +157,7 @@ fn inline(condition: &mut GroundCondition, bodies: &FxHashMap<AtomId, GroundCond
     let mut literals = Vec::with_capacity(condition.literals.len());
     for mut literal in std::mem::take(&mut condition.literals) {
         match bodies.get(&literal.0) {
+            // Only a positive literal can be replaced by a conjunction.
             Some(body) if literal.1 => {
                 literals.extend(&body.literals);
                 condition.comparisons.extend(body.comparisons.iter().cloned());

@@ -49,11 +49,13 @@ fn attach(task: &mut GroundTask<'_>, metric: &Metric, generality: &Generality) -
     let limits = task.world.limits;
     let (mut linear, mut time) = split(&mut task.world, &metric.expression, metric.place)?;
     let maximize = metric.direction == Direction::Maximize;
+    // Costs are minimised.
     if maximize {
         linear = linear.negated();
         time = -time;
     }
     let rest = rest(task, &mut linear, (metric, generality))?;
+    // Costs count changes of fluents, so that their initial values are a constant offset.
     let initial: Vec<_> = linear
         .coefficients
         .iter()
@@ -82,6 +84,7 @@ fn rest(
     for operator in &task.operators {
         for (variable, factor) in &linear.coefficients {
             let Some(value) = operator.numeric_effects.get(*variable) else { continue };
+            // A state-independent change has the form `variable + quantity`.
             let is_dependent = value.coefficients[..] != [(*variable, Rational::one())];
             let is_reward = generality.measures_rewards && lowers(value, factor);
             if is_dependent && !generality.measures_ends {

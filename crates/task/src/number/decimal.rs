@@ -64,6 +64,7 @@ fn is_multiple_of_five(number: I256) -> bool {
 impl Decimal {
     /// Normalises a decimal. Returns `None` if it has too many digits.
     fn new(mut mantissa: I256, mut places: u32) -> Option<Self> {
+        // A multiple of 10 is divisible by 2 and by 5.
         while places > 0 && mantissa.trailing_zeros() > 0 && is_multiple_of_five(mantissa) {
             mantissa = mantissa.checked_div(I256::new(10))?;
             places = places.checked_sub(1)?;

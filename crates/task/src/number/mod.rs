@@ -154,6 +154,7 @@ impl Rational {
         small: impl Fn(&Ratio<i128>, &Ratio<i128>) -> Option<Ratio<i128>>,
         big: impl Fn(BigRational, BigRational) -> BigRational,
     ) -> Self {
+        // Decimals are tried first, because they need no greatest common divisor.
         if let (Some(a), Some(b)) = (self.to_decimal(), other.to_decimal())
             && let Some(result) = decimal(a, b)
         {

@@ -160,6 +160,7 @@ pub fn decode<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N>) -> P
     let actions = actions.filter(|(step, _)| task.operators[step.operator.index()].wait.is_none());
     for ((step, measured), start) in actions.zip(starts(task, &plan.steps)) {
         let operator = &task.operators[step.operator.index()];
+        // Auxiliary actions of compiled constraints and preferences are not part of the plan for users.
         if is_hidden(&task.schema_names[operator.schema as usize]) {
             continue;
         }

@@ -18,6 +18,7 @@ use crate::task::{Operator, OperatorId, Task};
 pub fn earliest<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N>) -> GroundPlan<N> {
     let Context { task, limits } = context;
     let mut plan = plan.clone();
+    // Without timed events, sequential execution has no gaps.
     if task.operators.iter().all(|operator| operator.wait.is_none()) {
         return plan;
     }

@@ -69,6 +69,7 @@ impl Task {
     }
 
     fn step(&self, operator: OperatorId, choice: Vec<u32>) -> Option<Step> {
+        // Arguments and designs are named by the code for plans, with a plan of one step.
         let plan = GroundPlan { steps: vec![GroundStep { operator, choice }], cost: 0 };
         decode(Context::new(self, &Limits::none()), &plan).steps.pop()
     }

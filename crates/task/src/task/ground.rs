@@ -270,6 +270,7 @@ impl<N> Iterator for Choices<'_, N> {
             let current = self.next.take()?;
             let mut following = current.clone();
             for position in (0..following.len()).rev() {
+                // The last slot varies fastest.
                 following[position] += 1;
                 if (following[position] as usize) < self.sizes[position] {
                     self.next = Some(following);

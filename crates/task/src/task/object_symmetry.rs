@@ -40,6 +40,7 @@ pub fn symmetry_generators(context: Context<'_>, initially: bool) -> Result<Vec<
             }
         }
     }
+    // Interchangeable objects occur as the same arguments of the same schemas, equally often.
     let mut alike: BTreeMap<Vec<(u32, usize)>, Vec<ObjectId>> = BTreeMap::new();
     for (object, mut places) in uses {
         places.sort_unstable();
@@ -58,6 +59,7 @@ pub fn symmetry_generators(context: Context<'_>, initially: bool) -> Result<Vec<
             for object in remaining.drain(1..) {
                 work += task.operators.len();
                 let exchange =
+                    // Beyond the limit, no further symmetries are found, which is sound.
                     if work <= WORK_LIMIT { Exchange::new(&parts, last, object, limits)? } else { None };
                 match exchange {
                     Some(exchange) if exchange.keeps(&parts, initially, limits)? => {
@@ -164,6 +166,7 @@ impl Exchange {
         let mut facts = Vec::with_capacity(task.variables.len());
         for atoms in limits.watch(&parts.words) {
             let atoms = atoms?;
+            // All atoms of a variable must have their images in one variable.
             let images: Option<Vec<Fact>> = atoms.iter().flatten().map(exchanged).collect();
             let Some(images) = images else { return Ok(None) };
             let Some(target) = images.first().map(|image| image.variable) else { return Ok(None) };

@@ -106,6 +106,7 @@ impl<N: Number> Quantity<N> {
             }
             None => self.tables.push(table),
         }
+        // Sorted tables make equal quantities comparable.
         self.tables.sort_by(|a, b| a.slots.cmp(&b.slots));
         self.fold_constant_tables();
     }

@@ -61,6 +61,7 @@ impl Evaluation {
                 if !world.lifted.predicates[predicate.index()].fluent {
                     return Ok(truth(world.holds_initially(*predicate, &arguments) == *positive));
                 }
+                // An atom that is never reached in the relaxation is false in every state.
                 if !world.is_reached(*predicate, &arguments) {
                     return Ok(truth(!positive));
                 }

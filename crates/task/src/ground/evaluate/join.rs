@@ -66,6 +66,7 @@ pub fn each_binding<'a>(
                 return Ok(false);
             }
         }
+        // Backtrack to the innermost level with another option.
         while let Some(level) = levels.last_mut() {
             level.undo(binding);
             if join.advance(world, level, binding)? {
@@ -146,6 +147,7 @@ impl Join<'_> {
                 Term::Parameter(variable) if binding[*variable as usize].is_none() => Some(*variable),
                 _ => None,
             });
+            // The index of rows represents a set of columns by the bits of a word.
             let (mut count, mut joins) = (0_usize, !self.is_used[position] && terms.len() <= 64);
             for variable in open {
                 count = count.saturating_add(1);
@@ -179,6 +181,7 @@ impl Join<'_> {
                     if self.fits(terms, &row, binding, &mut level.fresh) {
                         return Ok(true);
                     }
+                    // A row that does not match may have bound some variables.
                     for variable in level.fresh.drain(..) {
                         binding[variable as usize] = None;
                     }

@@ -93,6 +93,7 @@ impl Definitions {
 
     /// Creates an auxiliary atom for a subcondition.
     fn name(&mut self, world: &mut World<'_>, residual: Residual) -> AtomId {
+        // Auxiliary atoms have a predicate number beyond the declared predicates.
         let predicate = PredicateId(dense(world.lifted.predicates.len()));
         let number = ObjectId(dense(self.named.len()));
         let atom = world.atom(predicate, &[number]);
@@ -153,6 +154,7 @@ fn clauses(residual: &Residual) -> Option<Vec<Vec<GroundLiteral>>> {
                     let mut clause: Vec<_> = left.iter().chain(right).copied().collect();
                     clause.sort_unstable();
                     clause.dedup();
+                    // A clause that contains an atom and its negation is a tautology.
                     if clause.windows(2).all(|pair| pair[0].0 != pair[1].0) {
                         next.push(clause);
                     }

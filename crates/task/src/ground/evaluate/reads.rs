@@ -69,6 +69,7 @@ impl Reads {
             }
             Formula::Exists(bound, body) | Formula::ForAll(bound, body) => {
                 let outer = self.scope.len();
+                // Inner quantifiers may reuse a variable, so that the scope is a stack.
                 self.scope.extend(bound.iter().cloned());
                 self.condition(lifted, body, binding);
                 self.scope.truncate(outer);
@@ -127,6 +128,7 @@ impl Reads {
         while let Some(predicate) = open.pop() {
             for axiom in lifted.axioms.iter().filter(|axiom| axiom.predicate == predicate) {
                 let mut below = Self::default();
+                // The arguments of a body are not traced back to those of the head.
                 below.literals(&axiom.condition);
                 for (predicate, _) in below.atoms {
                     if seen.insert(predicate) {

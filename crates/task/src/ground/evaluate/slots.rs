@@ -51,6 +51,7 @@ pub fn open(
         Expression::Product(parts, place) => {
             let (mentioning, closed): (Vec<_>, Vec<_>) =
                 parts.iter().partition(|part| !slots_of_expression(part, slots.parameters).is_empty());
+            // A product of several factors with slots has no sum of separate tables.
             let [part] = mentioning[..] else {
                 return table(world, expression, mentioned, binding, slots, undefined);
             };

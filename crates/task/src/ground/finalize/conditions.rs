@@ -23,6 +23,7 @@ pub(super) fn condition<N: TaskNumber>(
         let no_value = atoms.none[literal.fact.variable.index()];
         if literal.positive {
             condition.facts.push(literal.fact);
+        // A variable with two values has only one alternative, which is a fact instead of a clause.
         } else if no_value == 1 {
             condition.facts.push(Fact { variable: literal.fact.variable, value: no_value });
         } else {
@@ -45,6 +46,7 @@ pub(super) fn condition<N: TaskNumber>(
         let common = common.ok_or_else(|| Error::overflow("a factor of a numeric fluent"))?;
         linear.scale(&Rational::from_integer(common));
         let mut integers = numbers.linear(&linear)?;
+        // For integers, > 0 is ≥ 1.
         if *strict {
             integers.quantity.constant = integers.quantity.constant + -N::one();
         }

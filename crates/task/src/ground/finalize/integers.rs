@@ -43,6 +43,7 @@ impl Denominator {
     pub(super) fn quantity(&mut self, quantity: &Quantity<Rational>) {
         self.number(&quantity.constant);
         for table in &quantity.tables {
+            // The stored clone keeps the table alive, so that its address stays unique.
             if let Entry::Vacant(new) = self.seen.entry(table.values.as_ptr()) {
                 let values = new.insert(table.values.clone()).clone();
                 values.iter().for_each(|number| self.number(number));

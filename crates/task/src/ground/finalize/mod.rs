@@ -90,6 +90,7 @@ pub fn finish<N: TaskNumber>(
         time_scale: durations.scale,
         unreachable,
     };
+    // The rules determine the initial values of the derived variables.
     let mut initial = std::mem::replace(&mut task.initial, State { values: Vec::new(), numbers: Vec::new() });
     task.evaluate_axioms(&mut initial);
     task.initial = initial;

@@ -60,6 +60,7 @@ pub fn groups(task: &GroundTask<'_>, relevant: &FxHashSet<AtomId>) -> Result<Vec
                 entry.1.push(atom);
             }
         }
+        // With two initially true atoms, the atoms of a key are not mutually exclusive.
         instances.extend(by_key.into_values().filter(|(weight, _)| *weight <= 1).map(|(_, atoms)| atoms));
     }
     cover(&instances, limits)
@@ -78,6 +79,7 @@ fn cover(instances: &[Vec<AtomId>], limits: &Limits) -> Result<Vec<Group>, Inter
         pulse.beat()?;
         let group = &instances[index];
         let atoms: Vec<AtomId> = group.iter().filter(|atom| !covered.contains(*atom)).copied().collect();
+        // A single atom gains nothing from a group.
         if atoms.len() < 2 {
             continue;
         }
@@ -190,12 +192,14 @@ fn broken_by<'o>(
             Some((_, sum)) => *sum += weight,
             None => balance.push((key, weight)),
         };
+        // An atom that already holds adds no weight, unless the operator deletes it as well.
         let comes = |atom: &&AtomId| !change.requires(**atom) || deleted(atom);
         let added = change.adds.iter().filter(comes).filter_map(|atom| key_of(task, candidate, *atom));
         let added: SmallVec<[Key; 4]> = added.collect();
         added.iter().for_each(|key| weigh(key.clone(), 1));
         for atom in change.deletes {
             if let Some(key) = key_of(task, candidate, *atom) {
+                // A deletion sets the variable to "none of these", which is wrong if another atom of the group holds.
                 if !change.requires(*atom) {
                     return Some((operator, key));
                 }

@@ -53,6 +53,7 @@ impl<N: TaskNumber> Numbers<N> {
             denominator.number(number);
             denominator.note(|| (task.world.numeric_name(*variable), None));
         }
+        // Other initial states may have numbers of this precision.
         for precision in generality.numbers.into_iter().chain(generality.precision) {
             denominator.number(&Rational::new(1, precision));
         }
@@ -149,10 +150,12 @@ fn multiples(task: &GroundTask<'_>) -> FxHashMap<NumericId, Int> {
         let mut is_changed = false;
         for (variable, read, factor) in &factors {
             let of = |variable: &NumericId| multiples.get(variable).copied().unwrap_or(1);
+            // The factor between the stored multiples of both fluents.
             let stored = Rational::from_integer(of(variable)) * *factor / Rational::from_integer(of(read));
             if stored.is_integer() {
                 continue;
             }
+            // A fractional factor of a fluent on itself grows with each application: no multiple suffices.
             let denominator = if variable == read { None } else { stored.denominator() };
             let multiple = denominator
                 .and_then(|factor| of(variable).checked_mul(factor))

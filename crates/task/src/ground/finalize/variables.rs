@@ -36,6 +36,7 @@ impl Atoms {
         let mut exclusive = Vec::new();
         let mut groups = Vec::new();
         for group in mutex_groups::groups(task, &relevant)? {
+            // Atoms that are values of another variable still exclude those of this group.
             if group.exclusive.len() > group.atoms.len() {
                 exclusive.push(group.exclusive);
             }
@@ -43,6 +44,7 @@ impl Atoms {
         }
         let grouped: FxHashSet<AtomId> = groups.iter().flatten().copied().collect();
         groups.extend(relevant.iter().filter(|atom| !grouped.contains(atom)).map(|atom| vec![*atom]));
+        // Sorted, so that the numbers of variables are reproducible.
         groups.sort_unstable();
         let mut atoms = Self {
             variables: Vec::new(),
@@ -52,6 +54,7 @@ impl Atoms {
             none: Vec::new(),
             exclusive: Vec::new(),
         };
+        // Derived variables come last, so that `basic` separates them.
         groups.extend(derived.into_iter().map(|atom| vec![atom]));
         for group in limits.watch(groups) {
             let group = group?;
@@ -91,6 +94,7 @@ impl Atoms {
         let deletes = operator.deletes.iter().filter_map(|atom| self.fact(*atom)).map(to_none);
         let adds = operator.adds.iter().filter_map(|atom| self.fact(*atom));
         let mut effects: Vec<Fact> = Vec::with_capacity(operator.deletes.len() + operator.adds.len());
+        // Additions follow deletions, because adding takes precedence.
         for fact in deletes.chain(adds) {
             match effects.iter_mut().find(|existing| existing.variable == fact.variable) {
                 Some(existing) => *existing = fact,
@@ -107,6 +111,7 @@ impl Atoms {
             let literals = &operator.condition.literals;
             literals.iter().any(|(atom, positive)| *positive && self.fact(*atom) == Some(*fact))
         };
+        // An effect that the condition already implies matters only if a conditional effect may precede it.
         effects.retain(|fact| !required(fact) || overridden(fact));
         effects.sort_unstable();
         effects

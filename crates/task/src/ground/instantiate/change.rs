@@ -121,6 +121,7 @@ pub(super) fn numbers<'c>(
             None => last.push((*variable, change)),
         }
         let mut operand = operand.clone().ok_or(Failure::Undefined)?;
+        // Values refer to the state before the action, so earlier changes are substituted.
         substitute(&mut operand, before);
         let current = || {
             let old = changed.get(*variable).or_else(|| before.get(*variable));

@@ -123,6 +123,7 @@ pub(super) fn cases(
             .map(|(condition, change)| (after(condition), change.clone()))
             .filter(|(condition, _)| *condition != Residual::False)
             .collect();
+        // A conditional numeric effect would make costs state-dependent, so each outcome becomes a case.
         let numeric = end.iter().filter(|(_, change)| matches!(change, GroundChange::Number { .. }));
         let numeric: Vec<_> = numeric.map(|(condition, _)| condition.clone()).collect();
         for (decided, chosen) in split(schema, numeric.iter())? {
@@ -238,6 +239,7 @@ impl Case {
                 continue;
             }
             let condition = literals(world, definitions, condition);
+            // A condition that contains an atom and its negation never holds.
             if condition.windows(2).any(|pair| pair[0].0 == pair[1].0) {
                 continue;
             }
@@ -250,6 +252,7 @@ impl Case {
             if *positive { &mut entry.adds } else { &mut entry.deletes }.push(*atom);
         }
         for entry in &mut conditional {
+            // Adding takes precedence over deleting.
             entry.deletes.retain(|atom| !entry.adds.contains(atom));
         }
         let mut adds = end_adds;

@@ -75,6 +75,7 @@ impl<'a> SharedInstanceData<'a> {
             Some(duration) => build.static_quantity(duration, outline.schema)?,
             None => Quantity::constant(Rational::from_integer(0)),
         };
+        // PDDL requires durations of at least 0.
         build.forbid_negative(&duration)?;
         let forbidden = build.forbidden;
         if !admit_some(&forbidden, &designs.sizes(), world.limits)? {

@@ -57,6 +57,7 @@ impl Build<'_, '_> {
         for (conjunct, mentioned) in open {
             if let Formula::Compare(comparison, left, right, _) = conjunct {
                 let (left, right) = (self.open(left)?, self.open(right)?);
+                // A comparison over designs only is decided now.
                 let static_part = left.coefficients.is_empty() && right.coefficients.is_empty();
                 match compare(*comparison, left, right) {
                     residual if static_part => self.forbid(mentioned, &residual)?,

@@ -51,7 +51,6 @@ use crate::number::dense;
 /// atoms into rules. `designs` has the design parameters of each schema.
 ///
 /// # Errors
-/// All unsupported expressions and conditions.
 /// All expressions and conditions that the planner does not handle.
 pub fn instantiate<'a>(
     world: World<'a>,

@@ -38,6 +38,7 @@ impl<'a> Conjuncts<'a> {
             if !mentioned.is_empty() {
                 conjuncts_by_kind.open.push((conjunct, mentioned));
             } else if !settled(lifted, conjunct) {
+                // Settled conjuncts hold in all reached instances, so they are dropped.
                 conjuncts_by_kind.closed.push(conjunct);
             }
         }

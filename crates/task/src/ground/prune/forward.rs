@@ -24,6 +24,7 @@ pub(super) fn forward(task: &mut GroundTask<'_>, initially: &[bool]) -> Result<V
     let mut open: Vec<usize> = Vec::new();
     for item in limits.watch(conditions.enumerate()) {
         let (index, condition) = item?;
+        // Negative literals are ignored: atoms are never deleted in the relaxation.
         let needs = condition.literals.iter().filter(|(atom, positive)| *positive && !reached[atom.index()]);
         let count = needs.map(|(atom, _)| readers.entry(*atom).or_default().push(index)).count();
         missing.push(count);
@@ -47,6 +48,7 @@ pub(super) fn forward(task: &mut GroundTask<'_>, initially: &[bool]) -> Result<V
         };
         match task.operators.get(index) {
             Some(operator) => {
+                // Conditional effects are assumed to occur, which only weakens the pruning.
                 let conditional = operator.conditional.iter().flat_map(|effect| &effect.adds);
                 operator.adds.iter().chain(conditional).for_each(|atom| reach(*atom));
             }
@@ -56,6 +58,7 @@ pub(super) fn forward(task: &mut GroundTask<'_>, initially: &[bool]) -> Result<V
     let mut keep = missing.iter().map(|count| *count == 0);
     task.operators.retain(|_| keep.next().unwrap_or(true));
     task.axioms.retain(|_| keep.next().unwrap_or(true));
+    // Clauses were not counted above; a clause without a reachable literal removes its operator.
     let possible = |&(atom, positive): &GroundLiteral| !positive || reached[atom.index()];
     task.operators
         .retain(|operator| operator.condition.clauses.iter().all(|clause| clause.iter().any(possible)));

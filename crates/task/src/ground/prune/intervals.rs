@@ -73,6 +73,7 @@ fn reachable(task: &GroundTask<'_>) -> Result<Vec<Interval>, Interrupted> {
             for (variable, value) in operator.numeric_effects.iter() {
                 let range = range(value, &before);
                 let interval = &mut intervals[variable.index()];
+                // An unbounded end (`None`) absorbs every value.
                 interval.low = interval.low.take().zip(range.low).map(|(a, b)| a.min(b));
                 interval.high = interval.high.take().zip(range.high).map(|(a, b)| a.max(b));
             }
@@ -82,6 +83,7 @@ fn reachable(task: &GroundTask<'_>) -> Result<Vec<Interval>, Interrupted> {
         }
         round += 1;
         if round > ROUNDS {
+            // Widening: an end that still moves becomes unbounded.
             for (interval, before) in intervals.iter_mut().zip(&before) {
                 interval.low = interval.low.take().filter(|low| before.low.as_ref() == Some(low));
                 interval.high = interval.high.take().filter(|high| before.high.as_ref() == Some(high));

@@ -28,6 +28,7 @@ pub fn prune(task: &mut GroundTask<'_>, generality: &Generality) -> Result<Optio
         .map(|(predicate, arguments)| world.holds_initially(*predicate, arguments))
         .collect();
     let mut reached = forward(task, &initially)?;
+    // Each kind of pruning may enable the other one.
     while generality.numbers.is_none() && prune_by_numbers(task)? {
         simplify(task)?;
         reached = forward(task, &initially)?;

@@ -21,6 +21,7 @@ pub(super) fn drop_unread_numerics(task: &mut GroundTask<'_>) {
     read.extend(
         task.objectives.iter().flat_map(|objective| objective.rest.iter().map(|(variable, _)| *variable)),
     );
+    // A fluent is also read if it determines the new value of a read fluent.
     let mut open: Vec<NumericId> = read.iter().copied().collect();
     while let Some(variable) = open.pop() {
         let values = task.operators.iter().filter_map(|operator| operator.numeric_effects.get(variable));
@@ -38,6 +39,7 @@ pub(super) fn drop_unread_numerics(task: &mut GroundTask<'_>) {
 /// Removes rules of unread atoms, effects on such atoms, and operators that neither change the
 /// state nor reduce the cost.
 pub(super) fn backward(task: &mut GroundTask<'_>) -> Result<(), Interrupted> {
+    // A removed operator no longer reads atoms, so that further effects may become unread.
     loop {
         task.world.limits.check()?;
         let read = task.read_atoms();

@@ -40,6 +40,7 @@ pub fn reach(
     limits.check()?;
     let variables = lifted.schemas.iter().map(|schema| schema.variables);
     let mut variables = variables.chain(lifted.axioms.iter().map(|axiom| axiom.variables));
+    // The rule engine numbers the variables of a rule with 16 bits.
     if variables.any(|count| u16::try_from(count).is_err()) {
         return Err(Error::Rules("an action or axiom with more than 65,535 variables".into()));
     }
@@ -87,6 +88,7 @@ pub fn reach(
                 binding
             })
             .collect();
+        // Sorted, so that the numbers of operators are reproducible.
         bindings.sort_unstable();
         instances.push(bindings);
     }

@@ -59,6 +59,7 @@ pub(super) fn add_schema(
         body.push(ReachabilityProgramBuilder::relation(relation, &other_parameters));
         relaxed.rule(vec![ReachabilityProgramBuilder::relation(relation, &other_parameters)], fits);
     }
+    // Conditions over several slots are ignored, which is a further relaxation.
     for formula in needs.iter().filter(|formula| slots_in(formula, slots).is_empty()) {
         relaxed.body(formula, &candidates, false, &mut body)?;
     }

@@ -47,6 +47,7 @@ impl<'a> ReachabilityProgramBuilder<'a> {
         let objects: Vec<_> = (0..lifted.objects.len()).map(|i| table.name(&format!("object {i}"))).collect();
         let predicates: Vec<_> =
             (0..lifted.predicates.len()).map(|i| table.name(&format!("predicate {i}"))).collect();
+        // The relaxation ignores time, so that additions of timed events are initial facts.
         let events = lifted.events.iter().flat_map(|event| &event.changes).filter(|(_, _, holds)| *holds);
         let facts = lifted
             .facts
@@ -141,6 +142,7 @@ impl<'a> ReachabilityProgramBuilder<'a> {
                 {
                     out.push(Atom::Not { predicate: symbol, arguments });
                 }
+                // The relaxation ignores negated fluents.
                 _ => {}
             },
             Formula::Equal { positive, left, right } => {
@@ -153,12 +155,14 @@ impl<'a> ReachabilityProgramBuilder<'a> {
                 self.body(body, &candidates, exact, out)?;
             }
             Formula::Or(parts) => {
+                // A disjunction with a tautological part restricts nothing.
                 if exact || !parts.iter().any(|part| self.may_be_free(part)) {
                     let relation = self.auxiliary(formula, parts, candidates, exact)?;
                     out.push(Self::relation(relation, &free(formula)));
                 }
             }
             Formula::ForAll(..) => {
+                // ∀ is translated as ¬∃¬. Negation requires an exact, and therefore static, body.
                 if exact || (is_static(self.lifted, formula) && !has_numbers(formula)) {
                     let relation = self.auxiliary(formula, &[formula.negated()], candidates, true)?;
                     let arguments = free(formula).into_iter().map(variable);

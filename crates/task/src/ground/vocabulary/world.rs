@@ -88,8 +88,10 @@ impl<'a> World<'a> {
             Term::Parameter(variable) => binding[*variable as usize],
         };
         let columns = terms.iter().enumerate().filter(|(_, term)| value(term).is_some());
+        // The mask suffices, because guards have at most 64 columns (see `Join::next_guard`).
         let mask = columns.fold(0_u64, |mask, (column, _)| mask | (1 << column));
         let key: Vec<ObjectId> = terms.iter().filter_map(value).collect();
+        // The index is built when a set of columns is looked up for the first time.
         if !self.joins.contains_key(&(predicate, mask)) {
             let mut rows = Rows::default();
             for row in self.relation(predicate) {
