@@ -270,7 +270,7 @@ impl<S: Clone + Eq + Hash, N: Number> Explored<S, N> {
     )]
     fn add(&mut self, batch: &mut Batch<S, N>, first: usize, limit: usize) -> Result<(), Error> {
         let Self { mdp, states, rewards, deadlocks, .. } = self;
-        let too_many = |states: usize| Error::StateLimit { states, limit: limit };
+        let too_many = |states: usize| Error::StateLimit { states, limit };
         let mut transitions = batch.choices.transitions.drain(..).zip(&batch.probes);
         let mut reward = batch.choices.rewards.drain(..);
         let mut choices = batch.choices.ends.drain(..);

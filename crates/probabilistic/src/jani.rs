@@ -22,7 +22,7 @@ use crate::prism::ast::{
 /// that contains itself.
 pub fn write(name: &str, model: &Model) -> Result<Value, Error> {
     let recursive: Vec<Diagnostic> =
-        model.formulas.iter().filter_map(|formula| recursive(model, formula)).collect();
+        model.formulas.iter().filter_map(|formula| recursion(model, formula)).collect();
     if !recursive.is_empty() {
         return Err(Error::Model(recursive.into()));
     }
@@ -129,7 +129,7 @@ fn system(model: &Model, actions: &BTreeMap<&str, Vec<usize>>) -> Value {
 }
 
 /// Reports a formula that contains itself, which cannot be expanded.
-fn endless(model: &Model, formula: &Named) -> Option<Diagnostic> {
+fn recursion(model: &Model, formula: &Named) -> Option<Diagnostic> {
     let mut used = Vec::new();
     formula.expression.names(&mut used);
     for at in 0.. {

@@ -68,7 +68,7 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
         manner: Chosen::declare(node)?,
         joint: Joint::listen(node, setup.mission)?,
         executes: ExecutePlans::new(node, "execute_plan", options.version),
-        told: PlanPublisher::new(node)?,
+        plan_publisher: PlanPublisher::new(node)?,
     };
     smol::block_on(controller.control(stop)).map_err(Errors::from)
 }
@@ -78,7 +78,7 @@ struct Controller {
     manner: Arc<Chosen>,
     joint: Arc<Joint>,
     executes: ExecutePlans,
-    told: PlanPublisher,
+    plan_publisher: PlanPublisher,
 }
 
 /// Outcome of executing a plan.
@@ -180,7 +180,7 @@ impl Controller {
             .map_err(|error| NoPlan::None(format!("there is no further thread: {error}")))?;
         let outcome =
             receiver.recv().await.unwrap_or_else(|_| Err(NoPlan::Fault("the planner has ended".to_owned())));
-        self.told.publish_result(&outcome);
+        self.plan_publisher.publish_result(&outcome);
         outcome
     }
 
@@ -228,8 +228,8 @@ impl Controller {
 
     /// Waits for a change of the knowledge base, at most for `time`.
     async fn pause(&self, time: Duration, stop: &AtomicBool) {
-        let (begun, available) = (Instant::now(), self.joint.available());
-        while begun.elapsed() < time && !stop.load(Ordering::Relaxed) && self.joint.available() == available {
+        let (start, available) = (Instant::now(), self.joint.available());
+        while start.elapsed() < time && !stop.load(Ordering::Relaxed) && self.joint.available() == available {
             Timer::after(POLL_INTERVAL).await;
         }
     }

@@ -224,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pair_is_the_value_of_an_attribute() {
+    fn a_number_under_a_key_is_the_value_of_an_attribute() {
         let rule = rule("hardware_id = \"usb-*\"\nattribute = \"battery\"\nkey = \"Charge\"\nscale = 0.01");
         let rule = rule.expect("a rule");
         let measured = |text: &str| {
@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn rules_that_mean_nothing_are_refused() {
+    fn inconsistent_rules_are_rejected() {
         for (text, part) in [
             ("component = \"c\"", "selects every status"),
             ("name = \"a\"", "either"),

@@ -253,7 +253,7 @@ impl Driver {
                     let timeout = Duration::from_millis(self.timeout.load(Ordering::Relaxed));
                     self.robot.change(change, timeout);
                 }
-                Output::Look(function) => self.robot.look(&function),
+                Output::Look(function) => self.robot.request_mode(&function),
                 Output::Probe(function, after) => self.robot.probe(&function, after),
                 Output::Reply(number, success) => self.robot.reply(number, success),
                 Output::Perform(number, call) => self.robot.perform(number, call),

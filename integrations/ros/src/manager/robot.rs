@@ -40,10 +40,10 @@ const MAX_MODE_REQUESTS: u32 = 3;
 /// Services of a function.
 struct Function {
     change: Arc<Caller<ChangeMode>>,
-    look: Arc<Caller<GetMode>>,
+    get_mode: Arc<Caller<GetMode>>,
     /// Running call. A new call replaces it.
     calling: Option<Task<()>>,
-    looking: Option<Task<()>>,
+    mode_request: Option<Task<()>>,
     /// Servers of the mode.
     servers: BTreeSet<[u8; 16]>,
     /// Number of remaining mode requests.
@@ -85,9 +85,9 @@ impl Robot {
                 function.clone(),
                 Function {
                     change: Arc::new(node.caller(&service("change_mode"))),
-                    look: Arc::new(node.caller(&service("get_mode"))),
+                    get_mode: Arc::new(node.caller(&service("get_mode"))),
                     calling: None,
-                    looking: None,
+                    mode_request: None,
                     servers: BTreeSet::new(),
                     greetings: 0,
                 },
@@ -132,11 +132,11 @@ impl Robot {
     /// Returns the mode of each function, if it replies. Missing replies are logged and published
     /// as events.
     pub(super) async fn modes(&self) -> Vec<(String, Option<String>)> {
-        let look = |(name, function): (&String, &Function)| {
-            let (name, look) = (name.clone(), Arc::clone(&function.look));
-            async move { (name, look.call(GetModeRequest::default(), MODE_TIMEOUT).await) }
+        let request = |(name, function): (&String, &Function)| {
+            let (name, get_mode) = (name.clone(), Arc::clone(&function.get_mode));
+            async move { (name, get_mode.call(GetModeRequest::default(), MODE_TIMEOUT).await) }
         };
-        let answers = futures::future::join_all(self.functions.iter().map(look)).await;
+        let answers = futures::future::join_all(self.functions.iter().map(request)).await;
         let logged = |(name, answer): (String, Result<GetModeResponse, CallError>)| match answer {
             Ok(answer) => (name, Some(answer.current_mode)),
             Err(error) => {
@@ -184,7 +184,7 @@ impl Robot {
     pub(super) fn request_new_modes(&mut self) {
         let mut names = Vec::new();
         for (name, function) in &mut self.functions {
-            let servers = function.look.servers();
+            let servers = function.get_mode.servers();
             if !function.servers.is_empty() && !servers.is_subset(&function.servers) {
                 function.greetings = MAX_MODE_REQUESTS;
             }
@@ -197,16 +197,16 @@ impl Robot {
             }
         }
         for name in names {
-            self.look(&name);
+            self.request_mode(&name);
         }
     }
 
     /// Requests the mode of a function.
-    pub(super) fn look(&mut self, name: &str) {
+    pub(super) fn request_mode(&mut self, name: &str) {
         let Some(function) = self.functions.get_mut(name) else { return };
-        let (look, inputs, name) = (Arc::clone(&function.look), self.inputs.clone(), name.to_owned());
-        function.looking = Some(smol::spawn(async move {
-            if let Ok(answer) = look.call(GetModeRequest::default(), MODE_TIMEOUT).await {
+        let (get_mode, inputs, name) = (Arc::clone(&function.get_mode), self.inputs.clone(), name.to_owned());
+        function.mode_request = Some(smol::spawn(async move {
+            if let Ok(answer) = get_mode.call(GetModeRequest::default(), MODE_TIMEOUT).await {
                 let _ = inputs.send(Input::Mode(name, answer.current_mode));
             }
         }));
@@ -216,11 +216,11 @@ impl Robot {
     /// replying while it has a server.
     pub(super) fn probe(&mut self, name: &str, after: Duration) {
         let Some(function) = self.functions.get(name) else { return };
-        let (change, look) = (Arc::clone(&function.change), Arc::clone(&function.look));
+        let (change, get_mode) = (Arc::clone(&function.change), Arc::clone(&function.get_mode));
         let (inputs, name) = (self.inputs.clone(), name.to_owned());
         smol::spawn(async move {
             Timer::after(after).await;
-            let answers = match look.call(GetModeRequest::default(), MODE_TIMEOUT).await {
+            let answers = match get_mode.call(GetModeRequest::default(), MODE_TIMEOUT).await {
                 Ok(_) => true,
                 Err(CallError::Absent { .. }) => change.is_served(),
                 Err(_) => false,

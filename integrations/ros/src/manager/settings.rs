@@ -143,7 +143,7 @@ mod tests {
     use super::Settings;
 
     #[test]
-    fn the_example_is_read() {
+    fn settings_of_the_suave_example_are_read() {
         let mission = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/suave/suave.toml");
         let settings = Settings::read(None, &mission).expect("settings");
         let functions = &settings.functions;

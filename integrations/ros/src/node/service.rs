@@ -134,10 +134,10 @@ impl<S: Service> Caller<S> {
     /// # Errors
     /// No valid reply arrives in time.
     pub async fn call(&self, request: S::Request, within: Duration) -> Result<S::Response, CallError> {
-        let begun = Instant::now();
+        let start = Instant::now();
         let mut connection = self.connection.lock().await;
         let (Server { mapping, .. }, client) = self.connect(&mut connection, within).await?;
-        let remaining = within.saturating_sub(begun.elapsed());
+        let remaining = within.saturating_sub(start.elapsed());
         let broken = |because: String| CallError::Broken { service: self.full.clone(), because };
         let id = client.async_send_request(request).await.map_err(|error| broken(error.to_string()))?;
         let (mut answer, mut timer) = (

@@ -93,7 +93,7 @@ impl Node {
         drop(node);
         let subscription = created.map_err(|error| not_made(&full, &error))?;
         self.expect_message::<M>(&full);
-        let (weak, begun) = (Arc::downgrade(self), Instant::now());
+        let (weak, start) = (Arc::downgrade(self), Instant::now());
         let old = Old { since: SystemTime::now(), is_wanted: qos_wants_old };
         self.spawn(async move {
             let mut samples = Box::pin(subscription.async_stream());
@@ -102,7 +102,7 @@ impl Node {
                 let Some(node) = weak.upgrade() else { return };
                 match sample {
                     Ok((_, info)) if node.graph.is_unfit(info.publisher_gid()) => {}
-                    Ok((_, info)) if begun.elapsed() < AGE_CHECK_PERIOD && old.is_old(&info) => {}
+                    Ok((_, info)) if start.elapsed() < AGE_CHECK_PERIOD && old.is_old(&info) => {}
                     Ok((message, _)) => take(message),
                     Err(error) => {
                         if wrong % INVALID_PER_LOG_MESSAGE == 0 {

@@ -122,7 +122,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_plan_is_as_far_as_its_actions() {
+    fn progress_is_the_mean_completion_and_the_current_action() {
         let info = |status, completion, name: &str| ActionExecutionInfo {
             status,
             completion,

@@ -158,7 +158,7 @@ async fn negotiate(
         Canceled,
         Time,
     }
-    let begun = Instant::now();
+    let start = Instant::now();
     hub.send(negotiation.request());
     let mut last_request = Instant::now();
     loop {
@@ -188,7 +188,7 @@ async fn negotiate(
             Next::Time => {
                 last_request = Instant::now();
                 if negotiation.performer.is_none() {
-                    if begun.elapsed() > SEARCH_TIMEOUT {
+                    if start.elapsed() > SEARCH_TIMEOUT {
                         let seconds = SEARCH_TIMEOUT.as_secs();
                         let text = format!("no performer of PlanSys2 has answered for {seconds} s");
                         return End::Failed(text);

@@ -41,7 +41,7 @@ struct Planner {
     /// Mission whose knowledge base restricts the designs.
     joint: Option<Arc<Joint>>,
     manner: Arc<Chosen>,
-    told: PlanPublisher,
+    plan_publisher: PlanPublisher,
 }
 
 /// Serves as PlanSys2's planner. The node must have no parameters yet. Returns its lifecycle, which
@@ -57,7 +57,7 @@ pub fn serve(node: &Arc<Node>, setup: Option<Setup>) -> Result<Arc<Lifecycle>, E
         busy: AtomicUsize::new(0),
         joint,
         manner,
-        told: PlanPublisher::new(node)?,
+        plan_publisher: PlanPublisher::new(node)?,
     });
     let to_errors = |message: Message| vec![message];
     let lifecycle = Lifecycle::serve(node, |_| true).map_err(to_errors)?;
@@ -108,14 +108,14 @@ impl Planner {
         let (planner, phase) = (Arc::clone(self), Arc::clone(lifecycle));
         self.node.serve::<GetPlan>("planner/get_plan", move |request, answer| {
             let is_ready = is_ready(&phase);
-            planner.aside("get_plan", move |planner| {
+            planner.run_in_background("get_plan", move |planner| {
                 answer.send(get_plan_response(planner.plan(is_ready, request.domain, request.problem, 0)));
             });
         })?;
         let (planner, phase) = (Arc::clone(self), Arc::clone(lifecycle));
         self.node.serve::<GetPlanArray>("planner/get_plan_array", move |request, answer| {
             let is_ready = is_ready(&phase);
-            planner.aside("get_plan_array", move |planner| {
+            planner.run_in_background("get_plan_array", move |planner| {
                 let alternatives = planner.manner.get().alternatives;
                 let planned = planner.plan(is_ready, request.domain, request.problem, alternatives);
                 answer.send(get_plan_array_response(planned));
@@ -124,14 +124,14 @@ impl Planner {
         let (planner, phase) = (Arc::clone(self), Arc::clone(lifecycle));
         self.node.serve::<ValidateDomain>("planner/validate_domain", move |request, answer| {
             let is_ready = is_ready(&phase);
-            planner.aside("validate_domain", move |_| {
+            planner.run_in_background("validate_domain", move |_| {
                 answer.send(validate_domain_response(is_ready, &request.domain));
             });
         })
     }
 
     /// Runs work on a separate thread.
-    fn aside(self: &Arc<Self>, name: &str, work: impl FnOnce(&Self) + Send + 'static) {
+    fn run_in_background(self: &Arc<Self>, name: &str, work: impl FnOnce(&Self) + Send + 'static) {
         let planner = Arc::clone(self);
         if let Err(error) = on_a_thread(name, move || work(&planner)) {
             // The client receives no reply and times out.
@@ -168,7 +168,7 @@ impl Planner {
             joint: joint.as_ref(),
         };
         let planned = solve(request, &manner);
-        self.told.publish_result(&planned);
+        self.plan_publisher.publish_result(&planned);
         planned
     }
 }

@@ -162,7 +162,7 @@ pub fn solve(request: Request<'_>, manner: &Manner) -> Result<Found, NoPlan> {
 }
 
 fn solve_or_panic(Request { domain, problem, joint }: Request<'_>, manner: &Manner) -> Result<Found, NoPlan> {
-    let begun = Instant::now();
+    let start = Instant::now();
     let knowledge = joint.and_then(Mission::knowledge).cloned();
     let bindings = joint.map_or_else(Bindings::default, |mission| mission.bindings().clone());
     let mission =
@@ -182,7 +182,7 @@ fn solve_or_panic(Request { domain, problem, joint }: Request<'_>, manner: &Mann
     }
     let (solution, other_plans) = match overlapping {
         Some(solution) => (solution, Vec::new()),
-        None => task.sequence(Limits::none().with_time(manner.time_limit.saturating_sub(begun.elapsed())))?,
+        None => task.sequence(Limits::none().with_time(manner.time_limit.saturating_sub(start.elapsed())))?,
     };
     let plan = solution.plan.as_ref().ok_or_else(|| task.reason(&solution))?;
     let written = |plan: &Plan| plan_lines(&mission.written(plan.clone()));

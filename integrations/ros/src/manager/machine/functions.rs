@@ -68,7 +68,7 @@ impl Machine {
             Outcome::Done => {
                 self.pending.remove(&function);
                 self.grant(&function, &mode);
-                self.trouble.entry(function.clone()).or_default().silences = 0;
+                self.failures.entry(function.clone()).or_default().missed_replies = 0;
                 match effect {
                     Some(effect) => self.acknowledge(effect),
                     None => self.queue(&Event::Observed { function: function.clone(), design: None }),
@@ -82,10 +82,11 @@ impl Machine {
             }
             Outcome::Failed(because) => {
                 self.complain(&function, &mode, &because);
-                let trouble = self.trouble.entry(function.clone()).or_default();
-                trouble.silences = trouble.silences.saturating_add(1);
-                let wait =
-                    INITIAL_PROBE_DELAY.saturating_mul(1 << trouble.silences.min(6)).min(MAX_PROBE_DELAY);
+                let failures = self.failures.entry(function.clone()).or_default();
+                failures.missed_replies = failures.missed_replies.saturating_add(1);
+                let wait = INITIAL_PROBE_DELAY
+                    .saturating_mul(1 << failures.missed_replies.min(6))
+                    .min(MAX_PROBE_DELAY);
                 self.outputs.push(Output::Probe(function.clone(), wait));
                 self.failed(&function, effect, None);
                 because
@@ -120,7 +121,7 @@ impl Machine {
         if let Some(Command::Reconfigure { to, .. }) =
             outstanding.map(|effect_in_progress| effect_in_progress.command.clone())
         {
-            self.trouble.entry(function.to_owned()).or_default().designs.insert(to, again);
+            self.failures.entry(function.to_owned()).or_default().designs.insert(to, again);
             self.queue(&Event::ReconfigurationFailed { effect });
         }
         self.outputs.push(Output::Look(function.to_owned()));
@@ -184,8 +185,8 @@ impl Machine {
     pub(super) fn changed_late(&mut self, function: &str, mode: &str) {
         let designs = self.control.beliefs().mission().designs_of(function);
         let Some(design) = self.settings.functions.design(function, mode, &designs) else { return };
-        let trouble = self.trouble.get_mut(function).and_then(|trouble| trouble.designs.remove(&design));
-        if trouble.is_some() {
+        let failures = self.failures.get_mut(function).and_then(|failures| failures.designs.remove(&design));
+        if failures.is_some() {
             self.queue(&Event::Design { design, realisable: true });
         }
     }
@@ -201,19 +202,20 @@ impl Machine {
     }
 
     pub(super) fn probed(&mut self, function: &str, answers: bool) -> String {
-        let trouble = self.trouble.entry(function.to_owned()).or_default();
+        let failures = self.failures.entry(function.to_owned()).or_default();
         if !answers {
-            let wait = INITIAL_PROBE_DELAY.saturating_mul(1 << trouble.silences.min(6)).min(MAX_PROBE_DELAY);
+            let wait =
+                INITIAL_PROBE_DELAY.saturating_mul(1 << failures.missed_replies.min(6)).min(MAX_PROBE_DELAY);
             self.outputs.push(Output::Probe(function.to_owned(), wait.min(SILENT_RETRY_DELAY)));
             return format!("{function} does not answer");
         }
-        let back: Vec<String> = trouble
+        let back: Vec<String> = failures
             .designs
             .iter()
             .filter(|(_, again)| again.is_none())
             .map(|(design, _)| design.clone())
             .collect();
-        trouble.designs.retain(|_, again| again.is_some());
+        failures.designs.retain(|_, again| again.is_some());
         for design in back {
             self.queue(&Event::Design { design, realisable: true });
         }
@@ -225,12 +227,12 @@ impl Machine {
     pub(super) fn tick(&mut self) -> String {
         let now = self.now;
         let mut back = Vec::new();
-        for trouble in self.trouble.values_mut() {
+        for failures in self.failures.values_mut() {
             let due = |again: &Option<Duration>| again.is_some_and(|again| again <= now);
             back.extend(
-                trouble.designs.iter().filter(|(_, again)| due(again)).map(|(design, _)| design.clone()),
+                failures.designs.iter().filter(|(_, again)| due(again)).map(|(design, _)| design.clone()),
             );
-            trouble.designs.retain(|_, again| !due(again));
+            failures.designs.retain(|_, again| !due(again));
         }
         for design in back {
             self.queue(&Event::Design { design, realisable: true });

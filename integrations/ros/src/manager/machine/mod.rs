@@ -40,11 +40,11 @@ struct Action {
 
 /// Reasons not to call a function.
 #[derive(Debug, Clone, Default)]
-struct Trouble {
+struct CallFailures {
     /// Failed designs, with the time of the next attempt. `None` while the function does not reply.
     designs: BTreeMap<String, Option<Duration>>,
     /// Number of consecutive calls without a reply.
-    silences: u32,
+    missed_replies: u32,
 }
 
 /// Work after a restart that must wait until the state of the robot is known.
@@ -75,15 +75,15 @@ pub(super) struct Machine {
     grants: BTreeMap<String, Grant>,
     action: Option<Action>,
     /// Numbers of the unanswered requests to start and to end a task.
-    waiting: Vec<u64>,
-    ending: Vec<u64>,
-    trouble: BTreeMap<String, Trouble>,
+    start_requests: Vec<u64>,
+    end_requests: Vec<u64>,
+    failures: BTreeMap<String, CallFailures>,
     /// `true` if the last planning found no plan.
     without_plan: bool,
-    obeyed: bool,
+    autopilot_obeyed: bool,
     deferred: Option<Deferred>,
     /// Transient states since the last stable one.
-    through: Vec<State>,
+    transient_states: Vec<State>,
     outputs: Vec<Output>,
     lines: VecDeque<String>,
     now: Duration,
@@ -109,13 +109,13 @@ impl Machine {
             modes: BTreeMap::new(),
             grants: BTreeMap::new(),
             action: None,
-            waiting: Vec::new(),
-            ending: Vec::new(),
-            trouble: BTreeMap::new(),
+            start_requests: Vec::new(),
+            end_requests: Vec::new(),
+            failures: BTreeMap::new(),
             without_plan: false,
-            obeyed: false,
+            autopilot_obeyed: false,
             deferred: None,
-            through: Vec::new(),
+            transient_states: Vec::new(),
             outputs: Vec::new(),
             lines: VecDeque::new(),
             now: Duration::ZERO,
@@ -157,7 +157,7 @@ impl Machine {
             self.catch_up();
             self.settle()?;
         }
-        let is_news = matches!(input, Input::Line(_));
+        let is_line = matches!(input, Input::Line(_));
         let because = match input {
             Input::Ready(modes) => self.ready(modes)?,
             Input::Line(line) => self.queue_line(line),
@@ -180,7 +180,7 @@ impl Machine {
         };
         self.settle()?;
         // The line may contain the diagnostics for which deferred work waits.
-        if is_news {
+        if is_line {
             self.catch_up();
             self.settle()?;
         }
@@ -197,13 +197,13 @@ impl Machine {
             return Ok(());
         }
         while let Some(line) = self.lines.pop_front() {
-            let answers = self.hand(&line)?;
+            let answers = self.pass_line(&line)?;
             self.handle_answers(answers);
         }
         Ok(())
     }
 
-    fn hand(&mut self, line: &str) -> Result<Vec<Answer>, Message> {
+    fn pass_line(&mut self, line: &str) -> Result<Vec<Answer>, Message> {
         match &mut self.journal {
             None => Ok(self.control.handle(&Observation::parse(line), self.now)),
             Some(journal) => {
@@ -232,26 +232,26 @@ impl Machine {
             State::Idle
         };
         self.reply();
-        let through = std::mem::take(&mut self.through);
+        let transient_states = std::mem::take(&mut self.transient_states);
         if next != self.state {
-            let way: Vec<String> = [self.state]
+            let path: Vec<String> = [self.state]
                 .into_iter()
-                .chain(through)
+                .chain(transient_states)
                 .chain([next])
                 .map(|state| state.to_string())
                 .collect();
             self.state = next;
-            self.note(&way, because)?;
+            self.note(&path, because)?;
         }
         Ok(())
     }
 
     /// Notes transitions in the journal and publishes them.
-    fn note(&mut self, way: &[String], because: &str) -> Result<(), Message> {
-        let text = format!("{}: {because}", way.join(" -> "));
-        let answers = self.hand(&Event::Note { text }.to_json().to_string())?;
+    fn note(&mut self, path: &[String], because: &str) -> Result<(), Message> {
+        let text = format!("{}: {because}", path.join(" -> "));
+        let answers = self.pass_line(&Event::Note { text }.to_json().to_string())?;
         self.handle_answers(answers);
-        let event = json!({"answer": "state", "state": way.last(), "way": way, "because": because, "task": self.task});
+        let event = json!({"answer": "state", "state": path.last(), "way": path, "because": because, "task": self.task});
         self.outputs.push(Output::Event(event));
         Ok(())
     }
@@ -267,7 +267,7 @@ impl Machine {
         for answer in answers {
             self.outputs.push(Output::Event(answer.to_json()));
             match answer {
-                Answer::PlanRequested { .. } => self.through = vec![State::Plan],
+                Answer::PlanRequested { .. } => self.transient_states = vec![State::Plan],
                 Answer::PlanFound { .. } => {
                     self.without_plan = false;
                     // The remainder of a cancelled action is no plan once its task has ended.

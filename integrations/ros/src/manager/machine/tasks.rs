@@ -14,10 +14,10 @@ impl Machine {
             return;
         }
         let granted = self.task.is_some() && !self.without_plan;
-        for number in std::mem::take(&mut self.waiting) {
+        for number in std::mem::take(&mut self.start_requests) {
             self.outputs.push(Output::Reply(number, granted));
         }
-        for number in std::mem::take(&mut self.ending) {
+        for number in std::mem::take(&mut self.end_requests) {
             let unanswered =
                 self.modes.iter().any(|(function, mode)| self.settings.functions.unground(function) != mode);
             self.outputs.push(Output::Reply(number, self.task.is_none() && !unanswered));
@@ -38,7 +38,7 @@ impl Machine {
             self.refuse(&because);
             return because;
         }
-        self.waiting.push(number);
+        self.start_requests.push(number);
         if self.task.as_deref() != Some(task) {
             self.task = Some(task.to_owned());
             for (name, value) in &settings.facts {
@@ -67,10 +67,10 @@ impl Machine {
             self.outputs.extend(number.map(|number| Output::Reply(number, true)));
             return format!("the task {task} is not under way");
         }
-        self.ending.extend(number);
+        self.end_requests.extend(number);
         self.without_plan = false;
-        for waiting in std::mem::take(&mut self.waiting) {
-            self.outputs.push(Output::Reply(waiting, false));
+        for request in std::mem::take(&mut self.start_requests) {
+            self.outputs.push(Output::Reply(request, false));
         }
         if self.task.take().is_some() {
             self.queue(&Event::Goal { goal: EMPTY_GOAL.to_owned() });
@@ -94,7 +94,7 @@ impl Machine {
         if self.task.take().is_none() && !was_active {
             return;
         }
-        for number in std::mem::take(&mut self.waiting) {
+        for number in std::mem::take(&mut self.start_requests) {
             self.outputs.push(Output::Reply(number, true));
         }
         if self.control.beliefs().goal().is_some_and(|goal| goal != EMPTY_GOAL) {
@@ -107,10 +107,10 @@ impl Machine {
 
     pub(super) fn autopilot(&mut self, mode: &str) -> String {
         let obeys = self.settings.autopilot.as_ref().is_some_and(|autopilot| autopilot.mode == mode);
-        let was = std::mem::replace(&mut self.obeyed, obeys);
+        let had_obeyed = std::mem::replace(&mut self.autopilot_obeyed, obeys);
         let because = format!("the autopilot is in the mode {mode}");
         match self.task.clone() {
-            Some(task) if was && !obeys => {
+            Some(task) if had_obeyed && !obeys => {
                 self.cancel(None, &task);
                 because
             }

@@ -272,7 +272,7 @@ fn a_request_of_another_client_is_believed_at_once() {
 }
 
 #[test]
-fn the_battery_comes_first() {
+fn a_low_battery_interrupts_the_task_for_recharging() {
     let mut robot = Robot::new(None);
     let outputs = robot.request("search_pipeline");
     robot.obey(outputs);
@@ -296,7 +296,7 @@ fn the_battery_comes_first() {
 }
 
 #[test]
-fn a_task_ends_when_the_autopilot_does_not_obey_any_more() {
+fn a_task_ends_when_the_autopilot_no_longer_obeys() {
     let mut robot = Robot::new(None);
     let outputs = robot.request("search_pipeline");
     robot.obey(outputs);

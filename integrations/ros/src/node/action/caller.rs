@@ -108,14 +108,14 @@ impl<A: Action + 'static> ActionCaller<A> {
     /// # Errors
     /// There is no server, no answer, or the goal is rejected.
     pub async fn pursue(&self, goal: A::Goal, within: Duration) -> Result<Pursued<A>, GoalError> {
-        let begun = Instant::now();
+        let start = Instant::now();
         let unreachable = |because: String| GoalError::Unreachable { action: self.full.clone(), because };
         // The lock is held until the answer arrives, because concurrent receivers would take each
         // other's answers.
         let mut connection = self.connection.lock().await;
         let connection = self.connect(&mut connection, within).await.map_err(unreachable)?;
         let (client, mapping) = (&connection.client, connection.server.mapping);
-        let remaining = within.saturating_sub(begun.elapsed());
+        let remaining = within.saturating_sub(start.elapsed());
         let mut timer = futures::FutureExt::fuse(Timer::after(remaining));
         let mut sent = Box::pin(client.async_send_goal(goal)).fuse();
         let (id, response) = futures::select! {

@@ -52,7 +52,7 @@ fn see(keeping: &mut Keeping, metres: &str) -> Vec<Wanted> {
 const NOW: Duration = Duration::from_secs(100);
 
 #[test]
-fn an_objective_gets_the_best_design_and_loses_it_with_its_end() {
+fn an_objective_has_the_best_design_until_it_ends() {
     let (mut keeping, goal) = (keeping(), GoalId::new_random());
     assert!(keeping.refused(&wanted("f_fly")).is_some_and(|text| text.contains("`f_fly`")));
     assert_eq!(keeping.refused(&wanted(PATH)), None);
