@@ -165,13 +165,13 @@ pub fn explore<N: Number, G: Generator<N>>(
 ) -> Result<Explored<G::State, N>, Error> {
     let mut exploration = Exploration::new(generator, bounds)?;
     exploration.run(generator, bounds, usize::MAX)?;
-    Ok(exploration.found)
+    Ok(exploration.explored)
 }
 
 /// A resumable exploration.
 pub(crate) struct Exploration<S, N> {
     /// The explored part of the process.
-    pub found: Explored<S, N>,
+    pub explored: Explored<S, N>,
     /// The next state to expand.
     next: usize,
     /// The state at which progress is reported next.
@@ -192,7 +192,7 @@ impl<S: Clone + Eq + Hash, N: Number> Exploration<S, N> {
         }
         let rewards = vec![Vec::new(); generator.rewards()];
         let explored = Explored { mdp: Mdp::default(), starts: states.len(), states, rewards, deadlocks: 0 };
-        Ok(Self { found: explored, next: 0, next_report: 0 })
+        Ok(Self { explored, next: 0, next_report: 0 })
     }
 
     /// Explores until all states are expanded or `transitions` is reached, possibly exceeded by
@@ -207,21 +207,21 @@ impl<S: Clone + Eq + Hash, N: Number> Exploration<S, N> {
         let limit = bounds.states.min(MAX_COUNT);
         loop {
             let begin = self.next;
-            let end = self.found.states.len().min(begin.saturating_add(BATCH));
+            let end = self.explored.states.len().min(begin.saturating_add(BATCH));
             if begin == end {
                 return Ok(true);
             }
-            if self.found.mdp.transition_count() >= transitions {
+            if self.explored.mdp.transition_count() >= transitions {
                 return Ok(false);
             }
             if begin >= self.next_report {
                 self.next_report = begin.saturating_add(REPORT_INTERVAL);
-                if !(bounds.progress)(self.found.states.len()) {
-                    return Err(Error::Interrupted { states: self.found.states.len() });
+                if !(bounds.progress)(self.explored.states.len()) {
+                    return Err(Error::Interrupted { states: self.explored.states.len() });
                 }
             }
-            batch.write(generator, &self.found.states, begin..end)?;
-            self.found.add(&mut batch, begin, limit)?;
+            batch.write(generator, &self.explored.states, begin..end)?;
+            self.explored.add(&mut batch, begin, limit)?;
             self.next = end;
         }
     }
@@ -308,7 +308,11 @@ impl<S: Clone + Eq + Hash, N: Number> Explored<S, N> {
 impl<S: Clone> Exploration<S, Fraction> {
     /// Converts to doubles. Returns `None` if a number is out of range.
     pub fn rounded(&self) -> Option<Exploration<S, f64>> {
-        Some(Exploration { found: self.found.rounded()?, next: self.next, next_report: self.next_report })
+        Some(Exploration {
+            explored: self.explored.rounded()?,
+            next: self.next,
+            next_report: self.next_report,
+        })
     }
 }
 

@@ -110,7 +110,7 @@ fn survive(text: &str) {
     }
 }
 
-/// Checks a property of [`MODEL`], if the text is a property; only a panic is a failure.
+/// Checks a property of `MODEL`, if the text is a property; only a panic is a failure.
 fn survive_property(question: &str) {
     thread_local! {
         static READ: prism::ast::Model = prism::parse(MODEL).expect("a model");

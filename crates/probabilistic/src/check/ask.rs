@@ -18,10 +18,10 @@ impl From<Error> for Stop {
 }
 
 /// The result of a part of a check.
-pub type Asked<T> = Result<T, Stop>;
+pub type Checked<T> = Result<T, Stop>;
 
 /// Converts `None`, the result of exact arithmetic that exceeded its budget, to an error.
-pub fn worked<T>(result: Option<T>) -> Asked<T> {
+pub fn within_budget<T>(result: Option<T>) -> Checked<T> {
     result.ok_or(Stop::TooMuchWork)
 }
 

@@ -8,7 +8,7 @@
 use fixedbitset::FixedBitSet;
 use num_traits::{Signed, ToPrimitive};
 
-use crate::check::ask::{Asked, property_error, refusal, worked};
+use crate::check::ask::{Checked, property_error, refusal, within_budget};
 use crate::check::paths::Valued;
 use crate::check::query::Query;
 use crate::check::vector::{Span, Vector};
@@ -29,7 +29,7 @@ impl<N: Number> Query<'_, N> {
         problem: Problem<'_, N>,
         name: Option<&str>,
         steps: &Steps,
-    ) -> Asked<Valued<N>> {
+    ) -> Checked<Valued<N>> {
         if self.evaluated.is_some() || steps.least.is_some() {
             return Err(refusal(
                 "Q403",
@@ -62,7 +62,7 @@ impl<N: Number> Query<'_, N> {
             // The oldest vector is reused: no choice refers to its budget.
             let mut values = if previous.len() > greatest { previous.remove(0) } else { vec![N::zero(); n] };
             if let Some(sweep) = &sweep {
-                worked(sweep.layer(&mut values, &previous, budget, &mut self.work.borrow_mut()))?;
+                within_budget(sweep.layer(&mut values, &previous, budget, &mut self.work.borrow_mut()))?;
                 error += sweep.error;
                 previous.push(values);
                 continue;
@@ -89,7 +89,7 @@ impl<N: Number> Query<'_, N> {
                 blocked: problem.blocked.map(|_| &layers.blocked),
                 allowed: None,
             };
-            let solution = worked(solve_within(layer, None, &mut self.work.borrow_mut()))?;
+            let solution = within_budget(solve_within(layer, None, &mut self.work.borrow_mut()))?;
             let layer_error = solution.errors.iter().fold(0.0_f64, |most, error| most.max(*error));
             // The sums over the targets round, too.
             error += layer_error + 256.0 * f64::EPSILON;
@@ -104,7 +104,7 @@ impl<N: Number> Query<'_, N> {
 }
 
 /// Converts rewards to integers, or returns an error.
-fn whole_rewards<N: Number>(rewards: &[N]) -> Asked<Vec<usize>> {
+fn whole_rewards<N: Number>(rewards: &[N]) -> Checked<Vec<usize>> {
     let whole = |reward: &N| {
         let value = reward.to_f64();
         let exact = reward.to_rational().is_none_or(|exact| exact.is_integer());
@@ -213,7 +213,7 @@ impl<'a, N: Number> Sweep<'a, N> {
 }
 
 impl<N: Number> Layers<N> {
-    fn new(mdp: &Mdp<N>, problem: Problem<'_, N>, earned: &[usize]) -> Asked<Self> {
+    fn new(mdp: &Mdp<N>, problem: Problem<'_, N>, earned: &[usize]) -> Checked<Self> {
         let n = mdp.states();
         let mut result = Mdp::default();
         let mut paid = Vec::new();

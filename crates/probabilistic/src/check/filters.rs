@@ -5,7 +5,7 @@ use num_bigint::BigInt;
 use num_rational::BigRational;
 
 use crate::check::answer::{Answer, Listed, Quantity};
-use crate::check::ask::{Asked, refusal};
+use crate::check::ask::{Checked, refusal};
 use crate::check::query::Query;
 use crate::check::vector::Vector;
 use crate::number::{Number, count};
@@ -32,7 +32,7 @@ enum Values<N> {
 
 impl<N: Number> Query<'_, N> {
     /// Evaluates a filter.
-    pub fn filtered(&self, filter: Filter, inner: &Expr, states: Option<&Expr>) -> Asked<Filtered> {
+    pub fn filtered(&self, filter: Filter, inner: &Expr, states: Option<&Expr>) -> Checked<Filtered> {
         let chosen = states.map_or_else(|| Ok(self.every()), |states| self.truth(states))?;
         let values = match self.kind_of(inner)? {
             Type::Bool => Values::Truth(self.truth(inner)?),
@@ -47,7 +47,7 @@ impl<N: Number> Query<'_, N> {
         }
     }
 
-    fn of_truth(&self, filter: Filter, holds: &FixedBitSet, chosen: &FixedBitSet) -> Asked<Filtered> {
+    fn of_truth(&self, filter: Filter, holds: &FixedBitSet, chosen: &FixedBitSet) -> Checked<Filtered> {
         let satisfying = || chosen.intersection(holds);
         let listed = |state: usize| Listed {
             values: self.values_of(state),
@@ -68,7 +68,7 @@ impl<N: Number> Query<'_, N> {
         })
     }
 
-    fn of_numbers(&self, filter: Filter, vector: &Vector<N>, chosen: &FixedBitSet) -> Asked<Filtered> {
+    fn of_numbers(&self, filter: Filter, vector: &Vector<N>, chosen: &FixedBitSet) -> Checked<Filtered> {
         let listed = |state: usize| Listed {
             values: self.values_of(state),
             truth: None,
@@ -123,7 +123,7 @@ fn whole(number: usize) -> Answer {
 }
 
 /// Returns the only state of a set, or an error.
-fn only(chosen: &FixedBitSet) -> Asked<usize> {
+fn only(chosen: &FixedBitSet) -> Checked<usize> {
     let mut states = chosen.ones();
     match (states.next(), states.next()) {
         (Some(state), None) => Ok(state),

@@ -6,7 +6,7 @@
 
 use fixedbitset::FixedBitSet;
 
-use crate::check::ask::{Asked, refusal, worked};
+use crate::check::ask::{Checked, refusal, within_budget};
 use crate::check::paths::{Valued, inverse};
 use crate::check::query::Query;
 use crate::check::vector::{Span, Vector};
@@ -27,7 +27,7 @@ struct Ends {
 }
 
 impl<N: Number> Query<'_, N> {
-    fn no_given_policy(&self) -> Asked<()> {
+    fn no_given_policy(&self) -> Checked<()> {
         match self.evaluated {
             None => Ok(()),
             Some(_) => Err(refusal("Q403", "a policy is not evaluated for what happens for ever")),
@@ -35,7 +35,7 @@ impl<N: Number> Query<'_, N> {
     }
 
     /// The probabilities of visiting some states infinitely often.
-    pub fn repeatedly(&self, direction: Direction, goal: &FixedBitSet) -> Asked<Valued<N>> {
+    pub fn repeatedly(&self, direction: Direction, goal: &FixedBitSet) -> Checked<Valued<N>> {
         self.no_given_policy()?;
         let mut good = FixedBitSet::with_capacity(self.mdp().states());
         match direction {
@@ -63,7 +63,7 @@ impl<N: Number> Query<'_, N> {
     }
 
     /// Expected total rewards.
-    pub fn total(&self, direction: Direction, rewards: &[N]) -> Asked<Valued<N>> {
+    pub fn total(&self, direction: Direction, rewards: &[N]) -> Checked<Valued<N>> {
         self.no_given_policy()?;
         if direction == Direction::Min || self.program.kind == ModelKind::Dtmc {
             // A total is finite only if rewards are eventually 0 forever.
@@ -81,7 +81,7 @@ impl<N: Number> Query<'_, N> {
         reach_back(mdp, &mut infinite);
         let merged = EcQuotient::new(mdp, &ends, rewards, &infinite)?;
         let problem = Problem::new(&merged.mdp, Direction::Max, Some(&merged.rewards), &merged.end);
-        let solution = worked(solve_within(problem, None, &mut self.work.borrow_mut()))?;
+        let solution = within_budget(solve_within(problem, None, &mut self.work.borrow_mut()))?;
         let solved = Vector::solved(solution, Span::Positive);
         let place = |state: usize| merged.place[state] as usize;
         let finite = |state: &usize| !infinite.contains(*state);
@@ -120,7 +120,7 @@ impl<N: Number> Query<'_, N> {
     /// One state is chosen in each bottom component. The average is the quotient of the expected
     /// reward and the expected number of steps between two visits of that state (renewal
     /// theorem). The probability of each component is a reachability probability.
-    pub fn long_run(&self, rewards: &[N]) -> Asked<Valued<N>> {
+    pub fn long_run(&self, rewards: &[N]) -> Checked<Valued<N>> {
         self.no_given_policy()?;
         let mdp = self.mdp();
         let ends = end_components(mdp, &self.every());
@@ -158,7 +158,7 @@ impl<N: Number> Query<'_, N> {
         }
         let problem =
             Problem { terminal_values: Some(&averages), ..Problem::new(mdp, Direction::Max, None, &chosen) };
-        let solution = worked(solve_within(problem, None, &mut self.work.borrow_mut()))?;
+        let solution = within_budget(solve_within(problem, None, &mut self.work.borrow_mut()))?;
         let mut vector = Vector::solved(solution, Span::Positive);
         for bound in &mut vector.errors {
             *bound += error;
@@ -251,7 +251,7 @@ struct EcQuotient<N> {
 
 impl<N: Number> EcQuotient<N> {
     /// Computes the quotient without the states of infinite value.
-    fn new(mdp: &Mdp<N>, ends: &Ends, rewards: &[N], infinite: &FixedBitSet) -> Asked<Self> {
+    fn new(mdp: &Mdp<N>, ends: &Ends, rewards: &[N], infinite: &FixedBitSet) -> Checked<Self> {
         let mut place = vec![NONE; mdp.states()];
         let mut members: Vec<Vec<usize>> = Vec::new();
         let mut of_block = vec![NONE; ends.count];

@@ -236,14 +236,14 @@ impl Processes {
         let exact = Remembered::new(exact);
         let mut exploration = Exploration::new(&exact, bounds)?;
         if exploration.run(&exact, bounds, MAX_EXACT_TRANSITIONS)? {
-            let budget = budget(exploration.found.mdp.transition_count());
-            return Ok(Self { exact: Some(exploration.found), doubles: None, budget });
+            let budget = budget(exploration.explored.mdp.transition_count());
+            return Ok(Self { exact: Some(exploration.explored), doubles: None, budget });
         }
         let doubles = match exploration.rounded() {
             Some(mut rounded) => {
                 drop(exploration);
                 rounded.run(&Remembered::new(program), bounds, usize::MAX)?;
-                rounded.found
+                rounded.explored
             }
             // The exploration in doubles reports the place of the number.
             None => explore(&Remembered::new(program), bounds)?,

@@ -1,7 +1,7 @@
 //! Multi-objective properties with two objectives.
 
 use crate::check::answer::{Answer, Outcome};
-use crate::check::ask::{Asked, Stop, property_error, refusal};
+use crate::check::ask::{Checked, Stop, property_error, refusal};
 use crate::check::query::Query;
 use crate::error::Place;
 use crate::number::Number;
@@ -11,7 +11,7 @@ use crate::solve::Direction;
 
 impl<N: Number> Query<'_, N> {
     /// Returns the Pareto front, or the optimum of one objective under a bound on the other.
-    pub fn multi(&self, parts: &[Property]) -> Asked<Outcome> {
+    pub fn multi(&self, parts: &[Property]) -> Checked<Outcome> {
         let place = Place { line: 1, column: 1 };
         let [first, second] = parts else {
             return Err(property_error("Q403", place, "`multi` is handled with two objectives").into());
@@ -58,7 +58,7 @@ impl<N: Number> Query<'_, N> {
         Ok(Outcome::Front(pairs.collect()))
     }
 
-    fn objective(&self, property: &Property) -> Asked<Objective<N>> {
+    fn objective(&self, property: &Property) -> Checked<Objective<N>> {
         let refuse = |text: &str| Err(refusal("Q403", text));
         match property {
             Property::Reward(question, name, path) if reaches(path) => {

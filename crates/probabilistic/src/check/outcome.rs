@@ -4,7 +4,7 @@ use fixedbitset::FixedBitSet;
 use num_rational::BigRational;
 
 use crate::check::answer::{Answer, Outcome};
-use crate::check::ask::{Asked, Stop, refusal};
+use crate::check::ask::{Checked, Stop, refusal};
 use crate::check::filters::{Filtered, extreme};
 use crate::check::paths::Valued;
 use crate::check::query::Query;
@@ -28,7 +28,7 @@ impl<N: Number> Query<'_, N> {
         }
     }
 
-    fn outcome(&self, property: &Property) -> Asked<Attained> {
+    fn outcome(&self, property: &Property) -> Checked<Attained> {
         match property {
             Property::Multi(_) if self.evaluated.is_some() => {
                 Err(refusal("Q403", "a policy is evaluated for one objective at a time"))
@@ -61,7 +61,7 @@ impl<N: Number> Query<'_, N> {
     }
 
     /// The values of an operator in all states.
-    fn valued(&self, property: &Property) -> Asked<Valued<N>> {
+    fn valued(&self, property: &Property) -> Checked<Valued<N>> {
         match property {
             Property::Probability(question, path) => self.path(self.direction(question)?, path),
             Property::Reward(question, name, path) => {
@@ -84,7 +84,7 @@ impl<N: Number> Query<'_, N> {
     }
 
     /// The values of a nested property.
-    pub fn property_numbers(&self, property: &Property) -> Asked<Vector<N>> {
+    pub fn property_numbers(&self, property: &Property) -> Checked<Vector<N>> {
         match property {
             Property::Expression(inner) => self.numbers(inner),
             Property::Filter(filter, inner, states) => {
@@ -114,7 +114,7 @@ impl<N: Number> Query<'_, N> {
     }
 
     /// The states in which a nested property holds.
-    pub fn property_truth(&self, property: &Property) -> Asked<FixedBitSet> {
+    pub fn property_truth(&self, property: &Property) -> Checked<FixedBitSet> {
         let n = self.mdp().states();
         match property {
             Property::Expression(inner) => self.truth(inner),
@@ -148,7 +148,7 @@ impl<N: Number> Query<'_, N> {
     }
 
     /// The optimisation direction: as requested, or the worst case of a bound over all policies.
-    fn direction(&self, question: &Question) -> Asked<Direction> {
+    fn direction(&self, question: &Question) -> Checked<Direction> {
         match (question.direction, &question.bound) {
             (Some(direction), _) => Ok(direction),
             (None, Some((BinaryOp::Less | BinaryOp::LessEqual, _))) => Ok(Direction::Max),
@@ -161,7 +161,7 @@ impl<N: Number> Query<'_, N> {
         }
     }
 
-    fn judged(&self, vector: &Vector<N>, question: &Question) -> Asked<Outcome> {
+    fn judged(&self, vector: &Vector<N>, question: &Question) -> Checked<Outcome> {
         let Some((op, bound)) = &question.bound else { return Ok(self.of_starts(vector)) };
         let bound = self.constant(bound)?;
         let starts = 0..self.explored.starts;

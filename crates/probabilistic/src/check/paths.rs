@@ -3,7 +3,7 @@
 use fixedbitset::FixedBitSet;
 use num_traits::ToPrimitive;
 
-use crate::check::ask::{Asked, property_error, refusal, worked};
+use crate::check::ask::{Checked, property_error, refusal, within_budget};
 use crate::check::query::Query;
 use crate::check::steps;
 use crate::check::vector::{Span, Vector};
@@ -41,7 +41,7 @@ pub fn opposite(direction: Direction) -> Direction {
 
 impl<N: Number> Query<'_, N> {
     /// The minimal or maximal probabilities of a path formula.
-    pub fn path(&self, direction: Direction, path: &Path) -> Asked<Valued<N>> {
+    pub fn path(&self, direction: Direction, path: &Path) -> Checked<Valued<N>> {
         let n = self.mdp().states();
         match path {
             Path::State(states) => Ok(Vector::indicator(&self.truth(states)?, n).into()),
@@ -90,7 +90,7 @@ impl<N: Number> Query<'_, N> {
         left: &FixedBitSet,
         right: &FixedBitSet,
         steps: Option<&Steps>,
-    ) -> Asked<Valued<N>> {
+    ) -> Checked<Valued<N>> {
         let mut blocked = left.clone();
         blocked.union_with(right);
         blocked.toggle_range(..);
@@ -130,7 +130,7 @@ impl<N: Number> Query<'_, N> {
     }
 
     /// The step interval of a bounded operator.
-    fn span(&self, steps: &Steps) -> Asked<Range> {
+    fn span(&self, steps: &Steps) -> Checked<Range> {
         let least = match &steps.least {
             None => 0,
             Some(bound) => self.limit(bound, i8::from(bound.strict))?,
@@ -145,12 +145,12 @@ impl<N: Number> Query<'_, N> {
     }
 
     /// The value of an upper step bound.
-    fn at_most(&self, bound: &StepBound) -> Asked<u32> {
+    fn at_most(&self, bound: &StepBound) -> Checked<u32> {
         self.limit(bound, 0_i8.saturating_sub(i8::from(bound.strict)))
     }
 
     /// The value of a step bound plus `offset`.
-    fn limit(&self, bound: &StepBound, offset: i8) -> Asked<u32> {
+    fn limit(&self, bound: &StepBound, offset: i8) -> Checked<u32> {
         // `validate` has checked that the bound is an integer.
         let limit = self.constant(&bound.limit)?.to_integer() + offset;
         Ok(limit.to_u32().filter(|most| *most < MAX_STEPS).ok_or_else(|| {
@@ -160,7 +160,7 @@ impl<N: Number> Query<'_, N> {
     }
 
     /// Expected rewards of a reward formula.
-    pub fn reward(&self, direction: Direction, name: Option<&str>, path: &RewardPath) -> Asked<Valued<N>> {
+    pub fn reward(&self, direction: Direction, name: Option<&str>, path: &RewardPath) -> Checked<Valued<N>> {
         let n = self.mdp().states();
         let no_states = FixedBitSet::with_capacity(n);
         match path {
@@ -189,9 +189,9 @@ impl<N: Number> Query<'_, N> {
     }
 
     /// The optimal values after `steps` steps, or those of the given policy.
-    fn stepped(&self, problem: Problem<'_, N>, values: Vec<N>, steps: u32) -> Asked<steps::Stepped<N>> {
+    fn stepped(&self, problem: Problem<'_, N>, values: Vec<N>, steps: u32) -> Checked<steps::Stepped<N>> {
         let problem = Problem { allowed: self.evaluated.as_ref(), ..problem };
-        worked(steps::apply(problem, values, steps, &mut self.work.borrow_mut()))
+        within_budget(steps::apply(problem, values, steps, &mut self.work.borrow_mut()))
     }
 
     pub fn problem<'p>(
@@ -204,10 +204,10 @@ impl<N: Number> Query<'_, N> {
     }
 
     /// Solves a problem or evaluates the given policy, and breaks ties between optimal choices.
-    pub fn solved(&self, problem: Problem<'_, N>) -> Asked<Valued<N>> {
+    pub fn solved(&self, problem: Problem<'_, N>) -> Checked<Valued<N>> {
         let span = if problem.rewards.is_none() { Span::Probability } else { Span::Positive };
         let problem = Problem { allowed: self.evaluated.as_ref(), ..problem };
-        let solution = worked(self.solve_hinted(problem))?;
+        let solution = within_budget(self.solve_hinted(problem))?;
         let mut policy = solution.policy.clone();
         if self.options.policy && self.evaluated.is_none() {
             let secondary = match &self.options.secondary {

@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use fixedbitset::FixedBitSet;
 
 use crate::check::answer::Precision;
-use crate::check::ask::{Asked, property_error};
+use crate::check::ask::{Checked, property_error};
 use crate::check::options::Options;
 use crate::error::{Error, Place};
 use crate::explore::Explored;
@@ -76,13 +76,13 @@ impl<'a, N: Number> Query<'a, N> {
     /// The rewards of a structure, for each choice.
     pub fn rewards(&self, name: Option<&str>) -> Result<&[N], Error> {
         let number = structure(&self.program.reward_names, name)?;
-        let at = self.computed_rewards.iter().position(|computed_rewards| *computed_rewards == number);
+        let at = self.computed_rewards.iter().position(|computed| *computed == number);
         let at = at.ok_or_else(|| Error::Policy("these rewards were not computed".to_owned()))?;
         Ok(&self.explored.rewards[at])
     }
 
     /// The state rewards of a structure, without transition rewards.
-    pub fn state_rewards(&self, name: Option<&str>) -> Asked<Vec<N>> {
+    pub fn state_rewards(&self, name: Option<&str>) -> Checked<Vec<N>> {
         let number = structure(&self.program.reward_names, name)?;
         let mut values = Vec::new();
         let mut rewards = Vec::with_capacity(self.mdp().states());

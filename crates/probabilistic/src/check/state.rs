@@ -3,7 +3,7 @@
 use fixedbitset::FixedBitSet;
 use num_rational::BigRational;
 
-use crate::check::ask::{Asked, Stop, property_error, refusal};
+use crate::check::ask::{Checked, Stop, property_error, refusal};
 use crate::check::query::Query;
 use crate::check::vector::{Span, Vector};
 use crate::error::{Diagnostic, Error};
@@ -107,7 +107,7 @@ fn mentions_built_in(expression: &Expr, names: &Names) -> bool {
 
 impl<N: Number> Query<'_, N> {
     /// The type of an expression with nested properties.
-    pub fn kind_of(&self, expression: &Expr) -> Asked<Type> {
+    pub fn kind_of(&self, expression: &Expr) -> Checked<Type> {
         let names = &self.program.names;
         let compiled = names.clone().compile(&with_placeholders(expression, names));
         compiled.map(|(_, kind)| kind).map_err(|problem| Stop::Wrong(Error::Property(problem.into())))
@@ -121,7 +121,7 @@ impl<N: Number> Query<'_, N> {
     }
 
     /// The set of states in which an expression holds.
-    pub fn truth(&self, expression: &Expr) -> Asked<FixedBitSet> {
+    pub fn truth(&self, expression: &Expr) -> Checked<FixedBitSet> {
         let (code, sets) = self.prepared(expression, Type::Bool)?;
         let n = self.mdp().states();
         let mut satisfying = FixedBitSet::with_capacity(n);
@@ -137,7 +137,7 @@ impl<N: Number> Query<'_, N> {
     }
 
     /// Compiles an expression. Also returns the state sets of its additional variables.
-    fn prepared(&self, expression: &Expr, kind: Type) -> Asked<(Code, Vec<FixedBitSet>)> {
+    fn prepared(&self, expression: &Expr, kind: Type) -> Checked<(Code, Vec<FixedBitSet>)> {
         let mut sets = Vec::new();
         let mut stopped = None;
         let written = self.with_sets(expression, &mut sets, &mut stopped);
@@ -206,7 +206,7 @@ impl<N: Number> Query<'_, N> {
     }
 
     /// The states in which a comparison of numbers holds.
-    fn compared(&self, op: BinaryOp, left: &Expr, right: &Expr) -> Asked<FixedBitSet> {
+    fn compared(&self, op: BinaryOp, left: &Expr, right: &Expr) -> Checked<FixedBitSet> {
         let (left, right) = (self.numbers(left)?, self.numbers(right)?);
         let mut satisfying = FixedBitSet::with_capacity(self.mdp().states());
         for state in 0..self.mdp().states() {
@@ -231,7 +231,7 @@ impl<N: Number> Query<'_, N> {
     }
 
     /// The values of an expression in all states.
-    pub fn numbers(&self, expression: &Expr) -> Asked<Vector<N>> {
+    pub fn numbers(&self, expression: &Expr) -> Checked<Vector<N>> {
         match &expression.kind {
             ExprKind::Property(property) if is_number(property) => self.property_numbers(property),
             ExprKind::Negative(inner) if is_numeric(inner) => {
@@ -251,7 +251,7 @@ impl<N: Number> Query<'_, N> {
         }
     }
 
-    fn plain_numbers(&self, expression: &Expr) -> Asked<Vector<N>> {
+    fn plain_numbers(&self, expression: &Expr) -> Checked<Vector<N>> {
         let (code, sets) = self.prepared(expression, Type::Double)?;
         let mut values = Vec::new();
         let mut vector = Vector::exactly(Vec::new(), Span::Any);
@@ -271,7 +271,7 @@ impl<N: Number> Query<'_, N> {
     }
 
     /// The value of an expression without variables.
-    pub fn constant(&self, expression: &Expr) -> Asked<BigRational> {
+    pub fn constant(&self, expression: &Expr) -> Checked<BigRational> {
         let mut names = self.program.names.clone();
         let code = names.constant(expression, Type::Double);
         let value = code.and_then(|code| {
@@ -299,7 +299,7 @@ pub fn compare(op: BinaryOp, order: std::cmp::Ordering) -> bool {
 }
 
 /// Combines values state by state. The errors include those of the operands and of the operation.
-fn joined<N: Number>(op: BinaryOp, left: &Vector<N>, right: &Vector<N>, at: &Expr) -> Asked<Vector<N>> {
+fn joined<N: Number>(op: BinaryOp, left: &Vector<N>, right: &Vector<N>, at: &Expr) -> Checked<Vector<N>> {
     let wrong = |text: &str| Stop::Wrong(property_error("Q303", at.place, text));
     let mut vector = Vector::exactly(Vec::with_capacity(left.values.len()), Span::Any);
     vector.infinite.grow(left.values.len());

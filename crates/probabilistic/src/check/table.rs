@@ -107,7 +107,7 @@ impl PolicyTable {
         }
         let mut policy = vec![NONE; explored.mdp.states()];
         for (number, row) in self.rows.iter().enumerate() {
-            let problem = |what: &str| Error::Policy(numbered(number, what));
+            let problem = |description: &str| Error::Policy(numbered(number, description));
             let values: Vec<i64> = order.iter().map(|at| row.values[*at]).collect();
             let state = program
                 .pack(&values)

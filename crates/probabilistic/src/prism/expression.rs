@@ -115,12 +115,12 @@ impl<'a> Cursor<'a> {
         is_next
     }
 
-    /// Creates the error that `what` is expected at the next token.
-    pub fn expected(&self, what: &str) -> Diagnostic {
+    /// Creates the error that the described token is expected next.
+    pub fn expected(&self, description: &str) -> Diagnostic {
         Diagnostic::new(
             "Q102",
             self.place(),
-            format!("{what} is expected here, not {}", self.peek().describe()),
+            format!("{description} is expected here, not {}", self.peek().describe()),
         )
     }
 
@@ -135,7 +135,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// Consumes a name; an error if a name is not next. Keywords are not names.
-    pub fn name(&mut self, what: &str) -> Read<(String, Place)> {
+    pub fn name(&mut self, description: &str) -> Read<(String, Place)> {
         let place = self.place();
         match self.peek() {
             Kind::Name(name) if !is_keyword(name) => {
@@ -145,9 +145,9 @@ impl<'a> Cursor<'a> {
             Kind::Name(name) => Err(Diagnostic::new(
                 "Q103",
                 place,
-                format!("`{name}` is a word of the PRISM language and cannot be {what}"),
+                format!("`{name}` is a word of the PRISM language and cannot be {description}"),
             )),
-            _ => Err(self.expected(what)),
+            _ => Err(self.expected(description)),
         }
     }
 

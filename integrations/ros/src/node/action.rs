@@ -21,7 +21,7 @@ use crate::interfaces::action_msgs::srv::CancelGoalRequest;
 use crate::interfaces::{Action, Service, ServiceHashes, Structure as _};
 use crate::node::graph::{Expected, Graph, Topics};
 use crate::node::reply_gate::ReplyGate;
-use crate::node::{Node, Severity, client_name, dds_type, latched, not_made, qos};
+use crate::node::{Node, Severity, client_name, creation_error, dds_type, latched, qos};
 
 pub use caller::{Accepted, ActionCaller, GoalError, Pursued};
 
@@ -377,7 +377,7 @@ impl Node {
             match created {
                 Ok(server) => drop(served.server.set(server)),
                 Err(error) => {
-                    node.log(Severity::Fatal, &not_made(&full, &error).message);
+                    node.log(Severity::Fatal, &creation_error(&full, &error).message);
                     return;
                 }
             }

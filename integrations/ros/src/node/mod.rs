@@ -180,8 +180,8 @@ fn client_name(full: &str) -> Result<ros2_client::Name, Message> {
 }
 
 /// Error about an entity that could not be created.
-fn not_made(what: &str, error: &dyn std::fmt::Display) -> Message {
-    Message::error("N122", format!("{what} could not be made: {error}"))
+fn creation_error(entity: &str, error: &dyn std::fmt::Display) -> Message {
+    Message::error("N122", format!("{entity} could not be made: {error}"))
 }
 
 /// Returns `true` if the environment specifies Lyrical or later, in which some types differ.

@@ -18,7 +18,7 @@ use crate::node::graph::{Expected, Server, Topics};
 use crate::node::qos;
 use crate::node::reply_gate::ReplyGate;
 use crate::node::rmw::Mapping;
-use crate::node::{Node, Severity, client_name, dds_type, not_made};
+use crate::node::{Node, Severity, client_name, creation_error, dds_type};
 
 /// Time after the discovery of a server during which it discovers this client. Its earlier replies
 /// would be lost.
@@ -188,7 +188,7 @@ impl<S: Service> Caller<S> {
         self.node
             .inner()
             .create_client(mapping.service_mapping(), &name, &kind, qos::service(), qos::service())
-            .map_err(|error| not_made(&self.full, &error))
+            .map_err(|error| creation_error(&self.full, &error))
     }
 }
 
@@ -238,7 +238,7 @@ impl Node {
             let server = match created {
                 Ok(server) => server,
                 Err(error) => {
-                    node.log(Severity::Fatal, &not_made(&full, &error).message);
+                    node.log(Severity::Fatal, &creation_error(&full, &error).message);
                     return;
                 }
             };

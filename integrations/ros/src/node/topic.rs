@@ -12,7 +12,7 @@ use smol::Timer;
 
 use crate::interfaces::Msg;
 use crate::node::graph::Expected;
-use crate::node::{Node, Severity, client_name, dds_type, not_made};
+use crate::node::{Node, Severity, client_name, creation_error, dds_type};
 
 /// Number of invalid samples of a topic per log message.
 const INVALID_PER_LOG_MESSAGE: u64 = 1000;
@@ -68,7 +68,7 @@ impl Node {
             .create_topic(&topic_name, MessageTypeName::new(M::PACKAGE, M::NAME), &qos)
             .and_then(|topic| node.create_publisher(&topic, Some(qos)));
         drop(node);
-        let inner = created.map_err(|error| not_made(&full, &error))?;
+        let inner = created.map_err(|error| creation_error(&full, &error))?;
         self.expect_message::<M>(&full);
         Ok(Publisher { inner })
     }
@@ -91,7 +91,7 @@ impl Node {
             .create_topic(&topic_name, MessageTypeName::new(M::PACKAGE, M::NAME), &qos)
             .and_then(|topic| node.create_subscription::<M>(&topic, Some(qos)));
         drop(node);
-        let subscription = created.map_err(|error| not_made(&full, &error))?;
+        let subscription = created.map_err(|error| creation_error(&full, &error))?;
         self.expect_message::<M>(&full);
         let (weak, start) = (Arc::downgrade(self), Instant::now());
         let old = Old { since: SystemTime::now(), is_wanted: qos_wants_old };

@@ -25,8 +25,8 @@ const REFUSED_RETRY_DELAY: Duration = Duration::from_secs(60);
 
 /// Time during which a granted mode is believed although the mode manager reports another one.
 ///
-/// `system_modes` answers `change_mode` before the node has changed, and `get_mode` returns the old mode until its observer has noticed
-/// the change. A manager that believes the old mode requests the new one again, which causes the next report.
+/// `system_modes` answers `change_mode` before the node has changed, and `get_mode` returns the old mode until its observer
+/// has noticed the change. A manager that believes the old mode requests the new one again, which causes the next report.
 const GRANT_PERIOD: Duration = Duration::from_secs(2);
 
 /// A mode that was granted recently.
@@ -139,8 +139,8 @@ impl Machine {
         self.grants.insert(function.to_owned(), grant);
     }
 
-    /// A mode manager has received a request for a mode. Unlike a reported mode, a request for a mode that we have not requested recently comes
-    /// from another client, so that it ends the period of [`GRANT`].
+    /// Handles a request for a mode that a mode manager has received. Unlike a reported mode, a request that this program
+    /// has not sent recently comes from another client. It therefore ends the [`GRANT_PERIOD`].
     pub(super) fn mode_requested(&mut self, function: &str, mode: &str) -> String {
         if self.modes.get(function).is_some_and(|current| current == mode) {
             return format!("{function} was requested to have the mode {mode}, which it has");

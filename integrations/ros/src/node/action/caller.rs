@@ -15,7 +15,7 @@ use crate::interfaces::Action;
 use crate::node::action::{GoalEnd, POLL_INTERVAL, expect_action};
 use crate::node::graph::{Graph, Server, Topics};
 use crate::node::rmw::Mapping;
-use crate::node::{Node, client_name, latched, not_made, qos};
+use crate::node::{Node, client_name, creation_error, latched, qos};
 
 /// Time after the discovery of a server during which it discovers this client.
 const MATCHING_TIME: Duration = Duration::from_millis(100);
@@ -175,7 +175,7 @@ impl<A: Action + 'static> ActionCaller<A> {
         self.node
             .inner()
             .create_action_client(mapping.service_mapping(), &name, &kind, policies)
-            .map_err(|error| not_made(&self.full, &error))
+            .map_err(|error| creation_error(&self.full, &error))
     }
 }
 
