@@ -55,7 +55,7 @@ pub fn run(
     arguments: impl IntoIterator<Item = String>,
     environment: impl Fn(&str) -> Option<String>,
 ) -> Said {
-    let invocation = match invocation(arguments, environment) {
+    let invocation = match parse_invocation(arguments, environment) {
         Ok(invocation) => invocation,
         Err(text) => return Said::reason(&text),
     };
@@ -75,7 +75,7 @@ pub fn run(
 
 const USAGE: &str = "usage: popf [--metric EXPRESSION] [--mission MANIFEST] [--time-limit SECONDS] [--overlap yes|no] DOMAIN PROBLEM";
 
-fn asked(
+fn parse_invocation(
     arguments: impl IntoIterator<Item = String>,
     environment: impl Fn(&str) -> Option<String>,
 ) -> Result<Invocation, String> {

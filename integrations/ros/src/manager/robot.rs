@@ -151,7 +151,7 @@ impl Robot {
 
     /// Returns the possible modes of each function, if it replies.
     pub(super) async fn available(&self, settings: &Settings) -> Vec<(String, Vec<String>)> {
-        let ask = |name: &String| {
+        let request = |name: &String| {
             let service = format!("/{}/get_available_modes", settings.functions.system(name));
             let (name, caller) = (name.clone(), self.node.caller::<GetAvailableModes>(&service));
             async move {
@@ -159,7 +159,7 @@ impl Robot {
                 answer.map(|answer| (name, answer.available_modes))
             }
         };
-        futures::future::join_all(self.functions.keys().map(ask)).await.into_iter().flatten().collect()
+        futures::future::join_all(self.functions.keys().map(request)).await.into_iter().flatten().collect()
     }
 
     /// Calls `change_mode`. A running call of the function is cancelled.

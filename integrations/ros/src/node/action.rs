@@ -86,7 +86,7 @@ struct Known<R> {
     /// Result with the time of its end.
     result: Option<(R, Instant)>,
     /// Requests that wait for the result.
-    asked: Vec<RmwRequestId>,
+    result_requests: Vec<RmwRequestId>,
 }
 
 /// Goals of an action server.
@@ -127,7 +127,7 @@ impl<A: Action> Goals<A> {
     pub fn accept(&self, wanted: Wanted) -> GoalId {
         let accepted = Time::now();
         let goal_state =
-            Known { accepted, status: GoalStatusEnum::Executing, result: None, asked: Vec::new() };
+            Known { accepted, status: GoalStatusEnum::Executing, result: None, result_requests: Vec::new() };
         self.goals().insert(wanted.goal, goal_state);
         self.answer(wanted, true, accepted);
         self.publish_status();
@@ -142,7 +142,7 @@ impl<A: Action> Goals<A> {
             accepted: Time::now(),
             status: GoalStatusEnum::Executing,
             result: None,
-            asked: Vec::new(),
+            result_requests: Vec::new(),
         };
         self.goals().insert(id, goal_state);
         id
@@ -194,7 +194,7 @@ impl<A: Action> Goals<A> {
         let Some(known) = goals.get_mut(&goal) else { return };
         known.status = end.status();
         known.result = Some((result, Instant::now()));
-        for request in std::mem::take(&mut known.asked) {
+        for request in std::mem::take(&mut known.result_requests) {
             self.send_result(request, known);
         }
         goals.retain(|_, own| own.result.as_ref().is_none_or(|(_, ended)| ended.elapsed() < RESULT_LIFETIME));
@@ -259,7 +259,7 @@ impl<A: Action> Goals<A> {
         let mut goals = self.goals();
         match goals.get_mut(&goal) {
             Some(known) if known.result.is_some() => self.send_result(request, known),
-            Some(known) => known.asked.push(request),
+            Some(known) => known.result_requests.push(request),
             None => {
                 drop(goals);
                 let response =

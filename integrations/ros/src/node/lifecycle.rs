@@ -172,9 +172,9 @@ impl Lifecycle {
     /// A topic cannot be created.
     pub(crate) fn activated(node: &Arc<Node>) -> Result<Arc<AtomicBool>, Message> {
         let active = Arc::new(AtomicBool::new(true));
-        let hear = Arc::clone(&active);
+        let flag = Arc::clone(&active);
         let lifecycle = Self::serve(node, move |phase| {
-            hear.store(phase == Phase::Active, Ordering::Relaxed);
+            flag.store(phase == Phase::Active, Ordering::Relaxed);
             true
         })?;
         lifecycle.go(Phase::Inactive);

@@ -190,10 +190,10 @@ impl Node {
                 descriptors: request.names.iter().map(describe).collect(),
             });
         })?;
-        let (node, known, hear) = (Arc::downgrade(self), Arc::clone(&table), Arc::clone(&changed));
+        let (node, known, on_change) = (Arc::downgrade(self), Arc::clone(&table), Arc::clone(&changed));
         self.serve::<SetParameters>("~/set_parameters", move |request, answer| {
             let Some(node) = node.upgrade() else { return };
-            let set = |own: msg::Parameter| result(node.set(&known, &*hear, vec![own]));
+            let set = |parameter: msg::Parameter| result(node.set(&known, &*on_change, vec![parameter]));
             answer.send(SetParametersResponse { results: request.parameters.into_iter().map(set).collect() });
         })?;
         let node = Arc::downgrade(self);

@@ -84,7 +84,7 @@ async fn follow<A: Meaning>(
         Ok(pursued) => pursued,
         Err(error) => return End::Failed(error.to_string()),
     };
-    pursue_on(&pursued, performance, |heard| A::progress(call, heard), A::shortfall).await
+    pursue_on(&pursued, performance, |message| A::progress(call, message), A::shortfall).await
 }
 
 /// Follows a goal until it ends, and cancels it on request.
@@ -123,9 +123,9 @@ impl Meaning for SpiralSearch {
         Ok(SpiralSearchGoal::default())
     }
 
-    fn progress(call: &Call, heard: &SpiralSearchFeedback) -> Progress {
-        let text = format!("{:.1} s searched", heard.elapsed_time);
-        feedback(part(heard.elapsed_time, call.duration as f32), text)
+    fn progress(call: &Call, message: &SpiralSearchFeedback) -> Progress {
+        let text = format!("{:.1} s searched", message.elapsed_time);
+        feedback(part(message.elapsed_time, call.duration as f32), text)
     }
 
     fn shortfall(result: &SpiralSearchResult) -> Option<String> {
@@ -142,8 +142,8 @@ impl Meaning for FollowPipeline {
         Ok(FollowPipelineGoal { timeout: 0.0 })
     }
 
-    fn progress(_: &Call, heard: &FollowPipelineFeedback) -> Progress {
-        feedback(None, format!("{:.2} m inspected", heard.distance_inspected))
+    fn progress(_: &Call, message: &FollowPipelineFeedback) -> Progress {
+        feedback(None, format!("{:.2} m inspected", message.distance_inspected))
     }
 
     fn shortfall(result: &FollowPipelineResult) -> Option<String> {

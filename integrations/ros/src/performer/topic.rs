@@ -19,8 +19,8 @@ impl Awaited {
         let waiting = Arc::new(Mutex::new(Vec::<smol::channel::Sender<()>>::new()));
         let listeners = Arc::clone(&waiting);
         // A volatile subscription matches both latched and volatile publishers.
-        node.subscribe::<Bool>(topic, depth(10), move |heard| {
-            if heard.data {
+        node.subscribe::<Bool>(topic, depth(10), move |message| {
+            if message.data {
                 for listener in listeners.lock().unwrap_or_else(PoisonError::into_inner).drain(..) {
                     let _ = listener.try_send(());
                 }

@@ -24,7 +24,7 @@ impl Joint {
     /// # Errors
     /// The topic cannot be created.
     pub(crate) fn listen(node: &Arc<Node>, mission: Mission) -> Result<Arc<Self>, Errors> {
-        let diagnosed = Diagnosed::hear(node, &[], || {})?;
+        let diagnosed = Diagnosed::subscribe(node, &[], || {})?;
         Ok(Arc::new(Self { mission: Mutex::new(mission), diagnosed }))
     }
 
