@@ -125,9 +125,9 @@ fn parse_invocation(
 }
 
 fn seconds(text: &str) -> Result<Duration, String> {
-    let wrong = || format!("`{text}` is not a time in seconds such as 10 or 0.5");
-    let value: f64 = text.parse().map_err(|_| wrong())?;
-    Duration::try_from_secs_f64(value).ok().filter(|time| !time.is_zero()).ok_or_else(wrong)
+    let invalid = || format!("`{text}` is not a time in seconds such as 10 or 0.5");
+    let value: f64 = text.parse().map_err(|_| invalid())?;
+    Duration::try_from_secs_f64(value).ok().filter(|time| !time.is_zero()).ok_or_else(invalid)
 }
 
 /// Returns the text for the plugin, or the reason why there is no plan.
@@ -135,8 +135,8 @@ fn solve(invocation: &Invocation) -> Result<String, String> {
     let domain = read(&invocation.domain, DOMAIN)?;
     let problem = read(&invocation.problem, PROBLEM)?;
     if is_void(problem.text()) {
-        let wrong = |messages: Errors| NoPlan::Input(messages).text();
-        return planner::check_domain(&domain).map(|()| popf_text(&[])).map_err(wrong);
+        let describe = |messages: Errors| NoPlan::Input(messages).text();
+        return planner::check_domain(&domain).map(|()| popf_text(&[])).map_err(describe);
     }
     let setup =
         invocation.mission.as_deref().map(Setup::read).transpose().map_err(|messages| all(&messages))?;

@@ -300,20 +300,20 @@ pub fn compare(op: BinaryOp, order: std::cmp::Ordering) -> bool {
 
 /// Combines values state by state. The errors include those of the operands and of the operation.
 fn joined<N: Number>(op: BinaryOp, left: &Vector<N>, right: &Vector<N>, at: &Expr) -> Checked<Vector<N>> {
-    let wrong = |text: &str| Stop::Wrong(property_error("Q303", at.place, text));
+    let fault = |text: &str| Stop::Wrong(property_error("Q303", at.place, text));
     let mut vector = Vector::exactly(Vec::with_capacity(left.values.len()), Span::Any);
     vector.infinite.grow(left.values.len());
     for (state, (a, b)) in left.values.iter().zip(&right.values).enumerate() {
         let ends = [left.infinite.contains(state), right.infinite.contains(state)];
         let (value, infinite) = match (op, ends) {
             (BinaryOp::Divide, [false, _]) if ends[1] => (N::zero(), false),
-            (BinaryOp::Divide, [false, false]) if b.is_zero() => return Err(wrong("a division by zero")),
+            (BinaryOp::Divide, [false, false]) if b.is_zero() => return Err(fault("a division by zero")),
             (BinaryOp::Plus, [false, false]) => (a.plus(b), false),
             (BinaryOp::Minus, [false, false]) => (a.minus(b), false),
             (BinaryOp::Times, [false, false]) => (a.times(b), false),
             (BinaryOp::Divide, [false, false]) => (a.over(b), false),
             (BinaryOp::Plus, _) | (BinaryOp::Minus, [true, false]) => (N::zero(), true),
-            _ => return Err(wrong("an operation with an infinite value")),
+            _ => return Err(fault("an operation with an infinite value")),
         };
         vector.infinite.set(state, infinite);
         if !N::EXACT {

@@ -66,7 +66,7 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
     )?;
     let mut control = Loop::new(mission, adaptation)?;
     let journal = journal(node, options, &mut control)?;
-    let begun = control.beliefs().now();
+    let start_time = control.beliefs().now();
     let performers: BTreeMap<String, Box<dyn Perform>> =
         performers(node, &settings.actions, &settings.poses)?;
     let machine = Machine::new(control, journal, settings.clone());
@@ -81,7 +81,7 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
         active,
         timeout,
         clock: Instant::now(),
-        begun,
+        start_time,
     };
     driver.wait_for_functions(&sender, &inputs, stop)?;
     driver.drive(&inputs, stop).map_err(Errors::from)
@@ -111,7 +111,7 @@ struct Driver {
     timeout: Arc<AtomicU64>,
     clock: Instant,
     /// Time of the last line in the journal.
-    begun: Duration,
+    start_time: Duration,
 }
 
 impl Driver {
@@ -243,7 +243,7 @@ impl Driver {
             Input::Diagnosed => Input::Line(self.robot.diagnosed()),
             other => other,
         };
-        let now = self.begun + self.clock.elapsed();
+        let now = self.start_time + self.clock.elapsed();
         if self.node.is_logged(Severity::Debug) && !matches!(input, Input::Tick) {
             self.node.log(Severity::Debug, &format!("hears {input:?}"));
         }

@@ -47,7 +47,7 @@ struct Function {
     /// Servers of the mode.
     servers: BTreeSet<[u8; 16]>,
     /// Number of remaining mode requests.
-    greetings: u32,
+    remaining_requests: u32,
 }
 
 /// All topics, services and actions of the manager.
@@ -89,7 +89,7 @@ impl Robot {
                     calling: None,
                     mode_request: None,
                     servers: BTreeSet::new(),
-                    greetings: 0,
+                    remaining_requests: 0,
                 },
             );
         }
@@ -186,13 +186,13 @@ impl Robot {
         for (name, function) in &mut self.functions {
             let servers = function.get_mode.servers();
             if !function.servers.is_empty() && !servers.is_subset(&function.servers) {
-                function.greetings = MAX_MODE_REQUESTS;
+                function.remaining_requests = MAX_MODE_REQUESTS;
             }
             if !servers.is_empty() {
                 function.servers = servers;
             }
-            if function.greetings > 0 {
-                function.greetings -= 1;
+            if function.remaining_requests > 0 {
+                function.remaining_requests -= 1;
                 names.push(name.clone());
             }
         }

@@ -29,7 +29,7 @@ pub use caller::{Accepted, ActionCaller, GoalError, Pursued};
 const POLL_INTERVAL: Duration = Duration::from_millis(2);
 
 /// Lifetime of a result for later requests, as in `rcl_action`.
-const RESULT_LIFETIME: Duration = Duration::from_secs(15 * 60);
+const LIFETIME: Duration = Duration::from_secs(15 * 60);
 
 type Server<A> = ActionServer<<A as Action>::Goal, <A as Action>::Result, <A as Action>::Feedback>;
 
@@ -197,7 +197,7 @@ impl<A: Action> Goals<A> {
         for request in std::mem::take(&mut known.result_requests) {
             self.send_result(request, known);
         }
-        goals.retain(|_, own| own.result.as_ref().is_none_or(|(_, ended)| ended.elapsed() < RESULT_LIFETIME));
+        goals.retain(|_, goal| goal.result.as_ref().is_none_or(|(_, ended)| ended.elapsed() < LIFETIME));
         drop(goals);
         self.publish_status();
     }
@@ -384,9 +384,9 @@ impl Node {
             drop(node);
             let mut gates = Gates::<A>::new(&full);
             loop {
-                for wrong in served.poll(&graph, &mut gates, &mut take) {
+                for error in served.poll(&graph, &mut gates, &mut take) {
                     let Some(node) = weak.upgrade() else { return };
-                    node.log(Severity::Warn, &format!("what {full} has heard is wrong: {wrong}"));
+                    node.log(Severity::Warn, &format!("what {full} has heard is wrong: {error}"));
                 }
                 if weak.strong_count() == 0 {
                     return;

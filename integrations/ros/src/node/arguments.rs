@@ -57,15 +57,15 @@ impl RosArguments {
         let mut messages = Vec::new();
         let mut words = ros.into_iter();
         while let Some(word) = words.next() {
-            if let Err(more) = arguments.take(&word, &mut words) {
-                messages.extend(more);
+            if let Err(errors) = arguments.take(&word, &mut words) {
+                messages.extend(errors);
             }
         }
         if messages.is_empty() { Ok((program_arguments, arguments)) } else { Err(messages.into()) }
     }
 
     fn take(&mut self, word: &str, words: &mut impl Iterator<Item = String>) -> Result<(), Errors> {
-        let mut next = || words.next().ok_or_else(|| vec![wrong(format!("`{word}` wants a value"))]);
+        let mut next = || words.next().ok_or_else(|| vec![invalid(format!("`{word}` wants a value"))]);
         match word {
             "-r" | "--remap" => self.rules.push(rule(&next()?)?),
             "-p" | "--param" => self.parameters.push(parameter(&next()?)?),
@@ -79,7 +79,7 @@ impl RosArguments {
                 let text = format!(
                     "`{word}` is not known behind `--ros-args`; -r, -p, --params-file and --log-level are"
                 );
-                return Err(wrong(text).into());
+                return Err(invalid(text).into());
             }
         }
         Ok(())
@@ -88,8 +88,9 @@ impl RosArguments {
     /// Full name of a node after the rules `__node` and `__ns`.
     pub(crate) fn node(&self, name: &str) -> FullName {
         let rule = |key: &str| {
-            let is_it = |own: &&Rule| own.from == key && own.node.as_deref().is_none_or(|node| node == name);
-            self.rules.iter().find(is_it).map(|own| own.to.clone())
+            let fits =
+                |rule: &&Rule| rule.from == key && rule.node.as_deref().is_none_or(|node| node == name);
+            self.rules.iter().find(fits).map(|rule| rule.to.clone())
         };
         let namespace = rule("__ns").unwrap_or_else(|| "/".to_owned());
         FullName::new(
@@ -101,9 +102,9 @@ impl RosArguments {
     /// Full name of a topic, service or action of a node after the first matching rule.
     pub(crate) fn remap(&self, name: &str, node: &FullName) -> String {
         let full = node.expand(name);
-        let fits = |own: &&Rule| {
-            let is_for = own.node.as_deref().is_none_or(|for_node| for_node == node.name());
-            is_for && !own.from.starts_with("__") && node.expand(&own.from) == full
+        let fits = |rule: &&Rule| {
+            let is_for = rule.node.as_deref().is_none_or(|for_node| for_node == node.name());
+            is_for && !rule.from.starts_with("__") && node.expand(&rule.from) == full
         };
         self.rules.iter().find(fits).map_or(full, |rule| node.expand(&rule.to))
     }
@@ -111,18 +112,19 @@ impl RosArguments {
     /// Returns the parameter values of a node; later ones take precedence.
     pub(crate) fn parameters(&self, node: &FullName) -> Vec<(String, ParameterValue)> {
         let full = node.to_string();
-        let matching = self.parameters.iter().filter(|own| is_match(&own.nodes, &full, node.name()));
+        let matching = self.parameters.iter().filter(|entry| is_match(&entry.nodes, &full, node.name()));
         matching.map(|assigned| (assigned.name.clone(), assigned.value.clone())).collect()
     }
 }
 
-fn wrong(text: String) -> Message {
+fn invalid(text: String) -> Message {
     Message::error("N101", text)
 }
 
 /// Parses `from:=to` or `node:from:=to`.
 fn rule(text: &str) -> Result<Rule, Message> {
-    let malformed = || wrong(format!("`{text}` is not a rule; it should be `from:=to`, or `node:from:=to`"));
+    let malformed =
+        || invalid(format!("`{text}` is not a rule; it should be `from:=to`, or `node:from:=to`"));
     let (selector, to) = text.split_once(":=").ok_or_else(malformed)?;
     let (node, from) = match selector.split_once(':') {
         // `rostopic://` and `rosservice://` select the kind of name.
@@ -138,13 +140,13 @@ fn rule(text: &str) -> Result<Rule, Message> {
 
 /// Parses `name:=value`, for every node, or `node:name:=value`.
 fn parameter(text: &str) -> Result<Assigned, Message> {
-    let malformed = || wrong(format!("`{text}` is not a parameter; it should be `name:=value`"));
+    let malformed = || invalid(format!("`{text}` is not a parameter; it should be `name:=value`"));
     let (selector, value) = text.split_once(":=").ok_or_else(malformed)?;
     let (nodes, name) = selector.split_once(':').unwrap_or(("/**", selector));
     let value: Value = serde_yaml_ng::from_str(value)
-        .map_err(|error| wrong(format!("the value of the parameter `{name}` is not YAML: {error}")))?;
+        .map_err(|error| invalid(format!("the value of the parameter `{name}` is not YAML: {error}")))?;
     let value = parameter_value(&value)
-        .ok_or_else(|| wrong(format!("the parameter `{name}` has a value that no parameter can have")))?;
+        .ok_or_else(|| invalid(format!("the parameter `{name}` has a value that no parameter can have")))?;
     Ok(Assigned { nodes: nodes.to_owned(), name: name.to_owned(), value })
 }
 
@@ -246,10 +248,10 @@ mod tests {
 
     #[test]
     fn arguments_after_ros_args_are_for_ros() {
-        let (own, ros) = read(
+        let (program, ros) = read(
             "metaplan-ros --ros-args -r __node:=boss -r __ns:=/uuv -r /diagnostics:=/d2 -r ~/plan:=plan -p speed:=2 -- --as manager",
         );
-        assert_eq!(own, ["metaplan-ros", "--as", "manager"]);
+        assert_eq!(program, ["metaplan-ros", "--as", "manager"]);
         let node = ros.node("metaplan");
         assert_eq!(node.to_string(), "/uuv/boss");
         let name = |name: &str| ros.remap(name, &node);

@@ -251,8 +251,8 @@ impl Graph {
     /// Returns the readers of a topic, given by its DDS name.
     pub(crate) fn readers(&self, topic: &str) -> BTreeSet<[u8; 16]> {
         let state = self.state();
-        let is_it = |endpoint: &Endpoint| endpoint.is_reader && endpoint.topic == topic;
-        state.endpoints.iter().filter(|(_, endpoint)| is_it(endpoint)).map(|(guid, _)| *guid).collect()
+        let fits = |endpoint: &Endpoint| endpoint.is_reader && endpoint.topic == topic;
+        state.endpoints.iter().filter(|(_, endpoint)| fits(endpoint)).map(|(guid, _)| *guid).collect()
     }
 
     /// Waits for the mapping of our own services: that of the first participant that supports only

@@ -32,7 +32,7 @@ impl Network {
             None => 0,
             Some(text) => {
                 text.trim().parse().ok().filter(|domain| *domain <= GREATEST_DOMAIN).ok_or_else(|| {
-                    wrong(format!(
+                    network_error(format!(
                         "ROS_DOMAIN_ID is `{text}`, but should be a number from 0 to {GREATEST_DOMAIN}"
                     ))
                 })?
@@ -54,7 +54,7 @@ impl Network {
                 true
             }
             Some(other) => {
-                return Err(wrong(format!(
+                return Err(network_error(format!(
                     "ROS_AUTOMATIC_DISCOVERY_RANGE is `{other}`, but should be SUBNET, LOCALHOST, OFF or SYSTEM_DEFAULT"
                 )));
             }
@@ -74,7 +74,7 @@ impl Network {
     }
 }
 
-fn wrong(text: String) -> Message {
+fn network_error(text: String) -> Message {
     Message::error("N110", text)
 }
 

@@ -164,7 +164,7 @@ impl Node {
             let table = Arc::clone(&table);
             move |name: &str| {
                 let table = table.lock().unwrap_or_else(PoisonError::into_inner);
-                table.get(name).map(|own| own.value.clone())
+                table.get(name).map(|parameter| parameter.value.clone())
             }
         };
         let values = read.clone();
@@ -287,12 +287,12 @@ fn listed(names: Vec<String>, prefixes: &[String], depth: u64) -> msg::ListParam
     msg::ListParametersResult { names, prefixes: names_below }
 }
 
-fn described(name: &str, own: Option<&Declared>) -> msg::ParameterDescriptor {
+fn described(name: &str, parameter: Option<&Declared>) -> msg::ParameterDescriptor {
     msg::ParameterDescriptor {
         name: name.to_owned(),
-        r#type: own.map_or(0, |own| raw(own.value.clone()).r#type),
-        description: own.map_or_else(String::new, |own| own.description.to_owned()),
-        read_only: own.is_some_and(|own| !own.is_dynamic),
+        r#type: parameter.map_or(0, |parameter| raw(parameter.value.clone()).r#type),
+        description: parameter.map_or_else(String::new, |parameter| parameter.description.to_owned()),
+        read_only: parameter.is_some_and(|parameter| !parameter.is_dynamic),
         ..msg::ParameterDescriptor::default()
     }
 }
@@ -366,7 +366,8 @@ mod tests {
     fn names_are_listed_below_prefixes() {
         let names = || ["a", "b.c", "b.d.e", "bc"].map(str::to_owned).to_vec();
         let list = |prefixes: &[&str], depth| {
-            listed(names(), &prefixes.iter().map(|own| (*own).to_owned()).collect::<Vec<_>>(), depth).names
+            listed(names(), &prefixes.iter().map(|prefix| (*prefix).to_owned()).collect::<Vec<_>>(), depth)
+                .names
         };
         assert_eq!(list(&[], 0), names());
         assert_eq!(list(&[], 1), ["a", "bc"]);

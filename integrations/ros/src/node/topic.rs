@@ -97,7 +97,7 @@ impl Node {
         let old = Old { since: SystemTime::now(), is_wanted: qos_wants_old };
         self.spawn(async move {
             let mut samples = Box::pin(subscription.async_stream());
-            let mut wrong = 0;
+            let mut invalid_count = 0;
             while let Some(sample) = samples.next().await {
                 let Some(node) = weak.upgrade() else { return };
                 match sample {
@@ -105,11 +105,11 @@ impl Node {
                     Ok((_, info)) if start.elapsed() < AGE_CHECK_PERIOD && old.is_old(&info) => {}
                     Ok((message, _)) => take(message),
                     Err(error) => {
-                        if wrong % INVALID_PER_LOG_MESSAGE == 0 {
+                        if invalid_count % INVALID_PER_LOG_MESSAGE == 0 {
                             let text = format!("what was heard on {full} is not a {}: {error}", M::TYPE);
                             node.log(Severity::Warn, &text);
                         }
-                        wrong += 1;
+                        invalid_count += 1;
                         drop(node);
                         // A repeated error must not consume all of the processor time.
                         Timer::after(Duration::from_millis(1)).await;

@@ -155,8 +155,8 @@ pub struct Pose {
 impl Poses {
     /// Returns the pose of an object, for the current time.
     pub(super) fn find(&self, object: &str) -> Option<PoseStamped> {
-        let is_it = |(name, _): &(&String, &Pose)| name.eq_ignore_ascii_case(object);
-        let (_, pose) = self.places.iter().find(is_it)?;
+        let is_object = |(name, _): &(&String, &Pose)| name.eq_ignore_ascii_case(object);
+        let (_, pose) = self.places.iter().find(is_object)?;
         let half = pose.yaw / 2.0;
         Some(PoseStamped {
             // Time 0 selects the latest transform.

@@ -152,9 +152,10 @@ impl Network {
             let text = format!("goes on from the journal with {} objectives", memory.goals.len());
             self.node.log(Severity::Info, &text);
         }
-        let goals: Vec<GoalId> = memory.goals.iter().map(|own| self.goals.go_on(own.goal)).collect();
-        let look = |own: &Remembered| {
-            let function = own.wanted.objective_type.clone();
+        let goals: Vec<GoalId> =
+            memory.goals.iter().map(|remembered| self.goals.go_on(remembered.goal)).collect();
+        let request = |remembered: &Remembered| {
+            let function = remembered.wanted.objective_type.clone();
             let service = format!("/{}/get_mode", self.keeping.system(&function));
             let caller = self.node.caller::<GetMode>(&service);
             async move {
@@ -162,7 +163,7 @@ impl Network {
                 Some((function, answer.current_mode))
             }
         };
-        let modes = smol::block_on(futures::future::join_all(memory.goals.iter().map(look)));
+        let modes = smol::block_on(futures::future::join_all(memory.goals.iter().map(request)));
         let modes = modes.into_iter().flatten().collect();
         self.keeping.remember(memory, &goals, &modes);
     }

@@ -235,7 +235,7 @@ impl<A: Action + 'static> Connection<A> {
         let wishes: Vec<GoalId> = self
             .goals()
             .iter()
-            .filter(|(_, own)| own.cancelled.try_recv().is_ok())
+            .filter(|(_, pursued)| pursued.cancelled.try_recv().is_ok())
             .map(|(goal, _)| *goal)
             .collect();
         for goal in wishes {
