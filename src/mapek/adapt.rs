@@ -58,7 +58,7 @@ impl Adapting<'_> {
         let is_observed = changes.observed;
         self.decide(changes, findings, answers);
         // The action goes on with the design that was observed, and may wait for the one before.
-        if is_observed {
+        if is_observed && !self.planner.is_missing {
             self.configure_again(answers);
         }
     }

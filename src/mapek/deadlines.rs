@@ -36,7 +36,8 @@ pub(super) fn due(beliefs: &Beliefs, settings: &Settings) -> Option<Duration> {
     };
     let waits = beliefs.waits.iter().filter(|(number, _)| beliefs.receipts.are_sent() && is_effect(number));
     let effects = waits.map(|(_, wait)| wait.since.saturating_add(settings.deadline));
-    let running = beliefs.running.as_ref().filter(|own| !own.cancelling && !own.suspended);
+    let is_action = |own: &&Running| !own.suspended && !own.cancelling || own.cancelling && open_cancel(beliefs).is_some();
+    let running = beliefs.running.as_ref().filter(is_action);
     let action = running.map(|own| own.heard.saturating_add(patience(own, settings)));
     effects.chain(action).min()
 }
@@ -87,8 +88,29 @@ fn effects(beliefs: &mut Beliefs, deadline: Duration, answers: &mut Vec<Answer>)
     expired
 }
 
+/// The cancellation of the action under way, if it has to be repeated without regard to acknowledgements: of a robot that has never
+/// acknowledged anything, too, the end of the action is expected.
+fn open_cancel(beliefs: &Beliefs) -> Option<&Effect> {
+    let running = beliefs.running.as_ref().filter(|own| own.cancelling)?;
+    let is_cancel =
+        |own: &&Effect| own.action == running.action && matches!(own.command, Command::Cancel { .. });
+    beliefs.outstanding.values().find(is_cancel).filter(|_| !beliefs.receipts.are_sent())
+}
+
 /// The action under way, of which something should have been heard.
 fn action(beliefs: &mut Beliefs, settings: &Settings, answers: &mut Vec<Answer>) {
+    if let Some(cancel) = open_cancel(beliefs).cloned()
+        && let Some(running) = &mut beliefs.running
+    {
+        let silence = beliefs.now.saturating_sub(running.heard);
+        if silence >= patience(running, settings) {
+            running.overdue = running.overdue.saturating_mul(2).max(1);
+            let (effect, action, seconds) = (Some(cancel.number), running.action, silence.as_secs());
+            answers.push(Answer::Overdue { effect, action, seconds, outcome: OverdueOutcome::Repeated });
+            answers.push(Answer::Effect(Effect { repeated: true, ..cancel }));
+        }
+        return;
+    }
     let Some(running) = beliefs.running.as_mut().filter(|own| !own.cancelling && !own.suspended) else {
         return;
     };

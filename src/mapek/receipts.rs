@@ -25,8 +25,6 @@ pub(super) struct Received {
     /// The greatest number of an effect when the function was seen with a design that was neither the believed nor the pending one;
     /// 0 if it never was. Such a reconfiguration may have been carried out before or after.
     pub(super) doubted: u64,
-    /// Superseded reconfigurations up to this one were not carried out when the function was observed last, but may be on their way.
-    pub(super) settled: u64,
 }
 
 /// The greatest reconfiguration that was acknowledged.
@@ -54,10 +52,10 @@ impl Receipts {
         self.by_number
     }
 
-    /// Returns `true` if a reconfiguration of the function was superseded and never answered, and the function was not observed since.
+    /// Returns `true` if a reconfiguration of the function was superseded and never answered. It may still be on its way, also when the function
+    /// was observed since.
     pub(super) fn has_superseded(&self, function: &str) -> bool {
-        let is_open = |own: &Received| own.superseded.range(own.settled + 1..).next().is_some();
-        self.functions.get(function).is_some_and(is_open)
+        self.functions.get(function).is_some_and(|own| !own.superseded.is_empty())
     }
 
     /// Notes that a reconfiguration was superseded before it was answered.
@@ -74,7 +72,7 @@ impl Receipts {
     pub(super) fn observe(&mut self, function: &str, doubted: Option<u64>, is_pending: bool) {
         if !is_pending && let Some(own) = self.functions.get_mut(function) {
             let last = own.superseded.last_key_value().map_or(0, |(number, _)| *number);
-            (own.settled, own.doubted) = (own.settled.max(last), own.doubted.max(last));
+            own.doubted = own.doubted.max(last);
         }
         if let Some(doubted) = doubted {
             self.functions.entry(function.to_owned()).or_default().doubted = doubted;
@@ -100,7 +98,7 @@ impl Receipts {
                     let before = last.before.as_ref().map(|before| json!([before.design, before.effect]));
                     json!([last.effect, last.design, before, last.failed])
                 });
-            json!([name, last, own.superseded.iter().collect::<Vec<_>>(), own.doubted, own.settled])
+            json!([name, last, own.superseded.iter().collect::<Vec<_>>(), own.doubted])
         };
         json!([self.by_number, self.functions.iter().map(function).collect::<Vec<_>>()])
     }
@@ -121,8 +119,8 @@ impl Receipts {
                 }),
             };
             let superseded = record.get(2)?.as_array()?.iter().map(superseded).collect::<Option<_>>()?;
-            let (doubted, settled) = (record.get(3)?.as_u64()?, record.get(4)?.as_u64()?);
-            Some((text(record.get(0)?)?, Received { last, superseded, doubted, settled }))
+            let doubted = record.get(3)?.as_u64()?;
+            Some((text(record.get(0)?)?, Received { last, superseded, doubted }))
         };
         let functions = record.get(1)?.as_array()?.iter().map(function).collect::<Option<_>>()?;
         Some(Self { by_number: record.get(0)?.as_bool()?, functions })

@@ -17,6 +17,9 @@ const STEP: Duration = Duration::from_millis(500);
 /// Steps with faults, and fair steps after them.
 const STEPS: (u64, u64) = (60, 300);
 
+/// Number of messages that are printed of a schedule with a violation.
+const MAX_LOG: usize = 400;
+
 /// Steps that a belated message is under way: longer than two deadlines.
 const BELATED: (u64, u64) = (45, 90);
 
@@ -187,7 +190,7 @@ impl<'a> Schedule<'a> {
 
     fn explained(&self, violation: &str) -> String {
         let Some(log) = &self.log else { return violation.to_owned() };
-        let from = log.len().saturating_sub(80);
+        let from = log.len().saturating_sub(MAX_LOG);
         format!("{violation}\n{:?}\n{}", self.faults, log[from..].join("\n"))
     }
 
