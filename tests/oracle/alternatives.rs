@@ -1,7 +1,7 @@
-//! All cheapest plans: what is said of them is true of every sequence of actions up to a length that is a cheapest plan without idle
-//! actions.
+//! Test of [`planner::alternatives`]: the reported set of cheapest plans against an enumeration of all cheapest plans up to a
+//! length, without idle actions.
 //!
-//! An action is idle if nothing depends on what it does: it changes no fact that the goal or an applicable action that is not idle reads.
+//! An action is active if it can change a fact that the goal or an active action reads. All other actions are idle.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -13,13 +13,13 @@ use planner::{Config, Engine, Limits, Status, Thresholds};
 use crate::judge::{read, setting};
 
 const FACTS: usize = 5;
-/// Plans up to this length are looked at.
+/// Maximum number of steps of an enumerated plan.
 const LENGTH: usize = 5;
 
-/// Facts, a bit each.
+/// Bit set of the facts that hold.
 type State = u32;
 
-/// Facts that have to hold and those that must not, or are added and deleted.
+/// Bit sets of facts: required and forbidden facts of a condition, or added and deleted facts of an effect.
 type Literals = (State, State);
 
 #[derive(Debug)]
@@ -35,6 +35,7 @@ impl Action {
     }
 
     fn apply(&self, state: State) -> State {
+        // A fact that is both deleted and added holds afterwards (PDDL 2.1).
         state & !self.effect.1 | self.effect.0
     }
 }
@@ -51,14 +52,15 @@ fn holds((positive, negative): Literals, state: State) -> bool {
 }
 
 fn literals(rng: &mut Rng, count: usize, negative_in: u32) -> Literals {
-    let mut own = (0, 0);
+    let mut chosen = (0, 0);
     for _ in 0..count {
         let fact = 1 << rng.usize(0..FACTS);
-        if (own.0 | own.1) & fact == 0 {
-            *(if rng.u32(0..negative_in) == 0 { &mut own.1 } else { &mut own.0 }) |= fact;
+        // A fact that was already drawn is skipped, so a condition cannot contradict itself.
+        if (chosen.0 | chosen.1) & fact == 0 {
+            *(if rng.u32(0..negative_in) == 0 { &mut chosen.1 } else { &mut chosen.0 }) |= fact;
         }
     }
-    own
+    chosen
 }
 
 fn text(literals: Literals) -> String {
@@ -112,16 +114,18 @@ impl Task {
         (domain + ")", problem)
     }
 
-    /// Numbers of the actions that are not idle.
+    /// Numbers of the actions that are not idle; see the head of the file.
     fn active(&self) -> BTreeSet<usize> {
+        // All reachable states, by exhaustive search.
         let (mut states, mut open) = (BTreeSet::from([self.initial]), vec![self.initial]);
         while let Some(state) = open.pop() {
             let applicable = self.actions.iter().filter(|action| action.is_applicable(state));
             open.extend(applicable.map(|action| action.apply(state)).filter(|next| states.insert(*next)));
         }
         let (mut active, mut read) = (BTreeSet::new(), self.goal.0 | self.goal.1);
+        // Least fixpoint: the conditions of an active action are read, which may activate further actions.
         loop {
-            let before = active.len();
+            let previous_count = active.len();
             for (number, action) in self.actions.iter().enumerate() {
                 let changes = |state: &State| {
                     action.is_applicable(*state) && (*state ^ action.apply(*state)) & read != 0
@@ -130,13 +134,13 @@ impl Task {
                     read |= action.condition.0 | action.condition.1;
                 }
             }
-            if active.len() == before {
+            if active.len() == previous_count {
                 return active;
             }
         }
     }
 
-    /// All plans of so many of some actions at most that cost `cost`.
+    /// All plans with at most [`LENGTH`] steps from `actions` that cost exactly `cost`.
     fn plans(&self, actions: &BTreeSet<usize>, cost: u32) -> Vec<Vec<usize>> {
         let (mut plans, mut open) = (Vec::new(), vec![(self.initial, 0, Vec::new())]);
         while let Some((state, paid, steps)) = open.pop() {
@@ -157,12 +161,14 @@ impl Task {
     }
 }
 
-/// Checks what is said of all cheapest plans of a task; whether they are all known.
+/// Compares the reported alternatives with the enumeration. Returns whether the report claims to be complete; `None` if the
+/// planner proved no optimum.
 fn check(seed: u64) -> Option<bool> {
     let task = Task::new(seed);
     let (domain, problem) = task.files();
     let about = || format!("seed {seed}\n{domain}\n{problem}");
     let (mission, filled) = read(&domain, &problem).unwrap_or_else(|messages| panic!("{messages:#?}"));
+    // Without thresholds, small tasks also reach the prunings that are meant for large ones.
     let limits = Limits::none();
     let limits = if seed.is_multiple_of(2) { limits.with_thresholds(Thresholds::NONE) } else { limits };
     let ground = mission.ground(&filled, &[], &limits).expect("a ground task");
@@ -175,26 +181,31 @@ fn check(seed: u64) -> Option<bool> {
     let numbers = |plan: &planner::Plan| -> Vec<usize> {
         plan.steps.iter().map(|step| step.action[1..].parse().expect("a number")).collect()
     };
-    let found = planner::alternatives(&ground, &solution, 30, &config)?;
+    let report = planner::alternatives(&ground, &solution, 30, &config)?;
     let plan = solution.plan.as_ref().expect("an optimal plan");
     let (first, cost) = (numbers(plan), plan.cost.to_string().parse().expect("a small number"));
-    let known: BTreeSet<Vec<usize>> = found.plans.iter().map(numbers).chain([first.clone()]).collect();
-    let all = task.plans(&task.active(), cost);
-    for other in &all {
-        assert!(!found.complete || known.contains(other), "{other:?} is not in {known:?}\n{}", about());
-        for (step, forced) in found.forced.iter().flatten().enumerate() {
+    let reported: BTreeSet<Vec<usize>> = report.plans.iter().map(numbers).chain([first.clone()]).collect();
+    let cheapest = task.plans(&task.active(), cost);
+    // Every enumerated plan must be reported if the report is complete, and must agree with each step that is reported as forced.
+    for plan_steps in &cheapest {
+        assert!(
+            !report.complete || reported.contains(plan_steps),
+            "{plan_steps:?} is not in {reported:?}\n{}",
+            about()
+        );
+        for (step, forced) in report.forced.iter().flatten().enumerate() {
             assert!(
-                !forced.action || other.get(step) == first.get(step),
-                "step {step} of {other:?}\n{}",
+                !forced.action || plan_steps.get(step) == first.get(step),
+                "step {step} of {plan_steps:?}\n{}",
                 about()
             );
         }
     }
-    Some(found.complete)
+    Some(report.complete)
 }
 
 #[test]
-fn what_is_said_of_all_cheapest_plans_is_true_up_to_idle_actions() {
+fn reported_cheapest_plans_match_enumeration() {
     let (from, tasks) = (setting("ORACLE_FROM", 0), setting("ORACLE_TASKS", 500));
     let complete = (from..from + tasks).filter(|seed| check(*seed) == Some(true)).count();
     assert!(complete as u64 * 5 > tasks, "all cheapest plans of {complete} tasks are known");

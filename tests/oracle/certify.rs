@@ -1,4 +1,4 @@
-//! Certifies what the planner claims, and has the certificate verified.
+//! Certifies the planner's claims and verifies the certificates.
 
 use metaplan::certificate::{self, Contents, Ground};
 use metaplan::mission::Mission;
@@ -7,29 +7,29 @@ use planner::{ExactTask, Limits, Solution, Status, Task};
 
 use crate::judge::{Case, Tally, Truth, compare, plan_lines, rational, steps_of};
 
-/// What was planned.
+/// The ground task of a solution, by the kind of its numbers.
 #[derive(Debug)]
 pub enum Planned {
     Integers(Box<Task>),
     Exact(Box<ExactTask>),
 }
 
-/// A message without what stands in parentheses.
+/// Removes the parts of a message in parentheses, which contain names.
 fn without_names(message: &str) -> String {
     let mut depth = 0_usize;
-    let mut kept = String::new();
+    let mut outside = String::new();
     for character in message.chars() {
         match character {
             '(' => depth += 1,
             ')' => depth = depth.saturating_sub(1),
-            _ if depth == 0 => kept.push(character),
+            _ if depth == 0 => outside.push(character),
             _ => {}
         }
     }
-    kept
+    outside
 }
 
-/// What is claimed is certified, and the certificate has to be verified if the claim is true, and only then.
+/// Writes a certificate for an optimality or unsolvability claim. Verification must succeed if the claim is true and fail otherwise.
 pub fn check(
     case: &Case,
     (mission, problem): (&Mission, &Problem),
@@ -50,16 +50,17 @@ pub fn check(
     let contents = Contents { mission, problem, task, solution, plan: &plan };
     let limits = || Limits::none().with_time(case.limit);
     if let Err(message) = certificate::write(&directory, &contents, &limits()) {
-        // Without what is said of one task alone.
+        // Names are specific to a task; without them, equal reasons are counted together.
         return tally.count(format!("{}: {:.120}", message.code, without_names(&message.message)));
     }
-    // That it is too slow on a busy machine is not what is asked.
+    // A generous time limit: a busy machine must not make verification fail.
     let limits = Limits::none().with_time(30 * case.limit);
     let report = certificate::Verifier::new(&directory).stop(|| limits.reached()).verify();
+    // A claim is false if it contradicts the oracle; an optimum worse than a known plan is one such case.
     let refuted = match (&case.truth, &solution.plan) {
         (Truth::Best(best, _), Some(plan)) => rational(&plan.cost) != *best,
-        (Truth::Open(Some((found, _))), Some(plan)) => {
-            compare(case.maximize, found, &rational(&plan.cost)).is_lt()
+        (Truth::Open(Some((incumbent, _))), Some(plan)) => {
+            compare(case.maximize, incumbent, &rational(&plan.cost)).is_lt()
         }
         (Truth::NoPlan, None) | (Truth::Open(None), _) => false,
         (Truth::NoPlan, Some(_)) | (Truth::NoBest(..), _) | (Truth::Best(..) | Truth::Open(_), None) => true,

@@ -1,12 +1,12 @@
-//! The validator as a judge: plans of up to three steps over all start times that make a difference, on tiny tasks.
+//! Test of the validator: it judges plans of up to three steps over all start times that can matter, on tiny tasks.
 //!
-//! Every plan is given to the project's validator and to the oracle's executor; they have to agree on whether it is valid, on whether only the
-//! goal is missed, and on its value. Then the best plan that the *validator* accepts is held against the planner's claim.
+//! Each plan is executed by the project's validator and by the oracle's executor. They must agree on validity, on whether only the
+//! goal fails, and on the value. The best plan that the *validator* accepts is then compared with the planner's claim.
 //!
-//! One after another, what is possible at a start s depends on where s and the ends lie among the events; so all that matters
-//! are the times T - (sums of up to three durations) for events at T, the points between them, and the end of the action before. A plan
-//! whose beginning cannot be executed is not extended. Overlapping, starts are multiples of half the separation. `ORACLE_PLANS` bounds the
-//! plans of a task; where that cuts off, the order is random.
+//! Sequential plans: applicability at a start s depends on the position of s and of the ends relative to the events. So the only
+//! relevant times are T − (sums of up to three durations) for events at T, the points between these times, and the end of the previous
+//! action. A plan with an inexecutable prefix is not extended. Concurrent plans: starts are multiples of half the separation.
+//! `ORACLE_PLANS` limits the number of plans per task; the order is random, so the limit selects a random sample.
 
 use std::time::Duration;
 
@@ -21,11 +21,11 @@ use crate::temporal::happening::{Obstacle, World};
 use crate::temporal::model::{Body, Q, big, q};
 use crate::temporal::{concurrent_unit, execute, maximizes, overlap, sequential_task};
 
-/// What an execution comes to.
+/// Result of an execution.
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Outcome {
     Valid(Option<BigRational>),
-    /// Executable, but the goal does not hold in the end.
+    /// Executable, but the goal does not hold in the final state.
     Goal,
     Invalid,
 }
@@ -38,14 +38,14 @@ struct Enumeration<'e> {
     mode: Mode,
     random: fastrand::Rng,
     times: Vec<Q>,
-    left: usize,
-    /// Plans on which the two disagree.
+    remaining_plans: usize,
+    /// Descriptions of plans on which validator and executor disagree.
     disagreements: Vec<String>,
     best: Option<(BigRational, Schedule)>,
     valid: usize,
 }
 
-/// All that makes a difference for starts one after another.
+/// Relevant start times of sequential plans; see the head of the file.
 fn times(world: &World, durations: &[Q]) -> Vec<Q> {
     let mut borders = vec![q(0)];
     let mut sums = vec![q(0)];
@@ -59,6 +59,7 @@ fn times(world: &World, durations: &[Q]) -> Vec<Q> {
     }
     borders.sort_unstable();
     borders.dedup();
+    // Applicability is constant between two neighbouring times, so one point per interval is sufficient.
     let between: Vec<Q> = borders.windows(2).map(|pair| (pair[0] + pair[1]) / q(2)).collect();
     let last = *borders.last().expect("0") + q(1);
     borders.extend(between);
@@ -67,7 +68,7 @@ fn times(world: &World, durations: &[Q]) -> Vec<Q> {
     borders
 }
 
-/// How long an instance lasts in the initial state.
+/// Duration of an instance in the initial state; `None` if it is undefined or negative.
 fn duration(world: &World, instance: usize) -> Option<Q> {
     let (action, objects) = &world.instances[instance];
     match &world.task.actions[*action].body {
@@ -79,14 +80,14 @@ fn duration(world: &World, instance: usize) -> Option<Q> {
 }
 
 impl Enumeration<'_> {
-    /// Executes a plan twice.
+    /// Executes a plan with both implementations and records a disagreement. Returns the executor's result, `None` on overflow.
     fn outcome(&mut self, plan: &Schedule) -> Option<Outcome> {
-        self.left = self.left.saturating_sub(1);
-        let own = match self.unit {
+        self.remaining_plans = self.remaining_plans.saturating_sub(1);
+        let executed = match self.unit {
             None => execute::execute(self.world, plan),
             Some(unit) => overlap::execute(self.world, plan, unit),
         };
-        let own = match own {
+        let executed = match executed {
             Ok(value) => Outcome::Valid(Some(big(value))),
             Err(Obstacle::Blocked("the goal does not hold")) => Outcome::Goal,
             Err(Obstacle::Blocked(_)) => Outcome::Invalid,
@@ -94,18 +95,18 @@ impl Enumeration<'_> {
         };
         let steps = written(self.world, plan);
         let verdict = project_verdict(self.mission, self.problem, &steps, &self.mode);
-        let other = match &verdict.violation {
+        let validated = match &verdict.violation {
             None if self.problem.metric.is_some() => Outcome::Valid(verdict.metric),
-            // Without a metric the validator has the time; steps are counted.
+            // Without a metric the validator reports the total time, but the oracle counts the steps of sequential plans.
             None if self.unit.is_some() => Outcome::Valid(Some(verdict.total_time)),
-            None => match &own {
+            None => match &executed {
                 Outcome::Valid(value) => Outcome::Valid(value.clone()),
                 _ => Outcome::Valid(None),
             },
             Some(violation) if violation.kind == ViolationKind::Goal => Outcome::Goal,
             Some(_) => Outcome::Invalid,
         };
-        if let Outcome::Valid(Some(value)) = &other {
+        if let Outcome::Valid(Some(value)) = &validated {
             self.valid += 1;
             let maximize = maximizes(&self.world.task);
             let better = |(best, _): &(BigRational, _)| if maximize { value > best } else { value < best };
@@ -113,37 +114,39 @@ impl Enumeration<'_> {
                 self.best = Some((value.clone(), plan.clone()));
             }
         }
-        if own != other {
+        if executed != validated {
             let reason = verdict.violation.map_or_else(String::new, |violation| violation.message.clone());
             let text = plan_lines(&steps);
-            self.disagreements.push(format!("oracle {own:?}, validator {other:?} {reason} on\n{text}"));
+            self.disagreements
+                .push(format!("oracle {executed:?}, validator {validated:?} {reason} on\n{text}"));
         }
-        Some(own)
+        Some(executed)
     }
 
-    /// All plans that go on from one, in a random order.
+    /// Executes all extensions of a plan by up to `steps` further actions, in random order.
     fn extend(&mut self, plan: &Schedule, steps: usize) {
         let clock = plan.last().map_or(q(0), |(_, start, length)| start + length);
-        let mut further: Vec<(usize, Q, Q)> = Vec::new();
+        let mut candidates: Vec<(usize, Q, Q)> = Vec::new();
         for instance in 0..self.world.instances.len() {
             let Some(length) = duration(self.world, instance) else { continue };
             let later = self.times.iter().filter(|time| self.unit.is_some() || **time > clock);
-            further.extend(later.map(|time| (instance, *time, length)));
+            candidates.extend(later.map(|time| (instance, *time, length)));
             if self.unit.is_none() {
-                further.push((instance, clock, length));
+                candidates.push((instance, clock, length));
             }
         }
-        self.random.shuffle(&mut further);
-        for step in further {
-            if self.left == 0 || !self.disagreements.is_empty() {
+        self.random.shuffle(&mut candidates);
+        for step in candidates {
+            if self.remaining_plans == 0 || !self.disagreements.is_empty() {
                 return;
             }
-            let longer = [&plan[..], &[step]].concat();
-            let outcome = self.outcome(&longer);
-            // What cannot be executed can be, overlapping, with a further action.
-            let extended = self.unit.is_some() || matches!(outcome, Some(Outcome::Valid(_) | Outcome::Goal));
-            if steps > 1 && extended {
-                self.extend(&longer, steps - 1);
+            let extended_plan = [&plan[..], &[step]].concat();
+            let outcome = self.outcome(&extended_plan);
+            // In concurrent mode a further action can make an inexecutable plan executable, for example by adding a fact in time.
+            let is_extensible =
+                self.unit.is_some() || matches!(outcome, Some(Outcome::Valid(_) | Outcome::Goal));
+            if steps > 1 && is_extensible {
+                self.extend(&extended_plan, steps - 1);
             }
         }
     }
@@ -171,7 +174,7 @@ fn check(name: &str, seed: u64, unit: Option<Q>, tally: &mut Tally) {
         mode: mode.clone(),
         random: fastrand::Rng::with_seed(seed),
         times,
-        left: setting("ORACLE_PLANS", 300) as usize,
+        remaining_plans: setting("ORACLE_PLANS", 300) as usize,
         disagreements: Vec::new(),
         best: None,
         valid: 0,
@@ -179,12 +182,12 @@ fn check(name: &str, seed: u64, unit: Option<Q>, tally: &mut Tally) {
     let empty = Schedule::new();
     enumeration.outcome(&empty);
     enumeration.extend(&empty, 3);
-    tally.count(if enumeration.left > 0 { "enumerated: all" } else { "enumerated: some" });
+    tally.count(if enumeration.remaining_plans > 0 { "enumerated: all" } else { "enumerated: some" });
     *tally.counts.entry("plans that are valid".into()).or_default() += enumeration.valid;
     let best = enumeration.best.map(|(value, plan)| (value, written(&world, &plan)));
     let disagreements = enumeration.disagreements;
     let maximize = maximizes(&world.task);
-    // The executor for plans of the planner is the validator here, which has judged them already.
+    // The oracle's executor cannot check the claimed truth here: the validator found it, and both were compared above.
     let case = Case {
         name: format!("{name}-{seed}"),
         domain,
@@ -214,11 +217,11 @@ fn enumerate(name: &str, default: u64, unit: impl Fn(u64) -> Option<Q>) {
 }
 
 #[test]
-fn plans_one_after_another() {
+fn validator_agrees_on_sequential_plans() {
     enumerate("enumerated", 200, |_| None);
 }
 
 #[test]
-fn plans_that_overlap() {
+fn validator_agrees_on_concurrent_plans() {
     enumerate("enumerated-overlap", 200, |seed| Some(concurrent_unit(seed)));
 }

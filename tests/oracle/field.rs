@@ -1,7 +1,7 @@
-//! What users found: tasks on which the planner was wrong once, each with what is true of it, in every mode.
+//! Regression tests from user reports: tasks on which the planner was wrong, with the correct answer in each mode.
 //!
-//! The small ones are written out, others lie in `field/`. The verdicts are from the definition; where it differs from what was
-//! reported, a comment says why.
+//! Small tasks are written out; others are files in `field/`. The correct answers follow the definition of a plan. Where they differ
+//! from the report, a comment gives the reason.
 
 use std::time::Duration;
 
@@ -12,18 +12,18 @@ use planner::{Config, Limits, Status};
 
 use crate::judge::{Case, Mode, Step, Tally, Truth, judge, read};
 
-/// An exact decimal.
+/// Parses a decimal exactly.
 fn exact(text: &str) -> BigRational {
-    let (whole, rest) = text.split_once('.').unwrap_or((text, ""));
-    let digits: BigInt = format!("{whole}{rest}").parse().expect("a number");
-    BigRational::new(digits, BigInt::from(10).pow(rest.len() as u32))
+    let (whole, fraction) = text.split_once('.').unwrap_or((text, ""));
+    let digits: BigInt = format!("{whole}{fraction}").parse().expect("a number");
+    BigRational::new(digits, BigInt::from(10).pow(fraction.len() as u32))
 }
 
-/// Steps from `start: (action arguments) [duration]`, separated by commas.
+/// Parses steps `start: (action arguments) [duration]`, separated by commas.
 fn steps(text: &str) -> Vec<Step> {
     let step = |text: &str| {
-        let (start, rest) = text.split_once(": (").expect("a start");
-        let (call, duration) = rest.split_once(") [").expect("a duration");
+        let (start, remainder) = text.split_once(": (").expect("a start");
+        let (call, duration) = remainder.split_once(") [").expect("a duration");
         let mut call = call.split(' ').map(str::to_owned);
         Step {
             start: exact(start.trim()),
@@ -35,7 +35,7 @@ fn steps(text: &str) -> Vec<Step> {
     text.split(", ").filter(|text| !text.is_empty()).map(step).collect()
 }
 
-/// The best value, and a plan that has it.
+/// The best value, with a plan that attains it.
 fn best(value: &str, plan: &str) -> Truth {
     Truth::Best(exact(value), steps(plan))
 }
@@ -55,6 +55,7 @@ fn check(name: &str, (domain, problem): (&str, &str), cases: Vec<(Mode, Truth)>)
             Truth::Best(value, _) | Truth::NoBest(value, _) => Ok(value.clone()),
             _ => Err("there is no plan".to_owned()),
         };
+        // Certificates exist for sequential plans only.
         let certify = mode == Mode::Sequential;
         let case = Case {
             name: name.to_owned(),
@@ -75,24 +76,28 @@ fn check(name: &str, (domain, problem): (&str, &str), cases: Vec<(Mode, Truth)>)
 const CONFLICT: &str = "(:durative-action a :parameters () :duration (= ?duration 2) :condition (and)
   :effect (and (at start (q)) (at start (p)) (at start (increase (f) 5)) (when (at start (p)) (at start (assign (f) 0)))))";
 
-fn conflict(dear: &str) -> String {
+fn conflict(costly_action: &str) -> String {
     format!(
-        "(define (domain d) (:requirements :adl :fluents :durative-actions) (:predicates (p) (q)) (:functions (f)) {CONFLICT} {dear})"
+        "(define (domain d) (:requirements :adl :fluents :durative-actions) (:predicates (p) (q)) (:functions (f)) {CONFLICT} {costly_action})"
     )
 }
 
-/// Effects at the start that contradict each other only if a condition holds.
+/// Effects at the start that conflict only under a condition.
 #[test]
 fn b1_conditional_start_conflict() {
     let problem = "(define (problem p) (:domain d) (:init (= (f) 2)) (:goal (q)))";
-    let dear = "(:durative-action dear :parameters () :duration (= ?duration 100) :condition (and) :effect (at end (q)))";
-    for dear in ["", dear] {
+    let costly_action = "(:durative-action dear :parameters () :duration (= ?duration 100) :condition (and) :effect (at end (q)))";
+    for costly_action in ["", costly_action] {
         let truth = best("2", "0: (a) [2]");
-        check("b1", (&conflict(dear), problem), vec![(sequential(), truth.clone()), (overlapping(), truth)]);
+        check(
+            "b1",
+            (&conflict(costly_action), problem),
+            vec![(sequential(), truth.clone()), (overlapping(), truth)],
+        );
     }
 }
 
-/// As before, for every pair of effects that contradict each other.
+/// Every pair of conflicting numeric effects, at the start and at the end.
 #[test]
 fn b1_all_pairs() {
     let effects =
@@ -113,7 +118,7 @@ fn b1_all_pairs() {
     }
 }
 
-/// An operand without a value in an effect whose condition does not hold.
+/// An undefined operand in a conditional effect whose condition does not hold.
 #[test]
 fn b1_undefined_operand() {
     let domain = "(define (domain d) (:requirements :adl :fluents :durative-actions)
@@ -128,13 +133,14 @@ fn b1_undefined_operand() {
 const BETWEEN: &str = "(:durative-action a :parameters () :duration (= ?duration 10)
   :condition (and (at start (p)) (at end (q))) :effect (at end (g)))";
 
-/// The start lies between events. Overlapping, the end reads what the event at 12 adds, so it lies at least the separation later.
+/// The start lies between events. In concurrent mode the end reads the fact that the event at 12 adds, so it is at least the
+/// separation later.
 #[test]
 fn b2_wait_between_events() {
-    let dear = "(:durative-action dear :parameters () :duration (= ?duration 100) :condition (and) :effect (at end (g)))";
-    for dear in ["", dear] {
+    let costly_action = "(:durative-action dear :parameters () :duration (= ?duration 100) :condition (and) :effect (at end (g)))";
+    for costly_action in ["", costly_action] {
         let domain = format!(
-            "(define (domain d) (:requirements :durative-actions :timed-initial-literals) (:predicates (p) (q) (g)) {BETWEEN} {dear})"
+            "(define (domain d) (:requirements :durative-actions :timed-initial-literals) (:predicates (p) (q) (g)) {BETWEEN} {costly_action})"
         );
         let problem = "(define (problem p) (:domain d) (:init (p) (at 5 (not (p))) (at 12 (q))) (:goal (g)))";
         let cases = vec![
@@ -145,7 +151,7 @@ fn b2_wait_between_events() {
     }
 }
 
-/// A metric without a best value, and an event to wait for: no horizon was asked for.
+/// A metric without a best value, and an event to wait for. The planner reported a horizon although none was set.
 #[test]
 fn b3_no_horizon() {
     let domain = "(define (domain d) (:requirements :durative-actions :timed-initial-literals :fluents)
@@ -159,14 +165,14 @@ fn b3_no_horizon() {
     }
 }
 
-/// A condition over all ends before the end.
+/// An over-all condition need not hold at the end itself.
 #[test]
 fn b4_event_at_the_end() {
-    let dear = "(:durative-action dear :parameters () :duration (= ?duration 50) :condition (and) :effect (at end (g)))";
-    for dear in ["", dear] {
+    let costly_action = "(:durative-action dear :parameters () :duration (= ?duration 50) :condition (and) :effect (at end (g)))";
+    for costly_action in ["", costly_action] {
         let domain = format!(
             "(define (domain d) (:requirements :durative-actions :timed-initial-literals) (:predicates (p) (g))
-             (:durative-action a :parameters () :duration (= ?duration 2) :condition (over all (p)) :effect (at end (g))) {dear})"
+             (:durative-action a :parameters () :duration (= ?duration 2) :condition (over all (p)) :effect (at end (g))) {costly_action})"
         );
         let problem = "(define (problem p) (:domain d) (:init (p) (at 2 (not (p)))) (:goal (g)))";
         let truth = best("2", "0: (a) [2]");
@@ -174,7 +180,7 @@ fn b4_event_at_the_end() {
     }
 }
 
-/// Start and end of an action of duration 0 are one happening, and interfere here.
+/// Start and end of an action of duration 0 are one happening. Here their effects interfere.
 #[test]
 fn duration_zero_that_interferes() {
     let domain = "(define (domain d) (:requirements :adl :fluents :durative-actions) (:predicates (p) (g)) (:functions (total-cost))
@@ -186,7 +192,7 @@ fn duration_zero_that_interferes() {
     check("e4", (domain, problem), vec![(sequential(), truth.clone()), (overlapping(), truth)]);
 }
 
-/// An event at the end of an action whose end does not care.
+/// An event coincides with the end of an action, but does not interfere with it.
 #[test]
 fn conc_14() {
     let domain = "(define (domain c) (:requirements :durative-actions :fluents :negative-preconditions :timed-initial-literals)
@@ -202,8 +208,8 @@ fn conc_14() {
     check("conc-14", (domain, problem), vec![(sequential(), truth.clone()), (overlapping(), truth)]);
 }
 
-/// Reported with 1, but an end at 1 adds what the event at 1 deletes, and so they interfere. From 3 on (p2) holds, so the start, which
-/// reads it, is at 3.001; one after another, at any time after 3.
+/// The report expected 1, but an end at 1 adds the fact that the event at 1 deletes, so they interfere. (p2) holds from 3 on. The
+/// start reads it, so it is at 3.001 or later in concurrent mode, and after 3 in sequential mode.
 #[test]
 fn conc_30012() {
     let domain = "(define (domain c) (:requirements :durative-actions :fluents :negative-preconditions :timed-initial-literals)
@@ -248,7 +254,7 @@ fn one_action(functions: &str, condition: &str, values: &str) -> (String, String
     (domain, format!("(define (problem p) (:domain d) (:init {values}) (:goal (done)))"))
 }
 
-/// Products of decimals with many digits.
+/// Products of decimals with many digits, in conditions.
 #[test]
 fn n1_products() {
     let cases = [
@@ -269,7 +275,7 @@ fn n1_products() {
     }
 }
 
-/// A cheap action behind such a product, and a dear one.
+/// A cheap action whose condition is such a product, and a costly alternative.
 #[test]
 fn n1_cheap_and_dear() {
     let domain = "(define (domain d) (:requirements :fluents) (:predicates (done)) (:functions (total-cost) (a) (b) (c))
@@ -287,7 +293,7 @@ fn n1_cheap_and_dear() {
     }
 }
 
-/// A cost of 2^128 beside one of 1.
+/// A cost of 2^128 next to a cost of 1.
 #[test]
 fn n1_large_cost() {
     let domain =
@@ -299,23 +305,23 @@ fn n1_large_cost() {
     check("n1-cost", (domain, problem), vec![(sequential(), best("1", "0: (cheap) [0]"))]);
 }
 
-/// An action that has to lie exactly between two events, with which its start may interfere.
+/// An action must lie exactly between two events. Its start may interfere with the first of them.
 #[test]
 fn exactly_between_events() {
     let domain = "(define (domain d) (:requirements :adl :durative-actions :timed-initial-literals) (:predicates (e) (w) (q) (g))
      (:durative-action a :parameters () :duration (= ?duration 5) :condition (over all (and (e) (w)))
       :effect (and (when (at start (q)) (at start (not (e)))) (at end (g))))
      (:action disturb :parameters () :precondition (and) :effect (q)))";
-    let problem = |more: &str| {
+    let problem = |extra_facts: &str| {
         format!(
-            "(define (problem p) (:domain d) (:init (w) {more} (at 5 (e)) (at 10 (not (w)))) (:goal (g)))"
+            "(define (problem p) (:domain d) (:init (w) {extra_facts} (at 5 (e)) (at 10 (not (w)))) (:goal (g)))"
         )
     };
     check("between", (domain, &problem("")), vec![(sequential(), best("5", "5: (a) [5]"))]);
     check("between-disturbed", (domain, &problem("(q)")), vec![(sequential(), Truth::NoPlan)]);
 }
 
-/// A design that takes longer reaches over an event that a quicker one does not.
+/// The slower design makes the action last over an event; the quicker one does not.
 #[test]
 fn a_slow_design_reaches_over_events() {
     let domain = "(define (domain d) (:requirements :typing :fluents :durative-actions :timed-initial-literals)
@@ -327,7 +333,7 @@ fn a_slow_design_reaches_over_events() {
     check("slow-design", (domain, problem), vec![(sequential(), best("4", "1.001: (a f d2) [4]"))]);
 }
 
-/// As before, with a second action that has to end exactly at the second event: the first one has to start exactly at the first.
+/// Two actions in sequence, the second of which must end exactly at the second event. So the first must start exactly at the first.
 #[test]
 fn two_exactly_between_events() {
     let domain = "(define (domain d) (:requirements :adl :durative-actions :timed-initial-literals) (:predicates (e) (w) (q) (h) (g))
@@ -344,7 +350,7 @@ fn two_exactly_between_events() {
     check("two-too-late", (domain, &problem("19.999")), vec![(sequential(), Truth::NoPlan)]);
 }
 
-/// A number that one action changes when another one reads it.
+/// One action changes a number that another action reads.
 #[test]
 fn a_number_is_read_after_it_has_changed() {
     let domain = "(define (domain d) (:requirements :fluents :durative-actions) (:predicates (g)) (:functions (x))
@@ -358,7 +364,7 @@ fn a_number_is_read_after_it_has_changed() {
     check("number-read", (domain, problem), cases);
 }
 
-/// A function has one design at a time: what PDDL alone would let overlap does not.
+/// A function has one design at a time. So actions with different designs do not overlap, although PDDL alone would permit it.
 #[test]
 fn a_function_has_one_design_at_a_time() {
     let domain = "(define (domain d) (:requirements :typing :durative-actions) (:types function functiondesign)
@@ -379,7 +385,7 @@ fn a_function_has_one_design_at_a_time() {
     check("designs-together", (domain, &problem("d1")), together);
 }
 
-/// Large coefficients.
+/// Coefficients of 10^18 in a linear condition.
 #[test]
 fn n2_coefficients() {
     let domain = "(define (domain d) (:requirements :fluents) (:predicates (done) (ready)) (:functions (x) (y) (z))
@@ -396,7 +402,7 @@ fn n2_coefficients() {
     check("n2", (domain, problem), cases);
 }
 
-/// Seventy doublings.
+/// A number that grows to 2^70.
 #[test]
 fn n3_doublings() {
     let predicates: String = (0..71).map(|at| format!(" (c{at})")).collect();
@@ -422,7 +428,7 @@ fn n3_doublings() {
     }
 }
 
-/// A number that outgrows all integers on the only way to the goal: what cannot be calculated is not "no plan".
+/// A number that exceeds all integer types on the only way to the goal. An overflow must not be reported as "no plan".
 #[test]
 fn n3_more_doublings() {
     let predicates: String = (0..141).map(|at| format!(" (c{at})")).collect();
@@ -441,7 +447,7 @@ fn n3_more_doublings() {
     check("n3-more", (&domain, problem), vec![(sequential(), best("140", &plan.join(", ")))]);
 }
 
-/// A measure beyond 64 bits.
+/// A metric value beyond 64 bits.
 #[test]
 fn n5_large_measure() {
     let domain = "(define (domain d) (:requirements :durative-actions :fluents) (:predicates (done)) (:functions (cost))

@@ -1,6 +1,6 @@
-//! Asks the planner about a task whose truth is known, and says where the two differ.
+//! Compares the planner's answer for a task with the oracle's and records differences.
 //!
-//! The planner is called as the program calls it: read, ground, optimize, validate, certify, verify.
+//! The stages are the same as in the program: read, ground, optimize, validate, certify, verify.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -30,68 +30,68 @@ pub struct Step {
     pub duration: BigRational,
 }
 
-/// What is true of a task.
+/// The correct answer for a task.
 #[derive(Debug, Clone)]
 pub enum Truth {
-    /// The best value of the metric, and a plan that has it.
+    /// The best value of the metric, with a plan that attains it.
     Best(BigRational, Vec<Step>),
     /// There is no plan.
     NoPlan,
-    /// There are plans, but none that is best. A plan and its value.
+    /// Solvable, but without a best value. The fields are the value of some plan and this plan.
     NoBest(BigRational, Vec<Step>),
-    /// The oracle gave up; with the best plan that it found, if any.
+    /// The oracle gave up. The field is its best plan with its value, if any.
     Open(Option<(BigRational, Vec<Step>)>),
 }
 
-/// Whether actions overlap.
+/// Plan semantics.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Mode {
-    /// One after another.
+    /// One action after another.
     Sequential,
-    /// They overlap; what interferes is at least so far apart.
+    /// Actions can overlap. Interfering happenings are at least the given time apart.
     Concurrent(BigRational),
 }
 
-/// Executes a plan by the definition: its value, or why it is none.
+/// Executes a plan according to the definition and returns its value, or the reason why it is invalid.
 pub type Executor = Box<dyn Fn(&[Step]) -> Result<BigRational, String>>;
 
-/// A task and what is true of it.
+/// A task with its correct answer.
 pub struct Case {
-    /// Generator and seed, also the name of the directory where a failure is saved.
+    /// Generator and seed; also the directory name under which a failure is saved.
     pub name: String,
     pub domain: String,
     pub problem: String,
     pub mode: Mode,
-    /// Whether the larger value is the better.
+    /// `true` if larger values are better.
     pub maximize: bool,
     pub truth: Truth,
     pub execute: Executor,
-    /// Whether a claim is certified, and the certificate verified. In sequential mode only.
+    /// `true` if a certificate is written and verified; in sequential mode only.
     pub certify: bool,
-    /// How long the planner may take.
+    /// Time limit of the planner.
     pub limit: Duration,
 }
 
-/// Something that cannot be: the planner, the certificate, the validator and the oracle do not agree.
+/// A contradiction between planner, certificate, validator and oracle.
 #[derive(Debug)]
 pub struct Failure {
-    /// In a few words, for counting.
+    /// Short description, the key for counting.
     pub kind: &'static str,
     pub text: String,
 }
 
-/// What came of many tasks.
+/// Counts and failures of a run over many tasks.
 #[derive(Debug, Default)]
 pub struct Tally {
     pub tasks: usize,
     pub counts: BTreeMap<String, usize>,
     pub failures: Vec<Failure>,
-    /// Time in the planner, and in certificates.
+    /// Total time in the planner and in certificates (writing and verifying).
     pub planning: Duration,
     pub certificates: Duration,
 }
 
-/// What the planner says.
+/// The planner's answer.
 #[derive(Debug)]
 enum Answer {
     Refused(String),
@@ -101,26 +101,26 @@ enum Answer {
 #[derive(Debug)]
 struct Solved {
     solution: Solution,
-    /// Where there is no metric: whether plans are measured by their time.
+    /// `true` if plans without a metric are measured by their total time.
     timed: bool,
-    /// The task, where a certificate can be written.
+    /// The task, if a certificate is to be written.
     task: Option<Planned>,
 }
 
-/// An exact number of the planner.
+/// Converts an exact number of the planner.
 pub fn rational(exact: &Exact) -> BigRational {
     exact.to_rational()
 }
 
-/// A decimal for a plan, exact where there is one, otherwise with nine digits.
+/// Decimal notation of a time: exact if at most 39 fractional digits suffice, otherwise rounded to nine.
 pub fn decimal(number: &BigRational) -> String {
     let mut scale = num_bigint::BigInt::from(1);
     for digits in 0..40_usize {
         let scaled = number * &scale;
         if scaled.is_integer() {
             let text = format!("{:0>width$}", scaled.to_integer().to_string(), width = digits + 1);
-            let (whole, rest) = text.split_at(text.len() - digits);
-            return if rest.is_empty() { whole.to_owned() } else { format!("{whole}.{rest}") };
+            let (whole, fraction) = text.split_at(text.len() - digits);
+            return if fraction.is_empty() { whole.to_owned() } else { format!("{whole}.{fraction}") };
         }
         scale *= 10;
     }
@@ -128,7 +128,7 @@ pub fn decimal(number: &BigRational) -> String {
     decimal(&((number * &billion).round() / billion))
 }
 
-/// A plan as lines `start: (action arguments) [duration]`.
+/// Plan as lines `start: (action arguments) [duration]`.
 pub fn plan_lines(steps: &[Step]) -> String {
     steps.iter().fold(String::new(), |mut text, step| {
         let call = [std::slice::from_ref(&step.action), &step.arguments[..]].concat().join(" ");
@@ -137,7 +137,7 @@ pub fn plan_lines(steps: &[Step]) -> String {
     })
 }
 
-/// The planner's plan in the oracle's terms.
+/// Converts the planner's plan to oracle steps.
 pub fn steps_of(plan: &Plan) -> Vec<Step> {
     plan.steps
         .iter()
@@ -150,7 +150,7 @@ pub fn steps_of(plan: &Plan) -> Vec<Step> {
         .collect()
 }
 
-/// A plan as the validator takes it.
+/// Converts a plan to the validator's input.
 pub fn plan_text(steps: &[Step]) -> PlanText {
     let step = |step: &Step| PlanStep {
         action: Name::new(&step.action),
@@ -162,7 +162,7 @@ pub fn plan_text(steps: &[Step]) -> PlanText {
     PlanText { steps: steps.iter().map(step).collect() }
 }
 
-/// How the validator reads a plan of a mode. One after another it takes no rounding: the times are exact.
+/// Validator options for a mode. Sequential plans are checked without tolerance, as the times are exact.
 pub fn options(mode: &Mode) -> Options {
     match mode {
         Mode::Sequential => Options::default().with_tolerance(BigRational::zero()),
@@ -172,12 +172,12 @@ pub fn options(mode: &Mode) -> Options {
     }
 }
 
-/// What the project's validator says about a plan.
+/// Validator's verdict on a plan.
 pub fn project_verdict(mission: &Mission, problem: &Problem, steps: &[Step], mode: &Mode) -> Verdict {
     validate(mission.domain(), problem, &plan_text(steps), &options(mode))
 }
 
-/// Domain and problem as the program reads them.
+/// Parses domain and problem like the program.
 pub fn read(domain: &str, problem: &str) -> Result<(Mission, Problem), Errors> {
     let source = |name: &str, text: &str| Ok(Source::new(name, text.to_owned()));
     let (domain, problem) = (source("domain.pddl", domain), source("problem.pddl", problem));
@@ -186,7 +186,7 @@ pub fn read(domain: &str, problem: &str) -> Result<(Mission, Problem), Errors> {
     Ok((mission, problem))
 }
 
-/// The planner's settings: those of the program, or others with which small tasks reach what only large ones reach otherwise.
+/// Planner settings. The head start of the search varies with the task's name, so that all engines get their turn.
 fn config(name: &str, limits: Limits, thresholds: Thresholds) -> Config {
     let sum: usize = name.bytes().map(usize::from).sum();
     let config = Config::default().with_limits(limits);
@@ -201,7 +201,7 @@ fn plan(
     (limits, thresholds): (&Limits, Thresholds),
 ) -> Answer {
     let limits = &limits.clone().with_thresholds(thresholds);
-    // A certificate does not depend on how the answer was found.
+    // A certificate does not depend on the engine that found the answer, so one per task is enough.
     let is_certified = thresholds == Thresholds::default();
     let refused = |messages: Errors| {
         let mut codes: Vec<_> = messages.iter().map(|message| message.code.clone()).collect();
@@ -210,7 +210,7 @@ fn plan(
     };
     match mode {
         Mode::Sequential => match mission.ground(problem, &[], limits) {
-            // As the program does where numbers are too large for integers.
+            // E304: numbers exceed the integers. The program then plans in rationals, too.
             Err(messages) if messages.iter().all(|message| message.code == "E304") => {
                 match mission.ground_exact(problem, &[], limits) {
                     Err(messages) => refused(messages),
@@ -243,12 +243,12 @@ fn plan(
 }
 
 impl Tally {
-    /// Counts something.
-    pub fn count(&mut self, what: impl Into<String>) {
-        *self.counts.entry(what.into()).or_default() += 1;
+    /// Increments the counter `key`.
+    pub fn count(&mut self, key: impl Into<String>) {
+        *self.counts.entry(key.into()).or_default() += 1;
     }
 
-    /// Notes a failure, and saves its files where `ORACLE_SAVE` says.
+    /// Records a failure and saves its files to the directory `ORACLE_SAVE`, if it is set.
     pub fn fail(&mut self, case: &Case, kind: &'static str, reason: &str) {
         let Case { name, domain, problem, mode, truth, .. } = case;
         let mode = match mode {
@@ -277,11 +277,11 @@ impl Tally {
         self.failures.push(Failure { kind, text });
     }
 
-    /// The counts, one a line, and the times.
+    /// Counts, one per line, and mean times per task.
     pub fn summary(&self) -> String {
         let mut text = format!("{} tasks\n", self.tasks);
-        for (what, count) in &self.counts {
-            let _ = writeln!(text, "{count:>8}  {what}");
+        for (key, count) in &self.counts {
+            let _ = writeln!(text, "{count:>8}  {key}");
         }
         let each = |time: Duration| time.as_secs_f64() * 1e3 / self.tasks.max(1) as f64;
         let (planning, certificates) = (each(self.planning), each(self.certificates));
@@ -290,7 +290,7 @@ impl Tally {
         text
     }
 
-    /// Ends a test: prints the summary, and panics with the first failures if there are any.
+    /// Ends a test: prints the summary and panics with the first five failures, if any.
     #[allow(clippy::print_stdout)]
     pub fn finish(&self) {
         println!("{}", self.summary());
@@ -299,12 +299,12 @@ impl Tally {
     }
 }
 
-/// Which value is better: less than 0 if the first is.
+/// Compares two metric values. `Less` means that the first is better.
 pub fn compare(maximize: bool, left: &BigRational, right: &BigRational) -> std::cmp::Ordering {
     if maximize { right.cmp(left) } else { left.cmp(right) }
 }
 
-/// Asks the planner about a task, and counts and notes what comes of it.
+/// Runs the planner on a task and records the result.
 pub fn judge(case: &Case, tally: &mut Tally) {
     tally.tasks += 1;
     tally.count(match &case.truth {
@@ -313,11 +313,12 @@ pub fn judge(case: &Case, tally: &mut Tally) {
         Truth::NoBest(..) => "oracle: no best value",
         Truth::Open(_) => "oracle: open",
     });
+    // The oracle's own plan must have the oracle's value; otherwise the oracle is wrong.
     if let Truth::Best(cost, plan) | Truth::NoBest(cost, plan) | Truth::Open(Some((cost, plan))) = &case.truth
     {
         match (case.execute)(plan) {
             Ok(value) if value == *cost => {}
-            other => tally.fail(case, "the oracle refutes itself", &format!("{other:?}")),
+            unexpected => tally.fail(case, "the oracle refutes itself", &format!("{unexpected:?}")),
         }
     }
     if let Err(panic) = catch_unwind(AssertUnwindSafe(|| judge_caught(case, tally))) {
@@ -336,7 +337,7 @@ fn judge_caught(case: &Case, tally: &mut Tally) {
         }
     };
     check_witness(case, &mission, &problem, tally);
-    // What is not decided the first time is hardly decided the second time.
+    // A task that the first run does not decide is rarely decided by the second one, so its limit is short.
     let short = case.limit.min(Duration::from_millis(300));
     for (thresholds, limit) in [(Thresholds::default(), case.limit), (Thresholds::NONE, short)] {
         let started = Instant::now();
@@ -347,7 +348,7 @@ fn judge_caught(case: &Case, tally: &mut Tally) {
     }
 }
 
-/// Compares an answer with the truth.
+/// Compares an answer with the correct one.
 fn judge_answer(
     case: &Case,
     (mission, problem): (&Mission, &Problem),
@@ -357,7 +358,7 @@ fn judge_answer(
 ) {
     match answer {
         Answer::Refused(codes) => {
-            // A limit while grounding is not a refusal.
+            // A limit reached while grounding is not a refusal of the task.
             tally.count(if limits.reached() {
                 "limit while grounding".into()
             } else {
@@ -378,7 +379,7 @@ fn judge_answer(
     }
 }
 
-/// The validator has to accept the oracle's plan.
+/// Checks that the validator accepts the oracle's plan with the oracle's value.
 fn check_witness(case: &Case, mission: &Mission, problem: &Problem, tally: &mut Tally) {
     let (Truth::Best(cost, plan) | Truth::NoBest(cost, plan) | Truth::Open(Some((cost, plan)))) = &case.truth
     else {
@@ -396,7 +397,7 @@ fn check_witness(case: &Case, mission: &Mission, problem: &Problem, tally: &mut 
     }
 }
 
-/// Compares the planner's claim with the truth.
+/// Compares the planner's status, cost and lower bound with the correct answer.
 fn check_claim(case: &Case, solved: &Solved, tally: &mut Tally) {
     let solution = &solved.solution;
     let cost = solution.plan.as_ref().map(|plan| rational(&plan.cost));
@@ -418,8 +419,8 @@ fn check_claim(case: &Case, solved: &Solved, tally: &mut Tally) {
         (Status::Optimal | Status::Feasible, Truth::NoPlan) => Some("a plan where there is none"),
         (Status::Optimal, Truth::NoBest(..)) => Some("false: optimal, no best value"),
         (Status::Optimal, Truth::Best(best, _)) if cost.as_ref() != Some(best) => Some("false: optimal"),
-        (Status::Optimal, Truth::Open(Some((found, _))))
-            if cost.as_ref().is_none_or(|cost| compare(case.maximize, found, cost).is_lt()) =>
+        (Status::Optimal, Truth::Open(Some((incumbent, _))))
+            if cost.as_ref().is_none_or(|cost| compare(case.maximize, incumbent, cost).is_lt()) =>
         {
             Some("false: optimal")
         }
@@ -435,19 +436,21 @@ fn check_claim(case: &Case, solved: &Solved, tally: &mut Tally) {
     if let Some(contradiction) = &solution.statistics.contradiction {
         tally.fail(case, "the planner contradicts itself", contradiction);
     }
-    let (Truth::Best(found, _) | Truth::Open(Some((found, _))) | Truth::NoBest(found, _)) = &case.truth
+    let (Truth::Best(attained, _) | Truth::Open(Some((attained, _))) | Truth::NoBest(attained, _)) =
+        &case.truth
     else {
         return;
     };
+    // A bound on the metric is false if an existing plan is better.
     if let Some(bound) = solution.lower_bound.as_ref().map(rational)
         && kind.is_none()
-        && compare(case.maximize, found, &bound).is_lt()
+        && compare(case.maximize, attained, &bound).is_lt()
     {
         tally.fail(case, "false: bound", &format!("{claim}, bound {bound}"));
     }
 }
 
-/// Every plan that is shown has to be valid, and to cost what is claimed.
+/// Checks that a reported plan is valid and has the claimed cost, by the oracle's executor and by the validator.
 fn check_plan(
     case: &Case,
     (mission, problem): (&Mission, &Problem),
@@ -476,17 +479,17 @@ fn check_plan(
     }
 }
 
-/// A number from the environment.
+/// Integer from an environment variable.
 pub fn setting(name: &str, default: u64) -> u64 {
     std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
 }
 
-/// Whether nothing more is judged after a failure.
+/// Returns `true` if the run ends after a failure (`ORACLE_STOP`).
 pub fn is_over(tally: &Tally) -> bool {
     !tally.failures.is_empty() && std::env::var_os("ORACLE_STOP").is_some()
 }
 
-/// Judges as many tasks of a generator as the environment says (`default` if it does not), each from its seed.
+/// Judges the cases of `ORACLE_TASKS` seeds (default: `default`), starting at `ORACLE_FROM`.
 pub fn run(default: u64, cases: impl Fn(u64) -> Vec<Case>) -> Tally {
     let (from, tasks) = (setting("ORACLE_FROM", 0), setting("ORACLE_TASKS", default));
     let mut tally = Tally::default();

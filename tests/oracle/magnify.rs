@@ -1,12 +1,11 @@
-//! Generated missions with all their numbers replaced by decimals of 16 significant digits: how much longer is planning, certifying
-//! and verifying?
+//! Benchmark: slowdown of planning, certifying and verifying if all numbers of a mission become decimals of 16 significant digits.
 //!
-//! Missions come from `../shared/tools/gen_ratpa.py` (needs python3). Distances are multiplied by square roots, everything else by
-//! decimals, so that nothing is used more than before and the battery holds a little more: a mission that could be carried out
-//! still can be. Numbers that are compared with each other move apart, so that the same designs may be used.
+//! The missions come from `../shared/tools/gen_ratpa.py` (needs python3). Distances are multiplied by square roots, other numbers by
+//! decimals. Consumption does not grow and the battery holds slightly more, so a solvable mission remains solvable. The replaced
+//! numbers preserve the order of compared values, so the same designs can be used.
 //!
-//! Once the factors of a domain (weights of the metric) stay whole, and once they are decimals, too: products of three numbers of
-//! 16 digits exceed the planner's integers, so that those missions are planned in rationals.
+//! Two variants: the factors in the domain (weights of the metric) remain integers, or they become decimals as well. Products of
+//! three numbers of 16 digits exceed the planner's integers, so the second variant is planned in rationals.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -14,16 +13,16 @@ use std::process::Command;
 
 /// Significant digits.
 const DIGITS: usize = 16;
-/// How many missions.
+/// Number of generated missions.
 const MISSIONS: usize = 50;
-/// What becomes of a mission, whether factors are replaced, and how much longer that may take in the geometric mean.
+/// Variants: name, whether factors are replaced, and the maximum ratio of times (geometric mean).
 const KINDS: [(&str, bool, f64); 2] = [("decimals", false, 3.0), ("all", true, 3.0)];
-/// Shown as a status where a plan is proved and no certificate is written.
+/// Exit status shown for a proved plan without a certificate.
 const NO_CERTIFICATE: i32 = 120;
-/// Measurements below are noise of starting a program, in seconds.
-const LEAST: f64 = 0.002;
+/// Lower limit of a measured time in seconds; below it, the start of the process dominates.
+const MIN_SECONDS: f64 = 0.002;
 
-/// A number between 0 and 1 that depends on a name only (FNV).
+/// A pseudorandom number in [0, 1) that depends only on `name` (FNV hash with a final mix).
 fn fraction(name: &str) -> f64 {
     let hash = name.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
         (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
@@ -31,58 +30,58 @@ fn fraction(name: &str) -> f64 {
     ((hash ^ (hash >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-/// A decimal with 16 significant digits.
+/// Decimal notation with [`DIGITS`] significant digits.
 fn written(value: f64) -> String {
-    let before = (value.log10().floor() as i64 + 1).max(0) as usize;
-    format!("{value:.digits$}", digits = DIGITS - before.min(DIGITS))
+    let integer_digits = (value.log10().floor() as i64 + 1).max(0) as usize;
+    format!("{value:.digits$}", digits = DIGITS - integer_digits.min(DIGITS))
 }
 
-/// What a number of a function becomes.
+/// Replacement for a number of a function.
 fn magnified(function: &str, arguments: &[&str], value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }
-    // A way is as long in both directions.
+    // A distance is the same in both directions, so the order of the places is ignored.
     let mut sorted = arguments.to_vec();
     if function == "dist" {
         sorted.sort_unstable();
     }
-    let part = fraction(&format!("{function} {}", sorted.join(" ")));
+    let fraction_of_name = fraction(&format!("{function} {}", sorted.join(" ")));
     written(match function {
-        "dist" => value * (1.0 - part / 20.0).sqrt(),
-        // The same value, or recharging would not fill the battery.
+        "dist" => value * (1.0 - fraction_of_name / 20.0).sqrt(),
+        // One factor for both, otherwise recharging would not fill the battery.
         "battery" | "capacity" => value + fraction("battery") / 4.0,
-        "visibility" => value * (1.0 + part / 50.0),
-        _ => value * (1.0 - part / 50.0),
+        "visibility" => value * (1.0 + fraction_of_name / 50.0),
+        _ => value * (1.0 - fraction_of_name / 50.0),
     })
 }
 
-/// The problem with other initial values.
+/// Replaces the initial values of a problem.
 fn problem(text: &str) -> String {
     let mut parts = text.split("(= (");
     let mut magnified_text = parts.next().unwrap_or_default().to_owned();
     for part in parts {
-        let (call, rest) = part.split_once(") ").expect("a value follows a function");
-        let (number, rest) = rest.split_once(')').expect("a value ends");
+        let (call, remainder) = part.split_once(") ").expect("a value follows a function");
+        let (number, remainder) = remainder.split_once(')').expect("a value ends");
         let mut names = call.split(' ');
         let function = names.next().expect("a function");
         let value = magnified(function, &names.collect::<Vec<_>>(), number.parse().expect("a number"));
-        let _ = write!(magnified_text, "(= ({call}) {value}){rest}");
+        let _ = write!(magnified_text, "(= ({call}) {value}){remainder}");
     }
     magnified_text
 }
 
-/// The domain with another value that the battery is charged to, and, if asked for, with other factors.
+/// Replaces the value to which the battery is charged and, if `factors`, all other numbers of the domain.
 fn domain(text: &str, factors: bool) -> String {
     let mut words = Vec::new();
     for (position, word) in text.split(' ').enumerate() {
         let digits = word.trim_end_matches([')', '\n']);
-        let rest = &word[digits.len()..];
+        let suffix = &word[digits.len()..];
         match digits.parse::<f64>() {
             Ok(value) if factors || words.last().is_some_and(|word| word == "(battery)") => {
                 let charged = words.last().is_some_and(|word| word == "(battery)");
                 let function = if charged { "battery".to_owned() } else { format!("factor {position}") };
-                words.push(magnified(&function, &[], value) + rest);
+                words.push(magnified(&function, &[], value) + suffix);
             }
             _ => words.push(word.to_owned()),
         }
@@ -90,13 +89,13 @@ fn domain(text: &str, factors: bool) -> String {
     words.join(" ")
 }
 
-/// What a program came to: its exit status and its processor time.
+/// Exit status and processor time (in seconds) of a run.
 struct Run {
     status: i32,
     time: f64,
 }
 
-/// Runs the program, three times where it is quick, and takes the median.
+/// Runs the program. A run under 1 s is repeated twice unless `once`; the median counts.
 fn run(arguments: &[&str], once: bool) -> Run {
     let script = "import resource as r, subprocess as s, sys\n\
         def once():\n \
@@ -116,14 +115,14 @@ fn run(arguments: &[&str], once: bool) -> Run {
     Run { status: status.parse().expect("a status"), time: time.parse().expect("a time") }
 }
 
-/// The command that plans a mission.
+/// Arguments of the planning command for a mission.
 fn plan_arguments(directory: &Path, name: &str) -> [String; 6] {
     let file = |part: &str| directory.join(format!("{name}.{part}.pddl")).display().to_string();
     let [plan, quiet, limit, seconds] = ["plan", "--quiet", "--time-limit", "60"].map(str::to_owned);
     [plan, quiet, limit, seconds, file("domain"), file("problem")]
 }
 
-/// Planning, certifying, verifying.
+/// Runs planning, certifying and verifying.
 fn all_runs(directory: &Path, name: &str) -> [Run; 3] {
     let certificate = directory.join(format!("{name}.certificate")).display().to_string();
     let _ = std::fs::remove_dir_all(&certificate);
@@ -138,7 +137,7 @@ fn all_runs(directory: &Path, name: &str) -> [Run; 3] {
     [planned, certified, verified]
 }
 
-/// Family, places or pipelines, designs, functions, goals, seed.
+/// Parameters of the generator: family, places or pipelines, designs, functions, goals, seed.
 fn sizes() -> Vec<[usize; 6]> {
     let mut sizes = Vec::new();
     for seed in 1..=4 {
@@ -164,7 +163,7 @@ fn sizes() -> Vec<[usize; 6]> {
     sizes
 }
 
-/// Lets the tool write a mission, and writes it once more with decimals.
+/// Generates a mission with the tool and writes its variants with decimals. Returns `None` if python3 does not start.
 fn generate(tool: &Path, directory: &Path, size: &[usize; 6], encoding: &str) -> Option<String> {
     let [family, n, m, k, goals, seed] = size;
     let family = ["ugv", "uuv"][*family];
@@ -201,17 +200,17 @@ fn geometric_mean(ratios: &[f64]) -> f64 {
 #[test]
 #[allow(clippy::print_stdout)]
 #[ignore = "plans, certifies and verifies 150 missions: minutes, and only a release build says something"]
-fn decimals_beside_integers() {
+fn decimals_slow_planning_by_a_bounded_factor() {
     let tool = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/tools/gen_ratpa.py");
     if !tool.exists() || Command::new("python3").arg("--version").output().is_err() {
         println!("skipped: needs python3 and {}", tool.display());
         return;
     }
     let temporary = tempfile::tempdir().expect("a temporary directory");
-    // `ORACLE_SAVE` keeps the missions and the certificates.
+    // `ORACLE_SAVE` preserves the missions and certificates.
     let directory = std::env::var_os("ORACLE_SAVE").map_or(temporary.path().to_owned(), PathBuf::from);
     let mut ratios = [const { [const { Vec::new() }; 3] }; KINDS.len()];
-    let mut wrong = Vec::new();
+    let mut failures = Vec::new();
     println!(
         "mission, kind | planning: integers, decimals, ratio | certifying | verifying; processor time in seconds"
     );
@@ -223,9 +222,9 @@ fn decimals_beside_integers() {
             let digits = all_runs(&directory, &format!("{name}.{kind}"));
             let mut line = format!("{name} {kind}");
             for ((whole, digits), ratios) in whole.iter().zip(&digits).zip(ratios) {
-                let ratio = digits.time.max(LEAST) / whole.time.max(LEAST);
+                let ratio = digits.time.max(MIN_SECONDS) / whole.time.max(MIN_SECONDS);
                 let _ = write!(line, " | {:.3} {:.3} {ratio:.2}", whole.time, digits.time);
-                // A refusal takes no time.
+                // A refused mission takes no time, so its ratio would be meaningless.
                 if (whole.status, digits.status) == (0, 0) {
                     ratios.push(ratio);
                 } else {
@@ -234,7 +233,7 @@ fn decimals_beside_integers() {
             }
             println!("{line}");
             if digits.iter().any(|run| run.status != 0) {
-                wrong.push(line);
+                failures.push(line);
             }
         }
     }
@@ -246,11 +245,11 @@ fn decimals_beside_integers() {
             "geometric means of {kind} over integers: planning {planning:.2}, certifying {certifying:.2}, verifying {verifying:.2} ({counts:?} missions)"
         );
     }
-    assert!(wrong.is_empty(), "not planned, certified and verified:\n{}", wrong.join("\n"));
-    for ((kind, _, most), means) in KINDS.iter().zip(&means) {
+    assert!(failures.is_empty(), "not planned, certified and verified:\n{}", failures.join("\n"));
+    for ((kind, _, max_ratio), means) in KINDS.iter().zip(&means) {
         assert!(
-            means.iter().all(|mean| mean <= most),
-            "{kind} take more than {most} times as long: {means:?}"
+            means.iter().all(|mean| mean <= max_ratio),
+            "{kind} take more than {max_ratio} times as long: {means:?}"
         );
     }
 }

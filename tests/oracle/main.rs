@@ -1,13 +1,14 @@
-//! The planner, its certificates and its validator against oracles by another hand.
+//! Tests of the planner, its certificates and its validator against independent oracles.
 //!
-//! A generator makes a tiny task from a seed and computes by brute force what is true of it; [`judge`] asks the planner and compares.
-//! The oracles are written from the definition of a plan (PDDL 2.1, PDDL 2.2) and share nothing with the planner, not even the reader:
-//! a generator's task is a structure of its own, which is printed as PDDL.
+//! A generator derives a tiny task from a seed. Its oracle computes the correct answer by brute force, and [`judge`] compares the
+//! planner's answer with it. The oracles implement the definition of a plan (PDDL 2.1, PDDL 2.2) and share no code with the planner,
+//! not even the parser: a generator has its own task structure, which is printed as PDDL.
 //!
-//! `ORACLE_FROM` is the first seed, `ORACLE_TASKS` how many follow, `ORACLE_SAVE` a directory for the files of what fails;
-//! where `ORACLE_STOP` is set, the first failure is the last. `mutants.toml` has faults of the planner that the oracles have to notice.
+//! Environment variables: `ORACLE_FROM` is the first seed, `ORACLE_TASKS` the number of tasks, `ORACLE_SAVE` a directory for the files
+//! of failing tasks. If `ORACLE_STOP` is set, a run ends at the first failure. `mutants.toml` lists faults of the planner that the
+//! oracles must detect.
 
-// Speed does not matter here.
+// Readability of the oracles matters more than their speed.
 #![allow(clippy::format_collect, clippy::format_push_string, clippy::needless_for_each)]
 
 mod alternatives;

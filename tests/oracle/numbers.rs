@@ -1,7 +1,7 @@
 //! Generator B: numbers, function designs, optimisation.
 //!
-//! Missions with designs and tasks of arithmetic are made from seeds, with numbers that are hard to compute with and thresholds
-//! that are hit exactly or missed by a hair; explicit search in rational numbers says what is true of them.
+//! Missions with designs and arithmetic tasks are derived from seeds. Their numbers are hard to compute with, and thresholds are hit
+//! exactly or missed by a tiny amount. The oracle is explicit search in rational numbers.
 
 mod arithmetic;
 mod deeds;
@@ -29,12 +29,12 @@ use crate::judge::{Case, Executor, Mode, Step, Tally, Truth, is_over, judge, set
 use explore::{Budget, Measures};
 use ground::Ground;
 use model::{Expr, Number, Task};
-use truth::{Explored, Known};
+use truth::{Explored, Outcome};
 
-/// How much the oracle does for a task.
+/// Work limits of the oracle for a task.
 const BUDGET: Budget = Budget { states: 300, attempts: 25_000 };
 
-/// A task, and what is known of it.
+/// A task with the oracle's result.
 struct Puzzle {
     name: String,
     task: Task,
@@ -58,11 +58,11 @@ impl Puzzle {
         self.task.metric.as_ref().is_some_and(|(maximize, _)| *maximize)
     }
 
-    /// The plan in the terms of the judge, one action after another.
+    /// Steps of a sequential plan without gaps.
     fn steps(&self, plan: &[usize]) -> Vec<Step> {
         let mut clock = model::whole(0);
-        let step = |position: &usize| {
-            let instance = &self.ground.instances[*position];
+        let step = |number: &usize| {
+            let instance = &self.ground.instances[*number];
             let name = |object: &usize| self.task.objects[*object].0.clone();
             let start = clock.clone();
             clock += &instance.duration;
@@ -78,18 +78,18 @@ impl Puzzle {
 
     fn case(&self, certify: bool) -> Case {
         let (domain, problem) = print::print(&self.task);
-        let found = |found: &(Number, Vec<usize>)| (found.0.clone(), self.steps(&found.1));
-        let truth = match &self.explored.known {
-            Known::Best(best) => {
-                let (cost, plan) = found(best);
+        let solution = |solution: &(Number, Vec<usize>)| (solution.0.clone(), self.steps(&solution.1));
+        let truth = match &self.explored.outcome {
+            Outcome::Best(best) => {
+                let (cost, plan) = solution(best);
                 Truth::Best(cost, plan)
             }
-            Known::NoPlan => Truth::NoPlan,
-            Known::NoBest(best) => {
-                let (cost, plan) = found(best);
+            Outcome::NoPlan => Truth::NoPlan,
+            Outcome::NoBest(best) => {
+                let (cost, plan) = solution(best);
                 Truth::NoBest(cost, plan)
             }
-            Known::Open(best) => Truth::Open(best.as_ref().map(found)),
+            Outcome::Open(best) => Truth::Open(best.as_ref().map(solution)),
         };
         Case {
             name: self.name.clone(),
@@ -105,7 +105,7 @@ impl Puzzle {
     }
 }
 
-/// Executes a plan, one action after another, and says what it costs.
+/// Executor of sequential plans; returns the value of a plan.
 fn executor(ground: Rc<Ground>) -> Executor {
     Box::new(move |steps: &[Step]| {
         let measures = Measures::new(&ground);
@@ -131,24 +131,24 @@ fn executor(ground: Rc<Ground>) -> Executor {
     })
 }
 
-/// The task of a seed.
+/// Task of a seed.
 fn task(seed: u64) -> Task {
     let mut rng = Rng::with_seed(seed);
-    // Close seeds give close sequences at first.
+    // The first numbers of neighbouring seeds are correlated, so they are discarded.
     (0..8).for_each(|_| {
         rng.u64(..);
     });
     if rng.u32(0..5) < 3 { missions::mission(&mut rng) } else { arithmetic::arithmetic(&mut rng) }
 }
 
-/// Judges a task: always as the program plans it, every second time with a certificate, and on a share in other ways.
+/// Judges a task as the program plans it, with a certificate for even seeds, and one quarter each in other variants and objectives.
 fn judge_seed(seed: u64, tally: &mut Tally) {
     judge_task(seed, &task(seed), tally);
 }
 
 fn judge_task(seed: u64, task: &Task, tally: &mut Tally) {
-    let of = |objectives: &[Expr]| Puzzle::new(format!("numbers-{seed}"), task.clone(), objectives);
-    let Some(puzzle) = of(&[]) else { return tally.count("oracle: too large") };
+    let puzzle_with = |objectives: &[Expr]| Puzzle::new(format!("numbers-{seed}"), task.clone(), objectives);
+    let Some(puzzle) = puzzle_with(&[]) else { return tally.count("oracle: too large") };
     let case = puzzle.case(seed.is_multiple_of(2));
     judge(&case, tally);
     let mut rng = Rng::with_seed(seed ^ 0x5eed);
@@ -158,13 +158,13 @@ fn judge_task(seed: u64, task: &Task, tally: &mut Tally) {
     }
     if seed % 4 == 3 {
         let objectives = variants::objectives(&puzzle, &mut rng);
-        if let Some(puzzle) = of(&objectives) {
+        if let Some(puzzle) = puzzle_with(&objectives) {
             variants::check_objectives(&puzzle, &objectives, &case, tally);
         }
     }
 }
 
-/// Judges every other seed, so that two cores share the work.
+/// Judges the seeds of one parity, so that two test threads share the work.
 fn judge_seeds(first: u64) {
     let (from, tasks) = (setting("ORACLE_FROM", 0), setting("ORACLE_TASKS", 600));
     let mut tally = Tally::default();
@@ -183,7 +183,7 @@ fn random_tasks_with_numbers() {
 }
 
 #[test]
-fn random_tasks_with_numbers_in_between() {
+fn random_tasks_with_numbers_odd_seeds() {
     judge_seeds(1);
 }
 
@@ -213,6 +213,7 @@ fn smaller() {
             tally.failures.iter().map(|failure| failure.kind).collect::<Vec<_>>()
         };
         for kind in kinds(&task(seed)) {
+            // Delta debugging: the failure must remain of the same kind while the task shrinks.
             let small = shrink::shrink(task(seed), &|task| kinds(task).contains(&kind));
             let mut tally = Tally::default();
             judge_task(seed, &small, &mut tally);

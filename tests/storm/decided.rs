@@ -1,4 +1,4 @@
-//! What does not count once a property is decided, and what is left of a reward: without Storm.
+//! Tests that need no Storm: early termination for decided properties, and bounded rewards.
 
 use probabilistic::check::{Exactness, Options, check};
 use probabilistic::explore::{Bounds, explore};
@@ -9,33 +9,36 @@ use probabilistic::property;
 use super::ours;
 use super::random::{Random, questions, random_model};
 
-/// A property that is decided in some states is not followed beyond them; where a policy is wanted, all states are explored.
+/// Exploration stops at states in which the property is decided, unless a policy is requested. The answers are equal.
 #[test]
-fn what_comes_later_does_not_count() {
+fn decided_states_are_not_explored_further() {
     let mut random = Random(7);
     let mut fewer = 0;
     for _ in 0..300 {
         let model = random_model(&mut random);
-        let more = ["P=? [ G \"good\" ]", "P=? [ G<=3 !\"goal\" ]", "P>=0.5 [ \"good\" U<=4 \"goal\" ]"];
-        let more = more.map(|question| match model.kind {
+        let bounded_questions =
+            ["P=? [ G \"good\" ]", "P=? [ G<=3 !\"goal\" ]", "P>=0.5 [ \"good\" U<=4 \"goal\" ]"];
+        let bounded_questions = bounded_questions.map(|question| match model.kind {
             ModelKind::Mdp => question.replace("P=?", "Pmin=?"),
             ModelKind::Dtmc => question.to_owned(),
         });
-        for question in questions(model.kind).iter().copied().chain(more.iter().map(String::as_str)) {
+        for question in
+            questions(model.kind).iter().copied().chain(bounded_questions.iter().map(String::as_str))
+        {
             let property = property::parse(question).expect("a property");
-            let [all, some] = [true, false].map(|policy| {
+            let [full_report, early_report] = [true, false].map(|policy| {
                 let options = Options::default().with_exactness(Exactness::Always).with_policy(policy);
                 check(&model, &property, &options).expect("an answer")
             });
-            assert_eq!(some.outcome, all.outcome, "{question}\n{}", prism::write(&model));
-            assert!(some.states <= all.states);
-            fewer += usize::from(some.states < all.states);
+            assert_eq!(early_report.outcome, full_report.outcome, "{question}\n{}", prism::write(&model));
+            assert!(early_report.states <= full_report.states);
+            fewer += usize::from(early_report.states < full_report.states);
         }
     }
     assert!(fewer > 100, "{fewer} have fewer states");
 }
 
-/// The value of reaching `s=m-1` within a budget, by iteration over states and what is left of it.
+/// Probability of reaching `s=m-1` within a reward budget, by value iteration over states and remaining budget.
 fn unfolded(model: &Model, budget: usize, greatest: bool) -> f64 {
     let program = Program::<f64>::new(model, &Settings::default()).expect("a program").with_rewards(&[0]);
     let explored = explore(&program, &Bounds::default()).expect("explored");
@@ -46,40 +49,42 @@ fn unfolded(model: &Model, budget: usize, greatest: bool) -> f64 {
         program.unpack(state, &mut values);
         is_goal.push(values[0] == program.variables[0].greatest);
     }
-    let mut known = vec![vec![0.0_f64; mdp.states()]; budget + 1];
+    let mut probabilities = vec![vec![0.0_f64; mdp.states()]; budget + 1];
     for _ in 0..20_000 {
         let mut change = 0.0_f64;
-        for left in 0..=budget {
+        for remaining in 0..=budget {
             for state in 0..mdp.states() {
-                let worth = |choice: usize| {
-                    let Some(left) = left.checked_sub(rewards[choice] as usize) else { return 0.0 };
-                    mdp.transitions(choice).map(|(target, p)| p * known[left][target]).sum::<f64>()
+                let choice_value = |choice: usize| {
+                    let Some(remaining) = remaining.checked_sub(rewards[choice] as usize) else { return 0.0 };
+                    mdp.transitions(choice)
+                        .map(|(target, p)| p * probabilities[remaining][target])
+                        .sum::<f64>()
                 };
-                let all = mdp.choices(state).map(worth);
+                let choice_values = mdp.choices(state).map(choice_value);
                 let best = match (is_goal[state], greatest) {
                     (true, _) => 1.0,
-                    (false, true) => all.fold(0.0, f64::max),
-                    (false, false) => all.fold(1.0, f64::min),
+                    (false, true) => choice_values.fold(0.0, f64::max),
+                    (false, false) => choice_values.fold(1.0, f64::min),
                 };
-                change = change.max((best - known[left][state]).abs());
-                known[left][state] = best;
+                change = change.max((best - probabilities[remaining][state]).abs());
+                probabilities[remaining][state] = best;
             }
         }
         if change < 1e-13 {
             break;
         }
     }
-    known[budget][0]
+    probabilities[budget][0]
 }
 
-/// Whether what earns nothing goes round or not.
+/// Value iteration on the unfolded process is the oracle, with and without cycles of choices without reward.
 #[test]
 fn bounds_on_rewards_are_those_of_the_unfolded_process() {
     let mut random = Random(11);
     let mut between = 0;
     for _ in 0..200 {
         let model = random_model(&mut random);
-        // Rewards of a chain are shared among the commands of a state, and no whole numbers then.
+        // In a chain, the rewards of a state's commands are averaged, so they are not integers.
         if model.kind == ModelKind::Dtmc {
             continue;
         }

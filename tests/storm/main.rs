@@ -1,8 +1,8 @@
-//! The model checker beside Storm: values on random models and on our mission, JANI, and speed on co-adaptation models.
+//! Comparison of the model checker with Storm: values on random models and on our mission, JANI files, and speed on co-adaptation models.
 //!
-//! `python3 -m venv storm && storm/bin/pip install stormpy==2.0.0`, then
-//! `STORM_PYTHON=storm/bin/python cargo test --release --test storm -- --ignored --nocapture`; `SEED` and `MODELS` change the
-//! random models and how many there are.
+//! Setup: `python3 -m venv storm && storm/bin/pip install stormpy==2.0.0`. Run:
+//! `STORM_PYTHON=storm/bin/python cargo test --release --test storm -- --ignored --nocapture`. `SEED` and `MODELS` set the seed and the
+//! number of the random models.
 
 #![allow(clippy::print_stdout)]
 
@@ -25,7 +25,7 @@ use serde_json::{Value, json};
 
 use random::{Random, questions, random_model};
 
-/// Reads lines of JSON with `file`, `property` and `exact`, and answers each with the value or why there is none.
+/// Answers each line of JSON (`file`, `property`, `exact`) with the value or an error, and with times and memory.
 const SCRIPT: &str = r#"
 import json, sys, time, resource
 import stormpy
@@ -54,7 +54,7 @@ for line in sys.stdin:
     print(json.dumps(out), flush=True)
 "#;
 
-/// Storm's answers; none where it is not installed.
+/// Storm's answers; `None` if it is not installed.
 fn storm(questions: &[Value]) -> Option<Vec<Value>> {
     let python = std::env::var("STORM_PYTHON").unwrap_or_else(|_| "python3".to_owned());
     let installed = Command::new(&python).args(["-c", "import stormpy"]).output().ok()?.status.success();
@@ -87,31 +87,32 @@ fn storm(questions: &[Value]) -> Option<Vec<Value>> {
     )
 }
 
-/// Our value, with bounds; infinite as none.
+/// Our value with lower and upper bound; `None` if it is infinite.
 fn ours(model: &Model, text: &str, exactness: Exactness) -> Option<(f64, f64, f64)> {
     let options = Options::default().with_exactness(exactness);
     let report = check(model, &property::parse(text).expect("a property"), &options).expect("an answer");
     match report.outcome {
         Outcome::Value(Answer::Finite(quantity)) => Some((quantity.value, quantity.lower, quantity.upper)),
         Outcome::Value(Answer::Infinite) => None,
-        other => panic!("{text}: {other:?}"),
+        unexpected => panic!("{text}: {unexpected:?}"),
     }
 }
 
-fn compare(what: &str, found: Option<(f64, f64, f64)>, storm: &Value) {
-    assert!(storm["error"].is_null(), "{what}: {storm}");
-    match (found, storm["value"].as_f64()) {
+fn compare(label: &str, computed: Option<(f64, f64, f64)>, storm: &Value) {
+    assert!(storm["error"].is_null(), "{label}: {storm}");
+    match (computed, storm["value"].as_f64()) {
         (None, None) => {}
         (Some((value, lower, upper)), Some(expected)) => {
+            // Storm's sound value iteration has a relative error of up to 1e-6.
             let tolerance = 1e-6 * expected.abs().max(1.0);
-            assert!((value - expected).abs() <= tolerance, "{what}: {value}, Storm {expected}");
+            assert!((value - expected).abs() <= tolerance, "{label}: {value}, Storm {expected}");
             assert!(
                 lower - 1e-12 * expected.abs() <= expected && expected <= upper + 1e-12 * expected.abs(),
-                "{what}: [{lower}, {upper}], Storm {expected}"
+                "{label}: [{lower}, {upper}], Storm {expected}"
             );
-            assert!(upper - lower <= tolerance, "{what}: [{lower}, {upper}]");
+            assert!(upper - lower <= tolerance, "{label}: [{lower}, {upper}]");
         }
-        other => panic!("{what}: {other:?}"),
+        different => panic!("{label}: {different:?}"),
     }
 }
 
@@ -127,7 +128,7 @@ fn random_models() {
     let folder = tempfile::tempdir().expect("a folder");
     let number = |name: &str| std::env::var(name).ok().and_then(|text| text.parse::<u64>().ok());
     let mut random = Random(number("SEED").unwrap_or(3));
-    let (mut asked, mut expected) = (Vec::new(), Vec::new());
+    let (mut queries, mut expected) = (Vec::new(), Vec::new());
     let mut infinite = 0;
     for number in 0..number("MODELS").unwrap_or(200) {
         let model = random_model(&mut random);
@@ -141,15 +142,15 @@ fn random_models() {
                 [Exactness::Always, Exactness::Never].map(|exactness| ours(&read, question, exactness));
             infinite += usize::from(exact.is_none());
             for file in [&prism_file, &jani_file] {
-                asked.push(json!({ "file": file, "property": question, "exact": true }));
+                queries.push(json!({ "file": file, "property": question, "exact": true }));
                 expected.push((format!("{question}\n{text}"), exact, rounded));
             }
         }
     }
-    let Some(answers) = storm(&asked) else { return };
-    assert_eq!(answers.len(), asked.len());
+    let Some(answers) = storm(&queries) else { return };
+    assert_eq!(answers.len(), queries.len());
     let mut refused = 0;
-    for (((what, exact, rounded), answer), question) in expected.iter().zip(&answers).zip(&asked) {
+    for (((label, exact, rounded), answer), question) in expected.iter().zip(&answers).zip(&queries) {
         if question["file"]
             .as_str()
             .is_some_and(|file| Path::new(file).extension().is_some_and(|e| e == "jani"))
@@ -159,8 +160,8 @@ fn random_models() {
             println!("JANI refused: {answer}");
             continue;
         }
-        compare(what, *exact, answer);
-        compare(what, *rounded, answer);
+        compare(label, *exact, answer);
+        compare(label, *rounded, answer);
     }
     println!(
         "{} answers agree with Storm, {infinite} of ours infinite, {refused} JANI files refused",
@@ -169,7 +170,7 @@ fn random_models() {
     assert_eq!(refused, 0);
 }
 
-/// A question on our mission with more battery levels.
+/// A property of our mission with more battery levels.
 struct Case {
     property: &'static str,
     reward: Option<&'static str>,
@@ -181,7 +182,7 @@ const CASES: [Case; 2] = [
     Case { property: "R{\"time\"}min=? [ F \"goal\" ]", reward: Some("time"), failures: false },
 ];
 
-/// Our mission with a battery and the size of its levels, as `14000/20`.
+/// Our mission with a battery capacity and an optional size of its levels, such as `14000/20`.
 fn larger(battery: &str, case: &Case) -> (Coadaptation, Risk) {
     let number = |text: &str| text.parse::<u32>().expect("a number");
     let (battery, unit) = battery.split_once('/').unwrap_or((battery, "1"));
@@ -197,7 +198,7 @@ fn larger(battery: &str, case: &Case) -> (Coadaptation, Risk) {
     (coadaptation, risk)
 }
 
-/// What one side says, and what it took.
+/// Value of a property, with the number of states and processor times in seconds.
 struct Run {
     states: usize,
     value: f64,
@@ -205,7 +206,7 @@ struct Run {
     solve: f64,
 }
 
-/// Explores and solves natively.
+/// Explores and solves the process without its text.
 fn native(mission: &Coadaptation, risk: Risk, case: &Case) -> Run {
     let started = processor();
     let names: Vec<&str> = case.reward.into_iter().collect();
@@ -226,7 +227,7 @@ fn native(mission: &Coadaptation, risk: Risk, case: &Case) -> Run {
     Run { states: explored.mdp.states(), value, build, solve }
 }
 
-/// The model as text, as anybody would check it.
+/// Checks the process as PRISM text, like any other model.
 fn as_text(text: &str, case: &Case) -> Run {
     let model = prism::parse(text).expect("a model");
     let bounds = Bounds::default().with_states(100_000_000);
@@ -238,13 +239,13 @@ fn as_text(text: &str, case: &Case) -> Run {
         Outcome::Value(Answer::Finite(quantity)) => quantity.value,
         _ => f64::INFINITY,
     };
-    // The parts in wall time, the sum in processor time.
-    let all = processor() - started;
-    let build = all * report.build.as_secs_f64() / (report.build + report.solve).as_secs_f64();
-    Run { states: report.states, value, build, solve: all - build }
+    // The stages are measured in wall time, so their ratio is applied to the total processor time.
+    let total = processor() - started;
+    let build = total * report.build.as_secs_f64() / (report.build + report.solve).as_secs_f64();
+    Run { states: report.states, value, build, solve: total - build }
 }
 
-/// One size in one process, so that its memory can be told: `LEVELS`, `CASE` and `SIDE` (`native` or `text`).
+/// Runs one size in its own process, to measure its memory. Parameters: `LEVELS`, `CASE` and `SIDE` (`native` or `text`).
 #[test]
 #[ignore = "part of `speed_on_coadaptation_models`"]
 fn one_side() {
@@ -297,9 +298,10 @@ fn speed_on_coadaptation_models() {
             for (side, run) in &sides {
                 let ratio = seconds(storm) / seconds(run);
                 println!("  {side:6} {:8.3} s {:6} MB, {ratio:.1}x: {run}", seconds(run), run["memory"]);
-                let (found, expected) = (run["value"].as_f64(), storm["value"].as_f64());
-                let close = found.zip(expected).is_none_or(|(a, b)| (a - b).abs() <= 1e-6 * b.abs().max(1.0));
-                assert!(found.is_some() == expected.is_some() && close, "{run}, Storm {storm}");
+                let (computed, expected) = (run["value"].as_f64(), storm["value"].as_f64());
+                let is_close =
+                    computed.zip(expected).is_none_or(|(a, b)| (a - b).abs() <= 1e-6 * b.abs().max(1.0));
+                assert!(computed.is_some() == expected.is_some() && is_close, "{run}, Storm {storm}");
                 assert!(ratio > 10.0, "less than ten times as fast");
                 assert!(run["memory"].as_u64() <= storm["memory"].as_u64(), "more memory");
             }
@@ -307,14 +309,14 @@ fn speed_on_coadaptation_models() {
     }
 }
 
-/// The processor time of this thread in seconds: other programs on the machine do not count.
+/// Processor time of this thread in seconds, so that other processes do not matter.
 fn processor() -> f64 {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
     let nanoseconds = text.split_whitespace().next().and_then(|word| word.parse::<f64>().ok());
     nanoseconds.unwrap_or(0.0) / 1e9
 }
 
-/// The greatest resident memory so far, in megabytes.
+/// Peak resident memory of this process in megabytes.
 fn peak() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).unwrap_or("0");

@@ -1,4 +1,4 @@
-//! Random models of two modules that share an action.
+//! Random models of two modules that synchronise on an action.
 
 use probabilistic::Place;
 use probabilistic::prism::ast::{
@@ -23,18 +23,19 @@ fn equals(name: &str, value: usize) -> Expr {
     Expr::name(name).op(BinaryOp::Equal, Expr::int(value as i64))
 }
 
-/// A module over `variable` with random commands; actions are shared with the other module.
+/// A module over `variable` with random commands. The other module synchronises on common actions.
 fn module(random: &mut Random, name: &str, variable: &str, size: usize, actions: &[&str]) -> Module {
     let mut commands = Vec::new();
     for state in 0..size {
         for _ in 0..random.below(4) {
             let action = random.below(actions.len() + 1);
             let ends = 1 + random.below(3);
-            let mut left = 100;
+            let mut remaining = 100;
             let mut updates = Vec::new();
+            // The probabilities are percentages; the last one gets the remainder.
             for end in 0..ends {
-                let share = if end + 1 == ends { left } else { random.below(left + 1) };
-                left -= share;
+                let share = if end + 1 == ends { remaining } else { random.below(remaining + 1) };
+                remaining -= share;
                 let probability = Expr::int(share as i64).op(BinaryOp::Divide, Expr::int(100));
                 let target = Expr::int(random.below(size) as i64);
                 updates.push(Update {
@@ -65,7 +66,7 @@ pub fn random_model(random: &mut Random) -> Model {
         modules.iter().flat_map(|m| &m.commands).filter_map(|c| c.action.clone()).collect();
     let mut items = Vec::new();
     for action in ["a", "b", "c"] {
-        if used.iter().any(|known| known == action) && random.below(3) > 0 {
+        if used.iter().any(|used_action| used_action == action) && random.below(3) > 0 {
             items.push(RewardItem {
                 action: Some(Some(action.to_owned())),
                 guard: Expr::bool(true),

@@ -1,10 +1,10 @@
-//! Every front end and every compilation: a mission has the same best plan as the files that `export --to pddl` writes of it, and the
-//! oracles confirm it.
+//! Differential test of all front ends and compilations: a mission and the files that `export --to pddl` writes of it have the same
+//! optimum, and a brute-force oracle confirms it.
 //!
-//! Of the two one is planned with the usual thresholds and one with [`Thresholds::NONE`], so that stubborn sets, pairs of facts, landmarks,
-//! trees of labels and all searches that take turns are reached by tasks that are small enough for brute force.
+//! One of the two is planned with the default thresholds and the other one with [`Thresholds::NONE`]. Without thresholds, tasks that are
+//! small enough for brute force also reach stubborn sets, h² mutexes, landmarks, label trees and all engines of the portfolio.
 //!
-//! Some tasks and oracles are those of the planner's own tests: `crates/planner/tests`.
+//! Some generators and oracles are shared with the planner's own tests in `crates/planner/tests`.
 
 #[path = "../../../crates/planner/tests/partial/model.rs"]
 #[allow(dead_code, reason = "the planner's own tests ask more of it")]
@@ -29,39 +29,39 @@ use crate::temporal;
 use robots::{Form, Robot};
 use testing::random::Random;
 
-/// A mission and what brute force knows of it.
+/// A mission with the result of brute force.
 pub struct Sample {
     pub mission: Mission,
     pub mode: Mode,
-    /// Whether the larger value is the better.
+    /// `true` if larger values are better.
     pub maximize: bool,
-    pub known: Known,
+    pub reference: Reference,
 }
 
-/// What brute force has looked at, with the best value of a plan, if there is one.
+/// Result of brute force: the enumerated plans, and the best value among them (`None` if there is no plan).
 #[derive(Debug, Clone)]
-pub enum Known {
+pub enum Reference {
     /// All plans.
     All(Option<BigRational>),
-    /// All plans of at most this value, where less is better.
+    /// All plans up to this value; less is better.
     UpTo(i64, Option<BigRational>),
     /// Some plans.
     Some(Option<BigRational>),
 }
 
-/// A whole number.
+/// An integer as a rational number.
 pub fn whole(value: i64) -> BigRational {
     BigRational::from_integer(value.into())
 }
 
-/// What the planner answers.
+/// The planner's answer.
 #[derive(Debug)]
 struct Answer {
     status: Status,
     cost: Option<BigRational>,
     bound: Option<BigRational>,
     steps: Vec<Step>,
-    /// Whether a limit was reached.
+    /// `true` if a limit was reached.
     is_limited: bool,
 }
 
@@ -71,13 +71,13 @@ impl Answer {
     }
 }
 
-/// A generator of samples from seeds; none where a seed has no sample.
+/// A generator of samples; `None` if it has no sample for a seed.
 type Samples = Box<dyn FnMut(u64) -> Option<Sample>>;
 
-/// The number of situations in which a robot is looked at.
+/// Number of situations per robot. The knowledge base is read once per robot.
 const SITUATIONS: u64 = 15;
 
-/// The mission of the domain and the problem as `export --to pddl` writes them, and their texts.
+/// Mission of the exported domain and problem (`export --to pddl`), with their texts.
 fn exported(mission: &Mission) -> (Mission, [String; 2]) {
     let (problem, _) = mission.filled().unwrap_or_else(|messages| panic!("{messages:#?}"));
     let (domain, problem) = portable(mission.domain(), &problem);
@@ -88,13 +88,13 @@ fn exported(mission: &Mission) -> (Mission, [String; 2]) {
     (mission.unwrap_or_else(|messages| panic!("{messages:#?}\n{}\n{}", texts[0], texts[1])), texts)
 }
 
-/// Plans a mission; if it is refused, the codes of the messages.
+/// Plans a mission. `Err` has the codes of the messages if the mission is refused.
 fn plan(mission: &Mission, mode: &Mode, thresholds: Thresholds) -> Result<Answer, String> {
     let (problem, _) = mission.filled().unwrap_or_else(|messages| panic!("{messages:#?}"));
     let limits = Limits::none().with_thresholds(thresholds);
     let limits = match mode {
         Mode::Sequential => limits.with_time(Duration::from_secs(2)),
-        // Not all of these tasks are decided, however long it takes: memory ends that in the same way on every machine.
+        // Some of these tasks are never decided. The memory limit ends the search at the same point on every machine.
         Mode::Concurrent(_) => limits.with_time(Duration::from_secs(2)).with_room(1 << 20),
     };
     let codes = |messages: metaplan::Errors| {
@@ -124,23 +124,23 @@ fn plan(mission: &Mission, mode: &Mode, thresholds: Thresholds) -> Result<Answer
     })
 }
 
-/// A sentence about a claim of the first answer that the second one refutes.
-fn refuted(one: &Answer, other: &Answer, maximize: bool) -> Option<&'static str> {
-    let found = other.cost.as_ref()?;
-    let is_better = |than: &BigRational| compare(maximize, found, than).is_lt();
-    if one.status == Status::Unsolvable {
+/// Describes a claim of `claim` that the plan of `witness` refutes.
+fn refuted(claim: &Answer, witness: &Answer, maximize: bool) -> Option<&'static str> {
+    let cost = witness.cost.as_ref()?;
+    let is_better = |than: &BigRational| compare(maximize, cost, than).is_lt();
+    if claim.status == Status::Unsolvable {
         return Some("there is no plan, and there is one");
     }
-    if one.status == Status::Optimal && one.cost.as_ref().is_some_and(is_better) {
+    if claim.status == Status::Optimal && claim.cost.as_ref().is_some_and(is_better) {
         return Some("a plan is optimal, and another one is better");
     }
-    one.bound.as_ref().is_some_and(is_better).then_some("no plan is better than a bound, and one is")
+    claim.bound.as_ref().is_some_and(is_better).then_some("no plan is better than a bound, and one is")
 }
 
-/// A sentence about a claim that brute force refutes.
-fn disproved(answer: &Answer, known: &Known, maximize: bool) -> Option<&'static str> {
-    let (Known::All(best) | Known::UpTo(_, best) | Known::Some(best)) = known;
-    let is_better = |one: &BigRational, other: &BigRational| compare(maximize, one, other).is_lt();
+/// Describes a claim that brute force refutes.
+fn disproved(answer: &Answer, reference: &Reference, maximize: bool) -> Option<&'static str> {
+    let (Reference::All(best) | Reference::UpTo(_, best) | Reference::Some(best)) = reference;
+    let is_better = |left: &BigRational, right: &BigRational| compare(maximize, left, right).is_lt();
     if let Some(best) = best {
         if answer.status == Status::Unsolvable {
             return Some("false: no plan");
@@ -153,31 +153,31 @@ fn disproved(answer: &Answer, known: &Known, maximize: bool) -> Option<&'static 
             return Some("false: bound");
         }
     }
-    match (known, &answer.cost) {
-        (Known::All(None), Some(_)) => Some("a plan where there is none"),
-        (Known::UpTo(limit, best), Some(cost))
+    match (reference, &answer.cost) {
+        (Reference::All(None), Some(_)) => Some("a plan where there is none"),
+        (Reference::UpTo(limit, best), Some(cost))
             if *cost <= whole(*limit) && best.as_ref().is_none_or(|best| cost < best) =>
         {
             Some("a plan that is better than all plans")
         }
-        (Known::All(Some(best)), Some(cost)) if is_better(cost, best) => {
+        (Reference::All(Some(best)), Some(cost)) if is_better(cost, best) => {
             Some("a plan that is better than all plans")
         }
         _ => None,
     }
 }
 
-/// Compares the answers to a mission and to its export with each other, and with brute force.
+/// Compares the answers for a mission and its export with each other and with brute force.
 fn check(sample: &Sample, about: &str, seed: u64, tally: &mut Tally) {
     tally.tasks += 1;
-    let Sample { mission, mode, maximize, known } = sample;
+    let Sample { mission, mode, maximize, reference } = sample;
     let (export, texts) = exported(mission);
     let [first, second] = if seed.is_multiple_of(2) {
         [Thresholds::default(), Thresholds::NONE]
     } else {
         [Thresholds::NONE, Thresholds::default()]
     };
-    let (own, other) = (plan(mission, mode, first), plan(&export, mode, second));
+    let (original, counterpart) = (plan(mission, mode, first), plan(&export, mode, second));
     let mut fail = |kind: &'static str, reason: &str| {
         let show = |answer: &Result<Answer, String>| match answer {
             Err(codes) => format!("refused: {codes}"),
@@ -187,9 +187,9 @@ fn check(sample: &Sample, about: &str, seed: u64, tally: &mut Tally) {
             }
         };
         let text = format!(
-            "{about}: {kind}: {reason}\nthe mission: {}the export: {}brute force: {known:?}\n{}\n{}\n{}\n{}\n",
-            show(&own),
-            show(&other),
+            "{about}: {kind}: {reason}\nthe mission: {}the export: {}brute force: {reference:?}\n{}\n{}\n{}\n{}\n",
+            show(&original),
+            show(&counterpart),
             mission.domain_source().text(),
             mission.problem_source().text(),
             texts[0],
@@ -197,30 +197,39 @@ fn check(sample: &Sample, about: &str, seed: u64, tally: &mut Tally) {
         );
         tally.failures.push(Failure { kind, text });
     };
-    let (one, two) = match (&own, &other) {
-        (Ok(one), Ok(two)) => (one, two),
-        (Err(one), Err(two)) if one == two => return tally.count(format!("refused: {one}")),
+    let (first_answer, second_answer) = match (&original, &counterpart) {
+        (Ok(first_answer), Ok(second_answer)) => (first_answer, second_answer),
+        (Err(first_answer), Err(second_answer)) if first_answer == second_answer => {
+            return tally.count(format!("refused: {first_answer}"));
+        }
         _ => return fail("one is refused, the other one is not", ""),
     };
-    for (answer, against) in [(one, two), (two, one)] {
-        if let Some(kind) = refuted(answer, against, *maximize) {
+    for (answer, witness) in [(first_answer, second_answer), (second_answer, first_answer)] {
+        if let Some(kind) = refuted(answer, witness, *maximize) {
             fail(kind, "mission and export contradict each other");
         }
-        if let Some(kind) = disproved(answer, known, *maximize) {
+        if let Some(kind) = disproved(answer, reference, *maximize) {
             fail(kind, "brute force");
         }
     }
-    if one.is_decided() && two.is_decided() {
-        if (one.status, &one.cost) != (two.status, &two.cost) {
+    // Undecided tasks can differ by the time that the engines got, unless no limit was reached.
+    if first_answer.is_decided() && second_answer.is_decided() {
+        if (first_answer.status, &first_answer.cost) != (second_answer.status, &second_answer.cost) {
             fail("the answers differ", "");
         }
-    } else if *mode == Mode::Sequential && one.status != two.status && !one.is_limited && !two.is_limited {
+    } else if *mode == Mode::Sequential
+        && first_answer.status != second_answer.status
+        && !first_answer.is_limited
+        && !second_answer.is_limited
+    {
         fail("the statuses differ", "no limit was reached");
     }
-    // Each plan is one of the other files, too, and costs as much.
+    // A plan for the mission is also a plan for the export with the same cost, and vice versa.
     let problem = mission.filled().expect("filled").0;
     let exported_problem = export.filled().expect("filled").0;
-    for (answer, mission, problem) in [(one, &export, &exported_problem), (two, mission, &problem)] {
+    for (answer, mission, problem) in
+        [(first_answer, &export, &exported_problem), (second_answer, mission, &problem)]
+    {
         let Some(cost) = &answer.cost else { continue };
         let verdict = project_verdict(mission, problem, &answer.steps, mode);
         if let Some(violation) = &verdict.violation {
@@ -229,56 +238,56 @@ fn check(sample: &Sample, about: &str, seed: u64, tally: &mut Tally) {
             fail("a plan costs otherwise in the other files", &format!("{:?}", verdict.metric));
         }
     }
-    tally.count(match (one.is_decided() && two.is_decided(), one.status) {
+    tally.count(match (first_answer.is_decided() && second_answer.is_decided(), first_answer.status) {
         (true, Status::Optimal) => "decided: optimal",
         (true, _) => "decided: no plan",
         (false, _) => "not decided",
     });
-    if let (Known::All(best) | Known::UpTo(_, best) | Known::Some(best), Status::Optimal) =
-        (known, one.status)
+    if let (Reference::All(best) | Reference::UpTo(_, best) | Reference::Some(best), Status::Optimal) =
+        (reference, first_answer.status)
     {
-        let is_same = best.as_ref() == one.cost.as_ref();
+        let is_same = best.as_ref() == first_answer.cost.as_ref();
         tally.count(if is_same { "brute force: as good" } else { "brute force: worse, or nothing" });
     }
 }
 
-/// Robots, each in some situations.
+/// Robots with [`SITUATIONS`] situations each.
 fn robots(form: impl Fn(u64) -> Form + 'static) -> Samples {
     let directory = tempfile::tempdir().expect("a temporary directory");
-    let mut known: Option<(u64, Robot)> = None;
+    let mut current: Option<(u64, Robot)> = None;
     Box::new(move |seed| {
         let group = seed / SITUATIONS;
-        if known.as_ref().is_none_or(|(own, _)| *own != group) {
-            known = Some((group, Robot::new(group, form(group), directory.path())));
+        if current.as_ref().is_none_or(|(group_of_robot, _)| *group_of_robot != group) {
+            current = Some((group, Robot::new(group, form(group), directory.path())));
         }
-        known.as_ref().map(|(_, robot)| robot.sample(seed))
+        current.as_ref().map(|(_, robot)| robot.sample(seed))
     })
 }
 
-fn of_texts(domain: &str, problem: &str, maximize: bool, known: Known) -> Sample {
+fn of_texts(domain: &str, problem: &str, maximize: bool, reference: Reference) -> Sample {
     let (mission, _) = crate::judge::read(domain, problem)
         .unwrap_or_else(|messages| panic!("{messages:#?}\n{domain}\n{problem}"));
-    Sample { mission, mode: Mode::Sequential, maximize, known }
+    Sample { mission, mode: Mode::Sequential, maximize, reference }
 }
 
 fn derived(seed: u64) -> Option<Sample> {
     let case = temporal::with_derived(seed)?;
-    let known = match case.truth {
-        Truth::Best(value, _) => Known::All(Some(value)),
-        Truth::NoPlan => Known::All(None),
-        Truth::NoBest(value, _) => Known::Some(Some(value)),
-        Truth::Open(found) => Known::Some(found.map(|(value, _)| value)),
+    let reference = match case.truth {
+        Truth::Best(value, _) => Reference::All(Some(value)),
+        Truth::NoPlan => Reference::All(None),
+        Truth::NoBest(value, _) => Reference::Some(Some(value)),
+        Truth::Open(best_plan) => Reference::Some(best_plan.map(|(value, _)| value)),
     };
-    Some(of_texts(&case.domain, &case.problem, case.maximize, known))
+    Some(of_texts(&case.domain, &case.problem, case.maximize, reference))
 }
 
 fn undefined(seed: u64) -> Sample {
     let task = partial::Generator(Random(seed)).task();
-    let known = Known::UpTo(partial::DEPTH as i64, task.shortest().map(|steps| whole(steps as i64)));
-    of_texts(&task.domain(), &task.problem(), false, known)
+    let reference = Reference::UpTo(partial::DEPTH as i64, task.shortest().map(|steps| whole(steps as i64)));
+    of_texts(&task.domain(), &task.problem(), false, reference)
 }
 
-/// The samples of a front end, by name.
+/// Samples of a front end by its name.
 fn samples(front: &str) -> Samples {
     match front {
         "explicit form" => robots(|_| Form::Explicit),
@@ -292,7 +301,7 @@ fn samples(front: &str) -> Samples {
         "chosen durations" => Box::new(|seed| Some(grid::durations(seed))),
         "derived predicates" => Box::new(derived),
         "undefined fluents" => Box::new(|seed| Some(undefined(seed))),
-        other => panic!("there is no front end `{other}`"),
+        unknown => panic!("there is no front end `{unknown}`"),
     }
 }
 
@@ -308,8 +317,8 @@ const FRONTS: [&str; 9] = [
     "undefined fluents",
 ];
 
-/// Checks so many samples; at least as many of a hundred must be decided.
-fn run(front: &str, default: u64, least: usize) {
+/// Checks `default` samples (or `ORACLE_TASKS`), of which at least `least` percent must be decided.
+fn run(front: &str, default: u64, min_percent: usize) {
     let (from, tasks) = (setting("ORACLE_FROM", 0), setting("ORACLE_TASKS", default) as usize);
     let (mut samples, mut tally) = (samples(front), Tally::default());
     for seed in from.. {
@@ -321,11 +330,11 @@ fn run(front: &str, default: u64, least: usize) {
         }
     }
     let decided: usize = ["decided: optimal", "decided: no plan"]
-        .map(|what| tally.counts.get(what).copied().unwrap_or(0))
+        .map(|key| tally.counts.get(key).copied().unwrap_or(0))
         .iter()
         .sum();
     tally.finish();
-    assert!(100 * decided >= least * tasks, "{front}: {decided} of {tasks} are decided");
+    assert!(100 * decided >= min_percent * tasks, "{front}: {decided} of {tasks} are decided");
 }
 
 #[test]
@@ -373,10 +382,10 @@ fn undefined_fluents() {
     run("undefined fluents", 300, 50);
 }
 
-/// Ten thousand tasks of each front end, or of `ORACLE_FRONT`.
+/// 10,000 samples of each front end, or of the front end `ORACLE_FRONT` only.
 #[test]
 #[ignore = "takes an hour"]
-fn many() {
+fn thousands_of_samples_per_front_end() {
     let only = std::env::var("ORACLE_FRONT").ok();
     for front in FRONTS.iter().filter(|front| only.as_ref().is_none_or(|only| only == *front)) {
         run(front, 10_000, 0);

@@ -1,8 +1,8 @@
-//! Arithmetic without a robot: a few numbers and flags, actions that change them in every way, metrics of every sign.
+//! Arithmetic tasks without a robot: a few numbers and flags, all kinds of numeric effects, metrics of every sign.
 
 use fastrand::Rng;
 
-use super::draw::{Style, number, once_in, one, palette};
+use super::draw::{Style, number, once_in, one_of, palette};
 use super::model::{
     Action, Change, Condition, Effect, Expr, Happening, Lasting, Relation, Task, Term, applied, whole,
 };
@@ -14,11 +14,11 @@ struct Builder<'r> {
     styles: Vec<Style>,
     /// Functions without parameters that actions change.
     fluents: Vec<usize>,
-    /// Functions without parameters that none changes.
+    /// Functions without parameters that no action changes.
     constants: Vec<usize>,
-    /// A function of a thing that none changes, and one that actions change.
+    /// Two functions of a thing: a static one, and one that actions change.
     of_thing: [usize; 2],
-    /// The fluent that metrics mention; usually it is changed by what never changes only, as the planner demands.
+    /// Fluent for metrics. Unless the task is `wild`, it is changed by static amounts only, as the planner requires.
     counted: usize,
     wild: bool,
     flags: Vec<usize>,
@@ -27,7 +27,7 @@ struct Builder<'r> {
     open: usize,
 }
 
-/// A task from a seed.
+/// Generates a task.
 pub fn arithmetic(rng: &mut Rng) -> Task {
     let mut builder = Builder::new(rng);
     builder.values();
@@ -84,15 +84,15 @@ impl<'r> Builder<'r> {
     }
 
     fn constant(&mut self) -> Expr {
-        Expr::Function(applied(one(self.rng, &self.constants), &[]))
+        Expr::Function(applied(one_of(self.rng, &self.constants), &[]))
     }
 
     fn fluent(&mut self) -> Expr {
-        Expr::Function(applied(one(self.rng, &self.fluents), &[]))
+        Expr::Function(applied(one_of(self.rng, &self.fluents), &[]))
     }
 
-    /// What never changes: a number, a function, products, quotients.
-    fn fixed(&mut self, thing: Option<Term>) -> Expr {
+    /// A static expression: a number, a function, a product or a quotient.
+    fn static_expression(&mut self, thing: Option<Term>) -> Expr {
         match (self.rng.u32(0..8), thing) {
             (0 | 1, Some(thing)) => Expr::Function(applied(self.of_thing[0], &[thing])),
             (0 | 1, None) => self.constant(),
@@ -107,13 +107,13 @@ impl<'r> Builder<'r> {
         }
     }
 
-    /// Linear in what changes.
+    /// An expression that is linear in the fluents.
     fn linear(&mut self, thing: Option<Term>) -> Expr {
         match self.rng.u32(0..8) {
             0 | 1 => self.fluent(),
             2 => Expr::Sum(vec![self.fluent(), self.fluent()]),
             3 => Expr::Minus(Box::new(self.fluent()), Box::new(self.fluent())),
-            4 => Expr::Product(vec![self.fixed(thing), self.fluent()]),
+            4 => Expr::Product(vec![self.static_expression(thing), self.fluent()]),
             5 => {
                 let divisor = whole(self.rng.i64(1..8));
                 Expr::Quotient(Box::new(self.fluent()), Box::new(Expr::Number(divisor)))
@@ -122,7 +122,7 @@ impl<'r> Builder<'r> {
             _ => match thing {
                 Some(thing) => Expr::Sum(vec![
                     Expr::Function(applied(self.of_thing[1], &[thing])),
-                    self.fixed(Some(thing)),
+                    self.static_expression(Some(thing)),
                 ]),
                 None => Expr::Sum(vec![
                     Expr::Product(vec![self.draw(), self.fluent()]),
@@ -133,23 +133,23 @@ impl<'r> Builder<'r> {
     }
 
     fn flag(&mut self) -> Condition {
-        let flag = Condition::Holds(applied(one(self.rng, &self.flags), &[]));
+        let flag = Condition::Holds(applied(one_of(self.rng, &self.flags), &[]));
         if once_in(self.rng, 3) { Condition::Not(Box::new(flag)) } else { flag }
     }
 
     fn change(&mut self, thing: Option<Term>) -> Effect {
         let target = match thing {
             Some(thing) if once_in(self.rng, 3) => applied(self.of_thing[1], &[thing]),
-            _ => applied(one(self.rng, &self.fluents), &[]),
+            _ => applied(one_of(self.rng, &self.fluents), &[]),
         };
         let kinds = if target.symbol == self.counted && !self.wild { 6 } else { 10 };
         match self.rng.u32(0..kinds) {
-            0..=2 => Effect::Number(Change::Increase, target, self.fixed(thing)),
-            3..=5 => Effect::Number(Change::Decrease, target, self.fixed(thing)),
-            6 => Effect::Number(Change::Assign, target, self.fixed(thing)),
+            0..=2 => Effect::Number(Change::Increase, target, self.static_expression(thing)),
+            3..=5 => Effect::Number(Change::Decrease, target, self.static_expression(thing)),
+            6 => Effect::Number(Change::Assign, target, self.static_expression(thing)),
             7 => Effect::Number(Change::Assign, target, self.linear(thing)),
             8 => {
-                let change = one(self.rng, &[Change::Increase, Change::Decrease]);
+                let change = one_of(self.rng, &[Change::Increase, Change::Decrease]);
                 Effect::Number(change, target, self.linear(thing))
             }
             _ => {
@@ -159,7 +159,7 @@ impl<'r> Builder<'r> {
                     2 => whole(-1),
                     _ => number(self.rng, &self.styles),
                 };
-                let change = one(self.rng, &[Change::ScaleUp, Change::ScaleDown]);
+                let change = one_of(self.rng, &[Change::ScaleUp, Change::ScaleDown]);
                 Effect::Number(change, target, Expr::Number(factor))
             }
         }
@@ -172,11 +172,12 @@ impl<'r> Builder<'r> {
             happening.conditions.push(flag);
         }
         if once_in(self.rng, 6) {
-            let any = vec![self.flag(), self.flag()];
-            happening.conditions.push(Condition::Any(any));
+            let disjuncts = vec![self.flag(), self.flag()];
+            happening.conditions.push(Condition::Any(disjuncts));
         }
         if open && !once_in(self.rng, 3) {
-            let expression = if once_in(self.rng, 4) { self.fixed(thing) } else { self.linear(thing) };
+            let expression =
+                if once_in(self.rng, 4) { self.static_expression(thing) } else { self.linear(thing) };
             happening.conditions.push(Condition::Open(Relation::AtLeast, expression, self.open));
             self.open += 1;
         }
@@ -186,13 +187,14 @@ impl<'r> Builder<'r> {
                 Effect::Number(_, target, _) => Some(target.clone()),
                 _ => None,
             };
-            // Contradictions are rare.
-            if happening.effects.iter().all(|other| target(other) != target(&effect)) || once_in(self.rng, 6)
+            // Two effects on one number may contradict each other. That is wanted, but rarely.
+            if happening.effects.iter().all(|earlier| target(earlier) != target(&effect))
+                || once_in(self.rng, 6)
             {
                 happening.effects.push(effect);
             }
         }
-        let flag = applied(one(self.rng, &self.flags), &[]);
+        let flag = applied(one_of(self.rng, &self.flags), &[]);
         match self.rng.u32(0..4) {
             0 | 1 => happening.effects.push(Effect::Add(flag)),
             2 => happening.effects.push(Effect::Delete(flag)),
@@ -221,19 +223,19 @@ impl<'r> Builder<'r> {
         let mut lasting = timed.then(|| {
             let duration = match self.rng.u32(0..6) {
                 0 => Expr::Number(whole(0)),
-                1 => self.fixed(thing),
+                1 => self.static_expression(thing),
                 _ => Expr::Number(whole(self.rng.i64(1..4))),
             };
             let over_all = if once_in(self.rng, 4) { vec![self.flag()] } else { Vec::new() };
             Lasting { duration, over_all, end: self.happening(thing, false) }
         });
-        let cost = Effect::Number(Change::Increase, applied(self.cost, &[]), self.fixed(thing));
+        let cost = Effect::Number(Change::Increase, applied(self.cost, &[]), self.static_expression(thing));
         match &mut lasting {
             Some(lasting) => lasting.end.effects.push(cost),
             None => start.effects.push(cost),
         }
         if self.wild && self.rng.bool() {
-            // What an action costs may depend on the state.
+            // Wild tasks may have costs that depend on the state.
             let cost = Effect::Number(Change::Increase, applied(self.cost, &[]), self.linear(thing));
             start.effects.push(cost);
         }
@@ -245,7 +247,7 @@ impl<'r> Builder<'r> {
         let counted = Expr::Function(applied(self.counted, &[]));
         let maximize = once_in(self.rng, 6);
         let metric = match self.rng.u32(0..8) {
-            // Without a metric, durations of 0 and others would have to be told apart.
+            // The default metric depends on whether any duration is positive, so timed tasks always have a metric.
             0 if !timed => return None,
             0..=3 => cost,
             4 => self.fluent(),

@@ -1,11 +1,11 @@
-//! What the actions of a mission demand and do, and what missions are measured by.
+//! Conditions and effects of a mission's actions, and its metric.
 
-use super::draw::{once_in, one};
+use super::draw::{once_in, one_of};
 use super::missions::{Builder, DESIGN, PLACE};
 use super::model::{Action, Change, Condition, Effect, Expr, Number, Relation, Term, applied, whole};
 
 impl Builder<'_> {
-    /// What the action needs of designs and battery.
+    /// Adds conditions on designs and battery.
     pub fn demand(&mut self, action: &mut Action, slots: &[(Term, Term)], way: Option<[Term; 2]>) {
         for _ in 0..self.rng.usize(0..3) {
             let expression = self.static_expression(slots, way);
@@ -17,21 +17,22 @@ impl Builder<'_> {
             action.start.conditions.push(condition);
         }
         if once_in(self.rng, 6) {
-            // A value that some designs do not have.
+            // Some designs have no value for `range`.
             let range = Expr::Function(applied(self.names.range, &[slots[0].1]));
             let bound = Expr::Number(self.draw());
-            let relation = one(self.rng, &[Relation::AtLeast, Relation::AtMost]);
+            let relation = one_of(self.rng, &[Relation::AtLeast, Relation::AtMost]);
             action.start.conditions.push(Condition::Compare(relation, range, bound));
         }
     }
 
-    /// What the action uses, and what that costs.
+    /// Adds battery consumption and costs.
     pub fn use_up(&mut self, action: &mut Action, slots: &[(Term, Term)], way: Option<[Term; 2]>) {
         let names = self.names;
         let used = self.consumption(slots, way);
         if once_in(self.rng, 3) {
-            let enough = Condition::Compare(Relation::AtLeast, Self::number(names.battery), used.clone());
-            action.start.conditions.push(enough);
+            let battery_condition =
+                Condition::Compare(Relation::AtLeast, Self::number(names.battery), used.clone());
+            action.start.conditions.push(battery_condition);
         }
         let costs = self.consumption(slots, way);
         let mut effects = vec![Effect::Number(Change::Increase, applied(names.cost, &[]), costs)];
@@ -46,10 +47,10 @@ impl Builder<'_> {
             effects.push(Effect::Number(Change::Increase, applied(names.energy, &[]), sparse));
         }
         if once_in(self.rng, 4) {
-            // A value that some designs do not have, and that counts in some states only.
+            // An undefined operand counts only in states where the condition of the effect holds.
             let sparse = Expr::Function(applied(names.range, &[slots[0].1]));
             let low = Expr::Number(self.draw());
-            let relation = one(self.rng, &[Relation::AtLeast, Relation::AtMost]);
+            let relation = one_of(self.rng, &[Relation::AtLeast, Relation::AtMost]);
             let battery = Condition::Compare(relation, Self::number(names.battery), low);
             let effect = Effect::Number(Change::Increase, applied(names.energy, &[]), sparse);
             effects.push(Effect::When(vec![battery], vec![effect]));
@@ -58,8 +59,8 @@ impl Builder<'_> {
             let low = self.draw();
             let battery =
                 Condition::Compare(Relation::AtMost, Self::number(names.battery), Expr::Number(low));
-            let more = Expr::Number(self.draw());
-            let effect = Effect::Number(Change::Increase, applied(names.cost, &[]), more);
+            let extra_cost = Expr::Number(self.draw());
+            let effect = Effect::Number(Change::Increase, applied(names.cost, &[]), extra_cost);
             effects.push(Effect::When(vec![battery], vec![effect]));
         }
         for effect in effects {
@@ -71,7 +72,7 @@ impl Builder<'_> {
         }
     }
 
-    /// Effects that mention a design or a function.
+    /// Adds effects whose arguments are a design or a function.
     pub fn touch(&mut self, action: &mut Action, slots: &[(Term, Term)], way: &[Term]) {
         let names = self.names;
         let (function, design) = slots[0];
@@ -79,8 +80,8 @@ impl Builder<'_> {
             self.remember(action, function, design);
         }
         if self.fluent_availability && once_in(self.rng, 2) {
-            let lost = Effect::Delete(applied(names.available, &[design]));
-            Self::finally(action).push(lost);
+            let unavailable = Effect::Delete(applied(names.available, &[design]));
+            Self::finally(action).push(unavailable);
         }
         if !self.side_effects {
             return;
@@ -100,8 +101,8 @@ impl Builder<'_> {
             }
             2 => {
                 let marked = Condition::Holds(applied(names.marked, &[design]));
-                let dear = Expr::Number(self.draw_positive());
-                let effect = Effect::Number(Change::Increase, applied(names.cost, &[]), dear);
+                let extra_cost = Expr::Number(self.draw_positive());
+                let effect = Effect::Number(Change::Increase, applied(names.cost, &[]), extra_cost);
                 Self::finally(action).push(Effect::When(vec![marked], vec![effect]));
                 action.start.effects.push(Effect::Add(applied(names.marked, &[design])));
             }
@@ -116,7 +117,7 @@ impl Builder<'_> {
         }
     }
 
-    /// The current design of a function is remembered, and another one costs.
+    /// Records the current design of a function. A replacement has a cost.
     fn remember(&mut self, action: &mut Action, function: Term, design: Term) {
         let names = self.names;
         action.parameters.push(("old".to_owned(), DESIGN));
@@ -131,7 +132,7 @@ impl Builder<'_> {
         action.start.effects.push(Effect::When(vec![differs], vec![effect]));
     }
 
-    /// Something to do at a place.
+    /// A task to perform at a place.
     pub fn work(&mut self) -> Action {
         let mut action = self.empty("work".to_owned());
         let names = self.names;
@@ -147,11 +148,11 @@ impl Builder<'_> {
         action
     }
 
-    /// Fills the battery: a value is assigned, or added where it is low.
+    /// An action that assigns a value to the battery, or adds to it if it is low.
     pub fn recharge(&mut self) -> Action {
         let mut action = self.empty("recharge".to_owned());
         let names = self.names;
-        let place = one(self.rng, &self.places);
+        let place = one_of(self.rng, &self.places);
         action.start.conditions.push(Condition::Holds(applied(names.at, &[Term::Object(place)])));
         let battery = applied(names.battery, &[]);
         let full = self.task.values.iter().find(|(function, ..)| *function == names.battery);
@@ -171,7 +172,7 @@ impl Builder<'_> {
         action
     }
 
-    /// Makes a design available.
+    /// An action that makes a design available.
     pub fn repair(&mut self) -> Action {
         let mut action = self.empty("repair".to_owned());
         let names = self.names;
@@ -186,8 +187,8 @@ impl Builder<'_> {
 
     pub fn metric(&mut self) -> Option<(bool, Expr)> {
         let names = self.names;
-        let weighted = |weight: Number, of: Expr| Expr::Product(vec![Expr::Number(weight), of]);
-        // Where a value is assigned to the battery, the planner refuses a metric of it.
+        let weighted = |weight: Number, value: Expr| Expr::Product(vec![Expr::Number(weight), value]);
+        // The planner refuses metrics of a number that an action assigns.
         let recharged = self.task.actions.iter().any(|action| action.name == "recharge");
         let kinds = if recharged && !once_in(self.rng, 10) { 9 } else { 12 };
         let metric = match self.rng.u32(0..kinds) {

@@ -1,11 +1,11 @@
-//! Random numbers of the kinds that break arithmetic, and random choices.
+//! Random numbers of the kinds that challenge arithmetic, and random choices.
 
 use fastrand::Rng;
 use num_bigint::BigInt;
 
 use super::model::{Number, Relation, decimal, power_of_ten, whole};
 
-/// What the numbers of a task look like.
+/// Distribution of numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Style {
     /// 0 to 9.
@@ -16,22 +16,22 @@ pub enum Style {
     Short,
     /// -5 to 5.
     Signed,
-    /// 16 digits after the point, below 1: what a sensor prints.
+    /// 16 digits after the point, below 1, like the output of a sensor.
     Sensor,
-    /// 16 significant digits, the point anywhere.
+    /// 16 significant digits, with the point at any position.
     Digits,
     /// Halves, quarters, eighths: exact doubles.
     Binary,
-    /// 10^-12 and 10^18 side by side.
+    /// Digit times 10^-12 or 10^18.
     Wide,
-    /// Around 2^31, 2^46, 2^53, 2^62, 2^63, 2^64.
+    /// At most 1 away from 2^31, 2^46, 2^53, 2^62, 2^63 or 2^64.
     Powers,
-    /// 10^30.
+    /// Slightly above 10^30.
     Huge,
     Zero,
 }
 
-/// Styles from which a task draws.
+/// Styles for the numbers of a task.
 pub fn palette(rng: &mut Rng) -> Vec<Style> {
     use Style::{Binary, Digits, Huge, Positive, Powers, Sensor, Short, Signed, Small, Wide, Zero};
     let kind: &[Style] = match rng.u32(0..20) {
@@ -53,7 +53,7 @@ pub fn palette(rng: &mut Rng) -> Vec<Style> {
     kind.to_vec()
 }
 
-/// A number of one of the styles.
+/// A number of a random style of the list.
 pub fn number(rng: &mut Rng, styles: &[Style]) -> Number {
     match styles[rng.usize(0..styles.len())] {
         Style::Small => whole(rng.i64(0..10)),
@@ -64,8 +64,8 @@ pub fn number(rng: &mut Rng, styles: &[Style]) -> Number {
         }
         Style::Signed => whole(rng.i64(-5..6)),
         Style::Sensor => {
-            let lowest = if rng.bool() { 9_000_000_000_000_000 } else { 1 };
-            decimal(&format!("0.{:016}", rng.i64(lowest..10_000_000_000_000_000)))
+            let lower_limit = if rng.bool() { 9_000_000_000_000_000 } else { 1 };
+            decimal(&format!("0.{:016}", rng.i64(lower_limit..10_000_000_000_000_000)))
         }
         Style::Digits => {
             let digits = whole(rng.i64(1_000_000_000_000_000..10_000_000_000_000_000));
@@ -86,22 +86,22 @@ pub fn number(rng: &mut Rng, styles: &[Style]) -> Number {
     }
 }
 
-/// True once in so many times.
+/// Returns `true` with probability 1/`times`.
 pub fn once_in(rng: &mut Rng, times: u32) -> bool {
     rng.u32(0..times) == 0
 }
 
-/// One of them.
-pub fn one<T: Clone>(rng: &mut Rng, of: &[T]) -> T {
-    of[rng.usize(0..of.len())].clone()
+/// A random element of the slice.
+pub fn one_of<T: Clone>(rng: &mut Rng, choices: &[T]) -> T {
+    choices[rng.usize(0..of.len())].clone()
 }
 
-/// A comparison; equality is rare.
+/// A random comparison; equality is rare.
 pub fn relation(rng: &mut Rng) -> Relation {
-    if once_in(rng, 8) { Relation::Equal } else { one(rng, &Relation::ALL) }
+    if once_in(rng, 8) { Relation::Equal } else { one_of(rng, &Relation::ALL) }
 }
 
-/// A value at, just above or just below another.
+/// A number equal to `value`, or just above or below it.
 pub fn near(rng: &mut Rng, value: &Number) -> Number {
     let step = match rng.u32(0..8) {
         0..=3 => return value.clone(),

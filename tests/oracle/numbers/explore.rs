@@ -1,8 +1,8 @@
-//! All states that can be reached, up to a limit, and what every step costs.
+//! Enumerates the reachable states up to a limit, with the cost of each step.
 //!
-//! A number that nothing reads and that is only increased and decreased is a *counter*: it is left out of the state, and what a
-//! step adds to it goes into the step's cost. Metrics are linear, so a step costs the same wherever its counters stand; numbers
-//! that stay in the state enter the cost as a difference, so that the costs of the steps add up to the metric either way.
+//! A *counter* is a number that is not read and only increased and decreased. Counters are not part of the state; their changes are
+//! part of the step's cost. Metrics are linear, so this cost does not depend on the values of the counters. Other numbers contribute
+//! their difference to the cost. So the costs of the steps of a plan always add up to its metric (minus the initial value).
 
 use std::collections::HashMap;
 
@@ -18,11 +18,11 @@ use super::step::{State, all_hold, execute, number};
 pub struct Edge {
     pub to: usize,
     pub instance: usize,
-    /// What it adds to the metric and to each objective.
+    /// Contribution to the metric and to each objective.
     pub costs: Vec<Number>,
 }
 
-/// What plans are measured by: the metric of the task and further objectives.
+/// Functions that plans are measured by: the metric of the task, then further objectives.
 pub struct Measures<'g> {
     ground: &'g Ground,
     values: Vec<Measure<'g>>,
@@ -36,16 +36,16 @@ enum Measure<'g> {
 }
 
 impl<'g> Measures<'g> {
-    /// The metric, or what stands in for it (definition, 9), and the objectives.
+    /// The metric of the task, or the default metric (definition, 9), and the objectives.
     pub fn new(ground: &'g Ground) -> Self {
-        let lasts = ground.instances.iter().any(|instance| !instance.duration.is_zero());
-        let first = match &ground.metric {
+        let has_durations = ground.instances.iter().any(|instance| !instance.duration.is_zero());
+        let metric_measure = match &ground.metric {
             Some(metric) => Measure::Expression(metric),
-            None if lasts => Measure::Time,
+            None if has_durations => Measure::Time,
             None => Measure::Steps,
         };
-        let others = ground.objectives.iter().map(Measure::Expression);
-        let values = std::iter::once(first).chain(others).collect();
+        let objectives = ground.objectives.iter().map(Measure::Expression);
+        let values = std::iter::once(metric_measure).chain(objectives).collect();
         Self { ground, values, counters: counters(ground) }
     }
 
@@ -55,19 +55,19 @@ impl<'g> Measures<'g> {
         State { atoms: atoms.clone(), numbers: numbers.clone(), time: Number::zero() }
     }
 
-    /// What the measures are in a state after so many steps; nothing where one has no value.
+    /// Values of all measures in a state that is reached after `steps` steps; `None` if one is undefined.
     pub fn of(&self, state: &State, steps: i64) -> Option<Vec<Number>> {
-        let each = self.values.iter().map(|measure| match measure {
+        let results = self.values.iter().map(|measure| match measure {
             Measure::Expression(value) => number(value, state),
             Measure::Steps => Some(super::model::whole(steps)),
             Measure::Time => Some(state.time.clone()),
         });
-        each.collect()
+        results.collect()
     }
 
-    /// The state after a step without its counters, and what the step adds to each measure.
+    /// State after a step, with counters reset, and the contribution of the step to each measure. `None` if the step is not applicable.
     ///
-    /// `old` is what the measures are before it.
+    /// `old` has the values of the measures in the state `before`.
     pub fn step(
         &self,
         instance: &Instance,
@@ -85,9 +85,10 @@ impl<'g> Measures<'g> {
         Some((after, costs))
     }
 
-    /// Whether it is certain, without looking at states, that no step lowers a measure (raises it, if it is to be maximised).
+    /// Returns `true` if it is certain from the effects alone that no step lowers a measure (raises it, if `maximize`).
     pub fn never_improves(&self, measure: usize, maximize: bool) -> bool {
         let Measure::Expression(value) = self.values[measure] else { return true };
+        // The weight of a number is the difference of the measure between the unit state and the zero state, as measures are linear.
         let zero = State {
             atoms: Vec::new(),
             numbers: vec![Some(Number::zero()); self.counters.len()],
@@ -95,7 +96,7 @@ impl<'g> Measures<'g> {
         };
         let base = number(value, &zero);
         let weight = |state: &State| Some(number(value, state)? - base.clone()?);
-        let bad = |change: Number| if maximize { change.is_positive() } else { change.is_negative() };
+        let improves = |change: Number| if maximize { change.is_positive() } else { change.is_negative() };
         let mut weights = Vec::new();
         for fluent in 0..self.counters.len() {
             let mut state = zero.clone();
@@ -107,30 +108,30 @@ impl<'g> Measures<'g> {
             weights.push(weight);
         }
         let Some(time) = weight(&State { time: Number::one(), ..zero }) else { return false };
-        let safe = |acts: &[Act]| {
+        let never_improving = |acts: &[Act]| {
             all_acts(acts).into_iter().all(|act| match act {
                 Act::Number(change, fluent, value) if !weights[*fluent].is_zero() => match (change, value) {
-                    (Change::Increase, Value::Known(value)) => !bad(&weights[*fluent] * value),
-                    (Change::Decrease, Value::Known(value)) => !bad(-(&weights[*fluent] * value)),
+                    (Change::Increase, Value::Known(value)) => !improves(&weights[*fluent] * value),
+                    (Change::Decrease, Value::Known(value)) => !improves(-(&weights[*fluent] * value)),
                     _ => false,
                 },
                 _ => true,
             })
         };
         self.ground.instances.iter().all(|instance| {
-            !bad(&time * &instance.duration)
-                && safe(&instance.start.acts)
-                && instance.end.as_ref().is_none_or(|end| safe(&end.acts))
+            !improves(&time * &instance.duration)
+                && never_improving(&instance.start.acts)
+                && instance.end.as_ref().is_none_or(|end| never_improving(&end.acts))
         })
     }
 }
 
 fn all_acts<'a>(acts: &'a [Act]) -> Vec<&'a Act> {
-    let each = |act: &'a Act| if let Act::When(_, inner) = act { all_acts(inner) } else { vec![act] };
-    acts.iter().flat_map(each).collect()
+    let flattened = |act: &'a Act| if let Act::When(_, inner) = act { all_acts(inner) } else { vec![act] };
+    acts.iter().flat_map(flattened).collect()
 }
 
-/// Which numbers are counters.
+/// For each number, whether it is a counter; see the head of the file.
 fn counters(ground: &Ground) -> Vec<bool> {
     let mut counters: Vec<bool> = ground.numbers.iter().map(Option::is_some).collect();
     ground.goal.iter().for_each(|test| mark_test(test, &mut counters));
@@ -195,46 +196,47 @@ fn mark(value: &Value, counters: &mut [bool]) {
     }
 }
 
-/// Gives equal states one number.
+/// Numbers the distinct states.
 #[derive(Default)]
 pub struct States {
-    pub all: Vec<State>,
-    known: HashMap<(Vec<bool>, Vec<u32>), usize>,
+    pub by_number: Vec<State>,
+    index: HashMap<(Vec<bool>, Vec<u32>), usize>,
     numbers: HashMap<(BigInt, BigInt), u32>,
 }
 
 impl States {
-    /// The number of a state, and whether it is new.
+    /// Number of a state, and whether it is new. Total time is not part of the identity.
     pub fn number(&mut self, state: State) -> (usize, bool) {
         let mut ids = Vec::with_capacity(state.numbers.len());
+        // 0 means undefined; distinct numbers have distinct positive ids.
         for value in &state.numbers {
             let next = u32::try_from(self.numbers.len()).expect("few numbers") + 1;
             ids.push(value.as_ref().map_or(0, |value| {
                 *self.numbers.entry((value.numer().clone(), value.denom().clone())).or_insert(next)
             }));
         }
-        let next = self.all.len();
-        let number = *self.known.entry((state.atoms.clone(), ids)).or_insert(next);
+        let next = self.by_number.len();
+        let number = *self.index.entry((state.atoms.clone(), ids)).or_insert(next);
         if number == next {
-            self.all.push(state);
+            self.by_number.push(state);
         }
         (number, number == next)
     }
 }
 
-/// What was reached, breadth first.
+/// The explored part of the state space, in breadth-first order.
 pub struct Space {
-    /// What the measures are in the initial state.
+    /// Values of the measures in the initial state.
     pub initial: Vec<Number>,
     pub edges: Vec<Vec<Edge>>,
     pub goals: Vec<bool>,
-    /// Fewest steps to each state.
+    /// Least number of steps to each state.
     pub depths: Vec<usize>,
-    /// Whether that is all.
+    /// `true` if no budget was exceeded, so that all reachable states are included.
     pub complete: bool,
 }
 
-/// How much is done before the search gives up.
+/// Limits of the exploration.
 #[derive(Debug, Clone, Copy)]
 pub struct Budget {
     pub states: usize,
@@ -242,7 +244,7 @@ pub struct Budget {
     pub attempts: usize,
 }
 
-/// Visits states, those with fewest steps first.
+/// Explores the state space breadth-first. Returns `None` if a measure is undefined in a visited state.
 pub fn explore(ground: &Ground, measures: &Measures<'_>, budget: Budget) -> Option<Space> {
     let mut states = States::default();
     let first = measures.initial();
@@ -255,29 +257,30 @@ pub fn explore(ground: &Ground, measures: &Measures<'_>, budget: Budget) -> Opti
     };
     states.number(first);
     let mut attempts = 0;
-    while space.edges.len() < states.all.len() {
-        let at = space.edges.len();
+    while space.edges.len() < states.by_number.len() {
+        let current = space.edges.len();
         attempts += ground.instances.len();
-        if at >= budget.states || attempts > budget.attempts {
+        if current >= budget.states || attempts > budget.attempts {
             space.complete = false;
             break;
         }
-        let state = states.all[at].clone();
+        let state = states.by_number[current].clone();
         space.goals.push(all_hold(&ground.goal, &state));
         let mut edges = Vec::new();
         let old = measures.of(&state, 0)?;
         for (position, instance) in ground.instances.iter().enumerate() {
             if let Some((after, costs)) = measures.step(instance, (&state, &old)) {
-                let (to, new) = states.number(after);
-                if new {
-                    space.depths.push(space.depths[at] + 1);
+                let (target, is_new) = states.number(after);
+                if is_new {
+                    space.depths.push(space.depths[current] + 1);
                 }
-                edges.push(Edge { to, instance: position, costs });
+                edges.push(Edge { target, instance: position, costs });
             }
         }
         space.edges.push(edges);
     }
-    for state in &states.all[space.goals.len()..] {
+    // States that were reached but not expanded have no edges.
+    for state in &states.by_number[space.goals.len()..] {
         space.goals.push(all_hold(&ground.goal, state));
         space.edges.push(Vec::new());
     }

@@ -1,36 +1,37 @@
-//! What is best by several objectives: label-correcting search over the states that were visited.
+//! Pareto front of several objectives: label-correcting search over the explored states.
 
 use num_traits::Signed as _;
 
 use super::explore::Space;
 use super::model::Number;
 
-/// Most labels before it is given up.
-const LABELS: usize = 4_000;
+/// Maximum number of labels.
+const MAX_LABELS: usize = 4_000;
 
-/// All values of plans such that no other plan is as good by every objective and better by one; sorted. The objectives are the
-/// measures after the first, all minimised. Nothing where states are missing, a step has a negative cost, or there are too many labels.
+/// Sorted values of all Pareto-optimal plans. The objectives are the measures after the first one, all minimised. Returns `None` if
+/// the space is incomplete, a step has a negative cost, or there are too many labels.
 pub fn front(space: &Space) -> Option<Vec<Vec<Number>>> {
-    let negative = |costs: &[Number]| costs[1..].iter().any(Number::is_negative);
-    if !space.complete || space.edges.iter().flatten().any(|edge| negative(&edge.costs)) {
+    let has_negative = |costs: &[Number]| costs[1..].iter().any(Number::is_negative);
+    if !space.complete || space.edges.iter().flatten().any(|edge| has_negative(&edge.costs)) {
         return None;
     }
     let mut labels: Vec<Vec<Vec<Number>>> = vec![Vec::new(); space.edges.len()];
     labels[0].push(space.initial[1..].to_vec());
-    let mut waiting = vec![(0, space.initial[1..].to_vec())];
-    let mut made = 0;
-    while let Some((at, label)) = waiting.pop() {
-        if !labels[at].contains(&label) {
+    let mut open = vec![(0, space.initial[1..].to_vec())];
+    let mut created = 0;
+    while let Some((state, label)) = open.pop() {
+        // The label was dominated after it had been added to the open list.
+        if !labels[state].contains(&label) {
             continue;
         }
-        for edge in &space.edges[at] {
+        for edge in &space.edges[state] {
             let new: Vec<Number> = label.iter().zip(&edge.costs[1..]).map(|(a, b)| a + b).collect();
             if insert(&mut labels[edge.to], &new) {
-                made += 1;
-                waiting.push((edge.to, new));
+                created += 1;
+                open.push((edge.to, new));
             }
         }
-        if made > LABELS {
+        if created > MAX_LABELS {
             return None;
         }
     }
@@ -46,13 +47,13 @@ pub fn front(space: &Space) -> Option<Vec<Vec<Number>>> {
     Some(front)
 }
 
-/// Adds a label that no other one covers, and removes those that it covers.
+/// Inserts a label unless another one dominates or equals it, and removes the labels that it dominates. Returns `true` if inserted.
 fn insert(labels: &mut Vec<Vec<Number>>, new: &[Number]) -> bool {
-    let covers = |one: &[Number], other: &[Number]| one.iter().zip(other).all(|(a, b)| a <= b);
-    if labels.iter().any(|known| covers(known, new)) {
+    let dominates = |left: &[Number], right: &[Number]| left.iter().zip(right).all(|(a, b)| a <= b);
+    if labels.iter().any(|label| dominates(label, new)) {
         return false;
     }
-    labels.retain(|known| !covers(new, known));
+    labels.retain(|label| !dominates(new, label));
     labels.push(new.to_vec());
     true
 }

@@ -1,8 +1,8 @@
-//! From schemas to instances: every action with every choice of objects, what never changes folded in.
+//! Grounding by instantiation: every action with all combinations of objects, with static subexpressions evaluated.
 //!
-//! An instance is left out only where a conjunct that mentions nothing that changes does not hold or has no value (definition,
-//! 2), or where its duration is negative or has no value (1). Nothing else is simplified: what a condition reads counts even
-//! where it makes no difference (6).
+//! An instance is omitted only if a static conjunct is false or undefined (definition, 2), or if its duration is negative or undefined
+//! (1). No other simplification is made, because the facts and numbers that a condition mentions decide about interference even if
+//! they do not matter for its value (6).
 
 use std::collections::{HashMap, HashSet};
 
@@ -34,7 +34,7 @@ pub enum Test {
     Not(Box<Test>),
     Any(Vec<Test>),
     Compare(Relation, Value, Value),
-    /// Holds; the number of the threshold and the expression whose value is of interest.
+    /// Always holds. The number of an open threshold and the expression whose values are recorded.
     Open(usize, Value),
 }
 
@@ -65,21 +65,21 @@ pub struct Instance {
     pub end: Option<Moment>,
 }
 
-/// A task without variables. Atoms and numbers that change have positions.
+/// A ground task. Atoms and numbers that actions change are numbered.
 #[derive(Debug, Default)]
 pub struct Ground {
     pub instances: Vec<Instance>,
     pub by_name: HashMap<(String, Vec<String>), usize>,
     pub goal: Vec<Test>,
-    /// The initial state.
+    /// Initial truth values of the atoms.
     pub atoms: Vec<bool>,
+    /// Initial values of the numbers; `None` if undefined.
     pub numbers: Vec<Option<Number>>,
     pub metric: Option<Value>,
-    /// What else plans may be measured by.
+    /// Further measures of plans.
     pub objectives: Vec<Value>,
 }
 
-/// Builds the instances.
 pub struct Grounder<'t> {
     task: &'t Task,
     changing: (Vec<bool>, Vec<bool>),
@@ -90,8 +90,8 @@ pub struct Grounder<'t> {
     ground: Ground,
 }
 
-/// A task without variables; `None` beyond `most` instances.
-pub fn ground(task: &Task, objectives: &[Expr], most: usize) -> Option<Ground> {
+/// Grounds a task. Returns `None` beyond `max_instances` instances.
+pub fn ground(task: &Task, objectives: &[Expr], max_instances: usize) -> Option<Ground> {
     let mut grounder = Grounder {
         task,
         changing: task.changing(),
@@ -107,7 +107,7 @@ pub fn ground(task: &Task, objectives: &[Expr], most: usize) -> Option<Ground> {
     };
     for action in 0..task.actions.len() {
         let mut bound = Vec::new();
-        grounder.instances(action, &mut bound, most)?;
+        grounder.instances(action, &mut bound, max_instances)?;
     }
     grounder.ground.goal = task.goal.iter().map(|condition| grounder.test(condition, &[])).collect();
     grounder.ground.metric = task.metric.as_ref().map(|(_, metric)| grounder.value(metric, &[]));
@@ -116,15 +116,15 @@ pub fn ground(task: &Task, objectives: &[Expr], most: usize) -> Option<Ground> {
 }
 
 impl Grounder<'_> {
-    /// Binds one parameter after the other; conjuncts that cannot hold end a branch as soon as all their parameters are bound.
-    fn instances(&mut self, action: usize, bound: &mut Vec<usize>, most: usize) -> Option<()> {
+    /// Binds the parameters one after another. A false static conjunct ends a branch as soon as its parameters are bound.
+    fn instances(&mut self, action: usize, bound: &mut Vec<usize>, max_instances: usize) -> Option<()> {
         let task = self.task;
         let schema: &Action = &task.actions[action];
         if let Some(&(_, kind)) = schema.parameters.get(bound.len()).as_ref() {
             for object in task.of_type(*kind) {
                 bound.push(object);
                 if self.may_hold(schema, bound) {
-                    self.instances(action, bound, most)?;
+                    self.instances(action, bound, max_instances)?;
                 }
                 bound.pop();
             }
@@ -135,11 +135,11 @@ impl Grounder<'_> {
             self.ground.by_name.insert((schema.name.clone(), names), self.ground.instances.len());
             self.ground.instances.push(instance);
         }
-        (self.ground.instances.len() <= most).then_some(())
+        (self.ground.instances.len() <= max_instances).then_some(())
     }
 
-    /// Whether no static conjunct whose last parameter has just been bound fails. Conditions over all count only where the action
-    /// takes time, so they wait for the whole instance.
+    /// Returns `false` if a static conjunct fails whose last parameter has just been bound. Over-all conditions matter only if the
+    /// duration is positive, so they are evaluated for complete instances only.
     fn may_hold(&mut self, schema: &Action, bound: &[usize]) -> bool {
         let end = schema.lasting.as_ref().map_or(&[][..], |lasting| &lasting.end.conditions);
         schema
@@ -150,7 +150,7 @@ impl Grounder<'_> {
             .all(|condition| greatest(condition) != Some(bound.len() - 1) || !self.fails(condition, bound))
     }
 
-    /// Whether a condition is static and does not hold.
+    /// Returns `true` if a condition is static and does not hold.
     fn fails(&mut self, condition: &Condition, bound: &[usize]) -> bool {
         if !self.is_static(condition) {
             return false;
@@ -166,12 +166,13 @@ impl Grounder<'_> {
             Some(Value::Known(_) | Value::Undefined) => return None,
             Some(_) => unreachable!("durations are static"),
         };
-        let lasts = !duration.is_zero();
-        let over_all: &[Condition] = schema.lasting.as_ref().filter(|_| lasts).map_or(&[], |l| &l.over_all);
+        let is_durative = !duration.is_zero();
+        let over_all: &[Condition] =
+            schema.lasting.as_ref().filter(|_| is_durative).map_or(&[], |l| &l.over_all);
         let end = schema.lasting.as_ref().map(|lasting| &lasting.end);
-        let all = schema.start.conditions.iter().chain(over_all);
-        let all = all.chain(end.iter().flat_map(|end| &end.conditions));
-        for condition in all {
+        let conjuncts = schema.start.conditions.iter().chain(over_all);
+        let conjuncts = conjuncts.chain(end.iter().flat_map(|end| &end.conditions));
+        for condition in conjuncts {
             if self.fails(condition, bound) {
                 return None;
             }
@@ -193,7 +194,7 @@ impl Grounder<'_> {
         }
     }
 
-    /// Conjuncts, without those that never change: they hold, or there were no instance.
+    /// Non-static conjuncts. The static ones hold, otherwise the instance would have been omitted.
     fn tests(&mut self, conditions: &[Condition], bound: &[usize]) -> Vec<Test> {
         let mut tests = Vec::new();
         for condition in conditions {
@@ -279,8 +280,10 @@ impl Grounder<'_> {
     }
 
     fn fluent(&mut self, key: (usize, Vec<usize>)) -> usize {
-        let stated = self.values.get(&key).cloned();
-        let initial = stated.or_else(|| (self.task.functions[key.0].name == "total-cost").then(Number::zero));
+        let initial_value = self.values.get(&key).cloned();
+        // `total-cost` starts at 0 if the problem does not initialise it.
+        let initial =
+            initial_value.or_else(|| (self.task.functions[key.0].name == "total-cost").then(Number::zero));
         let numbers = &mut self.ground.numbers;
         *self.fluents.entry(key).or_insert_with(|| {
             numbers.push(initial);
@@ -332,15 +335,15 @@ fn object(term: Term, bound: &[usize]) -> usize {
     }
 }
 
-fn key(of: &Applied, bound: &[usize]) -> (usize, Vec<usize>) {
-    (of.symbol, of.arguments.iter().map(|term| object(*term, bound)).collect())
+fn key(applied: &Applied, bound: &[usize]) -> (usize, Vec<usize>) {
+    (applied.symbol, applied.arguments.iter().map(|term| object(*term, bound)).collect())
 }
 
-/// The last parameter that a condition mentions.
+/// Position of the last parameter that a condition mentions.
 fn greatest(condition: &Condition) -> Option<usize> {
-    let of = |of: &Applied| of.arguments.iter().filter_map(|term| parameter(*term)).max();
+    let applied = |applied: &Applied| applied.arguments.iter().filter_map(|term| parameter(*term)).max();
     match condition {
-        Condition::Holds(atom) => of(atom),
+        Condition::Holds(atom) => last_parameter(atom),
         Condition::Not(inner) => greatest(inner),
         Condition::Any(parts) => parts.iter().filter_map(greatest).max(),
         Condition::Same(left, right) => parameter(*left).max(parameter(*right)),
@@ -352,7 +355,7 @@ fn greatest(condition: &Condition) -> Option<usize> {
 fn greatest_in(expression: &Expr) -> Option<usize> {
     match expression {
         Expr::Number(_) | Expr::TotalTime => None,
-        Expr::Function(of) => of.arguments.iter().filter_map(|term| parameter(*term)).max(),
+        Expr::Function(applied) => applied.arguments.iter().filter_map(|term| parameter(*term)).max(),
         Expr::Sum(parts) | Expr::Product(parts) => parts.iter().filter_map(greatest_in).max(),
         Expr::Minus(left, right) | Expr::Quotient(left, right) => greatest_in(left).max(greatest_in(right)),
         Expr::Negative(inner) => greatest_in(inner),

@@ -1,21 +1,22 @@
-//! Missions: a robot moves between places and does things there, with one to three functions and designs for each.
+//! Missions: a robot moves between places and works there, with one to three functions and several designs for each.
 //!
-//! Random in what the designs differ by, what actions do to them, what a battery loses and how it is filled, and what counts.
+//! Random are the differences between designs, the effects of actions on designs, the consumption and charging of the battery, and the
+//! metric.
 
 use fastrand::Rng;
 
-use super::draw::{Style, number, once_in, one, palette};
+use super::draw::{Style, number, once_in, one_of, palette};
 use super::model::{
     Action, Condition, Effect, Expr, Happening, Lasting, Number, Relation, Task, Term, applied, whole,
 };
 use super::tune::{Wishes, tune};
 
-/// The types.
+/// Numbers of the types.
 pub const PLACE: usize = 0;
 pub const FUNCTION: usize = 1;
 pub const DESIGN: usize = 2;
 
-/// Which predicates and functions there are.
+/// Numbers of the predicates and functions.
 #[derive(Debug, Clone, Copy)]
 pub struct Names {
     pub at: usize,
@@ -48,21 +49,21 @@ pub struct Builder<'r> {
     pub functions: Vec<usize>,
     pub designs: Vec<usize>,
     pub timed: bool,
-    /// Open comparisons so far.
+    /// Number of open comparisons.
     pub open: usize,
-    /// Whether designs are mentioned by what changes.
+    /// `true` if actions have effects on designs.
     pub side_effects: bool,
     pub memory: bool,
     pub fluent_availability: bool,
 }
 
-/// A mission from a seed.
+/// A random mission; once in 150 times with hundreds of designs.
 pub fn mission(rng: &mut Rng) -> Task {
     let designs = if once_in(rng, 150) { rng.usize(300..1500) } else { rng.usize(1..7) };
     mission_with(rng, designs)
 }
 
-/// A mission with so many designs of the first function.
+/// A random mission with the given number of designs of the first function.
 pub fn mission_with(rng: &mut Rng, designs: usize) -> Task {
     let mut builder = Builder::new(rng, designs);
     builder.values();
@@ -120,20 +121,20 @@ impl<'r> Builder<'r> {
         let places = (0..rng.usize(2..4)).map(|i| task.object(format!("p{i}"), PLACE)).collect();
         let functions = if designs > 50 { 1 } else { rng.usize(1..4) };
         let functions: Vec<usize> = (0..functions).map(|i| task.object(format!("f{i}"), FUNCTION)).collect();
-        let mut all = Vec::new();
+        let mut all_designs = Vec::new();
         for (position, function) in functions.iter().enumerate() {
             let count = if position == 0 { designs } else { rng.usize(1..4) };
             for i in 0..count {
                 let design = task.object(format!("fd{position}_{i}"), DESIGN);
                 task.atoms.push((names.solves, vec![design, *function]));
-                // Some designs solve two functions.
+                // Rarely, a design solves two functions.
                 if designs < 50 && once_in(rng, 12) {
-                    let other = one(rng, &functions);
-                    if other != *function {
-                        task.atoms.push((names.solves, vec![design, other]));
+                    let second_function = one_of(rng, &functions);
+                    if second_function != *function {
+                        task.atoms.push((names.solves, vec![design, second_function]));
                     }
                 }
-                all.push(design);
+                all_designs.push(design);
             }
         }
         let small = designs < 50;
@@ -143,7 +144,7 @@ impl<'r> Builder<'r> {
             styles: palette(rng),
             places,
             functions,
-            designs: all,
+            designs: all_designs,
             timed: rng.bool(),
             open: 0,
             side_effects: small && once_in(rng, 4),
@@ -158,11 +159,11 @@ impl<'r> Builder<'r> {
     }
 
     pub fn draw_positive(&mut self) -> Number {
-        let drawn = self.draw();
-        if drawn > whole(0) { drawn } else { whole(1) - drawn }
+        let value = self.draw();
+        if value > whole(0) { value } else { whole(1) - value }
     }
 
-    /// The initial state.
+    /// Draws the initial state.
     fn values(&mut self) {
         let names = self.names;
         for from in self.places.clone() {
@@ -176,7 +177,7 @@ impl<'r> Builder<'r> {
         }
         self.task.atoms.push((names.at, vec![self.places[0]]));
         let sparse = once_in(self.rng, 4);
-        // Designs that are equal in all numbers.
+        // Some designs get the numbers of the previous one, so that they are interchangeable.
         let equal = once_in(self.rng, 4);
         let mut previous: Option<[Number; 5]> = None;
         for design in self.designs.clone() {
@@ -184,8 +185,8 @@ impl<'r> Builder<'r> {
                 self.task.atoms.push((names.available, vec![design]));
             }
             let fresh = [self.draw(), self.draw(), self.draw(), self.draw_positive(), self.draw()];
-            let again = equal && self.rng.bool();
-            let values = previous.filter(|_| again).unwrap_or(fresh);
+            let is_repeated = equal && self.rng.bool();
+            let values = previous.filter(|_| is_repeated).unwrap_or(fresh);
             let functions = [names.usage, names.quality, names.trust, names.speed, names.range];
             for (function, value) in functions.into_iter().zip(values.clone()) {
                 if function != names.range || !sparse || self.rng.bool() {
@@ -195,7 +196,7 @@ impl<'r> Builder<'r> {
             previous = Some(values);
         }
         for function in self.functions.clone() {
-            let design = one(self.rng, &self.designs);
+            let design = one_of(self.rng, &self.designs);
             self.task.atoms.push((names.current, vec![function, design]));
             self.task.values.push((names.worn, vec![function], whole(0)));
         }
@@ -208,9 +209,10 @@ impl<'r> Builder<'r> {
         }
     }
 
-    pub fn slots(&mut self, action: &mut Action, most: usize) -> Vec<(Term, Term)> {
-        let count = self.rng.usize(1..=most.min(self.functions.len()));
-        // The same function twice is rare.
+    /// Adds one to `max_slots` slots with their parameters and conditions. Returns function and design of each slot.
+    pub fn slots(&mut self, action: &mut Action, max_slots: usize) -> Vec<(Term, Term)> {
+        let count = self.rng.usize(1..=max_slots.min(self.functions.len()));
+        // Rarely, all constant slots have the same function.
         let twice = once_in(self.rng, 10);
         let mut slots = Vec::new();
         for position in 0..count {
@@ -248,14 +250,15 @@ impl<'r> Builder<'r> {
         Action { name, parameters: Vec::new(), start: Happening::default(), lasting }
     }
 
-    /// An expression over the designs and the way: static.
+    /// A static expression over the designs of the slots and the distance.
     pub fn static_expression(&mut self, slots: &[(Term, Term)], way: Option<[Term; 2]>) -> Expr {
         let names = self.names;
-        let of = |function: usize, rng: &mut Rng| Expr::Function(applied(function, &[one(rng, slots).1]));
+        let estimation =
+            |function: usize, rng: &mut Rng| Expr::Function(applied(function, &[one_of(rng, slots).1]));
         let numbers = [names.usage, names.quality, names.trust];
-        let first = of(one(self.rng, &numbers), self.rng);
-        let second = of(one(self.rng, &numbers), self.rng);
-        let quotient = of(names.speed, self.rng);
+        let first = estimation(one_of(self.rng, &numbers), self.rng);
+        let second = estimation(one_of(self.rng, &numbers), self.rng);
+        let quotient = estimation(names.speed, self.rng);
         let constant = Expr::Number(number(self.rng, &self.styles));
         let distance = way.map_or(constant.clone(), |way| Expr::Function(applied(names.distance, &way)));
         match self.rng.u32(0..10) {
@@ -271,15 +274,15 @@ impl<'r> Builder<'r> {
         }
     }
 
-    /// A sum over all slots, so that each design counts: what an action uses.
+    /// Consumption of an action: usually a sum over all slots, so that each design matters.
     pub fn consumption(&mut self, slots: &[(Term, Term)], way: Option<[Term; 2]>) -> Expr {
         let usage = |slot: &(Term, Term)| Expr::Function(applied(self.names.usage, &[slot.1]));
-        let mut each: Vec<Expr> = slots.iter().map(usage).collect();
-        let all = if each.len() == 1 { each.remove(0) } else { Expr::Sum(each) };
+        let mut usages: Vec<Expr> = slots.iter().map(usage).collect();
+        let total = if usages.len() == 1 { usages.remove(0) } else { Expr::Sum(usages) };
         match (self.rng.u32(0..4), way) {
-            (0, _) | (_, None) => all,
+            (0, _) | (_, None) => total,
             (1, _) => self.static_expression(slots, way),
-            (_, Some(way)) => Expr::Product(vec![Expr::Function(applied(self.names.distance, &way)), all]),
+            (_, Some(way)) => Expr::Product(vec![Expr::Function(applied(self.names.distance, &way)), total]),
         }
     }
 
@@ -292,23 +295,24 @@ impl<'r> Builder<'r> {
         Expr::Function(applied(function, &[]))
     }
 
-    /// From a place to another.
+    /// An action that moves the robot to another place.
     fn travel(&mut self, name: String) -> Action {
         let mut action = self.empty(name);
         let names = self.names;
-        let first = self.rng.bool();
+        let places_first = self.rng.bool();
         let place = |action: &mut Action| {
             action.parameters.push(("from".to_owned(), PLACE));
             action.parameters.push(("to".to_owned(), PLACE));
         };
-        if first {
+        // The order of places and designs among the parameters varies.
+        if places_first {
             place(&mut action);
         }
         let slots = self.slots(&mut action, 3);
-        if !first {
+        if !places_first {
             place(&mut action);
         }
-        let to = if first { 1 } else { action.parameters.len() - 1 };
+        let to = if places_first { 1 } else { action.parameters.len() - 1 };
         let way = [Term::Parameter(to - 1), Term::Parameter(to)];
         action.start.conditions.push(Condition::Holds(applied(names.at, &way[..1])));
         action.start.conditions.push(Condition::Holds(applied(names.way, &way)));
@@ -335,7 +339,7 @@ impl<'r> Builder<'r> {
         }
     }
 
-    /// Effects at the end, if the action lasts.
+    /// The effects at the end, or the only effects of an instantaneous action.
     pub fn finally(action: &mut Action) -> &mut Vec<Effect> {
         match &mut action.lasting {
             Some(lasting) => &mut lasting.end.effects,
@@ -346,7 +350,7 @@ impl<'r> Builder<'r> {
     fn finish(self) -> Task {
         let Self { mut task, names, rng, places, .. } = self;
         let mut atoms = vec![(names.at, vec![places[places.len() - 1]])];
-        atoms.push((names.at, vec![one(rng, &places)]));
+        atoms.push((names.at, vec![one_of(rng, &places)]));
         atoms.extend(places.iter().map(|place| (names.done, vec![*place])));
         let wishes = Wishes { atoms, numbers: vec![Self::number(names.battery), Self::number(names.energy)] };
         tune(&mut task, &wishes, rng);

@@ -1,7 +1,7 @@
 //! Tasks as data: typed predicates and functions, actions with and without duration, exact numbers.
 //!
-//! Only what generator B needs: no derived predicates, no timed initial literals, no quantifiers. What a task means is said in
-//! `ground` and `step`; how it reads in `print`.
+//! Restricted to the needs of generator B: no derived predicates, no timed initial literals, no quantifiers. `ground` and `step`
+//! define the semantics, `print` the syntax.
 
 use num_bigint::BigInt;
 use num_rational::BigRational;
@@ -10,17 +10,17 @@ use num_traits::{One as _, Zero as _};
 /// An exact number.
 pub type Number = BigRational;
 
-/// A whole number.
+/// An integer.
 pub fn whole(value: i64) -> Number {
     Number::from_integer(BigInt::from(value))
 }
 
-/// The value of a decimal such as `-0.25`.
+/// Parses a decimal such as `-0.25`.
 pub fn decimal(text: &str) -> Number {
-    let (negative, digits) = text.strip_prefix('-').map_or((false, text), |rest| (true, rest));
-    let (before, after) = digits.split_once('.').unwrap_or((digits, ""));
-    let all: BigInt = format!("{before}{after}").parse().expect("digits");
-    let value = Number::new(all, power_of_ten(after.len()));
+    let (negative, digits) = text.strip_prefix('-').map_or((false, text), |unsigned| (true, unsigned));
+    let (whole_digits, fraction_digits) = digits.split_once('.').unwrap_or((digits, ""));
+    let scaled: BigInt = format!("{whole_digits}{fraction_digits}").parse().expect("digits");
+    let value = Number::new(scaled, power_of_ten(fraction_digits.len()));
     if negative { -value } else { value }
 }
 
@@ -29,7 +29,7 @@ pub fn power_of_ten(exponent: usize) -> BigInt {
     BigInt::from(10).pow(u32::try_from(exponent).expect("a small exponent"))
 }
 
-/// A number as a decimal, if it has one.
+/// Decimal notation of a number, if it has one with at most 200 digits after the point.
 pub fn text_of(value: &Number) -> Option<String> {
     let (mut digits, mut power) = (0, BigInt::one());
     while !(&power % value.denom()).is_zero() {
@@ -43,25 +43,29 @@ pub fn text_of(value: &Number) -> Option<String> {
     let sign = if scaled < BigInt::zero() { "-" } else { "" };
     let plain = scaled.magnitude().to_string();
     let padded = format!("{plain:0>width$}", width = digits + 1);
-    let (before, after) = padded.split_at(padded.len() - digits);
-    Some(if digits == 0 { format!("{sign}{before}") } else { format!("{sign}{before}.{after}") })
+    let (whole_digits, fraction_digits) = padded.split_at(padded.len() - digits);
+    Some(if digits == 0 {
+        format!("{sign}{whole_digits}")
+    } else {
+        format!("{sign}{whole_digits}.{fraction_digits}")
+    })
 }
 
-/// An argument: a parameter of the action, or an object, by position.
+/// An argument: a parameter of the action or an object, by its number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Term {
     Parameter(usize),
     Object(usize),
 }
 
-/// A predicate or a function with its arguments.
+/// A predicate or function applied to arguments.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Applied {
     pub symbol: usize,
     pub arguments: Vec<Term>,
 }
 
-/// A predicate or function with arguments.
+/// Applies a predicate or function to arguments.
 pub fn applied(symbol: usize, arguments: &[Term]) -> Applied {
     Applied { symbol, arguments: arguments.to_vec() }
 }
@@ -80,7 +84,7 @@ pub enum Expr {
     TotalTime,
 }
 
-/// How two numbers compare.
+/// A comparison operator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Relation {
     Less,
@@ -93,7 +97,6 @@ pub enum Relation {
 impl Relation {
     pub const ALL: [Self; 5] = [Self::Less, Self::AtMost, Self::Equal, Self::AtLeast, Self::Greater];
 
-    /// Whether it holds.
     pub fn holds(self, left: &Number, right: &Number) -> bool {
         match self {
             Self::Less => left < right,
@@ -105,7 +108,7 @@ impl Relation {
     }
 }
 
-/// What must hold.
+/// A condition.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Condition {
     Holds(Applied),
@@ -113,11 +116,11 @@ pub enum Condition {
     Any(Vec<Condition>),
     Same(Term, Term),
     Compare(Relation, Expr, Expr),
-    /// A comparison whose right side is to be chosen from values that occur: the number of the threshold.
+    /// A comparison with the number of an open threshold, which [`super::tune`] chooses among the values that occur.
     Open(Relation, Expr, usize),
 }
 
-/// How a number changes.
+/// A numeric assignment operator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Change {
     Assign,
@@ -127,7 +130,7 @@ pub enum Change {
     ScaleDown,
 }
 
-/// What an action does.
+/// An effect of an action.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Effect {
     Add(Applied),
@@ -143,7 +146,7 @@ pub struct Happening {
     pub effects: Vec<Effect>,
 }
 
-/// What a durative action has besides its start.
+/// Duration, over-all conditions and end of a durative action.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lasting {
     pub duration: Expr,
@@ -151,7 +154,7 @@ pub struct Lasting {
     pub end: Happening,
 }
 
-/// An action schema; classical if it does not last.
+/// An action schema, instantaneous if `lasting` is `None`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Action {
     pub name: String,
@@ -161,7 +164,7 @@ pub struct Action {
     pub lasting: Option<Lasting>,
 }
 
-/// A predicate's or function's name and the types of its parameters.
+/// Name of a predicate or function, with the types of its parameters.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Symbol {
     pub name: String,
@@ -180,64 +183,64 @@ pub struct Task {
     pub atoms: Vec<(usize, Vec<usize>)>,
     pub values: Vec<(usize, Vec<usize>, Number)>,
     pub goal: Vec<Condition>,
-    /// Whether it is to be maximised, and what.
+    /// `true` for maximisation, and the expression.
     pub metric: Option<(bool, Expr)>,
 }
 
 impl Task {
-    /// The objects of a type.
+    /// Objects of a type.
     pub fn of_type(&self, kind: usize) -> impl Iterator<Item = usize> + '_ {
         (0..self.objects.len()).filter(move |object| self.objects[*object].1 == kind)
     }
 
-    /// Whether any action lasts.
+    /// Returns `true` if the task has a durative action.
     pub fn is_timed(&self) -> bool {
         self.actions.iter().any(|action| action.lasting.is_some())
     }
 
-    /// Declares a predicate.
+    /// Declares a predicate and returns its number.
     pub fn predicate(&mut self, name: &str, types: &[usize]) -> usize {
         self.predicates.push(Symbol { name: name.to_owned(), types: types.to_vec() });
         self.predicates.len() - 1
     }
 
-    /// Declares a function.
+    /// Declares a function and returns its number.
     pub fn function(&mut self, name: &str, types: &[usize]) -> usize {
         self.functions.push(Symbol { name: name.to_owned(), types: types.to_vec() });
         self.functions.len() - 1
     }
 
-    /// Declares an object.
+    /// Declares an object and returns its number.
     pub fn object(&mut self, name: String, kind: usize) -> usize {
         self.objects.push((name, kind));
         self.objects.len() - 1
     }
 
-    /// Which predicates, and which functions, actions change.
+    /// For each predicate and for each function, whether an action changes it.
     pub fn changing(&self) -> (Vec<bool>, Vec<bool>) {
         let mut changing = (vec![false; self.predicates.len()], vec![false; self.functions.len()]);
         for action in &self.actions {
-            note_changes(&action.start.effects, &mut changing);
+            mark_changes(&action.start.effects, &mut changing);
             if let Some(lasting) = &action.lasting {
-                note_changes(&lasting.end.effects, &mut changing);
+                mark_changes(&lasting.end.effects, &mut changing);
             }
         }
         changing
     }
 }
 
-fn note_changes(effects: &[Effect], changing: &mut (Vec<bool>, Vec<bool>)) {
+fn mark_changes(effects: &[Effect], changing: &mut (Vec<bool>, Vec<bool>)) {
     for effect in effects {
         match effect {
             Effect::Add(atom) | Effect::Delete(atom) => changing.0[atom.symbol] = true,
             Effect::Number(_, function, _) => changing.1[function.symbol] = true,
-            Effect::When(_, inner) => note_changes(inner, changing),
+            Effect::When(_, inner) => mark_changes(inner, changing),
         }
     }
 }
 
 #[test]
-fn numbers_read_and_print() {
+fn decimals_round_trip_through_text() {
     for text in ["0", "-5", "0.25", "-0.0000000000000001", "0.9389281746152837", "1000000000000000000"] {
         assert_eq!(text_of(&decimal(text)).as_deref(), Some(text));
     }

@@ -1,4 +1,4 @@
-//! A task as the text of a domain and a problem.
+//! Prints a task as PDDL: the texts of a domain and a problem.
 
 use std::fmt::Write as _;
 
@@ -7,19 +7,19 @@ use super::model::{
     text_of,
 };
 
-/// The domain and the problem.
+/// Texts of the domain and the problem.
 pub fn print(task: &Task) -> (String, String) {
     let problem = problem(task);
     (domain(task, &problem), problem)
 }
 
-/// Symbols that are mentioned nowhere are not declared.
+/// Text of the domain. Unused predicates and functions are not declared.
 fn domain(task: &Task, problem: &str) -> String {
     let mut actions = String::new();
     for action in &task.actions {
         actions += &Printer { task, parameters: &action.parameters }.action(action);
     }
-    let used = |symbol: &&Symbol| {
+    let is_used = |symbol: &&Symbol| {
         let forms = [format!("({} ", symbol.name), format!("({})", symbol.name)];
         forms.iter().any(|form| actions.contains(form) || problem.contains(form))
     };
@@ -29,13 +29,13 @@ fn domain(task: &Task, problem: &str) -> String {
          :equality :conditional-effects{timed})\n  (:types {})\n  (:predicates",
         task.types.join(" ")
     );
-    for predicate in task.predicates.iter().filter(used) {
+    for predicate in task.predicates.iter().filter(is_used) {
         text += &declaration(task, predicate);
     }
     text += ")\n";
-    if task.functions.iter().any(|function| used(&function)) {
+    if task.functions.iter().any(|function| is_used(&function)) {
         text += "  (:functions";
-        for function in task.functions.iter().filter(used) {
+        for function in task.functions.iter().filter(is_used) {
             text += &declaration(task, function);
         }
         text += ")\n";
@@ -59,7 +59,7 @@ fn problem(task: &Task) -> String {
     }
     text += ")\n  (:init";
     let names = |objects: &[usize]| {
-        objects.iter().fold(String::new(), |all, object| all + " " + task.objects[*object].0.as_str())
+        objects.iter().fold(String::new(), |text, object| text + " " + task.objects[*object].0.as_str())
     };
     for (predicate, objects) in &task.atoms {
         let _ = write!(text, " ({}{})", task.predicates[*predicate].name, names(objects));
@@ -76,7 +76,7 @@ fn problem(task: &Task) -> String {
     text + ")\n"
 }
 
-/// The text of an objective, an expression without parameters.
+/// Text of an objective, which is an expression without parameters.
 pub fn objective(task: &Task, expression: &Expr) -> String {
     Printer { task, parameters: &[] }.expression(expression)
 }
@@ -101,12 +101,14 @@ impl Printer<'_> {
                 self.effects(&action.start.effects)
             );
         };
-        let timed = |when: &str, conditions: &[Condition]| -> String {
-            conditions.iter().fold(String::new(), |all, c| all + &format!(" ({when} {})", self.condition(c)))
+        let timed = |moment: &str, conditions: &[Condition]| -> String {
+            conditions
+                .iter()
+                .fold(String::new(), |text, c| text + &format!(" ({moment} {})", self.condition(c)))
         };
-        let effects = |when: &str, happening: &Happening| -> String {
-            let each = happening.effects.iter();
-            each.fold(String::new(), |all, e| all + &format!(" ({when} {})", self.effect(e)))
+        let effects = |moment: &str, happening: &Happening| -> String {
+            let items = happening.effects.iter();
+            items.fold(String::new(), |text, e| text + &format!(" ({moment} {})", self.effect(e)))
         };
         format!(
             "  (:durative-action {name} :parameters ({parameters})\n    :duration (= ?duration {})\n    \
@@ -127,20 +129,20 @@ impl Printer<'_> {
         }
     }
 
-    fn applied(&self, name: &str, of: &Applied) -> String {
-        of.arguments.iter().fold(format!("({name}"), |all, term| all + " " + &self.term(*term)) + ")"
+    fn applied(&self, name: &str, symbol: &Applied) -> String {
+        symbol.arguments.iter().fold(format!("({name}"), |text, term| text + " " + &self.term(*term)) + ")"
     }
 
-    fn atom(&self, of: &Applied) -> String {
-        self.applied(&self.task.predicates[of.symbol].name, of)
+    fn atom(&self, applied: &Applied) -> String {
+        self.applied(&self.task.predicates[applied.symbol].name, applied)
     }
 
-    fn function(&self, of: &Applied) -> String {
-        self.applied(&self.task.functions[of.symbol].name, of)
+    fn function(&self, applied: &Applied) -> String {
+        self.applied(&self.task.functions[applied.symbol].name, applied)
     }
 
     fn all(&self, conditions: &[Condition]) -> String {
-        conditions.iter().fold("(and".to_owned(), |all, c| all + " " + &self.condition(c)) + ")"
+        conditions.iter().fold("(and".to_owned(), |text, c| text + " " + &self.condition(c)) + ")"
     }
 
     fn condition(&self, condition: &Condition) -> String {
@@ -148,7 +150,7 @@ impl Printer<'_> {
             Condition::Holds(atom) => self.atom(atom),
             Condition::Not(inner) => format!("(not {})", self.condition(inner)),
             Condition::Any(parts) => {
-                parts.iter().fold("(or".to_owned(), |all, c| all + " " + &self.condition(c)) + ")"
+                parts.iter().fold("(or".to_owned(), |text, c| text + " " + &self.condition(c)) + ")"
             }
             Condition::Same(left, right) => format!("(= {} {})", self.term(*left), self.term(*right)),
             Condition::Compare(relation, left, right) => {
@@ -166,7 +168,7 @@ impl Printer<'_> {
     }
 
     fn effects(&self, effects: &[Effect]) -> String {
-        effects.iter().fold("(and".to_owned(), |all, effect| all + " " + &self.effect(effect)) + ")"
+        effects.iter().fold("(and".to_owned(), |text, effect| text + " " + &self.effect(effect)) + ")"
     }
 
     fn effect(&self, effect: &Effect) -> String {
@@ -191,11 +193,11 @@ impl Printer<'_> {
 
     fn expression(&self, expression: &Expr) -> String {
         let list = |operator: &str, parts: &[Expr]| {
-            parts.iter().fold(format!("({operator}"), |all, e| all + " " + &self.expression(e)) + ")"
+            parts.iter().fold(format!("({operator}"), |text, e| text + " " + &self.expression(e)) + ")"
         };
         match expression {
             Expr::Number(value) => number(value),
-            Expr::Function(of) => self.function(of),
+            Expr::Function(applied) => self.function(applied),
             Expr::Sum(parts) => list("+", parts),
             Expr::Product(parts) => list("*", parts),
             Expr::Minus(left, right) => list("-", &[(**left).clone(), (**right).clone()]),
@@ -206,7 +208,7 @@ impl Printer<'_> {
     }
 }
 
-/// A decimal where there is one, else a quotient of whole numbers.
+/// Decimal notation if it is finite, otherwise a quotient of integers.
 fn number(value: &Number) -> String {
     text_of(value).unwrap_or_else(|| format!("(/ {} {})", value.numer(), value.denom()))
 }

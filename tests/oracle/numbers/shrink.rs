@@ -1,8 +1,8 @@
-//! Makes a task on which something fails smaller, as long as the same fails.
+//! Delta debugging: shrinks a failing task as long as it fails in the same way.
 
 use super::model::{Action, Condition, Effect, Expr, Happening, Task, decimal, text_of, whole};
 
-/// A smaller task that still fails.
+/// Repeatedly replaces the task by the first smaller candidate that still fails, as long as there is one.
 pub fn shrink(mut task: Task, fails: &dyn Fn(&Task) -> bool) -> Task {
     loop {
         let smaller = candidates(&task).into_iter().find(|candidate| fails(candidate));
@@ -13,99 +13,106 @@ pub fn shrink(mut task: Task, fails: &dyn Fn(&Task) -> bool) -> Task {
     }
 }
 
-/// Tasks that lack one thing, the largest things first.
+/// Tasks with one part removed or simplified, large parts first.
 fn candidates(task: &Task) -> Vec<Task> {
-    let mut all = Vec::new();
+    let mut candidate_tasks = Vec::new();
     for position in 0..task.actions.len() {
         let mut smaller = task.clone();
         smaller.actions.remove(position);
-        all.push(smaller);
+        candidate_tasks.push(smaller);
     }
     if task.metric.is_some() {
-        all.push(Task { metric: None, ..task.clone() });
+        candidate_tasks.push(Task { metric: None, ..task.clone() });
     }
     if let Some((maximize, Expr::Sum(parts))) = &task.metric {
-        all.extend(parts.iter().map(|part| Task { metric: Some((*maximize, part.clone())), ..task.clone() }));
+        candidate_tasks.extend(
+            parts.iter().map(|part| Task { metric: Some((*maximize, part.clone())), ..task.clone() }),
+        );
     }
     for goal in without_one(&task.goal) {
-        all.push(Task { goal, ..task.clone() });
+        candidate_tasks.push(Task { goal, ..task.clone() });
     }
     for atoms in without_one(&task.atoms) {
-        all.push(Task { atoms, ..task.clone() });
+        candidate_tasks.push(Task { atoms, ..task.clone() });
     }
     for (position, action) in task.actions.iter().enumerate() {
         for smaller in smaller_actions(action) {
-            let mut with = task.clone();
-            with.actions[position] = smaller;
-            all.push(with);
+            let mut smaller_task = task.clone();
+            smaller_task.actions[position] = smaller;
+            candidate_tasks.push(smaller_task);
         }
     }
-    all.extend(without_unused(task));
+    candidate_tasks.extend(without_unused(task));
     for (position, (_, _, value)) in task.values.iter().enumerate() {
         let text = text_of(value).expect("an initial value is a decimal");
-        let short = text.split_once('.').map(|(before, after)| (before, &after[..after.len().min(1)]));
-        let short = short.map_or(whole(1), |(before, after)| decimal(&format!("{before}.{after}")));
-        for simple in [whole(0), whole(1), short] {
+        let shortened = text
+            .split_once('.')
+            .map(|(whole_digits, fraction_digits)| (whole_digits, &fraction_digits[..after.len().min(1)]));
+        let shortened = shortened.map_or(whole(1), |(whole_digits, fraction_digits)| {
+            decimal(&format!("{whole_digits}.{fraction_digits}"))
+        });
+        for simple in [whole(0), whole(1), shortened] {
             if text_of(&simple).is_some_and(|simple| simple.len() < text.len()) {
-                let mut with = task.clone();
-                with.values[position].2 = simple;
-                all.push(with);
+                let mut smaller_task = task.clone();
+                smaller_task.values[position].2 = simple;
+                candidate_tasks.push(smaller_task);
             }
         }
     }
-    all
+    candidate_tasks
 }
 
-fn without_one<T: Clone>(of: &[T]) -> Vec<Vec<T>> {
+/// All copies of the list with one element removed.
+fn without_one<T: Clone>(items: &[T]) -> Vec<Vec<T>> {
     let without = |position| {
-        let mut rest = of.to_vec();
-        rest.remove(position);
-        rest
+        let mut remaining = items.to_vec();
+        remaining.remove(position);
+        remaining
     };
     (0..of.len()).map(without).collect()
 }
 
 fn smaller_actions(action: &Action) -> Vec<Action> {
-    let mut all = Vec::new();
+    let mut smaller = Vec::new();
     let starts = smaller_happenings(&action.start);
-    all.extend(starts.into_iter().map(|start| Action { start, ..action.clone() }));
+    smaller.extend(starts.into_iter().map(|start| Action { start, ..action.clone() }));
     if let Some(lasting) = &action.lasting {
-        let mut with = |end: Happening, over_all: Vec<Condition>, duration: Expr| {
+        let mut add = |end: Happening, over_all: Vec<Condition>, duration: Expr| {
             let lasting = super::model::Lasting { duration, over_all, end };
-            all.push(Action { lasting: Some(lasting), ..action.clone() });
+            smaller.push(Action { lasting: Some(lasting), ..action.clone() });
         };
         for end in smaller_happenings(&lasting.end) {
-            with(end, lasting.over_all.clone(), lasting.duration.clone());
+            add(end, lasting.over_all.clone(), lasting.duration.clone());
         }
         for over_all in without_one(&lasting.over_all) {
-            with(lasting.end.clone(), over_all, lasting.duration.clone());
+            add(lasting.end.clone(), over_all, lasting.duration.clone());
         }
         if !matches!(lasting.duration, Expr::Number(_)) {
-            with(lasting.end.clone(), lasting.over_all.clone(), Expr::Number(whole(1)));
+            add(lasting.end.clone(), lasting.over_all.clone(), Expr::Number(whole(1)));
         }
     }
-    all
+    smaller
 }
 
 fn smaller_happenings(happening: &Happening) -> Vec<Happening> {
     let Happening { conditions, effects } = happening;
     let with_conditions = without_one(conditions).into_iter();
-    let mut all: Vec<Happening> =
+    let mut smaller: Vec<Happening> =
         with_conditions.map(|conditions| Happening { conditions, effects: effects.clone() }).collect();
     for effects in without_one(effects) {
-        all.push(Happening { conditions: conditions.clone(), effects });
+        smaller.push(Happening { conditions: conditions.clone(), effects });
     }
     for (position, effect) in effects.iter().enumerate() {
         if let Effect::When(_, inner) = effect {
             let mut effects = effects.clone();
             effects.splice(position..=position, inner.clone());
-            all.push(Happening { conditions: conditions.clone(), effects });
+            smaller.push(Happening { conditions: conditions.clone(), effects });
         }
     }
-    all
+    smaller
 }
 
-/// Without the values of functions that nothing mentions.
+/// The task without the values of functions that no action, goal or metric uses, if there are such functions.
 fn without_unused(task: &Task) -> Option<Task> {
     let bare = Task { values: Vec::new(), ..task.clone() };
     let (domain, problem) = super::print::print(&bare);
@@ -114,6 +121,6 @@ fn without_unused(task: &Task) -> Option<Task> {
         let name = &task.functions[*function].name;
         [format!("({name} "), format!("({name})")].iter().any(|f| domain.contains(f) || problem.contains(f))
     });
-    // The domain of the bare task declares what it mentions only.
+    // The printed domain of the task without values declares used functions only.
     (smaller.values.len() < task.values.len()).then_some(smaller)
 }

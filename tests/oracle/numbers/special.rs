@@ -1,4 +1,4 @@
-//! Tasks that no generator makes: more designs than 16 bits can count.
+//! Hand-made tasks with hundreds of designs, and with more designs than 16 bits can count.
 
 use std::time::Duration;
 
@@ -8,7 +8,7 @@ use super::model::{Action, Condition, Effect, Expr, Happening, Task, Term, appli
 use super::model::{Change, Number};
 use super::{Budget, Puzzle};
 
-/// One action, one function, so many designs; the later a design, the less it costs, by `step` each.
+/// A task with one action, one function and `count` designs. Each design costs `step` less than the previous one.
 fn many_designs(count: i64, step: &Number) -> Task {
     let types = ["function", "functiondesign"].map(str::to_owned).to_vec();
     let mut task = Task { types, ..Task::default() };
@@ -21,19 +21,21 @@ fn many_designs(count: i64, step: &Number) -> Task {
     for position in 0..count {
         let design = task.object(format!("fd{position}"), 1);
         task.atoms.push((solves, vec![design, function]));
-        // The last one is not available.
+        // The cheapest design is unavailable, so the last but one is optimal.
         if position + 1 < count {
             task.atoms.push((available, vec![design]));
         }
         task.values.push((usage, vec![design], whole(1_000_000) - whole(position) * step));
     }
     let parameters = vec![("f".to_owned(), 0), ("fd".to_owned(), 1)];
-    let (of, with) = (Term::Parameter(0), Term::Parameter(1));
-    let conditions =
-        vec![Condition::Holds(applied(solves, &[with, of])), Condition::Holds(applied(available, &[with]))];
+    let (function_term, design_term) = (Term::Parameter(0), Term::Parameter(1));
+    let conditions = vec![
+        Condition::Holds(applied(solves, &[design_term, function_term])),
+        Condition::Holds(applied(available, &[design_term])),
+    ];
     let effects = vec![
         Effect::Add(applied(done, &[])),
-        Effect::Number(Change::Increase, applied(cost, &[]), Expr::Function(applied(usage, &[with]))),
+        Effect::Number(Change::Increase, applied(cost, &[]), Expr::Function(applied(usage, &[design_term]))),
     ];
     let start = Happening { conditions, effects };
     task.actions.push(Action { name: "go".to_owned(), parameters, start, lasting: None });
@@ -42,7 +44,7 @@ fn many_designs(count: i64, step: &Number) -> Task {
     task
 }
 
-fn judge_many(count: i64, step: &str, limit: u64) {
+fn judge_designs(count: i64, step: &str, limit: u64) {
     let task = many_designs(count, &decimal(step));
     let budget = Budget { states: 10, attempts: 1_000_000 };
     let puzzle = Puzzle::within(format!("designs-{count}"), task, &[], budget).expect("few states");
@@ -55,19 +57,19 @@ fn judge_many(count: i64, step: &str, limit: u64) {
 
 #[test]
 fn hundreds_of_designs() {
-    judge_many(300, "0.0123456789012345", 30);
+    judge_designs(300, "0.0123456789012345", 30);
 }
 
 #[test]
 #[ignore = "66,000 designs of one function: seconds to minutes, much memory"]
-fn more_designs_than_16_bits_count() {
-    judge_many(66_000, "10", 600);
+fn design_numbers_can_exceed_16_bits() {
+    judge_designs(66_000, "10", 600);
 }
 
 #[test]
 #[ignore = "65,535, 65,536 and 65,537 designs of one function: seconds to minutes, much memory"]
-fn designs_around_16_bits() {
+fn design_numbers_around_the_16_bit_limit() {
     for count in [65_535, 65_536, 65_537] {
-        judge_many(count, "0.5", 600);
+        judge_designs(count, "0.5", 600);
     }
 }

@@ -1,20 +1,20 @@
-//! What one action does to a state (definition, 1, 2, 4 and 6).
+//! Semantics of one action in a state (definition, 1, 2, 4 and 6).
 
 use num_traits::{One as _, Zero as _};
 
 use super::ground::{Act, Instance, Moment, Test, Value};
 use super::model::{Change, Number};
 
-/// The atoms and numbers that change.
+/// A state: values of the atoms and numbers that actions change.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct State {
     pub atoms: Vec<bool>,
     pub numbers: Vec<Option<Number>>,
-    /// The sum of durations so far.
+    /// Sum of the durations of all previous actions.
     pub time: Number,
 }
 
-/// The value of an expression, if it has one.
+/// Value of an expression; `None` if it is undefined.
 pub fn number(value: &Value, state: &State) -> Option<Number> {
     match value {
         Value::Known(value) => Some(value.clone()),
@@ -36,7 +36,7 @@ pub fn number(value: &Value, state: &State) -> Option<Number> {
     }
 }
 
-/// Whether a condition holds; nothing where a comparison has no value.
+/// Truth value of a condition; `None` if a comparison in it is undefined, even if the other parts would decide it.
 pub fn holds(test: &Test, state: &State) -> Option<bool> {
     match test {
         Test::Known(holds) => Some(*holds),
@@ -53,22 +53,23 @@ pub fn holds(test: &Test, state: &State) -> Option<bool> {
     }
 }
 
-/// Whether all of them hold and have values.
+/// Returns `true` if all conditions are defined and hold.
 pub fn all_hold(tests: &[Test], state: &State) -> bool {
     tests.iter().all(|test| holds(test, state) == Some(true))
 }
 
-/// The state after an action, if it can be executed.
+/// State after an action; `None` if the action is not executable.
 pub fn execute(instance: &Instance, state: &State) -> Option<State> {
     let mut after = match &instance.end {
         None => happen(&[&instance.start], state)?,
         Some(end) if instance.duration.is_zero() => {
-            let happened = happen(&[&instance.start, end], state)?;
-            let (one, other) = (Touch::of(&instance.start, state)?, Touch::of(end, state)?);
-            if one.interferes(&other) {
+            // Duration 0: start and end are one happening, so their conditions are evaluated in one state and they must not interfere.
+            let next_state = happen(&[&instance.start, end], state)?;
+            let (start_access, end_access) = (Access::of(&instance.start, state)?, Access::of(end, state)?);
+            if start_access.interferes(&end_access) {
                 return None;
             }
-            happened
+            next_state
         }
         Some(end) => {
             let between = happen(&[&instance.start], state)?;
@@ -82,23 +83,23 @@ pub fn execute(instance: &Instance, state: &State) -> Option<State> {
     Some(after)
 }
 
-/// Effects that are active in a state; nothing where a condition of one has no value.
-fn active<'a>(acts: &'a [Act], state: &State, found: &mut Vec<&'a Act>) -> Option<()> {
+/// Collects the effects that apply in a state. Returns `None` if a condition of an effect is undefined.
+fn active_acts<'a>(acts: &'a [Act], state: &State, active: &mut Vec<&'a Act>) -> Option<()> {
     for act in acts {
         if let Act::When(tests, inner) = act {
-            let met: Option<Vec<bool>> = tests.iter().map(|test| holds(test, state)).collect();
-            if met?.iter().all(|met| *met) {
-                active(inner, state, found)?;
+            let results: Option<Vec<bool>> = tests.iter().map(|test| holds(test, state)).collect();
+            if results?.iter().all(|result| *result) {
+                active_acts(inner, state, active)?;
             }
         } else {
-            found.push(act);
+            active.push(act);
         }
     }
     Some(())
 }
 
-/// What active numeric effects do to one number, taken together.
-enum Together {
+/// Combination of all active numeric effects on one number.
+enum Combined {
     Sum(Number),
     Factor(Number),
     Assigned(Number),
@@ -111,61 +112,67 @@ fn happen(moments: &[&Moment], state: &State) -> Option<State> {
         if !all_hold(&moment.tests, state) {
             return None;
         }
-        active(&moment.acts, state, &mut acts)?;
+        active_acts(&moment.acts, state, &mut acts)?;
     }
     let mut after = state.clone();
-    let mut numbers: Vec<(usize, Together)> = Vec::new();
+    let mut numbers: Vec<(usize, Combined)> = Vec::new();
     for act in &acts {
         match act {
             Act::Delete(atom) => after.atoms[*atom] = false,
             Act::Number(change, fluent, value) => {
-                note(&mut numbers, *change, *fluent, number(value, state)?)?;
+                combine(&mut numbers, *change, *fluent, number(value, state)?)?;
             }
             Act::Add(_) | Act::When(..) => {}
         }
     }
+    // Deletions come first, so an atom that is added and deleted holds.
     for act in &acts {
         if let Act::Add(atom) = act {
             after.atoms[*atom] = true;
         }
     }
-    for (fluent, together) in numbers {
+    for (fluent, combined) in numbers {
         let before = state.numbers[fluent].clone();
-        after.numbers[fluent] = Some(match together {
-            Together::Assigned(value) => value,
-            Together::Sum(sum) => before? + sum,
-            Together::Factor(factor) => before? * factor,
+        after.numbers[fluent] = Some(match combined {
+            Combined::Assigned(value) => value,
+            Combined::Sum(sum) => before? + sum,
+            Combined::Factor(factor) => before? * factor,
         });
     }
     Some(after)
 }
 
-/// Adds an effect to those on the same number; nothing where they contradict each other.
-fn note(numbers: &mut Vec<(usize, Together)>, change: Change, fluent: usize, operand: Number) -> Option<()> {
-    let new = match change {
-        Change::Assign => Together::Assigned(operand),
-        Change::Increase => Together::Sum(operand),
-        Change::Decrease => Together::Sum(-operand),
-        Change::ScaleUp => Together::Factor(operand),
+/// Combines an effect with the previous ones on the same number. Returns `None` if they conflict.
+fn combine(
+    numbers: &mut Vec<(usize, Combined)>,
+    change: Change,
+    fluent: usize,
+    operand: Number,
+) -> Option<()> {
+    let added = match change {
+        Change::Assign => Combined::Assigned(operand),
+        Change::Increase => Combined::Sum(operand),
+        Change::Decrease => Combined::Sum(-operand),
+        Change::ScaleUp => Combined::Factor(operand),
         Change::ScaleDown if operand.is_zero() => return None,
-        Change::ScaleDown => Together::Factor(operand.recip()),
+        Change::ScaleDown => Combined::Factor(operand.recip()),
     };
-    let Some((_, known)) = numbers.iter_mut().find(|(other, _)| *other == fluent) else {
-        numbers.push((fluent, new));
+    let Some((_, combined)) = numbers.iter_mut().find(|(number, _)| *number == fluent) else {
+        numbers.push((fluent, added));
         return Some(());
     };
-    match (known, new) {
-        (Together::Sum(sum), Together::Sum(more)) => *sum += more,
-        (Together::Factor(factor), Together::Factor(more)) => *factor *= more,
-        (Together::Assigned(value), Together::Assigned(same)) if *value == same => {}
+    match (combined, added) {
+        (Combined::Sum(sum), Combined::Sum(operand)) => *sum += operand,
+        (Combined::Factor(factor), Combined::Factor(operand)) => *factor *= operand,
+        (Combined::Assigned(value), Combined::Assigned(second)) if *value == second => {}
         _ => return None,
     }
     Some(())
 }
 
-/// What a happening reads and writes, for interference.
+/// Facts and numbers that a happening reads and writes, for the interference test.
 #[derive(Default)]
-struct Touch {
+struct Access {
     read_atoms: Vec<usize>,
     read_numbers: Vec<usize>,
     adds: Vec<usize>,
@@ -173,22 +180,23 @@ struct Touch {
     changes: Vec<(Change, usize)>,
 }
 
-impl Touch {
+impl Access {
     fn of(moment: &Moment, state: &State) -> Option<Self> {
-        let mut touch = Self::default();
-        moment.tests.iter().for_each(|test| touch.test(test));
-        moment.acts.iter().for_each(|act| touch.operands(act));
+        let mut access = Self::default();
+        moment.tests.iter().for_each(|test| access.test(test));
+        // Operands count as read even if the effect is not active (6).
+        moment.acts.iter().for_each(|act| access.operands(act));
         let mut acts = Vec::new();
-        active(&moment.acts, state, &mut acts)?;
+        active_acts(&moment.acts, state, &mut acts)?;
         for act in acts {
             match act {
-                Act::Add(atom) => touch.adds.push(*atom),
-                Act::Delete(atom) => touch.deletes.push(*atom),
-                Act::Number(change, fluent, _) => touch.changes.push((*change, *fluent)),
+                Act::Add(atom) => access.adds.push(*atom),
+                Act::Delete(atom) => access.deletes.push(*atom),
+                Act::Number(change, fluent, _) => access.changes.push((*change, *fluent)),
                 Act::When(..) => {}
             }
         }
-        Some(touch)
+        Some(access)
     }
 
     fn operands(&mut self, act: &Act) {
@@ -234,17 +242,17 @@ impl Touch {
     }
 
     fn interferes(&self, other: &Self) -> bool {
-        let one_way = |one: &Self, other: &Self| {
-            let written = one.adds.iter().chain(&one.deletes);
+        let one_way = |writer: &Self, reader: &Self| {
+            let written = writer.adds.iter().chain(&writer.deletes);
             let mut written = written;
-            written.any(|atom| other.read_atoms.contains(atom))
-                || one.adds.iter().any(|atom| other.deletes.contains(atom))
-                || one.changes.iter().any(|(_, fluent)| other.read_numbers.contains(fluent))
+            written.any(|atom| reader.read_atoms.contains(atom))
+                || writer.adds.iter().any(|atom| reader.deletes.contains(atom))
+                || writer.changes.iter().any(|(_, fluent)| reader.read_numbers.contains(fluent))
         };
         let sums = |change: Change| matches!(change, Change::Increase | Change::Decrease);
         let factors = |change: Change| matches!(change, Change::ScaleUp | Change::ScaleDown);
         let compatible =
-            |one: Change, other: Change| sums(one) && sums(other) || factors(one) && factors(other);
+            |first: Change, second: Change| sums(first) && sums(second) || factors(first) && factors(second);
         let clash = |(change, fluent): &(Change, usize)| {
             other.changes.iter().any(|(o, f)| f == fluent && !compatible(*change, *o))
         };

@@ -1,8 +1,8 @@
-//! What is true of a task: the best value and a plan that has it, that there is no plan, or no best value.
+//! Computes the correct answer for a task: the best value with a plan, that there is no plan, or that there is no best value.
 //!
-//! Where all states were visited: Bellman and Ford's algorithm on the part that is on a way to a goal, with a look for cycles of
-//! negative cost in its tree. Otherwise, if no step can improve the metric, Dijkstra's; a plan that it ends with is best
-//! although states are left.
+//! If the state space is complete: Bellman-Ford on the states from which a goal is reachable, with cycle detection in the tree of
+//! parents (a cycle means negative cost). Otherwise, if no step can improve the metric: Dijkstra's algorithm. Its first plan is optimal
+//! although the state space is not complete.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -15,87 +15,87 @@ use super::ground::Ground;
 use super::model::Number;
 use super::step::all_hold;
 
-/// A value of the metric and the instances of a plan that has it.
-pub type Found = (Number, Vec<usize>);
+/// Value of the metric, with the instances of a plan that attains it.
+pub type ValuedPlan = (Number, Vec<usize>);
 
-/// What is known of a task.
+/// The correct answer for a task, or the part that the exploration shows.
 #[derive(Debug, Clone)]
-pub enum Known {
-    Best(Found),
+pub enum Outcome {
+    Best(ValuedPlan),
     NoPlan,
-    /// The plan is one of those with fewest steps.
-    NoBest(Found),
-    Open(Option<Found>),
+    /// There is no best value. The plan has the best value among the plans with fewest steps.
+    NoBest(ValuedPlan),
+    Open(Option<ValuedPlan>),
 }
 
-/// The truth, and the states that it was found by.
+/// The answer, with the explored states.
 pub struct Explored {
-    pub known: Known,
+    pub outcome: Outcome,
     pub space: Space,
 }
 
-/// Finds out. Nothing where the metric has no value in the initial state, or after a step.
+/// Solves a task. Returns `None` if the metric is undefined in the initial state or after a step.
 pub fn truth(ground: &Ground, maximize: bool, budget: Budget) -> Option<Explored> {
     let measures = Measures::new(ground);
     let space = explore(ground, &measures, budget)?;
-    let known = if space.complete || !measures.never_improves(0, maximize) {
+    let outcome = if space.complete || !measures.never_improves(0, maximize) {
         by_states(&space, maximize)
     } else {
         match dijkstra(ground, &measures, maximize, budget) {
-            Some(found) => Known::Best(found),
+            Some(plan) => Outcome::Best(plan),
             None => by_states(&space, maximize),
         }
     };
-    Some(Explored { known, space })
+    Some(Explored { outcome, space })
 }
 
-/// What follows from the states that were visited.
-fn by_states(space: &Space, maximize: bool) -> Known {
+/// Answer from the explored states.
+fn by_states(space: &Space, maximize: bool) -> Outcome {
     let useful = leads_to_goal(space);
     if !useful[0] {
-        return if space.complete { Known::NoPlan } else { Known::Open(None) };
+        return if space.complete { Outcome::NoPlan } else { Outcome::Open(None) };
     }
     let (scale, costs) = integers(space, maximize);
     match shortest(space, &costs, &useful) {
         None => {
-            let fewest = fewest_steps(space).expect("a goal is reached");
-            Known::NoBest(within(space, maximize, fewest).expect("a goal is reached"))
+            let least_steps = fewest_steps(space).expect("a goal is reached");
+            Outcome::NoBest(within(space, maximize, least_steps).expect("a goal is reached"))
         }
         Some((cost, plan)) => {
             let cost = Number::new(if maximize { -cost } else { cost }, scale);
-            let found = (&space.initial[0] + cost, plan);
-            if space.complete { Known::Best(found) } else { Known::Open(Some(found)) }
+            let best = (&space.initial[0] + cost, plan);
+            if space.complete { Outcome::Best(best) } else { Outcome::Open(Some(best)) }
         }
     }
 }
 
-/// From which states a goal can be reached.
+/// For each state, whether a goal is reachable.
 fn leads_to_goal(space: &Space) -> Vec<bool> {
-    let mut before = vec![Vec::new(); space.edges.len()];
+    let mut predecessors = vec![Vec::new(); space.edges.len()];
     for (from, edges) in space.edges.iter().enumerate() {
         for edge in edges {
-            before[edge.to].push(from);
+            predecessors[edge.to].push(from);
         }
     }
     let mut useful = space.goals.clone();
-    let mut waiting: Vec<usize> = (0..useful.len()).filter(|state| useful[*state]).collect();
-    while let Some(state) = waiting.pop() {
-        for from in &before[state] {
+    let mut open: Vec<usize> = (0..useful.len()).filter(|state| useful[*state]).collect();
+    while let Some(state) = open.pop() {
+        for from in &predecessors[state] {
             if !std::mem::replace(&mut useful[*from], true) {
-                waiting.push(*from);
+                open.push(*from);
             }
         }
     }
     useful
 }
 
-/// All costs over one denominator, negated if the metric is maximised.
+/// Common denominator and scaled costs of all edges, negated if the metric is maximised.
 fn integers(space: &Space, maximize: bool) -> (BigInt, Vec<Vec<BigInt>>) {
     let mut scale = BigInt::one();
     for edge in space.edges.iter().flatten() {
-        // The denominator over its common divisor with the scale.
-        let missing = Number::new(scale.clone(), edge.costs[0].denom().clone()).denom().clone();
-        scale *= missing;
+        // The factor by which the scale lacks this denominator.
+        let factor = Number::new(scale.clone(), edge.costs[0].denom().clone()).denom().clone();
+        scale *= factor;
     }
     let scaled = |cost: &Number| {
         let scaled = cost.numer() * (&scale / cost.denom());
@@ -106,7 +106,7 @@ fn integers(space: &Space, maximize: bool) -> (BigInt, Vec<Vec<BigInt>>) {
     (scale, costs)
 }
 
-/// The cheapest way to a goal; nothing if a cycle of negative cost is on a way to one.
+/// Shortest path to a goal by Bellman-Ford; `None` if a cycle of negative cost lies on a path to a goal.
 fn shortest(space: &Space, costs: &[Vec<BigInt>], useful: &[bool]) -> Option<(BigInt, Vec<usize>)> {
     let mut distance: Vec<Option<BigInt>> = vec![None; useful.len()];
     let mut parent: Vec<Option<(usize, usize)>> = vec![None; useful.len()];
@@ -118,9 +118,9 @@ fn shortest(space: &Space, costs: &[Vec<BigInt>], useful: &[bool]) -> Option<(Bi
         for from in active {
             let base = distance[from].clone().expect("an active state was reached");
             for (edge, cost) in space.edges[from].iter().zip(&costs[from]) {
-                let new = &base + cost;
-                if useful[edge.to] && distance[edge.to].as_ref().is_none_or(|known| new < *known) {
-                    distance[edge.to] = Some(new);
+                let candidate = &base + cost;
+                if useful[edge.to] && distance[edge.to].as_ref().is_none_or(|current| candidate < *current) {
+                    distance[edge.to] = Some(candidate);
                     parent[edge.to] = Some((from, edge.instance));
                     if !std::mem::replace(&mut queued[edge.to], true) {
                         next.push(edge.to);
@@ -128,6 +128,7 @@ fn shortest(space: &Space, costs: &[Vec<BigInt>], useful: &[bool]) -> Option<(Bi
                 }
             }
         }
+        // A cycle among the parents, or a parent of the initial state, proves a cycle of negative cost.
         if parent[0].is_some() || has_cycle(&parent) {
             return None;
         }
@@ -135,10 +136,10 @@ fn shortest(space: &Space, costs: &[Vec<BigInt>], useful: &[bool]) -> Option<(Bi
     }
     let goals = (0..useful.len()).filter(|state| space.goals[*state]);
     let (cost, goal) = goals.filter_map(|goal| Some((distance[goal].clone()?, goal))).min()?;
-    Some((cost, way_to(goal, &parent)))
+    Some((cost, path_to(goal, &parent)))
 }
 
-fn way_to(mut state: usize, parent: &[Option<(usize, usize)>]) -> Vec<usize> {
+fn path_to(mut state: usize, parent: &[Option<(usize, usize)>]) -> Vec<usize> {
     let mut plan = Vec::new();
     while let Some((from, instance)) = parent[state] {
         plan.push(instance);
@@ -148,27 +149,27 @@ fn way_to(mut state: usize, parent: &[Option<(usize, usize)>]) -> Vec<usize> {
     plan
 }
 
-/// Whether the tree of shortest ways is none.
+/// Returns `true` if the parent links contain a cycle.
 fn has_cycle(parent: &[Option<(usize, usize)>]) -> bool {
     let mut colour = vec![0_usize; parent.len()];
     for start in 0..parent.len() {
-        let mut at = start;
-        while colour[at] == 0 {
-            colour[at] = start + 1;
-            match parent[at] {
-                Some((from, _)) => at = from,
+        let mut state = start;
+        while colour[state] == 0 {
+            colour[state] = start + 1;
+            match parent[state] {
+                Some((from, _)) => state = from,
                 None => break,
             }
         }
-        if colour[at] == start + 1 && parent[at].is_some() {
+        if colour[state] == start + 1 && parent[state].is_some() {
             return true;
         }
     }
     false
 }
 
-/// The cheapest plan by Dijkstra's algorithm, if a goal is reached within the budget. No step may have a negative cost.
-fn dijkstra(ground: &Ground, measures: &Measures<'_>, maximize: bool, budget: Budget) -> Option<Found> {
+/// Cheapest plan by Dijkstra's algorithm; `None` if the budget is exceeded or no goal is reachable. Steps must not have negative costs.
+fn dijkstra(ground: &Ground, measures: &Measures<'_>, maximize: bool, budget: Budget) -> Option<ValuedPlan> {
     let mut states = States::default();
     let first = measures.initial();
     let start = measures.of(&first, 0)?.swap_remove(0);
@@ -178,49 +179,51 @@ fn dijkstra(ground: &Ground, measures: &Measures<'_>, maximize: bool, budget: Bu
     let mut closed = vec![false];
     let mut queue = BinaryHeap::from([Reverse((Number::zero(), 0))]);
     let mut attempts = 0;
-    while let Some(Reverse((cost, at))) = queue.pop() {
-        if std::mem::replace(&mut closed[at], true) {
+    while let Some(Reverse((cost, current))) = queue.pop() {
+        if std::mem::replace(&mut closed[current], true) {
             continue;
         }
-        let state = states.all[at].clone();
+        let state = states.by_number[current].clone();
         if all_hold(&ground.goal, &state) {
             let cost = if maximize { -cost } else { cost };
-            return Some((start + cost, way_to(at, &parent)));
+            return Some((start + cost, path_to(current, &parent)));
         }
         attempts += ground.instances.len();
-        if attempts > budget.attempts || states.all.len() > 2 * budget.states {
+        if attempts > budget.attempts || states.by_number.len() > 2 * budget.states {
             return None;
         }
         let old = measures.of(&state, 0)?;
         for (position, instance) in ground.instances.iter().enumerate() {
             let Some((after, mut costs)) = measures.step(instance, (&state, &old)) else { continue };
             let step = costs.swap_remove(0);
-            let new = &cost + if maximize { -step } else { step };
-            let (to, is_new) = states.number(after);
+            let candidate = &cost + if maximize { -step } else { step };
+            let (target, is_new) = states.number(after);
             if is_new {
-                distance.push(new.clone());
-                parent.push(Some((at, position)));
+                distance.push(candidate.clone());
+                parent.push(Some((current, position)));
                 closed.push(false);
-            } else if !closed[to] && new < distance[to] {
-                distance[to] = new.clone();
-                parent[to] = Some((at, position));
+            } else if !closed[target] && candidate < distance[target] {
+                distance[target] = candidate.clone();
+                parent[target] = Some((current, position));
             } else {
                 continue;
             }
-            queue.push(Reverse((new, to)));
+            queue.push(Reverse((candidate, target)));
         }
     }
     None
 }
 
-/// The fewest steps to a goal.
+/// Least number of steps to a goal.
 pub fn fewest_steps(space: &Space) -> Option<usize> {
     (0..space.goals.len()).filter(|state| space.goals[*state]).map(|state| space.depths[state]).min()
 }
 
-/// The best plan of at most so many steps among the states that were visited.
-pub fn within(space: &Space, maximize: bool, steps: usize) -> Option<Found> {
-    let better = |new: &Number, old: &Number| if maximize { new > old } else { new < old };
+/// Best plan with at most `steps` steps among the explored states, by dynamic programming over the number of steps.
+pub fn within(space: &Space, maximize: bool, steps: usize) -> Option<ValuedPlan> {
+    let better = |candidate: &Number, incumbent: &Number| {
+        if maximize { candidate > incumbent } else { candidate < incumbent }
+    };
     let mut layers: Vec<Vec<Option<(Number, usize, usize)>>> = vec![vec![None; space.goals.len()]];
     layers[0][0] = Some((space.initial[0].clone(), 0, 0));
     for step in 0..steps {
@@ -228,9 +231,9 @@ pub fn within(space: &Space, maximize: bool, steps: usize) -> Option<Found> {
         for (from, edges) in space.edges.iter().enumerate() {
             let Some((cost, ..)) = &layers[step][from] else { continue };
             for edge in edges {
-                let new = cost + &edge.costs[0];
-                if next[edge.to].as_ref().is_none_or(|(old, ..)| better(&new, old)) {
-                    next[edge.to] = Some((new, from, edge.instance));
+                let candidate = cost + &edge.costs[0];
+                if next[edge.to].as_ref().is_none_or(|(incumbent, ..)| better(&candidate, incumbent)) {
+                    next[edge.to] = Some((candidate, from, edge.instance));
                 }
             }
         }
@@ -240,7 +243,7 @@ pub fn within(space: &Space, maximize: bool, steps: usize) -> Option<Found> {
     for (layer, costs) in layers.iter().enumerate() {
         for (state, cost) in costs.iter().enumerate().filter(|(state, _)| space.goals[*state]) {
             if let Some((cost, ..)) = cost
-                && best.as_ref().is_none_or(|(old, ..)| better(cost, old))
+                && best.as_ref().is_none_or(|(incumbent, ..)| better(cost, incumbent))
             {
                 best = Some((cost.clone(), layer, state));
             }

@@ -1,7 +1,7 @@
-//! Chooses thresholds and a goal among the values that occur, so that they are hit exactly or missed by a hair.
+//! Chooses thresholds and a goal among the values that occur, so that they are hit exactly or missed by a tiny amount.
 //!
-//! The actions are executed at random, every open comparison taken as true. Each threshold then becomes a value that its
-//! expression had when an action was executed, or one next to it; the goal holds, or almost, in a state that was reached.
+//! Random walks execute the actions with all open comparisons taken as true. Each threshold becomes a value that its expression had
+//! when an action was executed, or a neighbouring value. The goal holds, or almost holds, in a reached state.
 
 use fastrand::Rng;
 
@@ -10,35 +10,36 @@ use super::ground::{Ground, Test, ground};
 use super::model::{Action, Applied, Condition, Expr, Number, Relation, Task, applied, whole};
 use super::step::{State, execute, number};
 
-/// Most instances of a task that is walked through.
-const INSTANCES: usize = 20_000;
+/// Maximum number of instances of a task for random walks.
+const MAX_INSTANCES: usize = 20_000;
 
-/// What may become the goal.
+/// Candidates for the goal.
 pub struct Wishes {
-    /// Atoms of which some that hold become conjuncts.
+    /// Atoms. Some of those that hold become conjuncts.
     pub atoms: Vec<(usize, Vec<usize>)>,
-    /// Expressions that may be compared with a value that they have.
+    /// Expressions. Some are compared with the values that they have.
     pub numbers: Vec<Expr>,
 }
 
-/// Fills in thresholds and goal.
+/// Replaces open thresholds and chooses the goal.
 pub fn tune(task: &mut Task, wishes: &Wishes, rng: &mut Rng) {
-    let mut with_wishes = task.clone();
-    with_wishes.goal = wishes.atoms.iter().map(|(p, objects)| Condition::Holds(fixed(*p, objects))).collect();
-    let Some(open) = ground(&with_wishes, &wishes.numbers, INSTANCES) else {
-        // Too many to walk through: any thresholds will do.
+    let mut task_with_wishes = task.clone();
+    task_with_wishes.goal =
+        wishes.atoms.iter().map(|(p, objects)| Condition::Holds(ground_atom(*p, objects))).collect();
+    let Some(open) = ground(&task_with_wishes, &wishes.numbers, MAX_INSTANCES) else {
+        // Too many instances for random walks: the thresholds are drawn at random.
         return close(task, &[], rng);
     };
-    let mut seen: Vec<Vec<Number>> = Vec::new();
+    let mut observed: Vec<Vec<Number>> = Vec::new();
     let mut last = start(&open);
     for _ in 0..3 {
-        last = walk(&open, &mut seen, rng);
+        last = walk(&open, &mut observed, rng);
     }
-    close(task, &seen, rng);
+    close(task, &observed, rng);
     task.goal = goal(wishes, &open, &last, rng);
 }
 
-fn fixed(symbol: usize, objects: &[usize]) -> Applied {
+fn ground_atom(symbol: usize, objects: &[usize]) -> Applied {
     let terms: Vec<_> = objects.iter().map(|object| super::model::Term::Object(*object)).collect();
     applied(symbol, &terms)
 }
@@ -47,8 +48,8 @@ fn start(ground: &Ground) -> State {
     State { atoms: ground.atoms.clone(), numbers: ground.numbers.clone(), time: whole(0) }
 }
 
-/// Executes up to six actions; notes the values of open comparisons.
-fn walk(ground: &Ground, seen: &mut Vec<Vec<Number>>, rng: &mut Rng) -> State {
+/// Executes up to six random actions and records the values of open comparisons. Returns the final state.
+fn walk(ground: &Ground, observed: &mut Vec<Vec<Number>>, rng: &mut Rng) -> State {
     let mut state = start(ground);
     let length = rng.usize(1..7);
     for _ in 0..length {
@@ -63,8 +64,8 @@ fn walk(ground: &Ground, seen: &mut Vec<Vec<Number>>, rng: &mut Rng) -> State {
             if let Test::Open(position, value) = test
                 && let Some(value) = number(value, &state)
             {
-                seen.resize((*position + 1).max(seen.len()), Vec::new());
-                seen[*position].push(value);
+                observed.resize((*position + 1).max(observed.len()), Vec::new());
+                observed[*position].push(value);
             }
         }
         state = after;
@@ -72,19 +73,19 @@ fn walk(ground: &Ground, seen: &mut Vec<Vec<Number>>, rng: &mut Rng) -> State {
     state
 }
 
-/// Replaces open comparisons.
-fn close(task: &mut Task, seen: &[Vec<Number>], rng: &mut Rng) {
+/// Replaces open comparisons by comparisons with an observed value.
+fn close(task: &mut Task, observed: &[Vec<Number>], rng: &mut Rng) {
     let mut close_all = |conditions: &mut Vec<Condition>| {
         for condition in conditions {
             if let Condition::Open(relation, expression, position) = condition {
-                let values = seen.get(*position).filter(|values| !values.is_empty());
+                let values = observed.get(*position).filter(|values| !values.is_empty());
                 let value = match values {
-                    Some(values) => draw::one(rng, values),
+                    Some(values) => draw::one_of(rng, values),
                     None => whole(rng.i64(0..4)),
                 };
                 let relation = match relation {
                     Relation::AtLeast if once_in(rng, 3) => draw::relation(rng),
-                    other => *other,
+                    unchanged => *unchanged,
                 };
                 *condition = compare(rng, relation, expression.clone(), &value);
             }
@@ -99,7 +100,7 @@ fn close(task: &mut Task, seen: &[Vec<Number>], rng: &mut Rng) {
     }
 }
 
-/// A comparison of an expression with a value or one next to it, in one of the ways to write it.
+/// A comparison of an expression with a value or a neighbouring value, in one of several equivalent forms.
 fn compare(rng: &mut Rng, relation: Relation, expression: Expr, value: &Number) -> Condition {
     let value = near(rng, value);
     let reversed = match relation {
@@ -116,7 +117,7 @@ fn compare(rng: &mut Rng, relation: Relation, expression: Expr, value: &Number) 
             Condition::Compare(relation, difference, Expr::Number(whole(0)))
         }
         2 => {
-            let factor = draw::one(rng, &["0.3", "7", "0.1234567890123456", "-2"]);
+            let factor = draw::one_of(rng, &["0.3", "7", "0.1234567890123456", "-2"]);
             let factor = super::model::decimal(factor);
             let relation = if factor < whole(0) { reversed } else { relation };
             let product = Expr::Product(vec![Expr::Number(factor.clone()), expression]);
@@ -136,12 +137,12 @@ fn compare(rng: &mut Rng, relation: Relation, expression: Expr, value: &Number) 
     }
 }
 
-/// Some of the wishes that hold in a state.
+/// Conditions that hold or almost hold in a state.
 fn goal(wishes: &Wishes, open: &Ground, state: &State, rng: &mut Rng) -> Vec<Condition> {
     let mut goal = Vec::new();
     for ((predicate, objects), test) in wishes.atoms.iter().zip(&open.goal) {
         if super::step::holds(test, state) == Some(true) && (goal.is_empty() || rng.bool()) {
-            goal.push(Condition::Holds(fixed(*predicate, objects)));
+            goal.push(Condition::Holds(ground_atom(*predicate, objects)));
         }
     }
     let mut numbers: Vec<usize> = (0..wishes.numbers.len()).collect();

@@ -1,4 +1,4 @@
-//! The same task asked in other ways: encodings, strategies, solvers, horizons, several objectives. What is claimed must not differ.
+//! Differential tests of one task: encodings, strategies, solvers, horizons, several objectives. Their claims must agree.
 
 use std::time::{Duration, Instant};
 
@@ -11,23 +11,23 @@ use planner::{
 use crate::judge::{Case, Mode, Tally, plan_lines, project_verdict, rational, read, steps_of};
 
 use super::Puzzle;
-use super::draw::one;
+use super::draw::one_of;
 use super::fronts::front;
 use super::model::{Expr, Number, applied};
 use super::print::objective;
-use super::truth::{Known, fewest_steps, within};
+use super::truth::{Outcome, fewest_steps, within};
 
-/// How long the planner may take each time.
+/// Time limit of each call of the planner.
 const LIMIT: Duration = Duration::from_millis(500);
 
 fn config(rng: &mut Rng) -> Config {
     let semantics = [StepSemantics::Sequential, StepSemantics::ForAllStep, StepSemantics::ExistsStep];
     Config::default()
-        .with_engine(one(rng, &[Engine::Auto, Engine::Sat, Engine::Search]))
+        .with_engine(one_of(rng, &[Engine::Auto, Engine::Sat, Engine::Search]))
         .with_confirmation(rng.bool())
-        .with_head_start(one(rng, &[1, 10, 100, 20_000]))
-        .with_semantics((!super::draw::once_in(rng, 4)).then(|| one(rng, &semantics)))
-        .with_strategy(one(rng, &[Strategy::Auto, Strategy::Tighten, Strategy::Cores]))
+        .with_head_start(one_of(rng, &[1, 10, 100, 20_000]))
+        .with_semantics((!super::draw::once_in(rng, 4)).then(|| one_of(rng, &semantics)))
+        .with_strategy(one_of(rng, &[Strategy::Auto, Strategy::Tighten, Strategy::Cores]))
         .with_backend(if rng.bool() { Backend::Batsat } else { Backend::Varisat })
         .with_limits(Limits::none().with_time(LIMIT).with_thresholds(thresholds(rng.bool())))
 }
@@ -36,7 +36,7 @@ fn thresholds(is_early: bool) -> Thresholds {
     if is_early { Thresholds::NONE } else { Thresholds::default() }
 }
 
-/// Asks with two random settings, and with a horizon.
+/// Plans with two random configurations, and once with a random horizon.
 pub fn check_variants(puzzle: &Puzzle, case: &Case, rng: &mut Rng, tally: &mut Tally) {
     let Ok((mission, problem)) = read(&case.domain, &case.problem) else { return };
     let Ok(task) = mission.ground(&problem, &[], &Limits::none().with_time(LIMIT)) else { return };
@@ -44,7 +44,7 @@ pub fn check_variants(puzzle: &Puzzle, case: &Case, rng: &mut Rng, tally: &mut T
     for _ in 0..2 {
         let config = config(rng);
         let solution = planner::optimize(&task, &config, &mut |_| {});
-        let said = format!(
+        let description = format!(
             "{:?} {:?} {:?} {:?} confirm: {} head start: {}",
             config.semantics,
             config.strategy,
@@ -54,7 +54,7 @@ pub fn check_variants(puzzle: &Puzzle, case: &Case, rng: &mut Rng, tally: &mut T
             config.head_start
         );
         tally.count(format!("variant: {:?}", solution.status));
-        check(puzzle, case, &solution, &said, tally);
+        check(puzzle, case, &solution, &description, tally);
     }
     let horizon = rng.usize(0..5);
     let config = config(rng).with_horizon(horizon).with_semantics(None);
@@ -64,8 +64,8 @@ pub fn check_variants(puzzle: &Puzzle, case: &Case, rng: &mut Rng, tally: &mut T
     tally.planning += started.elapsed();
 }
 
-/// What is said of plans of any length.
-fn check(puzzle: &Puzzle, case: &Case, solution: &Solution, said: &str, tally: &mut Tally) {
+/// Checks claims about plans of any length.
+fn check(puzzle: &Puzzle, case: &Case, solution: &Solution, description: &str, tally: &mut Tally) {
     let mut cost = None;
     if let Some(plan) = &solution.plan {
         let claimed = rational(&plan.cost);
@@ -74,38 +74,38 @@ fn check(puzzle: &Puzzle, case: &Case, solution: &Solution, said: &str, tally: &
         }
         match (case.execute)(&steps_of(plan)) {
             Ok(value) if value == claimed => {}
-            other => {
-                let reason = format!("{said}: {other:?} for {claimed}, {:?}", plan.steps);
+            unexpected => {
+                let reason = format!("{description}: {unexpected:?} for {claimed}, {:?}", plan.steps);
                 tally.fail(case, "a variant's plan is invalid or costs otherwise", &reason);
             }
         }
         cost = Some(claimed);
     }
-    let worse = |found: &Number| match &cost {
-        Some(cost) if puzzle.maximize() => cost < found,
-        Some(cost) => cost > found,
+    let is_worse = |incumbent: &Number| match &cost {
+        Some(cost) if puzzle.maximize() => cost < incumbent,
+        Some(cost) => cost > incumbent,
         None => true,
     };
-    let wrong = match (solution.status, &puzzle.explored.known) {
-        (Status::Optimal, Known::Best((best, _))) => cost.as_ref() != Some(best),
-        (Status::Optimal, Known::Open(Some((found, _)))) => worse(found),
-        (Status::Feasible, Known::Best(_)) => solution.unbounded == Some(MetricUnbounded::Proved),
-        (Status::Unsolvable, known) => !matches!(known, Known::NoPlan | Known::Open(None)),
-        (Status::Optimal, Known::NoBest(_))
-        | (Status::Optimal | Status::Feasible, Known::NoPlan)
+    let is_wrong = match (solution.status, &puzzle.explored.outcome) {
+        (Status::Optimal, Outcome::Best((best, _))) => cost.as_ref() != Some(best),
+        (Status::Optimal, Outcome::Open(Some((incumbent, _)))) => is_worse(incumbent),
+        (Status::Feasible, Outcome::Best(_)) => solution.unbounded == Some(MetricUnbounded::Proved),
+        (Status::Unsolvable, outcome) => !matches!(outcome, Outcome::NoPlan | Outcome::Open(None)),
+        (Status::Optimal, Outcome::NoBest(_))
+        | (Status::Optimal | Status::Feasible, Outcome::NoPlan)
         | (Status::UnsolvableWithinHorizon, _) => true,
         _ => false,
     };
-    if wrong {
+    if is_wrong {
         let reason = format!(
-            "{said}: {:?} {:?} {cost:?}: {:?}",
-            solution.status, solution.proof, puzzle.explored.known
+            "{description}: {:?} {:?} {cost:?}: {:?}",
+            solution.status, solution.proof, puzzle.explored.outcome
         );
         tally.fail(case, "a variant's claim is false", &reason);
     }
 }
 
-/// What is said of plans of at most so many steps.
+/// Checks claims about plans of at most `horizon` steps.
 fn check_horizon(
     puzzle: &Puzzle,
     case: &Case,
@@ -113,53 +113,56 @@ fn check_horizon(
     (horizon, config): (usize, &Config),
     tally: &mut Tally,
 ) {
-    let said = format!("horizon {horizon}, {:?}, {:?}", config.strategy, config.backend);
+    let description = format!("horizon {horizon}, {:?}, {:?}", config.strategy, config.backend);
     let space = &puzzle.explored.space;
     if solution.status == Status::UnsolvableWithinHorizon {
-        if fewest_steps(space).is_some_and(|fewest| fewest <= horizon) {
-            tally.fail(case, "a plan within the horizon is denied", &said);
+        if fewest_steps(space).is_some_and(|least_steps| least_steps <= horizon) {
+            tally.fail(case, "a plan within the horizon is denied", &description);
         }
         return;
     }
-    check(puzzle, case, solution, &said, tally);
+    check(puzzle, case, solution, &description, tally);
     let Some(plan) = &solution.plan else { return };
     if plan.steps.len() > horizon {
-        tally.fail(case, "a plan is longer than the horizon", &said);
+        tally.fail(case, "a plan is longer than the horizon", &description);
     }
     let best = within(space, puzzle.maximize(), horizon);
     let reached = config.limits.reached();
+    // Not a failure: the answer for a horizon may be the first plan. The count shows how often.
     if best.is_some_and(|(best, _)| space.complete && !reached && rational(&plan.cost) != best) {
         tally.count("NOTE: not the best plan within the horizon");
     }
 }
 
-/// Objectives of a mission, two or three.
+/// Two or three random objectives.
 pub fn objectives(puzzle: &Puzzle, rng: &mut Rng) -> Vec<Expr> {
     let task = &puzzle.task;
-    let mut all: Vec<Expr> = Vec::new();
+    let mut candidates: Vec<Expr> = Vec::new();
     for name in ["total-cost", "energy", "x0"] {
         if let Some(position) = task.functions.iter().position(|function| function.name == name) {
-            all.push(Expr::Function(applied(position, &[])));
+            candidates.push(Expr::Function(applied(position, &[])));
         }
     }
     let sum = Expr::Sum(vec![
-        all[0].clone(),
-        Expr::Product(vec![Expr::Number(super::model::decimal("0.3")), all[1].clone()]),
+        candidates[0].clone(),
+        Expr::Product(vec![Expr::Number(super::model::decimal("0.3")), candidates[1].clone()]),
     ]);
-    all.push(sum);
+    candidates.push(sum);
     if task.is_timed() {
-        all.push(Expr::TotalTime);
+        candidates.push(Expr::TotalTime);
     }
-    rng.shuffle(&mut all);
-    all.truncate(rng.usize(2..4));
-    all
+    rng.shuffle(&mut candidates);
+    candidates.truncate(rng.usize(2..4));
+    candidates
 }
 
-/// Asks for plans by several objectives: the first two as a Pareto front, all of them as a list.
+/// Checks plans with several objectives: the first two as a Pareto front, all of them lexicographically.
 pub fn check_objectives(puzzle: &Puzzle, expressions: &[Expr], case: &Case, tally: &mut Tally) {
-    let Some(all) = front(&puzzle.explored.space) else { return };
-    let two = Puzzle::new(puzzle.name.clone(), puzzle.task.clone(), &expressions[..2]);
-    let Some(pairs) = two.and_then(|two| front(&two.explored.space)) else { return };
+    let Some(expected_points) = front(&puzzle.explored.space) else { return };
+    let puzzle_of_pair = Puzzle::new(puzzle.name.clone(), puzzle.task.clone(), &expressions[..2]);
+    let Some(pairs) = puzzle_of_pair.and_then(|puzzle_of_pair| front(&puzzle_of_pair.explored.space)) else {
+        return;
+    };
     let Ok((mission, problem)) = read(&case.domain, &case.problem) else { return };
     let read = |expression: &Expr| mission.objective(&problem, &objective(&puzzle.task, expression));
     let metrics: Result<Vec<_>, _> = expressions.iter().map(read).collect();
@@ -173,51 +176,59 @@ pub fn check_objectives(puzzle: &Puzzle, expressions: &[Expr], case: &Case, tall
     let limits = || Limits::none().with_time(LIMIT).with_thresholds(thresholds(is_early));
     let config =
         || Config::default().with_limits(limits()).with_head_start(if is_early { 1 } else { 20_000 });
-    let said = || expressions.iter().map(|e| objective(&puzzle.task, e)).collect::<Vec<_>>().join(", ");
+    let description =
+        || expressions.iter().map(|e| objective(&puzzle.task, e)).collect::<Vec<_>>().join(", ");
     let started = Instant::now();
     if let Ok(task) = mission.ground(&problem, &metrics, &Limits::none()) {
         let point = planner::lexicographic(&task, &config(), &mut |_| {});
         let values: Vec<Number> = point.values.iter().map(rational).collect();
         tally.count(format!("list: {:?}", point.solution.status));
-        let wrong = match point.solution.status {
-            Status::Optimal => all.first() != Some(&values),
-            Status::Unsolvable => !all.is_empty(),
+        let is_wrong = match point.solution.status {
+            Status::Optimal => expected_points.first() != Some(&values),
+            Status::Unsolvable => !expected_points.is_empty(),
             _ => false,
         };
-        if wrong {
-            tally.fail(case, "a list is not minimal", &format!("{}: {values:?}, not {all:?}", said()));
+        if is_wrong {
+            tally.fail(
+                case,
+                "a list is not minimal",
+                &format!("{}: {values:?}, not {expected_points:?}", description()),
+            );
         }
     }
     if let Ok(task) = mission.ground(&problem, &metrics[..2], &Limits::none()) {
-        let found = planner::pareto(&task, &config(), &mut |_| {});
-        tally.count(format!("front: {:?}", found.status));
-        let points = found.points.into_iter();
+        let computed = planner::pareto(&task, &config(), &mut |_| {});
+        tally.count(format!("front: {:?}", computed.status));
+        let points = computed.points.into_iter();
         let mut points: Vec<Vec<Number>> =
             points.map(|point| point.values.iter().map(rational).collect()).collect();
         points.retain(|point| !point.is_empty());
         points.sort();
-        let wrong = match found.status {
+        let is_wrong = match computed.status {
             Status::Optimal => points != pairs,
             Status::Unsolvable => !pairs.is_empty(),
+            // An incomplete front may lack points, but must not contain a point that beats the exact front.
             _ => points.iter().any(|point| pairs.iter().all(|best| best[0] > point[0] || best[1] > point[1])),
         };
-        if wrong {
-            tally.fail(case, "a front is wrong", &format!("{}: {points:?}, not {pairs:?}", said()));
+        if is_wrong {
+            tally.fail(case, "a front is wrong", &format!("{}: {points:?}, not {pairs:?}", description()));
         }
     }
     tally.planning += started.elapsed();
 }
 
-/// The validator has to agree with the oracle on random plans, most of them invalid.
+/// Checks that validator and oracle agree on random plans, most of which are invalid.
 pub fn check_validator(puzzle: &Puzzle, case: &Case, rng: &mut Rng, tally: &mut Tally) {
     let Ok((mission, problem)) = read(&case.domain, &case.problem) else { return };
-    let known = match &puzzle.explored.known {
-        Known::Best((_, plan)) | Known::NoBest((_, plan)) | Known::Open(Some((_, plan))) => plan.clone(),
-        Known::NoPlan | Known::Open(None) => Vec::new(),
+    let base_plan = match &puzzle.explored.outcome {
+        Outcome::Best((_, plan)) | Outcome::NoBest((_, plan)) | Outcome::Open(Some((_, plan))) => {
+            plan.clone()
+        }
+        Outcome::NoPlan | Outcome::Open(None) => Vec::new(),
     };
     let instances = puzzle.ground.instances.len();
     for _ in 0..4 {
-        let mut plan = known.clone();
+        let mut plan = base_plan.clone();
         plan.truncate(6);
         for _ in 0..rng.usize(1..4) {
             let position = rng.usize(0..=plan.len());
@@ -232,15 +243,20 @@ pub fn check_validator(puzzle: &Puzzle, case: &Case, rng: &mut Rng, tally: &mut 
         }
         let steps = puzzle.steps(&plan);
         let verdict = project_verdict(&mission, &problem, &steps, &Mode::Sequential);
-        let own = (case.execute)(&steps);
-        tally.count(if own.is_ok() { "random plan: valid" } else { "random plan: invalid" });
+        let executed = (case.execute)(&steps);
+        tally.count(if executed.is_ok() { "random plan: valid" } else { "random plan: invalid" });
         let measured = puzzle.task.metric.is_some();
-        if own.is_ok() != verdict.valid
-            || own.is_ok() && measured && own.as_ref().ok() != verdict.metric.as_ref()
+        if executed.is_ok() != verdict.valid
+            || executed.is_ok() && measured && executed.as_ref().ok() != verdict.metric.as_ref()
         {
-            let said = verdict.violation.map_or_else(String::new, |violation| violation.message.clone());
-            let reason =
-                format!("{own:?}, but {} {said} {:?}\n{}", verdict.valid, verdict.metric, plan_lines(&steps));
+            let violation_text =
+                verdict.violation.map_or_else(String::new, |violation| violation.message.clone());
+            let reason = format!(
+                "{executed:?}, but {} {violation_text} {:?}\n{}",
+                verdict.valid,
+                verdict.metric,
+                plan_lines(&steps)
+            );
             tally.fail(case, "the validator judges a plan otherwise", &reason);
         }
     }

@@ -1,7 +1,7 @@
-//! Tiny random tasks with a battery that is charged, also again while it is charged, and that work empties: how many runs of an action at a time make a
-//! difference depends on what others undo.
+//! Tiny random tasks with a battery that is charged and discharged, where several charging runs can overlap. The number of overlapping
+//! runs of one action that a plan needs depends on the effects that other actions undo.
 
-use super::make::{LEVEL, none};
+use super::make::{LEVEL, always_true};
 use super::model::{
     Action, Atom, Body, Comparison, Condition, Effect, Expression, Fluent, Measure, Operation, Part, Q, Task,
     q,
@@ -26,61 +26,61 @@ fn change(operation: Operation, value: i64) -> Effect {
 }
 
 fn durative(name: String, length: Q, start: Part, end: Vec<Effect>) -> Action {
-    let end = Part { condition: none(), effects: end };
-    let body = Body::Durative { duration: Expression::Number(length), start, over_all: none(), end };
+    let end = Part { condition: always_true(), effects: end };
+    let body = Body::Durative { duration: Expression::Number(length), start, over_all: always_true(), end };
     Action { name, parameters: Vec::new(), body }
 }
 
-/// What charges: at its end, the battery is as full as that, or fuller by that much.
+/// An action that sets the battery to a level at its end, or increases it.
 fn charge(random: &mut fastrand::Rng, number: usize, unit: Q) -> Action {
     let operation = if random.u8(..10) < 8 { Operation::Assign } else { Operation::Increase };
-    let condition = if random.u8(..10) < 7 { none() } else { Condition::Atom(atom(random)) };
+    let condition = if random.u8(..10) < 7 { always_true() } else { Condition::Atom(atom(random)) };
     let length = unit * q(random.i64(2..8));
     let effects = vec![change(operation, random.i64(1..4))];
     durative(format!("charge{number}"), length, Part { condition, effects: Vec::new() }, effects)
 }
 
-/// What needs the battery, and mostly empties it at its end.
+/// An action that requires a battery level and usually discharges the battery at its end.
 fn work(random: &mut fastrand::Rng, number: usize, unit: Q) -> Action {
     let mut conditions = vec![at_least(random.i64(0..3))];
     if random.bool() {
         conditions.push(Condition::Atom(atom(random)));
     }
     if random.u8(..10) < 1 {
-        let full = Expression::Number(q(2));
-        conditions.push(Condition::Compare(Comparison::AtMost, Expression::Fluent(level()), full));
+        let bound = Expression::Number(q(2));
+        conditions.push(Condition::Compare(Comparison::AtMost, Expression::Fluent(level()), bound));
     }
-    let takes = change(Operation::Decrease, random.i64(1..3));
+    let consumption = change(Operation::Decrease, random.i64(1..3));
     let (mut start, mut end) = (Vec::new(), vec![Effect::Add(atom(random))]);
     if random.u8(..10) < 7 {
-        end.push(takes);
+        end.push(consumption);
     } else {
-        start.push(takes);
+        start.push(consumption);
     }
     if random.u8(..10) < 2 {
-        let deleted = Effect::Delete(atom(random));
-        if random.bool() { end.push(deleted) } else { start.push(deleted) }
+        let deletion = Effect::Delete(atom(random));
+        if random.bool() { end.push(deletion) } else { start.push(deletion) }
     }
     let start = Part { condition: Condition::All(conditions), effects: start };
     durative(format!("work{number}"), unit * q(random.i64(1..4)), start, end)
 }
 
-/// Work after work, each of which needs what the one before brings about, and all that is charged at once.
+/// A chain of actions, each of which requires an effect of the previous one and a full battery, and one charging action.
 fn chain(random: &mut fastrand::Rng, length: usize, unit: Q) -> Vec<Action> {
     let full = random.i64(1..3);
-    let nothing = Part { condition: none(), effects: Vec::new() };
-    let charged = vec![change(Operation::Assign, full)];
-    let mut actions = vec![durative("charge".into(), unit * q(random.i64(3..9)), nothing, charged)];
+    let no_condition = Part { condition: always_true(), effects: Vec::new() };
+    let charging = vec![change(Operation::Assign, full)];
+    let mut actions = vec![durative("charge".into(), unit * q(random.i64(3..9)), no_condition, charging)];
     for number in 0..length {
         let atom = |predicate| Atom { predicate, terms: Vec::new() };
-        let before = number.checked_sub(1).map(|before| Condition::Atom(atom(before)));
-        let condition = Condition::All([at_least(full)].into_iter().chain(before).collect());
-        let takes = change(Operation::Decrease, random.i64(1..=full));
+        let previous = number.checked_sub(1).map(|previous| Condition::Atom(atom(previous)));
+        let condition = Condition::All([at_least(full)].into_iter().chain(previous).collect());
+        let consumption = change(Operation::Decrease, random.i64(1..=full));
         let (mut start, mut end) = (Vec::new(), vec![Effect::Add(atom(number))]);
         if random.u8(..10) < 8 {
-            end.push(takes);
+            end.push(consumption);
         } else {
-            start.push(takes);
+            start.push(consumption);
         }
         let length = unit * q(random.i64(1..3));
         actions.push(durative(format!("chain{number}"), length, Part { condition, effects: start }, end));
@@ -88,59 +88,63 @@ fn chain(random: &mut fastrand::Rng, length: usize, unit: Q) -> Vec<Action> {
     actions
 }
 
-/// What can begin only until it ends for the first time, and adds something each time: all runs begin before one ends.
+/// An action that is applicable only until its first run ends, and increases the level. So all runs must begin before one ends.
 fn tank(random: &mut fastrand::Rng, unit: Q) -> Action {
     let open = Atom { predicate: 0, terms: Vec::new() };
     let mut effects = vec![Effect::Delete(open.clone())];
-    let adds = change(Operation::Increase, 1);
-    let begins = if random.bool() {
-        effects.push(adds);
+    let increase = change(Operation::Increase, 1);
+    let start_effects = if random.bool() {
+        effects.push(increase);
         Vec::new()
     } else {
-        vec![adds]
+        vec![increase]
     };
-    let start = Part { condition: Condition::Atom(open), effects: begins };
+    let start = Part { condition: Condition::Atom(open), effects: start_effects };
     durative("fill".into(), unit * q(random.i64(2..6)), start, effects)
 }
 
-/// A pump that needs the battery, and stages, each of which needs the one before, with what the pump brings there or gone in turns. All that is
-/// charged at once, mostly until it is charged for the first time, and what charges lets the water out: how many runs are worth while depends on what they undo themselves.
+/// A pump that requires a full battery, and a chain of stages that alternately require water and its absence. The charging action
+/// removes water and is usually applicable only until its first run ends. So the number of useful runs depends on effects that the
+/// runs undo themselves.
 fn vent(random: &mut fastrand::Rng, (stages, length): (usize, i64), unit: Q) -> Vec<Action> {
     let atom = |predicate| Atom { predicate, terms: Vec::new() };
     let full = random.i64(1..3);
-    let (water, current) = (atom(0), Condition::Atom(atom(stages + 1)));
-    let begin = Part { condition: current, effects: Vec::new() };
-    let (mut charged, mut pumped) = (vec![change(Operation::Assign, full)], vec![Effect::Add(water.clone())]);
+    let (water, is_powered) = (atom(0), Condition::Atom(atom(stages + 1)));
+    let charge_start = Part { condition: is_powered, effects: Vec::new() };
+    let (mut charge_effects, mut pump_effects) =
+        (vec![change(Operation::Assign, full)], vec![Effect::Add(water.clone())]);
     if random.u8(..10) < 9 {
-        charged.push(Effect::Delete(atom(stages + 1)));
+        charge_effects.push(Effect::Delete(atom(stages + 1)));
     }
     if random.u8(..10) < 9 {
-        charged.push(Effect::Delete(water.clone()));
+        charge_effects.push(Effect::Delete(water.clone()));
     }
     if random.u8(..10) < 9 {
-        pumped.push(change(Operation::Decrease, full));
+        pump_effects.push(change(Operation::Decrease, full));
     }
-    let needs = Part { condition: at_least(full), effects: Vec::new() };
+    let pump_start = Part { condition: at_least(full), effects: Vec::new() };
     let mut actions = vec![
-        durative("charge".into(), unit * q(length), begin, charged),
-        durative("pump".into(), unit * q(if random.u8(..10) < 8 { 1 } else { 2 }), needs, pumped),
+        durative("charge".into(), unit * q(length), charge_start, charge_effects),
+        durative("pump".into(), unit * q(if random.u8(..10) < 8 { 1 } else { 2 }), pump_start, pump_effects),
     ];
     for stage in 1..=stages {
-        let there = Condition::Atom(water.clone());
-        let mut conditions = vec![if stage % 2 == 1 { there } else { Condition::Not(Box::new(there)) }];
+        let has_water = Condition::Atom(water.clone());
+        let mut conditions =
+            vec![if stage % 2 == 1 { has_water } else { Condition::Not(Box::new(has_water)) }];
         conditions.extend((stage > 1).then(|| Condition::Atom(atom(stage - 1))));
-        let all = Part { condition: Condition::All(conditions), effects: vec![Effect::Add(atom(stage))] };
-        let (name, body) = (format!("stage{stage}"), Body::Instantaneous(all));
+        let stage_part =
+            Part { condition: Condition::All(conditions), effects: vec![Effect::Add(atom(stage))] };
+        let (name, body) = (format!("stage{stage}"), Body::Instantaneous(stage_part));
         actions.push(Action { name, parameters: Vec::new(), body });
     }
     actions
 }
 
-/// Nodes that the oracle visits before it gives up, also where runs undo what others bring, and many of them begin.
+/// Maximum number of nodes of the oracle; larger for tasks made by [`vent`], where many runs begin.
 const CAP: usize = 3000;
 const VENT_CAP: usize = 200_000;
 
-/// A task from a seed, whose durations are multiples of a unit of time, and how many nodes its oracle visits before it gives up.
+/// A random task with durations in multiples of `unit`, and the maximum number of nodes of its oracle.
 pub fn make(seed: u64, unit: Q) -> (Task, usize) {
     let random = &mut fastrand::Rng::with_seed(seed);
     let kind = random.u8(..21) / 2;
@@ -184,7 +188,7 @@ pub fn make(seed: u64, unit: Q) -> (Task, usize) {
     } else if random.u8(..10) < 3 {
         goal.push(at_least(random.i64(1..3)));
     }
-    let fullest = if stages > 0 {
+    let level_limit = if stages > 0 {
         1
     } else if length > 0 {
         2

@@ -1,15 +1,15 @@
-//! The best value of all plans one after another, and a plan that has it at exact times.
+//! Best value of all sequential plans, with a plan at exact times that attains it.
 
 use num_rational::BigRational;
 
 use super::execute::execute;
-use super::graph::{Graph, Optimum, Way};
+use super::graph::{Graph, Optimum, Path};
 use super::happening::{Obstacle, World};
 use super::model::{Q, big, q};
 use super::sequence::{Edge, Search};
 use crate::judge::{Step, Truth};
 
-/// What is true of a task, as far as so many nodes show it.
+/// Correct answer for a task, or an open one if the search would exceed `cap` nodes.
 pub fn best(world: &World, cap: usize) -> Truth {
     let search = Search::new(world, cap);
     let ends: Vec<usize> = search.goals.iter().map(|(edge, _)| *edge).collect();
@@ -19,36 +19,36 @@ pub fn best(world: &World, cap: usize) -> Truth {
         goals: search
             .goals
             .iter()
-            .map(|(edge, rest)| (search.edges[*edge].from, search.edges[*edge].cost + rest))
+            .map(|(edge, final_cost)| (search.edges[*edge].from, search.edges[*edge].cost + final_cost))
             .collect(),
     };
-    let schedule = |(edges, goal): &Way| scheduled(&search, &[&edges[..], &[ends[*goal]]].concat());
+    let schedule = |(edges, goal): &Path| scheduled(&search, &[&edges[..], &[ends[*goal]]].concat());
     judged(world, graph.optimum(), search.empty, search.open, &schedule, &|plan| execute(world, plan))
 }
 
 /// A plan: instances with start and duration.
 pub type Schedule = Vec<(usize, Q, Q)>;
 
-/// What is true, given the best way in a graph of all plans but the empty one, whose value is given if it is a plan. `open` if
-/// the graph has not all plans.
+/// Answer from the optimal path in a graph of all non-empty plans. `empty` is the value of the empty plan, if it is valid. `open` means
+/// that the graph is incomplete.
 #[allow(clippy::type_complexity)]
 pub fn judged(
     world: &World,
     optimum: Optimum,
     empty: Option<Q>,
     open: bool,
-    schedule: &dyn Fn(&Way) -> Schedule,
+    schedule: &dyn Fn(&Path) -> Schedule,
     execute: &dyn Fn(&[(usize, Q, Q)]) -> Result<Q, Obstacle>,
 ) -> Truth {
     let (unbounded, plan) = match optimum {
-        Optimum::Unbounded(way) => (true, schedule(&way)),
-        Optimum::Best(value, way) if empty.is_none_or(|empty| value < empty) => (false, schedule(&way)),
+        Optimum::Unbounded(path) => (true, schedule(&path)),
+        Optimum::Best(value, path) if empty.is_none_or(|empty| value < empty) => (false, schedule(&path)),
         _ if empty.is_some() => (false, Vec::new()),
         _ => return if open { Truth::Open(None) } else { Truth::NoPlan },
     };
-    let found: (BigRational, Vec<Step>) = match execute(&plan) {
+    let witness: (BigRational, Vec<Step>) = match execute(&plan) {
         Ok(value) => (big(value), written(world, &plan)),
-        // Numbers too large for the oracle leave the truth open; anything else is a fault of the oracle.
+        // An overflow in the oracle leaves the answer open. Any other obstacle is a fault of the oracle.
         Err(Obstacle::TooLarge) => return Truth::Open(None),
         Err(obstacle) => {
             panic!(
@@ -59,28 +59,29 @@ pub fn judged(
         }
     };
     match (unbounded, open) {
-        (true, _) => Truth::NoBest(found.0, found.1),
-        (false, false) => Truth::Best(found.0, found.1),
-        (false, true) => Truth::Open(Some(found)),
+        (true, _) => Truth::NoBest(witness.0, witness.1),
+        (false, false) => Truth::Best(witness.0, witness.1),
+        (false, true) => Truth::Open(Some(witness)),
     }
 }
 
-/// Times for the actions of a way.
+/// Start times for the actions of a path.
 fn scheduled(search: &Search<'_>, edges: &[usize]) -> Schedule {
     let edges: Vec<&Edge> = edges.iter().map(|edge| &search.edges[*edge]).collect();
     let steps = edges.iter().filter(|edge| edge.step.is_some()).count() as i64;
     let gap = edges.iter().filter_map(|edge| edge.step.and_then(|(_, _, _, gap)| gap)).min();
-    let small = gap.map_or(q(1), |gap| gap / q(steps + 1));
+    // Strict bounds are satisfied by delays so small that all of them together fit into the least gap.
+    let delay = gap.map_or(q(1), |gap| gap / q(steps + 1));
     let last = search.world.events.last().map(|(time, _)| *time);
     let mut clock = q(0);
     let mut plan = Vec::new();
     for edge in edges {
         let Some((instance, duration, (infimum, strict), _)) = edge.step else { continue };
-        let ended = search.nodes[edge.from].1 == search.world.events.len();
-        let start = match last.filter(|_| ended) {
-            Some(last) => clock.max(last + small),
-            None if ended => clock,
-            None if strict => infimum + small * q(plan.len() as i64 + 1),
+        let after_last_event = search.nodes[edge.from].1 == search.world.events.len();
+        let start = match last.filter(|_| after_last_event) {
+            Some(last) => clock.max(last + delay),
+            None if after_last_event => clock,
+            None if strict => infimum + delay * q(plan.len() as i64 + 1),
             None => infimum,
         };
         clock = start + duration;
@@ -89,7 +90,7 @@ fn scheduled(search: &Search<'_>, edges: &[usize]) -> Schedule {
     plan
 }
 
-/// A plan by names.
+/// Converts a schedule to steps with names.
 pub fn written(world: &World, steps: &[(usize, Q, Q)]) -> Vec<Step> {
     let step = |(instance, start, duration): &(usize, Q, Q)| {
         let (action, objects) = &world.instances[*instance];

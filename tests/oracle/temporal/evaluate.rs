@@ -1,4 +1,4 @@
-//! Conditions and expressions in a state: their values, and what they read.
+//! Evaluation of conditions and expressions in a state, and the facts and numbers that they read.
 
 use std::collections::HashMap;
 
@@ -8,21 +8,22 @@ use super::happening::{Atoms, Happening, Obstacle, State, UNDEFINED, World, fit}
 use super::model::{Comparison, Condition, Expression, Q};
 
 impl World {
+    /// Bit set of all ground atoms of a predicate.
     fn atoms_of(&self, predicate: usize) -> Atoms {
         let count = self.task.objects.len().pow(self.task.predicates[predicate].1 as u32);
         ((1 << count) - 1) << self.atoms[predicate]
     }
 
-    /// Derived predicates depend on every atom of the predicates that axioms reach from them.
+    /// For each derived predicate, the atoms and numbers that its axioms mention, directly or through other derived predicates.
     pub(super) fn dependencies(&self) -> HashMap<usize, (Atoms, u64)> {
         let mut depends: HashMap<usize, (Atoms, u64)> =
             self.task.axioms.iter().map(|axiom| (axiom.predicate, (0, 0))).collect();
         for _ in 0..=self.task.axioms.len() {
             for axiom in &self.task.axioms {
-                let mut found = (0, 0);
-                self.mentioned(&axiom.condition, &depends, &mut found);
+                let mut mentions = (0, 0);
+                self.mentioned(&axiom.condition, &depends, &mut mentions);
                 let entry = depends.get_mut(&axiom.predicate).expect("derived");
-                *entry = (entry.0 | found.0, entry.1 | found.1);
+                *entry = (entry.0 | mentions.0, entry.1 | mentions.1);
             }
         }
         depends
@@ -32,31 +33,31 @@ impl World {
         &self,
         condition: &Condition,
         depends: &HashMap<usize, (Atoms, u64)>,
-        found: &mut (Atoms, u64),
+        mentions: &mut (Atoms, u64),
     ) {
         match condition {
             Condition::Atom(atom) => match depends.get(&atom.predicate) {
-                Some((atoms, values)) => *found = (found.0 | atoms, found.1 | values),
-                None => found.0 |= self.atoms_of(atom.predicate),
+                Some((atoms, values)) => *mentions = (mentions.0 | atoms, mentions.1 | values),
+                None => mentions.0 |= self.atoms_of(atom.predicate),
             },
             Condition::Same(..) => {}
             Condition::Compare(_, left, right) => {
-                found.1 |= self.mentioned_values(left) | self.mentioned_values(right);
+                mentions.1 |= self.mentioned_values(left) | self.mentioned_values(right);
             }
             Condition::Not(part) | Condition::Forall(_, part) | Condition::Exists(_, part) => {
-                self.mentioned(part, depends, found);
+                self.mentioned(part, depends, mentions);
             }
             Condition::All(parts) | Condition::Any(parts) => {
-                parts.iter().for_each(|part| self.mentioned(part, depends, found));
+                parts.iter().for_each(|part| self.mentioned(part, depends, mentions));
             }
             Condition::Imply(left, right) => {
-                self.mentioned(left, depends, found);
-                self.mentioned(right, depends, found);
+                self.mentioned(left, depends, mentions);
+                self.mentioned(right, depends, mentions);
             }
         }
     }
 
-    /// All instances of the functions of an expression.
+    /// Bit set of all instances of the functions in an expression.
     fn mentioned_values(&self, expression: &Expression) -> u64 {
         match expression {
             Expression::Number(_) | Expression::Duration(_) => 0,
@@ -70,22 +71,23 @@ impl World {
         }
     }
 
-    /// The atoms of a state with the derived ones: the least fixpoint, stratum by stratum.
+    /// Atoms of a state including the derived ones, as the least fixpoint of the axioms, stratum by stratum.
     pub fn derived(&self, state: &State) -> Result<Atoms, Obstacle> {
         let mut atoms = state.atoms;
         for axiom in &self.task.axioms {
             let arity = self.task.predicates[axiom.predicate].1;
             let objects = self.task.objects.len();
             loop {
-                let before = atoms;
+                let previous = atoms;
                 for number in 0..objects.pow(arity as u32) {
+                    // The arguments are the digits of `number` in the base of the number of objects.
                     let digit = |at: usize| number / objects.pow((arity - 1 - at) as u32) % objects;
                     let mut bound: Vec<usize> = (0..arity).map(digit).collect();
                     if self.holds_with(&axiom.condition, atoms, state, &mut bound)? {
                         atoms |= 1 << (self.atoms[axiom.predicate] + number);
                     }
                 }
-                if atoms == before {
+                if atoms == previous {
                     break;
                 }
             }
@@ -93,7 +95,7 @@ impl World {
         Ok(atoms)
     }
 
-    /// Whether a condition holds.
+    /// Truth value of a condition in a state.
     pub fn holds(&self, condition: &Condition, state: &State, bound: &[usize]) -> Result<bool, Obstacle> {
         let atoms = self.derived(state)?;
         self.holds_with(condition, atoms, state, &mut bound.to_vec())
@@ -106,7 +108,7 @@ impl World {
         state: &State,
         bound: &mut Vec<usize>,
     ) -> Result<bool, Obstacle> {
-        let mut each = |parts: &[Condition]| {
+        let mut evaluate_all = |parts: &[Condition]| {
             parts.iter().map(|part| self.holds_with(part, atoms, state, bound)).collect::<Result<Vec<_>, _>>()
         };
         Ok(match condition {
@@ -123,8 +125,8 @@ impl World {
                 }
             }
             Condition::Not(part) => !self.holds_with(part, atoms, state, bound)?,
-            Condition::All(parts) => each(parts)?.into_iter().all(|part| part),
-            Condition::Any(parts) => each(parts)?.into_iter().any(|part| part),
+            Condition::All(parts) => evaluate_all(parts)?.into_iter().all(|part| part),
+            Condition::Any(parts) => evaluate_all(parts)?.into_iter().any(|part| part),
             Condition::Imply(left, right) => {
                 let left = self.holds_with(left, atoms, state, bound)?;
                 let right = self.holds_with(right, atoms, state, bound)?;
@@ -156,7 +158,7 @@ impl World {
         Ok(results)
     }
 
-    /// The value of an expression.
+    /// Value of an expression.
     pub fn value(&self, expression: &Expression, state: &State, bound: &[usize]) -> Result<Q, Obstacle> {
         let pair = |left: &Expression, right: &Expression| {
             Ok((self.value(left, state, bound)?, self.value(right, state, bound)?))
@@ -174,7 +176,7 @@ impl World {
         })
     }
 
-    /// What a condition reads, whether it makes a difference or not.
+    /// Adds the facts and numbers that a condition mentions, even if they do not matter for its value.
     pub(super) fn read(&self, condition: &Condition, bound: &mut Vec<usize>, reads: &mut Happening) {
         match condition {
             Condition::Atom(atom) => match self.depends.get(&atom.predicate) {
@@ -209,7 +211,7 @@ impl World {
 
     pub(super) fn read_values(&self, expression: &Expression, bound: &[usize], reads: &mut Happening) {
         match expression {
-            // A duration is that of the start, and what it is made of does not change.
+            // A duration is fixed at the start and its operands are static.
             Expression::Number(_) | Expression::Duration(_) => {}
             Expression::Fluent(fluent) => reads.reads_values |= 1 << self.value_index(fluent, bound),
             Expression::Sum(left, right)

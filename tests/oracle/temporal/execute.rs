@@ -1,9 +1,9 @@
-//! A plan of actions one after another at exact times, executed by the definition.
+//! Executes sequential plans at exact times, by the definition.
 
 use super::happening::{End, Obstacle, State, World, fit};
 use super::model::{Body, Measure, Q, q};
 
-/// Executes a plan at its times: the value, or why it is none.
+/// Value of a plan, or the reason why it is invalid.
 pub fn execute(world: &World, steps: &[(usize, Q, Q)]) -> Result<Q, Obstacle> {
     let mut run = Run { world, state: world.initial.clone(), applied: 0 };
     let (mut clock, mut total) = (q(0), q(0));
@@ -14,15 +14,16 @@ pub fn execute(world: &World, steps: &[(usize, Q, Q)]) -> Result<Q, Obstacle> {
         }
         run.events(*start)?;
         let (action, objects) = &world.instances[*instance];
-        let due = match &world.task.actions[*action].body {
+        let required = match &world.task.actions[*action].body {
             Body::Instantaneous(_) => q(0),
             Body::Durative { duration, .. } => world.value(duration, &run.state, objects)?,
         };
-        if due != *duration || due < q(0) {
+        // Durations are compared exactly, without tolerance.
+        if required != *duration || required < q(0) {
             return Err(Obstacle::Blocked("the duration is another, or negative"));
         }
         clock = fit(start + duration)?;
-        if due == q(0) {
+        if required == q(0) {
             run.happening(*instance, End::Both, *start)?;
         } else {
             run.happening(*instance, End::Start, *start)?;
@@ -35,7 +36,7 @@ pub fn execute(world: &World, steps: &[(usize, Q, Q)]) -> Result<Q, Obstacle> {
     value(world, &run.state, total, steps.len())
 }
 
-/// The goal; undefined it does not hold.
+/// Checks the goal. An undefined goal does not hold.
 pub fn goal(world: &World, state: &State) -> Result<(), Obstacle> {
     match world.holds(&world.task.goal, state, &[]) {
         Ok(true) => Ok(()),
@@ -44,7 +45,7 @@ pub fn goal(world: &World, state: &State) -> Result<(), Obstacle> {
     }
 }
 
-/// The value of a plan.
+/// Value of a valid plan by the measure of the task.
 pub fn value(world: &World, state: &State, time: Q, steps: usize) -> Result<Q, Obstacle> {
     match &world.task.measure {
         Measure::Steps => Ok(q(steps as i64)),
@@ -61,15 +62,16 @@ pub fn value(world: &World, state: &State, time: Q, steps: usize) -> Result<Q, O
     }
 }
 
-/// The execution of a plan.
+/// State of an execution.
 struct Run<'w> {
     world: &'w World,
     state: State,
+    /// Number of events that have been applied.
     applied: usize,
 }
 
 impl Run<'_> {
-    /// Applies all events up to a time.
+    /// Applies the remaining events up to a time.
     fn events(&mut self, until: Q) -> Result<(), Obstacle> {
         while let Some((_, event)) = self.world.events.get(self.applied).filter(|(time, _)| *time <= until) {
             self.state = event.apply(&self.state)?;
@@ -81,8 +83,11 @@ impl Run<'_> {
     fn happening(&mut self, instance: usize, end: End, time: Q) -> Result<(), Obstacle> {
         self.events(time)?;
         let happening = self.world.happening(instance, end, &self.state)?;
-        let interferes =
-            self.world.events.iter().any(|(at, event)| *at == time && event.interferes(&happening));
+        let interferes = self
+            .world
+            .events
+            .iter()
+            .any(|(event_time, event)| *event_time == time && event.interferes(&happening));
         if interferes {
             return Err(Obstacle::Blocked("an event at the same time interferes"));
         }
@@ -90,7 +95,7 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Over all: after the start, and after every event until before the end.
+    /// Checks the over-all condition after the start and after each event before the end.
     fn running(&mut self, instance: usize, end: Q) -> Result<(), Obstacle> {
         let (action, objects) = &self.world.instances[instance];
         let Body::Durative { over_all, .. } = &self.world.task.actions[*action].body else { return Ok(()) };

@@ -1,97 +1,97 @@
-//! A best way through a graph with costs of any sign, by Bellman-Ford.
+//! Shortest paths with costs of any sign, by the Bellman-Ford algorithm.
 
 use super::model::{Q, q};
 
-/// Nodes by number, the first one is the beginning.
+/// A directed graph. Node 0 is the source.
 #[derive(Debug, Default)]
 pub struct Graph {
     pub nodes: usize,
     /// From, to, cost.
     pub edges: Vec<(usize, usize, Q)>,
-    /// Last steps: from, and the cost with all that is still to be added.
+    /// Final steps: the node before, and the cost of the step including all final costs.
     pub goals: Vec<(usize, Q)>,
 }
 
-/// Edges, and the number of the last step.
-pub type Way = (Vec<usize>, usize);
+/// A path: edges, and the number of the final step.
+pub type Path = (Vec<usize>, usize);
 
 #[derive(Debug)]
 pub enum Optimum {
-    /// There is no way to a goal.
+    /// No goal is reachable.
     None,
-    /// A cycle of negative cost lies on the way; some way.
-    Unbounded(Way),
-    Best(Q, Way),
+    /// A cycle of negative cost lies on a path to a goal. The field is some path to a goal.
+    Unbounded(Path),
+    Best(Q, Path),
 }
 
-/// The least cost to a node, with the last edge.
-type Found = Vec<Option<(Q, Option<usize>)>>;
+/// For each node, the least cost of a path to it, with the last edge.
+type Distances = Vec<Option<(Q, Option<usize>)>>;
 
 impl Graph {
-    /// The best way to a goal.
+    /// Shortest path to a goal.
     pub fn optimum(&self) -> Optimum {
         let useful = self.useful();
-        let (found, cycle) = self.distances(&useful);
+        let (distances, cycle) = self.distances(&useful);
         if cycle {
-            let first = self.shortest();
-            let goal = self.goals.iter().position(|(from, _)| first[*from].is_some());
+            let some_paths = self.shortest();
+            let goal = self.goals.iter().position(|(from, _)| some_paths[*from].is_some());
             let goal = goal.expect("a useful node is reached");
-            return Optimum::Unbounded((first[self.goals[goal].0].clone().expect("a way"), goal));
+            return Optimum::Unbounded((some_paths[self.goals[goal].0].clone().expect("a way"), goal));
         }
-        let value = |(goal, (from, rest)): (usize, &(usize, Q))| {
-            found[*from].map(|(distance, _)| (distance + rest, goal))
+        let value = |(goal, (from, final_cost)): (usize, &(usize, Q))| {
+            distances[*from].map(|(distance, _)| (distance + final_cost, goal))
         };
         match self.goals.iter().enumerate().filter_map(value).min() {
             None => Optimum::None,
-            Some((value, goal)) => Optimum::Best(value, (self.way(&found, self.goals[goal].0), goal)),
+            Some((value, goal)) => Optimum::Best(value, (self.path(&distances, self.goals[goal].0), goal)),
         }
     }
 
-    /// The nodes from which a goal is reached.
+    /// For each node, whether a goal is reachable from it.
     fn useful(&self) -> Vec<bool> {
         let mut useful = vec![false; self.nodes];
-        let mut into: Vec<Vec<usize>> = vec![Vec::new(); self.nodes];
-        self.edges.iter().for_each(|(from, to, _)| into[*to].push(*from));
+        let mut predecessors: Vec<Vec<usize>> = vec![Vec::new(); self.nodes];
+        self.edges.iter().for_each(|(from, to, _)| predecessors[*to].push(*from));
         let mut stack: Vec<usize> = self.goals.iter().map(|(from, _)| *from).collect();
         while let Some(node) = stack.pop() {
             if !std::mem::replace(&mut useful[node], true) {
-                stack.extend(&into[node]);
+                stack.extend(&predecessors[node]);
             }
         }
         useful
     }
 
-    /// The least cost to each useful node; and whether there is a cycle of negative cost among them.
-    fn distances(&self, useful: &[bool]) -> (Found, bool) {
-        let mut found: Found = vec![None; self.nodes];
-        found[0] = useful[0].then_some((q(0), None));
+    /// Least costs of paths through useful nodes, and whether there is a cycle of negative cost among them.
+    fn distances(&self, useful: &[bool]) -> (Distances, bool) {
+        let mut distances: Distances = vec![None; self.nodes];
+        distances[0] = useful[0].then_some((q(0), None));
         for round in 0..=self.nodes {
             let mut changed = false;
             for (number, (from, to, cost)) in self.edges.iter().enumerate().filter(|(_, edge)| useful[edge.1])
             {
-                let Some((distance, _)) = found[*from] else { continue };
+                let Some((distance, _)) = distances[*from] else { continue };
                 let distance = distance + cost;
-                if found[*to].is_none_or(|(old, _)| distance < old) {
-                    found[*to] = Some((distance, Some(number)));
+                if distances[*to].is_none_or(|(previous, _)| distance < previous) {
+                    distances[*to] = Some((distance, Some(number)));
                     changed = true;
                 }
             }
             if !changed {
-                return (found, false);
+                return (distances, false);
             }
-            // Where the last edges form a cycle, its cost is negative.
-            if round % 8 == 7 && self.cyclic(&found) {
+            // A cycle formed by the last edges has negative cost. The test is linear, so it runs in every eighth round only.
+            if round % 8 == 7 && self.has_cycle(&distances) {
                 break;
             }
         }
-        (found, true)
+        (distances, true)
     }
 
-    fn cyclic(&self, found: &Found) -> bool {
+    fn has_cycle(&self, distances: &Distances) -> bool {
         (0..found.len()).any(|start| {
             let mut node = start;
-            for _ in 0..=found.len() {
-                match found[node] {
+            for _ in 0..=distances.len() {
+                match distances[node] {
                     Some((_, Some(edge))) => node = self.edges[edge].0,
                     _ => return false,
                 }
@@ -100,9 +100,9 @@ impl Graph {
         })
     }
 
-    fn way(&self, found: &Found, mut node: usize) -> Vec<usize> {
+    fn path(&self, distances: &Distances, mut node: usize) -> Vec<usize> {
         let mut edges = Vec::new();
-        while let Some((_, Some(edge))) = found[node] {
+        while let Some((_, Some(edge))) = distances[node] {
             edges.push(edge);
             node = self.edges[edge].0;
         }
@@ -110,15 +110,15 @@ impl Graph {
         edges
     }
 
-    /// Some way to each node. Nodes are numbered as they are found, so an edge to a new node is the first one to it.
+    /// Some path to each node. Nodes are numbered as they are discovered, so the first edge to a node comes from one that has a path.
     fn shortest(&self) -> Vec<Option<Vec<usize>>> {
-        let mut ways: Vec<Option<Vec<usize>>> = vec![None; self.nodes];
-        ways[0] = Some(Vec::new());
+        let mut paths: Vec<Option<Vec<usize>>> = vec![None; self.nodes];
+        paths[0] = Some(Vec::new());
         for (number, (from, to, _)) in self.edges.iter().enumerate() {
-            if let (Some(way), None) = (ways[*from].clone(), &ways[*to]) {
-                ways[*to] = Some([&way[..], &[number]].concat());
+            if let (Some(path), None) = (paths[*from].clone(), &paths[*to]) {
+                paths[*to] = Some([&path[..], &[number]].concat());
             }
         }
-        ways
+        paths
     }
 }

@@ -1,5 +1,5 @@
-//! One happening by the definition: conditions, `when` conditions and operands are evaluated in the state before it, all active effects
-//! apply at once; what it reads and writes decides with what it interferes.
+//! Semantics of one happening: conditions, `when` conditions and operands are evaluated in the state before it, and all active effects
+//! apply at once. Two happenings interfere depending on the facts and numbers that they read and write.
 
 use std::collections::HashMap;
 
@@ -7,28 +7,28 @@ use num_traits::Zero as _;
 
 use super::model::{Action, Atom, Body, Effect, Expression, Fluent, Operation, Part, Q, Task, Term, q};
 
-/// Why an action cannot be executed.
+/// Reason why an action cannot be executed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Obstacle {
-    /// By the definition.
+    /// The definition forbids it.
     Blocked(&'static str),
-    /// A number that this oracle has no place for: nothing is known.
+    /// A number exceeds the range of the oracle, so the result is unknown.
     TooLarge,
 }
 
 pub const UNDEFINED: Obstacle = Obstacle::Blocked("a value is undefined");
 
-/// Atoms by number, as bits.
+/// Bit set of ground atoms.
 pub type Atoms = u128;
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct State {
-    /// The atoms that are not derived.
+    /// Atoms of all predicates that are not derived.
     pub atoms: Atoms,
     pub values: Vec<Option<Q>>,
 }
 
-/// All changes of a number by one happening.
+/// Combination of all changes of one number by one happening.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Change {
     Add(Q),
@@ -36,7 +36,7 @@ pub enum Change {
     Assign(Q),
 }
 
-/// What a happening reads, and what its active effects write.
+/// Facts and numbers that a happening reads, and the writes of its active effects.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Happening {
     pub reads: Atoms,
@@ -46,32 +46,33 @@ pub struct Happening {
     pub changes: Vec<(usize, Change)>,
 }
 
-/// A task with numbers for ground atoms and functions.
+/// A task with numbered ground atoms and function instances.
 #[derive(Debug)]
 pub struct World {
     pub task: Task,
-    /// The number of the first atom of each predicate, and of the first instance of each function.
+    /// Number of the first atom of each predicate.
     pub(super) atoms: Vec<usize>,
+    /// Number of the first instance of each function.
     pub(super) values: Vec<usize>,
-    /// For each derived predicate: the atoms and functions that it depends on.
+    /// For each derived predicate, the atoms and numbers that it depends on.
     pub(super) depends: HashMap<usize, (Atoms, u64)>,
-    /// Actions with their objects.
+    /// Ground actions: action and arguments.
     pub instances: Vec<(usize, Vec<usize>)>,
     pub initial: State,
-    /// In order of time: what becomes true and false.
+    /// Times and effects of the timed initial literals, in order of time.
     pub events: Vec<(Q, Happening)>,
 }
 
-/// Which end of an action.
+/// The part of an action that happens.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum End {
     Start,
     Finish,
-    /// Of an instantaneous action, or of one of duration 0.
+    /// Start and end together, of an instantaneous action or one of duration 0.
     Both,
 }
 
-/// A number that fits.
+/// Returns the number if numerator and denominator are below 2^30, so that no operation on two such numbers overflows.
 pub fn fit(value: Q) -> Result<Q, Obstacle> {
     let limit = 1 << 30;
     if value.numer().abs() < limit && *value.denom() < limit { Ok(value) } else { Err(Obstacle::TooLarge) }
@@ -82,16 +83,16 @@ impl Happening {
         self.adds | self.deletes
     }
 
-    /// Whether two happenings interfere.
+    /// Returns `true` if the happenings interfere.
     pub fn interferes(&self, other: &Self) -> bool {
         let atoms = self.writes() & other.reads
             | other.writes() & self.reads
             | self.adds & other.deletes
             | self.deletes & other.adds;
-        let reads = |reader: &Self, writer: &Self| {
+        let reads_changed = |reader: &Self, writer: &Self| {
             writer.changes.iter().any(|(value, _)| reader.reads_values & (1 << value) != 0)
         };
-        let both = self.changes.iter().any(|(value, change)| {
+        let conflicting_changes = self.changes.iter().any(|(value, change)| {
             other.changes.iter().any(|(other_value, other_change)| {
                 let commute = matches!(
                     (change, other_change),
@@ -100,25 +101,25 @@ impl Happening {
                 value == other_value && !commute
             })
         });
-        atoms != 0 || reads(self, other) || reads(other, self) || both
+        atoms != 0 || reads_changed(self, other) || reads_changed(other, self) || conflicting_changes
     }
 
-    /// The state after it.
+    /// State after the happening.
     pub fn apply(&self, state: &State) -> Result<State, Obstacle> {
         let mut after = state.clone();
         after.atoms = (after.atoms & !self.deletes) | self.adds;
         for (at, change) in &self.changes {
-            let old = after.values[*at];
+            let previous = after.values[*at];
             after.values[*at] = Some(fit(match change {
-                Change::Add(by) => old.ok_or(UNDEFINED)? + by,
-                Change::Scale(by) => old.ok_or(UNDEFINED)? * by,
+                Change::Add(amount) => previous.ok_or(UNDEFINED)? + amount,
+                Change::Scale(amount) => previous.ok_or(UNDEFINED)? * amount,
                 Change::Assign(value) => *value,
             })?);
         }
         Ok(after)
     }
 
-    /// Both as one; they do not interfere.
+    /// Union of two happenings that do not interfere.
     fn joined(mut self, other: Self) -> Result<Self, Obstacle> {
         self.reads |= other.reads;
         self.reads_values |= other.reads_values;
@@ -126,8 +127,10 @@ impl Happening {
         self.deletes |= other.deletes;
         for (at, change) in other.changes {
             match (self.changes.iter_mut().find(|(value, _)| *value == at), change) {
-                (Some((_, Change::Add(sum))), Change::Add(by)) => *sum = fit(*sum + by)?,
-                (Some((_, Change::Scale(product))), Change::Scale(by)) => *product = fit(*product * by)?,
+                (Some((_, Change::Add(sum))), Change::Add(amount)) => *sum = fit(*sum + amount)?,
+                (Some((_, Change::Scale(product))), Change::Scale(amount)) => {
+                    *product = fit(*product * amount)?
+                }
                 _ => self.changes.push((at, change)),
             }
         }
@@ -140,12 +143,12 @@ impl World {
         let objects = task.objects.len();
         let offsets = |list: &[(String, usize)]| {
             let mut next = 0;
-            let of = |(_, arity): &(String, usize)| {
+            let offset = |(_, arity): &(String, usize)| {
                 let first = next;
                 next += objects.pow(*arity as u32);
                 first
             };
-            (list.iter().map(of).collect::<Vec<_>>(), next)
+            (list.iter().map(offset).collect::<Vec<_>>(), next)
         };
         let (atoms, _) = offsets(&task.predicates);
         let (values, total_values) = offsets(&task.functions);
@@ -210,24 +213,24 @@ impl World {
         self.index(self.values[fluent.function], &fluent.terms, bound)
     }
 
-    /// The number of the value of a function without arguments.
+    /// Number of the only instance of a function without arguments.
     pub fn value_of(&self, function: usize) -> usize {
         self.values[function]
     }
 
-    /// One end of an instance of an action in the state before it.
+    /// Happening of a ground action in the state before it. Fails if a condition does not hold.
     pub fn happening(&self, instance: usize, end: End, state: &State) -> Result<Happening, Obstacle> {
         let (action, bound) = &self.instances[instance];
         let action: &Action = &self.task.actions[*action];
         match (&action.body, end) {
             (Body::Durative { start, duration, .. }, End::Start) => {
-                self.beginning(start, duration, state, bound)
+                self.start_happening(start, duration, state, bound)
             }
             (Body::Instantaneous(part), _) | (Body::Durative { end: part, .. }, End::Finish) => {
                 self.part(part, state, bound)
             }
             (Body::Durative { start, duration, end, .. }, End::Both) => {
-                let start = self.beginning(start, duration, state, bound)?;
+                let start = self.start_happening(start, duration, state, bound)?;
                 let end = self.part(end, state, bound)?;
                 if start.interferes(&end) {
                     return Err(Obstacle::Blocked("start and end of an action of duration 0 interfere"));
@@ -237,8 +240,8 @@ impl World {
         }
     }
 
-    /// A start, which reads how long the action takes as well.
-    fn beginning(
+    /// A start. It also reads the numbers that determine the duration.
+    fn start_happening(
         &self,
         start: &Part,
         duration: &Expression,
@@ -271,7 +274,7 @@ impl World {
         Ok(happening)
     }
 
-    /// Collects what an effect reads, and if it is active what it writes.
+    /// Adds the reads of an effect, and its writes if it is active.
     fn effect(
         &self,
         effect: &Effect,
@@ -313,7 +316,7 @@ impl World {
     }
 }
 
-/// The active numeric effects of one happening, one change for each number.
+/// Combines the active numeric effects of one happening to one change per number. Fails if they conflict.
 fn combined(effects: &[(usize, Operation, Q)]) -> Result<Vec<(usize, Change)>, Obstacle> {
     let mut changes: Vec<(usize, Change)> = Vec::new();
     for (at, operation, value) in effects {
@@ -330,9 +333,9 @@ fn combined(effects: &[(usize, Operation, Q)]) -> Result<Vec<(usize, Change)>, O
             continue;
         };
         match (sum, change) {
-            (Change::Add(sum), Change::Add(by)) => *sum = fit(*sum + by)?,
-            (Change::Scale(product), Change::Scale(by)) => *product = fit(*product * by)?,
-            (Change::Assign(value), Change::Assign(other)) if *value == other => {}
+            (Change::Add(sum), Change::Add(amount)) => *sum = fit(*sum + amount)?,
+            (Change::Scale(product), Change::Scale(amount)) => *product = fit(*product * amount)?,
+            (Change::Assign(value), Change::Assign(second)) if *value == second => {}
             _ => return Err(Obstacle::Blocked("effects contradict each other")),
         }
     }

@@ -1,23 +1,23 @@
-//! Tiny random tasks, with everything temporal and logical in one domain.
+//! Tiny random tasks that combine all temporal and logical features.
 //!
-//! Times of events are sums of durations, and times a little before and after those, so that events fall on the borders of actions. Undefined
-//! values occur where the definition is clear only: in comparisons that stand in a conjunction, and in operands.
+//! Times of events are sums of durations, or slightly earlier or later, so that events coincide with ends of actions. Undefined values
+//! occur only where the definition is clear: in comparisons that are conjuncts, and in operands.
 
 use super::model::{
     Action, Atom, Axiom, Body, Comparison, Condition, Effect, Expression, Fluent, Measure, Operation, Part,
     Q, Task, Term, q,
 };
 
-/// Functions: a number that actions change, one that nobody changes, one that may have no value, and costs.
+/// Functions: a number that actions change, a static one, one that may be undefined, and the costs.
 pub(super) const LEVEL: usize = 0;
 pub(super) const LENGTH: usize = 1;
 pub(super) const MAYBE: usize = 2;
 pub(super) const COST: usize = 3;
 
-/// What a task is like.
+/// Frequencies of the features of a task, in percent.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Flavour {
-    /// For plans that overlap: every duration and time of an event is a multiple of this.
+    /// For concurrent plans, all durations and times of events are multiples of this unit. `None` for sequential plans.
     pub(super) unit: Option<Q>,
     pub(super) durative: u8,
     pub(super) conditional: u8,
@@ -30,9 +30,9 @@ pub struct Maker {
     pub(super) random: fastrand::Rng,
     pub(super) flavour: Flavour,
     pub(super) task: Task,
-    /// The predicate that says which objects are designs for which function, and the type of designs.
+    /// The predicate between designs and their functions, and the type of the designs.
     pub(super) designs: Option<(usize, usize)>,
-    /// The parameter of the action at hand that is its design, and little else.
+    /// The parameter of the current action that is its design.
     slot: Option<usize>,
 }
 
@@ -40,26 +40,27 @@ pub(super) fn constant(value: Q) -> Expression {
     Expression::Number(value)
 }
 
-pub(super) fn none() -> Condition {
+/// The empty conjunction.
+pub(super) fn always_true() -> Condition {
     Condition::All(Vec::new())
 }
 
 impl Maker {
-    /// A task from a seed, for plans that overlap if a unit of time is given.
+    /// A task from a seed; for concurrent plans if `unit` is given.
     pub fn make(seed: u64, unit: Option<Q>) -> Task {
         Self::build(seed, unit, false)
     }
 
-    /// A task from a seed whose actions choose designs, of which durations and costs depend.
+    /// A task from a seed whose actions have design parameters that durations and costs depend on.
     pub fn with_designs(seed: u64) -> Task {
         Self::build(seed, None, true)
     }
 
-    /// Where a seed makes a task that is too large, others are tried.
+    /// Tries derived seeds until a task is small enough.
     fn build(seed: u64, unit: Option<Q>, designs: bool) -> Task {
-        let seeds = (0..u64::MAX).map(|again| seed ^ (again << 40));
-        let mut small = seeds.filter_map(|seed| Self::small(seed, unit, designs));
-        small.next().expect("a small task")
+        let seeds = (0..u64::MAX).map(|attempt| seed ^ (attempt << 40));
+        let mut small_tasks = seeds.filter_map(|seed| Self::small_tasks(seed, unit, designs));
+        small_tasks.next().expect("a small task")
     }
 
     fn small(seed: u64, unit: Option<Q>, designs: bool) -> Option<Task> {
@@ -83,7 +84,7 @@ impl Maker {
             atoms: Vec::new(),
             values: Vec::new(),
             events: Vec::new(),
-            goal: none(),
+            goal: always_true(),
             measure: Measure::Steps,
         };
         let mut maker = Self { random, flavour, task, designs: None, slot: None };
@@ -105,7 +106,7 @@ impl Maker {
         choices[self.random.usize(..choices.len())].clone()
     }
 
-    /// Objects, predicates and functions.
+    /// Declares objects, predicates and functions.
     fn declare(&mut self, designs: bool) {
         for kind in 0..self.task.types {
             let count = 1 + self.random.usize(..2);
@@ -136,11 +137,11 @@ impl Maker {
         self.initial();
         self.events();
         self.goal();
-        self.dear();
+        self.add_costly_action();
         self.measure();
     }
 
-    /// Derived predicates: a closure of a binary predicate, or any condition.
+    /// Declares derived predicates: the transitive closure of a binary predicate, or a random condition.
     fn axioms(&mut self) {
         if !self.chance(30) {
             return;
@@ -167,12 +168,12 @@ impl Maker {
         self.task.axioms.iter().any(|axiom| axiom.predicate == predicate)
     }
 
-    /// Whether no effect and no event changes a predicate.
+    /// Returns `true` if effects and events must not change a predicate.
     pub(super) fn is_fixed(&self, predicate: usize) -> bool {
         self.is_derived(predicate) || self.designs.is_some_and(|(solves, _)| solves == predicate)
     }
 
-    /// An atom over variables of some types, or objects. Set by effects and events, or read.
+    /// A random atom. `set` excludes predicates that effects and events must not change.
     fn atom(&mut self, variables: usize, set: bool) -> Atom {
         let mut predicate = self.random.usize(..self.task.predicates.len());
         while set && self.is_fixed(predicate) {
@@ -185,7 +186,7 @@ impl Maker {
     fn term(&mut self, variables: usize) -> Term {
         if variables > 0 && self.chance(85) {
             let variable = self.random.usize(..variables);
-            // A parameter that what changes mentions is not a slot, but may have side effects.
+            // A design parameter in a fact that actions change is not a slot but a side effect. That is wanted, but rarely.
             if self.slot == Some(variable) && !self.chance(8) {
                 return Term::Object(self.random.usize(..self.task.objects.len()));
             }
@@ -227,20 +228,20 @@ impl Maker {
         Condition::Compare(self.pick(&signs), left, right)
     }
 
-    /// A condition, with further ones inside as deep as said. The types of the variables.
+    /// A random condition of at most `depth` nested connectives. `variables` has the types of the bound variables.
     pub(super) fn condition(&mut self, variables: &[usize], depth: usize) -> Condition {
         let count = variables.len();
         let choice = self.random.u8(..100);
-        let more = |maker: &mut Self| Box::new(maker.condition(variables, depth - 1));
+        let nested = |maker: &mut Self| Box::new(maker.condition(variables, depth - 1));
         match choice {
             0..12 if self.chance(self.flavour.numeric) => self.comparison(LEVEL, count),
             12..17 if count > 1 => {
                 let same = Condition::Same(Term::Var(0), Term::Var(self.random.usize(1..count)));
                 if self.chance(75) { Condition::Not(Box::new(same)) } else { same }
             }
-            17..27 if depth > 0 => Condition::Any(vec![*more(self), *more(self)]),
-            27..30 if depth > 0 => Condition::Imply(more(self), more(self)),
-            30..33 if depth > 0 => Condition::Not(more(self)),
+            17..27 if depth > 0 => Condition::Any(vec![*nested(self), *nested(self)]),
+            27..30 if depth > 0 => Condition::Imply(nested(self), nested(self)),
+            30..33 if depth > 0 => Condition::Not(nested(self)),
             33..42 if depth > 0 => {
                 let kind = self.random.usize(..self.task.types);
                 let part = Box::new(self.condition(&[variables, &[kind]].concat(), depth - 1));
@@ -269,8 +270,8 @@ impl Maker {
             2 if !cost => Expression::Fluent(self.fluent(LEVEL, 0)),
             3 if !cost && self.random.bool() => Expression::Fluent(self.fluent(MAYBE, 0)),
             _ if cost => {
-                let least = if self.chance(self.flavour.negative) { -2 } else { 0 };
-                constant(q(self.random.i64(least..5)))
+                let min = if self.chance(self.flavour.negative) { -2 } else { 0 };
+                constant(q(self.random.i64(min..5)))
             }
             _ => constant(self.pick(&[q(0), q(1), q(1), q(2), q(3), q(-1), Q::new(1, 2)])),
         }
@@ -291,7 +292,7 @@ impl Maker {
             scale @ (Operation::ScaleUp | Operation::ScaleDown) => {
                 (scale, constant(self.pick(&[q(2), q(1), Q::new(1, 2)])))
             }
-            other => (other, self.operand(variables, false)),
+            operation => (operation, self.operand(variables, false)),
         };
         Effect::Change(operation, self.fluent(function, variables), operand)
     }
@@ -320,7 +321,7 @@ impl Maker {
 
     fn effects(&mut self, variables: &[usize], counts: &[usize]) -> Vec<Effect> {
         let mut effects: Vec<_> = (0..self.pick(counts)).map(|_| self.effect(variables, 2)).collect();
-        // Effects that contradict each other if a condition holds.
+        // Two changes of one number, one of which is conditional, conflict in some states only.
         if self.chance(self.flavour.conditional / 3) {
             let first = self.change(LEVEL, variables.len());
             let condition = self.condition(variables, 1);
@@ -377,7 +378,7 @@ impl Maker {
         };
         if let (Some((predicate, _)), Some(slot)) = (self.designs, self.slot.take()) {
             let (Body::Instantaneous(start) | Body::Durative { start, .. }) = &mut body;
-            // The first object is the function that all require.
+            // All actions require the first object as their function.
             let solves = Atom { predicate, terms: vec![Term::Var(slot), Term::Object(0)] };
             if let Condition::All(parts) = &mut start.condition {
                 parts.push(Condition::Atom(solves));
@@ -386,13 +387,14 @@ impl Maker {
         Action { name: format!("a{number}"), parameters, body }
     }
 
-    /// Effects that depend on the duration.
+    /// Adds effects that depend on the duration.
     fn durations_in_effects(&mut self) {
         for at in 0..self.task.actions.len() {
             let mut action = self.task.actions[at].clone();
             let Body::Durative { duration, start, end, .. } = &mut action.body else { continue };
-            let changes = matches!(duration, Expression::Fluent(Fluent { function: LEVEL, .. }));
-            if changes || !self.chance(self.flavour.numeric / 4) {
+            // A duration that actions change is not repeated in effects.
+            let is_dynamic = matches!(duration, Expression::Fluent(Fluent { function: LEVEL, .. }));
+            if is_dynamic || !self.chance(self.flavour.numeric / 4) {
                 continue;
             }
             let mut operand = Expression::Duration(Box::new(duration.clone()));

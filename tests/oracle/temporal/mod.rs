@@ -1,4 +1,4 @@
-//! Generator A: everything temporal and logical, one after another and overlapping.
+//! Generator A: all temporal and logical features, for sequential and concurrent plans.
 
 mod battery;
 pub mod best;
@@ -24,25 +24,26 @@ use happening::{Obstacle, World};
 use make::Maker;
 use model::{Measure, Q, Task, big};
 
-/// How many nodes the oracle visits before it gives up.
+/// Maximum number of nodes of the oracle for sequential plans.
 const CAP: usize = 400;
+/// Maximum number of nodes of the oracle for concurrent plans.
 const OVERLAP_CAP: usize = 300;
 
-/// The oracle's terms for a plan.
-fn known(world: &World, steps: &[Step]) -> Result<Vec<(usize, Q, Q)>, String> {
-    let small = |number: &BigRational| {
+/// Converts steps to a schedule of ground actions.
+fn schedule_of(world: &World, steps: &[Step]) -> Result<Vec<(usize, Q, Q)>, String> {
+    let to_small = |number: &BigRational| {
         let (numerator, denominator) = (number.numer().to_i64(), number.denom().to_i64());
         let number = Q::new(numerator.ok_or("too large")?, denominator.ok_or("too large")?);
         happening::fit(number).map_err(|_| "too large".to_owned())
     };
     let step = |step: &Step| {
-        let named = |(action, objects): &&(usize, Vec<usize>)| {
+        let is_named = |(action, objects): &&(usize, Vec<usize>)| {
             let objects: Vec<_> = objects.iter().map(|object| format!("o{object}")).collect();
             world.task.actions[*action].name == step.action && objects == step.arguments
         };
-        let instance = world.instances.iter().position(|instance| named(&instance));
+        let instance = world.instances.iter().position(|instance| is_named(&instance));
         let instance = instance.ok_or_else(|| format!("no action ({} {:?})", step.action, step.arguments))?;
-        Ok((instance, small(&step.start)?, small(&step.duration)?))
+        Ok((instance, to_small(&step.start)?, to_small(&step.duration)?))
     };
     steps.iter().map(step).collect()
 }
@@ -55,26 +56,26 @@ fn obstacle(obstacle: Obstacle) -> String {
     }
 }
 
-/// A task from a seed.
+/// The task of a seed; for concurrent plans if `unit` is given.
 pub fn sequential_task(seed: u64, unit: Option<Q>) -> Task {
     Maker::make(seed, unit)
 }
 
-/// The separation for a seed.
+/// Separation for the concurrent task of a seed.
 pub fn concurrent_unit(seed: u64) -> Q {
     let units = [Q::from_integer(1), Q::from_integer(1), Q::new(1, 1000), Q::new(1, 2), Q::from_integer(2)];
     units[(seed % 5) as usize]
 }
 
-/// Whether the larger value is the better.
+/// Returns `true` if larger values are better.
 pub fn maximizes(task: &Task) -> bool {
     matches!(task.measure, Measure::Metric { maximize: true, .. })
 }
 
-/// Executes plans one after another, or overlapping with a separation.
+/// Executor of sequential plans, or of concurrent plans with the given separation.
 pub fn executor(world: World, unit: Option<Q>) -> Executor {
     Box::new(move |steps| {
-        let plan = known(&world, steps)?;
+        let plan = schedule_of(&world, steps)?;
         let value = match unit {
             None => execute::execute(&world, &plan),
             Some(unit) => overlap::execute(&world, &plan, unit),
@@ -83,7 +84,7 @@ pub fn executor(world: World, unit: Option<Q>) -> Executor {
     })
 }
 
-/// A task with its truth; for plans that overlap if a unit of time is given.
+/// A task with its correct answer; for concurrent plans if `unit` is given.
 fn case(name: &str, seed: u64, unit: Option<Q>) -> Case {
     case_of(format!("{name}-{seed}"), Maker::make(seed, unit), unit)
 }
@@ -92,13 +93,13 @@ fn case_of(name: String, task: Task, unit: Option<Q>) -> Case {
     case_up_to(if unit.is_none() { CAP } else { OVERLAP_CAP }, name, task, unit)
 }
 
-/// A task of actions one after another that has derived predicates, with its truth; none if the task of the seed has none.
+/// A sequential task with derived predicates, with its correct answer. `None` if the task of the seed has no derived predicate.
 pub fn with_derived(seed: u64) -> Option<Case> {
     let task = Maker::make(seed, None);
     (!task.axioms.is_empty()).then(|| case_of(format!("derived-{seed}"), task, None))
 }
 
-/// A task with its truth, as far as so many nodes show it.
+/// A task with its correct answer, or an open one if the oracle would exceed `cap` nodes.
 fn case_up_to(cap: usize, name: String, task: Task, unit: Option<Q>) -> Case {
     let world = World::new(task);
     let truth = match unit {
@@ -144,7 +145,7 @@ fn batteries_that_are_charged() {
     run(200, case).finish();
 }
 
-/// The kinds of failures of a task.
+/// Kinds and texts of the failures of a task.
 fn kinds(task: &Task, unit: Option<Q>) -> (Vec<&'static str>, String) {
     let case = std::panic::catch_unwind(|| case_of("smaller".into(), task.clone(), unit));
     let Ok(case) = case else { return (vec!["the oracle"], String::new()) };
@@ -154,7 +155,7 @@ fn kinds(task: &Task, unit: Option<Q>) -> (Vec<&'static str>, String) {
     (tally.failures.iter().map(|failure| failure.kind).collect(), text)
 }
 
-/// `ORACLE_SEEDS` are seeds that fail, `ORACLE_OVERLAP` says of which generator: prints them as small as they get.
+/// Shrinks the failing tasks of the seeds `ORACLE_SEEDS` and prints them. If `ORACLE_OVERLAP` is set, the seeds are of concurrent tasks.
 #[test]
 #[ignore = "a tool"]
 #[allow(clippy::print_stdout)]
@@ -164,13 +165,14 @@ fn shrink() {
         let seed = seed.parse().expect("a seed");
         let unit = overlap.then(|| concurrent_unit(seed));
         let mut task = Maker::make(seed, unit);
-        let (found, mut text) = kinds(&task, unit);
-        let Some(kind) = found.last() else { continue };
+        let (original_kinds, mut text) = kinds(&task, unit);
+        // Any failure of the last kind counts, so the shrunk task may fail for a different reason of the same kind.
+        let Some(kind) = original_kinds.last() else { continue };
         'less: loop {
-            for less in shrink::smaller(&task) {
-                let (kinds, less_text) = kinds(&less, unit);
+            for candidate in shrink::smaller(&task) {
+                let (kinds, candidate_text) = kinds(&candidate, unit);
                 if kinds.contains(kind) {
-                    (task, text) = (less, less_text);
+                    (task, text) = (candidate, candidate_text);
                     continue 'less;
                 }
             }

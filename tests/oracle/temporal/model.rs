@@ -1,7 +1,7 @@
-//! A lifted temporal task as a structure of its own, and its PDDL text.
+//! Lifted temporal tasks and their PDDL texts.
 //!
-//! Predicates and functions take objects of any type; parameters and quantified variables are typed. A variable is its depth: the
-//! parameters come first, then quantified variables from the outside to the inside.
+//! Predicates and functions accept objects of all types. Parameters and quantified variables are typed. A variable is identified by its
+//! nesting depth: first the parameters, then quantified variables from the outermost to the innermost.
 
 use std::fmt::Write as _;
 
@@ -9,16 +9,16 @@ use num_rational::Ratio;
 
 use crate::judge::decimal;
 
-/// Numbers of tasks and times. All operations are followed by a check that numerator and denominator stay below 2^30, so none
-/// overflows.
+/// Rational number for values and times. Each operation is followed by a check that numerator and denominator are below 2^30, so no
+/// operation overflows.
 pub type Q = Ratio<i64>;
 
-/// A number from an integer.
+/// Converts an integer.
 pub fn q(number: i64) -> Q {
     Q::from_integer(number)
 }
 
-/// The same number in any size.
+/// Converts to arbitrary precision.
 pub fn big(number: Q) -> num_rational::BigRational {
     num_rational::BigRational::new((*number.numer()).into(), (*number.denom()).into())
 }
@@ -55,7 +55,7 @@ pub enum Expression {
     Number(Q),
     Fluent(Fluent),
     Sum(Box<Expression>, Box<Expression>),
-    /// `?duration` of the action, which takes this long.
+    /// `?duration` of the action, with the expression that determines it.
     Duration(Box<Expression>),
     Product(Box<Expression>, Box<Expression>),
     Quotient(Box<Expression>, Box<Expression>),
@@ -111,59 +111,59 @@ pub enum Body {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Action {
     pub name: String,
-    /// The types of the parameters.
+    /// Types of the parameters.
     pub parameters: Vec<usize>,
     pub body: Body,
 }
 
-/// A derived predicate, true where its condition is; the arguments are the first variables.
+/// A derived predicate with its condition. The first variables are the arguments.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axiom {
     pub predicate: usize,
     pub condition: Condition,
 }
 
-/// What plans are measured by.
+/// The measure that plans minimise or maximise.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Measure {
-    /// The number of actions, without a metric.
+    /// Number of actions (no metric, sequential).
     Steps,
-    /// The time, without a metric.
+    /// Total time (no metric).
     Time,
-    /// Weights of `total-time` and of functions without arguments.
+    /// A weighted sum of `total-time` and of functions without arguments.
     Metric { maximize: bool, time: Q, functions: Vec<(Q, usize)> },
 }
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Task {
     pub types: usize,
-    /// The type of each object.
+    /// Type of each object.
     pub objects: Vec<usize>,
-    /// Name and number of arguments. Derived ones are named by an axiom.
+    /// Name and arity, including derived predicates.
     pub predicates: Vec<(String, usize)>,
     pub functions: Vec<(String, usize)>,
-    /// In the order of their strata.
+    /// Derived predicates in the order of their strata.
     pub axioms: Vec<Axiom>,
     pub actions: Vec<Action>,
     pub atoms: Vec<Atom>,
     pub values: Vec<(Fluent, Q)>,
-    /// In order of time, each time once: what becomes true, or false.
+    /// Timed initial literals in order of time, with one entry per time. `true` for atoms that become true.
     pub events: Vec<(Q, Vec<(bool, Atom)>)>,
     pub goal: Condition,
     pub measure: Measure,
 }
 
-/// A number as PDDL writes it.
+/// Number in PDDL syntax.
 pub fn number(value: Q) -> String {
     if value < q(0) { format!("(- {})", decimal(&big(-value))) } else { decimal(&big(value)) }
 }
 
 impl Task {
-    /// Whether states fit what they are kept in: 128 atoms, 64 values.
+    /// Returns `true` if states fit into their bit sets: at most 128 atoms and 64 numbers.
     pub fn is_small(&self) -> bool {
         let instances = |(_, arity): &(String, usize)| self.objects.len().pow(*arity as u32);
-        let all = |list: &[(String, usize)]| list.iter().map(instances).sum::<usize>();
-        all(&self.predicates) <= 128 && all(&self.functions) <= 64
+        let count = |list: &[(String, usize)]| list.iter().map(instances).sum::<usize>();
+        count(&self.predicates) <= 128 && count(&self.functions) <= 64
     }
 
     fn term(term: Term) -> String {
@@ -200,7 +200,7 @@ impl Task {
         }
     }
 
-    /// `depth` is how many variables are bound.
+    /// Text of a condition with `depth` bound variables.
     fn condition(&self, condition: &Condition, depth: usize) -> String {
         let list = |word: &str, parts: &[Condition]| {
             let parts: String =
@@ -234,7 +234,7 @@ impl Task {
         }
     }
 
-    /// An effect at a time, which is empty for instantaneous actions.
+    /// Text of an effect at a time specifier, which is empty for instantaneous actions.
     fn effect(&self, effect: &Effect, time: &str, depth: usize) -> String {
         let at = |text: String| if time.is_empty() { text } else { format!("({time} {text})") };
         let list = |parts: &[Effect], depth: usize| {
@@ -307,18 +307,19 @@ impl Task {
         }
     }
 
-    /// Whether anything but its own axiom mentions the last predicate.
+    /// Returns `true` if a goal, action or axiom other than its own mentions the predicate, which is the last one.
     pub fn domain_uses(&self, predicate: usize) -> bool {
         let name = &self.predicates[predicate].0;
-        let mut others = self.clone();
-        others.axioms.retain(|axiom| axiom.predicate != predicate);
-        others.predicates.truncate(predicate);
+        let mut task_without = self.clone();
+        task_without.axioms.retain(|axiom| axiom.predicate != predicate);
+        task_without.predicates.truncate(predicate);
         let actions: String = self.actions.iter().map(|action| self.action(action)).collect();
-        let axioms: String = others.axioms.iter().map(|axiom| self.condition(&axiom.condition, 2)).collect();
+        let axioms: String =
+            task_without.axioms.iter().map(|axiom| self.condition(&axiom.condition, 2)).collect();
         (actions + &axioms + &self.condition(&self.goal, 0)).contains(&format!("({name}"))
     }
 
-    /// The PDDL domain.
+    /// Text of the PDDL domain.
     pub fn domain(&self) -> String {
         let mut text = "(define (domain d) (:requirements :adl :fluents :durative-actions \
                         :timed-initial-literals :derived-predicates)\n (:types"
@@ -347,7 +348,7 @@ impl Task {
         text + ")\n"
     }
 
-    /// The PDDL problem.
+    /// Text of the PDDL problem.
     pub fn problem(&self) -> String {
         let mut text = "(define (problem p) (:domain d)\n (:objects".to_owned();
         for (object, kind) in self.objects.iter().enumerate() {
@@ -356,7 +357,7 @@ impl Task {
         text += ")\n (:init";
         self.atoms.iter().for_each(|atom| text += &format!(" {}", self.atom(atom)));
         for (fluent, value) in &self.values {
-            // Initial values are literals.
+            // Initial values must be numbers, so a negative one is not written as an expression.
             let value = if *value < q(0) { format!("-{}", decimal(&big(-value))) } else { number(*value) };
             let _ = write!(text, " (= {} {value})", self.fluent(fluent));
         }

@@ -1,24 +1,24 @@
-//! Overlapping actions: a plan is executed at its exact times, and the best value of all plans on a grid of times is computed.
+//! Concurrent plans: execution at exact times, and the best value of all plans with start times on a grid.
 //!
-//! **The grid is complete** where the separation is the unit u, and durations and times of events are multiples of u. Take any valid plan
-//! and round every start down to the grid: t becomes u·floor(t/u). Durations stay, so ends are rounded down likewise.
-//! (1) What interferes was at least u apart, and so it is still (floor(x + 1) = floor(x) + 1, and floor is monotonous); happenings that come
-//! to one time were less than u apart, so no two of them interfere: they can be executed together, in any order, with the
-//! same result, and none of them changes what another one reads. (2) With events likewise: T <= t just if T <= floor(t) for T on the grid, so
-//! each happening has the same events before it. (3) The states after the groups of happenings are some of the states of before, and a
-//! state that now lies strictly between start and end of an action did so before: over-all conditions hold. (4) The state in the end is the same, and the last end is not later. So rounding
-//! makes no plan invalid and none worse, if the metric does not reward time.
+//! **The grid is complete** if the separation is the unit u, and durations and times of events are multiples of u. Proof: take any valid
+//! plan and round each start time t down to the grid, u·floor(t/u). Durations do not change, so ends are rounded down in the same way.
+//! (1) Interfering happenings were at least u apart and still are, as floor(x + 1) = floor(x) + 1 and floor is monotonic. Happenings that
+//! now coincide were less than u apart, so they do not interfere: no happening changes a fact or number that another one reads, and they
+//! can be executed together, in any order, with the same result. (2) For events at T on the grid, T <= t if and only if T <= floor(t). So
+//! the same events precede each happening. (3) Each state after a group of coinciding happenings also occurred in the original plan, and
+//! a state that is now strictly between start and end of an action was so before. So over-all conditions hold. (4) The final state is the
+//! same and the last end is not later. So the rounded plan is valid, and not worse if the metric does not reward time.
 //!
-//! A node of the search is a state, the running actions with what remains of each, and the time on the grid, which no longer
-//! matters after the last event. From one tick to the next any actions start that do not interfere with each other, with what
-//! ends, and with the event, also such as are running. The same again at the same tick makes a difference only to what is added to a number or multiplied with it:
-//! otherwise both starts, and both ends, have the effects of one.
+//! A node of the search consists of a state, the running actions with their remaining durations, and the time on the grid (capped after
+//! the last event, as it is irrelevant from there on). At each tick any set of actions can start that do not interfere with each other,
+//! with ending actions and with the event. Several runs of one action can overlap. Several starts of one action at one tick
+//! matter only if it increases or scales a number: otherwise the starts together, and the ends together, have the effects of one.
 
 use std::collections::HashMap;
 
 use super::best::{Schedule, judged};
 use super::execute::{goal, value};
-use super::graph::{Graph, Way};
+use super::graph::{Graph, Path};
 use super::happening::{Change, End, Happening, Obstacle, State, World, fit};
 use super::model::{Body, Condition, Effect, Operation, Q, q};
 use super::reduce::Reduction;
@@ -26,7 +26,7 @@ use crate::judge::Truth;
 
 const INTERFERES: Obstacle = Obstacle::Blocked("happenings that interfere are too close");
 
-/// The condition over all of an instance with a duration, with its objects.
+/// Over-all condition of a durative instance, with its arguments.
 fn over_all(world: &World, instance: usize) -> Option<(&Condition, &[usize])> {
     let (action, objects) = &world.instances[instance];
     match &world.task.actions[*action].body {
@@ -43,7 +43,7 @@ fn duration(world: &World, instance: usize, state: &State) -> Result<Q, Obstacle
     }
 }
 
-/// Executes a plan at its times: the value, or why it is none.
+/// Value of a plan, or the reason why it is invalid.
 pub fn execute(world: &World, plan: &[(usize, Q, Q)], separation: Q) -> Result<Q, Obstacle> {
     let mut times: Vec<(Q, usize, End)> = Vec::new();
     for (number, (_, start, length)) in plan.iter().enumerate() {
@@ -63,12 +63,13 @@ pub fn execute(world: &World, plan: &[(usize, Q, Q)], separation: Q) -> Result<Q
     clocks.sort_unstable();
     clocks.dedup();
     let mut state = world.initial.clone();
-    let mut done: Vec<(Q, Option<usize>, Happening)> =
+    let mut happened: Vec<(Q, Option<usize>, Happening)> =
         world.events.iter().map(|(time, event)| (*time, None, event.clone())).collect();
     for clock in clocks {
         for (_, event) in world.events.iter().filter(|(time, _)| *time == clock) {
             state = event.apply(&state)?;
         }
+        // All happenings of one time are evaluated in the state before them.
         let before = state.clone();
         for (time, number, end) in times.iter().filter(|(time, ..)| *time == clock) {
             let (instance, _, length) = plan[*number];
@@ -76,15 +77,18 @@ pub fn execute(world: &World, plan: &[(usize, Q, Q)], separation: Q) -> Result<Q
                 return Err(Obstacle::Blocked("the duration is another"));
             }
             let happening = world.happening(instance, *end, &before)?;
-            let close = |(at, other, written): &(Q, Option<usize>, Happening)| {
-                let apart = if at > time { at - time } else { time - at };
-                *other != Some(*number) && apart < separation && written.interferes(&happening)
-            };
-            if done.iter().any(close) {
+            let is_too_close =
+                |(other_time, other_number, other_happening): &(Q, Option<usize>, Happening)| {
+                    let distance = if other_time > time { other_time - time } else { time - other_time };
+                    *other_number != Some(*number)
+                        && distance < separation
+                        && other_happening.interferes(&happening)
+                };
+            if happened.iter().any(is_too_close) {
                 return Err(INTERFERES);
             }
             state = happening.apply(&state)?;
-            done.push((*time, Some(*number), happening));
+            happened.push((*time, Some(*number), happening));
         }
         for (instance, start, length) in
             plan.iter().filter(|(_, start, length)| *start <= clock && clock < start + length)
@@ -100,28 +104,30 @@ pub fn execute(world: &World, plan: &[(usize, Q, Q)], separation: Q) -> Result<Q
     value(world, &state, last, plan.len())
 }
 
-/// How often an instance may start at one tick before the oracle gives up.
-const COPIES: usize = 3;
+/// Maximum number of starts of one instance at one tick. Beyond it, the result is open.
+const MAX_COPIES: usize = 3;
 
-/// State, running instances with their remaining ticks, tick.
+/// State, running instances with their remaining ticks, current tick.
 type Node = (State, Vec<(usize, i64)>, i64);
 
 struct Search<'w> {
     world: &'w World,
     unit: Q,
     reduction: Reduction,
-    /// The first tick after all events.
+    /// The first tick after all events. Later ticks are equivalent.
     late: i64,
     numbers: HashMap<Node, usize>,
     nodes: Vec<Node>,
     graph: Graph,
-    /// What starts at the tick of an edge, and of a last step.
+    /// Instances that start at the tick of each edge, with their durations in ticks.
     starts: Vec<Vec<(usize, i64)>>,
+    /// Instances that start at the tick of each final step.
     last_starts: Vec<Vec<(usize, i64)>>,
+    /// `true` if the graph is incomplete.
     open: bool,
 }
 
-/// What is true of a task whose times are multiples of the separation, as far as so many nodes show it.
+/// Correct answer for a task whose times are multiples of `unit`, which is also the separation; open beyond `cap` nodes.
 pub fn best(world: &World, unit: Q, cap: usize) -> Truth {
     let reduction = Reduction::new(world);
     let late = world.events.last().map_or(0, |(time, _)| (time / unit).to_integer() + 1);
@@ -139,12 +145,12 @@ pub fn best(world: &World, unit: Q, cap: usize) -> Truth {
     };
     let (state, _) =
         search.reduction.reduce(world.initial.clone()).expect("the generator's numbers are small");
-    let mut begun = state.clone();
+    let mut after_events = state.clone();
     for (_, event) in world.events.iter().filter(|(time, _)| *time == q(0)) {
-        begun = event.apply(&begun).expect("events change atoms");
+        after_events = event.apply(&after_events).expect("events change atoms");
     }
-    let goal = world.holds(&world.task.goal, &begun, &[]) == Ok(true);
-    let empty = search.reduction.rest(&begun).ok().filter(|_| goal);
+    let goal_holds = world.holds(&world.task.goal, &after_events, &[]) == Ok(true);
+    let empty = search.reduction.rest(&after_events).ok().filter(|_| goal_holds);
     search.node((state, Vec::new(), 0));
     let mut next = 0;
     while next < search.nodes.len() {
@@ -156,11 +162,11 @@ pub fn best(world: &World, unit: Q, cap: usize) -> Truth {
         next += 1;
     }
     search.graph.nodes = search.nodes.len();
-    let schedule = |way: &Way| search.scheduled(way);
+    let schedule = |path: &Path| search.scheduled(path);
     judged(world, search.graph.optimum(), empty, search.open, &schedule, &|plan| execute(world, plan, unit))
 }
 
-/// What happens at one tick.
+/// Happenings of one tick, and the instances that run or start at it.
 #[derive(Clone)]
 struct Tick {
     happenings: Vec<Happening>,
@@ -183,31 +189,33 @@ impl Search<'_> {
 
     fn expand(&mut self, from: usize) {
         let (mut state, running, tick) = self.nodes[from].clone();
-        let mut at = Tick { happenings: Vec::new(), running: Vec::new(), starts: Vec::new(), ended: false };
+        let mut current =
+            Tick { happenings: Vec::new(), running: Vec::new(), starts: Vec::new(), ended: false };
         let time = self.unit * q(tick);
-        for (_, event) in self.world.events.iter().filter(|(at, _)| *at == time) {
+        for (_, event) in self.world.events.iter().filter(|(current, _)| *current == time) {
             state = event.apply(&state).expect("events change atoms");
-            at.happenings.push(event.clone());
+            current.happenings.push(event.clone());
         }
         for (instance, remaining) in running {
             if remaining > 0 {
-                at.running.push((instance, remaining));
+                current.running.push((instance, remaining));
                 continue;
             }
-            at.ended = true;
+            // An action that cannot end makes the node a dead end.
+            current.ended = true;
             match self.world.happening(instance, End::Finish, &state) {
-                Ok(end) if at.happenings.iter().all(|other| !other.interferes(&end)) => {
-                    at.happenings.push(end);
+                Ok(end) if current.happenings.iter().all(|happening| !happening.interferes(&end)) => {
+                    current.happenings.push(end);
                 }
                 Err(Obstacle::TooLarge) => return self.open = true,
                 _ => return,
             }
         }
-        self.choose(from, &state, 0, &at);
+        self.choose(from, &state, 0, &current);
     }
 
-    /// Whether a happening changes a number of the state by what it was before.
-    fn counts(&self, happening: &Happening) -> bool {
+    /// Returns `true` if a happening increases or scales a relevant number, so that repeating it makes a difference.
+    fn is_cumulative(&self, happening: &Happening) -> bool {
         let relative = |change: &Change| {
             matches!(change, Change::Add(by) if *by != q(0))
                 || matches!(change, Change::Scale(by) if *by != q(1))
@@ -215,53 +223,56 @@ impl Search<'_> {
         happening.changes.iter().any(|(at, change)| relative(change) && self.reduction.keeps(*at))
     }
 
-    /// Whether the end of an instance may change a number of the state by what it was before.
-    fn counts_at_end(&self, instance: usize) -> bool {
-        fn changed(effects: &[Effect], found: &mut Vec<usize>) {
+    /// Returns `true` if the end of an instance may increase or scale a relevant number.
+    fn has_cumulative_end(&self, instance: usize) -> bool {
+        fn collect_relative(effects: &[Effect], functions: &mut Vec<usize>) {
             for effect in effects {
                 match effect {
                     Effect::Change(Operation::Assign, ..) | Effect::Add(_) | Effect::Delete(_) => {}
-                    Effect::Change(_, fluent, _) => found.push(fluent.function),
-                    Effect::When(_, parts) | Effect::Forall(_, parts) => changed(parts, found),
+                    Effect::Change(_, fluent, _) => functions.push(fluent.function),
+                    Effect::When(_, parts) | Effect::Forall(_, parts) => collect_relative(parts, functions),
                 }
             }
         }
-        let mut found = Vec::new();
+        let mut functions = Vec::new();
         if let Body::Durative { end, .. } = &self.world.task.actions[self.world.instances[instance].0].body {
-            changed(&end.effects, &mut found);
+            collect_relative(&end.effects, &mut functions);
         }
-        found.iter().any(|function| {
-            let after = self.world.values.get(function + 1).copied();
-            let after = after.unwrap_or(self.world.initial.values.len());
-            (self.world.values[*function]..after).any(|at| self.reduction.keeps(at))
+        functions.iter().any(|function| {
+            let next_offset = self.world.values.get(function + 1).copied();
+            let next_offset = next_offset.unwrap_or(self.world.initial.values.len());
+            (self.world.values[*function]..next_offset).any(|at| self.reduction.keeps(at))
         })
     }
 
-    /// Starts further instances, from a number on.
+    /// Starts any further instances with numbers from `first` on, in all combinations.
     fn choose(&mut self, from: usize, state: &State, first: usize, tick: &Tick) {
         for instance in first..self.world.instances.len() {
-            let Ok(lasts) = duration(self.world, instance, state) else { continue };
-            if lasts < q(0) {
+            let Ok(length) = duration(self.world, instance, state) else { continue };
+            if length < q(0) {
                 continue;
             }
-            let end = if lasts == q(0) { End::Both } else { End::Start };
+            let end = if length == q(0) { End::Both } else { End::Start };
             match self.world.happening(instance, end, state) {
-                Ok(happening) if tick.happenings.iter().all(|other| !other.interferes(&happening)) => {
-                    let mut more = tick.clone();
-                    let ticks = (lasts / self.unit).to_integer();
-                    more.happenings.push(happening);
-                    more.starts.push((instance, ticks));
-                    more.ended |= ticks == 0;
+                Ok(happening) if tick.happenings.iter().all(|earlier| !earlier.interferes(&happening)) => {
+                    let mut extended = tick.clone();
+                    let ticks = (length / self.unit).to_integer();
+                    extended.happenings.push(happening);
+                    extended.starts.push((instance, ticks));
+                    extended.ended |= ticks == 0;
                     if ticks > 0 {
-                        more.running.push((instance, ticks));
+                        extended.running.push((instance, ticks));
                     }
-                    let counts =
-                        |it: &Happening| self.counts(it) || ticks > 0 && self.counts_at_end(instance);
-                    let again = more.happenings.last().is_some_and(|it| !it.interferes(it) && counts(it));
-                    let copies = more.starts.iter().filter(|(other, _)| *other == instance).count();
-                    self.open |= again && copies == COPIES;
-                    let next = if again && copies < COPIES { instance } else { instance + 1 };
-                    self.choose(from, state, next, &more);
+                    let makes_difference = |happening: &Happening| {
+                        self.is_cumulative(happening) || ticks > 0 && self.has_cumulative_end(instance)
+                    };
+                    let is_repeatable = extended.happenings.last().is_some_and(|happening| {
+                        !happening.interferes(happening) && makes_difference(happening)
+                    });
+                    let copies = extended.starts.iter().filter(|(started, _)| *started == instance).count();
+                    self.open |= is_repeatable && copies == MAX_COPIES;
+                    let next = if is_repeatable && copies < MAX_COPIES { instance } else { instance + 1 };
+                    self.choose(from, state, next, &extended);
                 }
                 Err(Obstacle::TooLarge) => self.open = true,
                 _ => {}
@@ -272,10 +283,10 @@ impl Search<'_> {
         }
     }
 
-    /// All that happens at the tick is chosen.
+    /// Completes the tick once all starts are chosen: applies its happenings and adds edges to the graph.
     fn finish(&mut self, from: usize, state: &State, tick: &Tick) -> Result<(), Obstacle> {
         let mut after = state.clone();
-        // The event has been applied, and again it makes no difference: nothing interferes with it.
+        // The events have been applied already. Applying them again is harmless, as nothing at this tick interferes with them.
         for happening in &tick.happenings {
             after = happening.apply(&after)?;
         }
@@ -287,22 +298,23 @@ impl Search<'_> {
         }
         let (after, cost) = self.reduction.reduce(after)?;
         if tick.ended && tick.running.is_empty() && self.world.holds(&self.world.task.goal, &after, &[])? {
-            let rest = fit(cost + self.reduction.rest(&after)?)?;
-            self.graph.goals.push((from, rest));
+            let final_cost = fit(cost + self.reduction.rest(&after)?)?;
+            self.graph.goals.push((from, final_cost));
             self.last_starts.push(tick.starts.clone());
         }
         let running = tick.running.iter().map(|(instance, remaining)| (*instance, remaining - 1)).collect();
         let number = self.nodes[from].2 + 1;
-        let to = self.node((after, running, number));
-        if to != from {
+        let target = self.node((after, running, number));
+        // After all events, a tick that changes nothing leads back to its node. This edge is omitted.
+        if target != from {
             let cost = fit(cost + self.reduction.time * self.unit)?;
-            self.graph.edges.push((from, to, cost));
+            self.graph.edges.push((from, target, cost));
             self.starts.push(tick.starts.clone());
         }
         Ok(())
     }
 
-    fn scheduled(&self, (edges, goal): &Way) -> Schedule {
+    fn scheduled(&self, (edges, goal): &Path) -> Schedule {
         let ticks = edges.iter().map(|edge| &self.starts[*edge]).chain([&self.last_starts[*goal]]);
         let mut plan = Vec::new();
         for (tick, starts) in ticks.enumerate() {

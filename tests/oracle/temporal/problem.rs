@@ -1,7 +1,7 @@
-//! The problem of a random task: initial state, events, goal, and what plans are measured by.
+//! The problem of a random task: initial state, events, goal and measure.
 
 use super::happening::World;
-use super::make::{COST, LENGTH, LEVEL, MAYBE, Maker, constant, none};
+use super::make::{COST, LENGTH, LEVEL, MAYBE, Maker, always_true, constant};
 use super::model::{Action, Atom, Body, Condition, Effect, Fluent, Measure, Operation, Part, Q, Term, q};
 use super::sequence::Search;
 
@@ -49,7 +49,7 @@ impl Maker {
         self.task.values.push((Fluent { function: COST, terms: Vec::new() }, q(0)));
     }
 
-    /// The durations of the actions' instances.
+    /// Distinct positive durations of the ground actions in the initial state, sorted.
     fn durations(&self) -> Vec<Q> {
         let world = World::new(self.task.clone());
         let duration = |(action, objects): &(usize, Vec<usize>)| match &self.task.actions[*action].body {
@@ -73,6 +73,7 @@ impl Maker {
         }
         let atoms = self.ground_atoms();
         for _ in 0..self.random.usize(1..5) {
+            // Times of events are sums of durations with a small offset, so that events and ends coincide or almost coincide.
             let mut time = q(0);
             for _ in 0..self.random.usize(..3) {
                 time += if durations.is_empty() {
@@ -94,13 +95,13 @@ impl Maker {
                     Q::new(-1, 1000),
                 ]),
             };
-            if time < q(0) || self.task.events.iter().any(|(other, _)| *other == time) {
+            if time < q(0) || self.task.events.iter().any(|(used, _)| *used == time) {
                 continue;
             }
             let mut literals: Vec<(bool, Atom)> = Vec::new();
             for _ in 0..self.pick(&[1, 1, 2]) {
                 let atom = self.pick(&atoms);
-                if literals.iter().all(|(_, other)| *other != atom) {
+                if literals.iter().all(|(_, used)| *used != atom) {
                     literals.push((self.random.bool(), atom));
                 }
             }
@@ -109,7 +110,7 @@ impl Maker {
         self.task.events.sort_by_key(|(time, _)| *time);
     }
 
-    /// Mostly what holds in a state that can be reached.
+    /// Chooses the goal: usually literals that hold in a reachable state.
     pub(super) fn goal(&mut self) {
         if self.chance(20) {
             self.task.goal = self.conjunction(&[], &[1, 1, 2]);
@@ -117,12 +118,14 @@ impl Maker {
         }
         let world = World::new(self.task.clone());
         let search = Search::new(&world, 40);
+        // A state from the second half of the search needs several actions.
         let (state, ..) = search.nodes[self.random.usize(search.nodes.len() / 2..search.nodes.len())].clone();
         let initial = search.nodes[0].0.atoms;
         let mut literals: Vec<(bool, Atom)> = Vec::new();
         let atoms = self.ground_atoms();
         for atom in &atoms {
             let bit = 1 << world.atom(atom, &[]);
+            // Facts that differ from the initial state are preferred.
             let percent = if (state.atoms ^ initial) & bit == 0 { 5 } else { 60 };
             if self.chance(percent) {
                 literals.push((state.atoms & bit != 0, atom.clone()));
@@ -142,8 +145,8 @@ impl Maker {
         self.task.goal = Condition::All(parts);
     }
 
-    /// An action that reaches the literals of the goal and can always be executed, at a price.
-    pub(super) fn dear(&mut self) {
+    /// With probability 30 %, adds a costly action that is always applicable and achieves the literals of the goal.
+    pub(super) fn add_costly_action(&mut self) {
         let Condition::All(parts) = &self.task.goal else { return };
         let literal = |part: &Condition| match part {
             Condition::Atom(atom) => Some(Effect::Add(atom.clone())),
@@ -153,43 +156,43 @@ impl Maker {
             },
             _ => None,
         };
-        let set = |effect: &Effect| match effect {
+        let is_changeable = |effect: &Effect| match effect {
             Effect::Add(atom) | Effect::Delete(atom) => !self.is_fixed(atom.predicate),
             _ => false,
         };
-        let mut effects: Vec<_> = parts.iter().filter_map(literal).filter(set).collect();
+        let mut effects: Vec<_> = parts.iter().filter_map(literal).filter(is_changeable).collect();
         if !self.chance(30) {
             return;
         }
         let body = if self.flavour.durative > 0 {
-            let empty = Part { condition: none(), effects: Vec::new() };
+            let empty = Part { condition: always_true(), effects: Vec::new() };
             let duration = constant(self.flavour.unit.unwrap_or(q(10)) * q(10));
             Body::Durative {
                 duration,
                 start: empty,
-                over_all: none(),
-                end: Part { condition: none(), effects },
+                over_all: always_true(),
+                end: Part { condition: always_true(), effects },
             }
         } else {
             let cost = Fluent { function: COST, terms: Vec::new() };
             effects.push(Effect::Change(Operation::Increase, cost, constant(q(50))));
-            Body::Instantaneous(Part { condition: none(), effects })
+            Body::Instantaneous(Part { condition: always_true(), effects })
         };
         self.task.actions.push(Action { name: "dear".into(), parameters: Vec::new(), body });
     }
 
-    /// Without a metric only where it is clear whether plans are measured by their time.
+    /// Chooses the measure. There is no metric only if it is clear whether plans are measured by their time.
     pub(super) fn measure(&mut self) {
         let is_durative = |action: &&Action| matches!(action.body, Body::Durative { .. });
         let durative = self.task.actions.iter().filter(is_durative).count();
-        let dear = self
+        let has_costly_durative_action = self
             .task
             .actions
             .last()
             .filter(|action| action.name == "dear")
             .is_some_and(|action| is_durative(&action));
         if self.chance(30) {
-            if self.flavour.unit.is_some() || dear {
+            if self.flavour.unit.is_some() || has_costly_durative_action {
                 self.task.measure = Measure::Time;
                 return;
             }

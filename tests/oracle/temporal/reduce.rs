@@ -1,81 +1,83 @@
-//! What of a state matters: numbers that nothing reads and that only increase become costs of actions.
+//! Relevance analysis of numbers: those that nothing reads and that only increase or decrease become action costs.
 
 use super::happening::{Obstacle, State, World, fit};
 use super::model::{Body, Condition, Effect, Expression, Measure, Operation, Q, q};
 
-/// What becomes of a number.
+/// Role of a number in the search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
+    /// Part of the state.
     Kept,
-    /// Only its weight in the metric counts.
+    /// Excluded from the state. Its changes are costs, multiplied by its weight in the metric.
     Cost(Q),
-    /// Nobody reads it; only whether it has a value counts.
+    /// Excluded from the state, as nothing reads its value. Only whether it is defined matters.
     Unread,
 }
 
-/// How the states of a task are reduced, and what the rest costs.
+/// Reduction of states, and the parts of the metric.
 #[derive(Debug)]
 pub struct Reduction {
     roles: Vec<Role>,
-    /// The weight of time; 1 for each action if plans are measured by their steps.
+    /// Weight of the total time.
     pub time: Q,
+    /// Cost of each action: 1 if plans are measured by their steps.
     pub step: Q,
-    /// Weights of what is part of the state, by number.
+    /// Weights of the numbers that are part of the state.
     remaining: Vec<(Q, usize)>,
     pub maximize: bool,
-    /// What the metric has before the plan.
+    /// Contribution of the initial values of the other numbers to the metric.
     offset: Q,
 }
 
-fn expression_functions(expression: &Expression, found: &mut Vec<usize>) {
+fn expression_functions(expression: &Expression, functions: &mut Vec<usize>) {
     match expression {
         Expression::Number(_) | Expression::Duration(_) => {}
-        Expression::Fluent(fluent) => found.push(fluent.function),
+        Expression::Fluent(fluent) => functions.push(fluent.function),
         Expression::Sum(left, right)
         | Expression::Product(left, right)
         | Expression::Quotient(left, right) => {
-            expression_functions(left, found);
-            expression_functions(right, found);
+            expression_functions(left, functions);
+            expression_functions(right, functions);
         }
     }
 }
 
-fn condition_functions(condition: &Condition, found: &mut Vec<usize>) {
+fn condition_functions(condition: &Condition, functions: &mut Vec<usize>) {
     match condition {
         Condition::Atom(_) | Condition::Same(..) => {}
         Condition::Compare(_, left, right) => {
-            expression_functions(left, found);
-            expression_functions(right, found);
+            expression_functions(left, functions);
+            expression_functions(right, functions);
         }
         Condition::Not(part) | Condition::Forall(_, part) | Condition::Exists(_, part) => {
-            condition_functions(part, found);
+            condition_functions(part, functions);
         }
         Condition::All(parts) | Condition::Any(parts) => {
-            parts.iter().for_each(|part| condition_functions(part, found));
+            parts.iter().for_each(|part| condition_functions(part, functions));
         }
         Condition::Imply(left, right) => {
-            condition_functions(left, found);
-            condition_functions(right, found);
+            condition_functions(left, functions);
+            condition_functions(right, functions);
         }
     }
 }
 
-/// What effects read, and what they do otherwise than increasing and decreasing.
-fn effect_functions(effects: &[Effect], read: &mut Vec<usize>, other: &mut Vec<usize>) {
+/// Collects the functions that effects read, and those that effects change other than by increase and decrease.
+fn effect_functions(effects: &[Effect], read: &mut Vec<usize>, assigned: &mut Vec<usize>) {
     for effect in effects {
         match effect {
             Effect::Add(_) | Effect::Delete(_) => {}
             Effect::Change(operation, fluent, expression) => {
                 expression_functions(expression, read);
                 if !matches!(operation, Operation::Increase | Operation::Decrease) {
-                    other.push(fluent.function);
+                    assigned.push(fluent.function);
                 }
             }
             Effect::When(condition, parts) => {
                 condition_functions(condition, read);
-                effect_functions(parts, read, other);
+                effect_functions(parts, read, assigned);
             }
-            Effect::Forall(_, parts) => effect_functions(parts, read, other),
+            Effect::Forall(_, parts) => effect_functions(parts, read, assigned),
         }
     }
 }
@@ -83,7 +85,7 @@ fn effect_functions(effects: &[Effect], read: &mut Vec<usize>, other: &mut Vec<u
 impl Reduction {
     pub fn new(world: &World) -> Self {
         let task = &world.task;
-        let (mut read, mut other) = (Vec::new(), Vec::new());
+        let (mut read, mut assigned) = (Vec::new(), Vec::new());
         condition_functions(&task.goal, &mut read);
         task.axioms.iter().for_each(|axiom| condition_functions(&axiom.condition, &mut read));
         for action in &task.actions {
@@ -97,15 +99,15 @@ impl Reduction {
             };
             for part in parts {
                 condition_functions(&part.condition, &mut read);
-                effect_functions(&part.effects, &mut read, &mut other);
+                effect_functions(&part.effects, &mut read, &mut assigned);
             }
         }
         let (mut time, mut step, mut maximize, mut weights) = (q(0), q(0), false, Vec::new());
         match &task.measure {
             Measure::Steps => step = q(1),
             Measure::Time => time = q(1),
-            Measure::Metric { maximize: larger, time: weight, functions } => {
-                (time, maximize, weights) = (*weight, *larger, functions.clone());
+            Measure::Metric { maximize: is_maximized, time: weight, functions } => {
+                (time, maximize, weights) = (*weight, *is_maximized, functions.clone());
             }
         }
         let mut roles = vec![Role::Kept; world.initial.values.len()];
@@ -117,7 +119,7 @@ impl Reduction {
                 weights.iter().filter(|(_, at)| *at == function).map(|(weight, _)| *weight).collect();
             let role = match &weight[..] {
                 [] => Role::Unread,
-                _ if other.contains(&function) => Role::Kept,
+                _ if assigned.contains(&function) => Role::Kept,
                 weights => Role::Cost(weights.iter().sum()),
             };
             (first..first + count).for_each(|at| roles[at] = role);
@@ -133,7 +135,7 @@ impl Reduction {
         Self { roles, time, step, remaining, maximize, offset }
     }
 
-    /// The state without what does not matter, and what this has cost.
+    /// Removes irrelevant values from a state. Returns the new state, and the contribution of the removed values to the metric.
     pub fn reduce(&self, mut state: State) -> Result<(State, Q), Obstacle> {
         let mut cost = q(0);
         for (value, role) in state.values.iter_mut().zip(&self.roles) {
@@ -147,12 +149,12 @@ impl Reduction {
         Ok((state, cost))
     }
 
-    /// Whether a number is part of the state.
+    /// Returns `true` if a number is part of the state.
     pub fn keeps(&self, at: usize) -> bool {
         self.roles[at] == Role::Kept
     }
 
-    /// What the metric has besides the costs of actions.
+    /// Contribution of the state and of the initial values to the metric, in addition to action costs.
     pub fn rest(&self, state: &State) -> Result<Q, Obstacle> {
         let mut sum = self.offset;
         for (weight, at) in &self.remaining {

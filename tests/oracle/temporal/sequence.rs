@@ -1,28 +1,28 @@
-//! Actions one after another: a plan is executed at its exact times, and the best value of all plans is computed.
+//! Sequential plans: the graph of all plans, for the best value and for exact times.
 //!
-//! **The search is exact.** Let T1 < T2 < … be the times of the events. At time t all events with T <= t have been applied (an action's
-//! happening at T itself is only allowed if it does not interfere with the event, and then their order does not matter). A *node* is
-//! a state S, the number k of events applied, and a *clock*: a time v and whether it is meant strictly. It stands for the
-//! situations (S, t) with Tk <= t < Tk+1 and t >= v (or t > v). *Claim: those are exactly the times at which S can be had by
-//! the node's sequence of actions with its choices of regions (below), waiting included.*
+//! **The search is exact.** Let T1 < T2 < … be the times of the events. At time t all events with T <= t have been applied. (A happening
+//! of an action at T itself is allowed only if it does not interfere with the event, and then their order does not matter.) A *node*
+//! consists of a state S, the number k of applied events, and a *clock*: a time v, and whether the bound is strict. It represents the
+//! situations (S, t) with Tk <= t < Tk+1 and t >= v (strict: t > v). *Claim: these are exactly the times at which S can hold after the
+//! node's sequence of actions, with its choices of regions (below), including waiting.*
 //!
-//! Initially the clock is (0, not strict), and k counts the event at 0, if there is one. Waiting for an event is an edge to
-//! (S with the event, k + 1, (Tk+1, not strict)), as every situation of the node can wait, and no waiting within [Tk, Tk+1) changes
-//! the state. For an action from a node, its start s lies in the same [Tk, Tk+1) (other starts have wait edges before them). The
-//! states that the action passes, and whether it can be executed, depend only on (1) whether s = Tk, and (2) in which of
-//! the *regions* (Tk, Tk+1), {Tk+1}, (Tk+1, Tk+2), … its end e = s + d lies: these say which happenings coincide with events,
-//! and which events lie strictly between. So for each choice the possible s are an interval, the intersection of the clock's up-set, the
-//! choice for s, and the region for e minus d. If it is not empty, the times of the end are the interval plus d, and with waiting in the
-//! end's region they are the up-set of its infimum, strict if the infimum is not attained: the claim for the next node. By induction the
-//! claim holds for all nodes, and all plans are covered, for every plan makes its choices. (`s` and `t` are coupled
-//! by t <= s only, and every s in the up-set has such a t.)
+//! Initially the clock is (0, not strict), and k counts the event at 0, if any. Waiting for an event is an edge to (S with the event,
+//! k + 1, (Tk+1, not strict)), as every situation of the node can wait, and waiting within [Tk, Tk+1) does not change the state. For an
+//! action that is applied in a node, the start s lies in the same [Tk, Tk+1), as other starts follow a waiting edge. The states during
+//! the action, and whether it is executable, depend only on (1) whether s = Tk, and (2) in which of the *regions* (Tk, Tk+1), {Tk+1},
+//! (Tk+1, Tk+2), … the end e = s + d lies. They determine the happenings that coincide with events, and the events strictly between
+//! start and end. So for each choice the possible s are an interval: the intersection of the clock's up-set, the choice for s, and the
+//! region for e minus d. If it is not empty, the times of the end are the interval plus d. With waiting in the region of the end, they
+//! are the up-set of its infimum, strict if the infimum is not attained. This is the claim for the next node. By induction the claim
+//! holds for all nodes. All plans are covered, because every plan makes its choices. (`s` and `t` are coupled by t <= s only, and each s
+//! in the up-set has such a t.)
 //!
-//! The goal is asked for when an action ends (and at the beginning), for plans do not end with waiting. Costs of edges may be
-//! negative: Bellman-Ford on the nodes from which a goal can be reached; if there is a cycle of negative cost, there is no best value.
-//! Numbers that nothing reads and that only increase are costs of edges, not part of the state. Where the nodes end before the cap,
-//! the answer is exact; otherwise only what was found counts.
+//! The goal is tested at the ends of actions (and initially), as plans do not end with waiting. Costs of edges may be negative, so the
+//! shortest path is computed by Bellman-Ford on the nodes from which a goal is reachable. A cycle of negative cost among them means that
+//! there is no best value. Numbers that nothing reads and that only increase or decrease are costs of edges, not part of the state. If
+//! the nodes are exhausted before the cap, the answer is exact. Otherwise it is only the value of the best plan in the partial graph.
 //!
-//! Times of a plan: a strict clock v becomes v + i·δ at the i-th action, with δ so small that all of them together stay below every gap.
+//! Times of a plan: a strict clock v becomes v + i·δ at the i-th action, with δ so small that the sum of all delays is below every gap.
 
 use std::collections::HashMap;
 
@@ -30,23 +30,23 @@ use super::happening::{End, Obstacle, State, World, fit};
 use super::model::{Body, Q, q};
 use super::reduce::Reduction;
 
-/// A time, and whether it is meant strictly.
+/// Lower bound of a time, and whether it is strict.
 type Clock = (Q, bool);
-/// A state, the number of events before it, the clock. After the last event time does not matter.
+/// State, number of applied events, clock. After the last event the clock is irrelevant and set to 0.
 type Node = (State, usize, Clock);
 
-/// How one node follows another.
+/// An action or a wait between two nodes.
 #[derive(Debug, Clone)]
 pub struct Edge {
     pub from: usize,
     pub to: usize,
-    /// To be minimised.
+    /// Cost; negated if the metric is maximised.
     pub cost: Q,
-    /// The instance with its duration, infimum of the start, and a gap that δs must stay below. None for waiting.
+    /// Instance, duration, infimum of the start, and an upper limit of the total delay. `None` for waiting.
     pub step: Option<(usize, Q, Clock, Option<Q>)>,
 }
 
-/// The graph of a task.
+/// The graph of all sequential plans of a task.
 pub struct Search<'w> {
     pub world: &'w World,
     reduction: Reduction,
@@ -54,15 +54,16 @@ pub struct Search<'w> {
     numbers: HashMap<Node, usize>,
     pub edges: Vec<Edge>,
     /// Edges to goals, with the value there to be minimised.
+    /// Edges that reach a goal, with the final cost there.
     pub goals: Vec<(usize, Q)>,
-    /// The value of the empty plan, to be minimised, if it reaches the goal.
+    /// Final cost of the empty plan, if it reaches the goal.
     pub empty: Option<Q>,
-    /// Whether something was left out.
+    /// `true` if the graph is incomplete.
     pub open: bool,
 }
 
 impl<'w> Search<'w> {
-    /// The nodes that are reached, up to a cap.
+    /// Builds the graph, up to `cap` nodes.
     pub fn new(world: &'w World, cap: usize) -> Self {
         let reduction = Reduction::new(world);
         let mut search = Self {
@@ -83,7 +84,7 @@ impl<'w> Search<'w> {
         }
         let (state, _) = search.reduction.reduce(state).expect("the generator's numbers are small");
         if world.holds(&world.task.goal, &state, &[]) == Ok(true) {
-            search.empty = search.reduction.rest(&state).ok().map(|rest| search.sign() * rest);
+            search.empty = search.reduction.rest(&state).ok().map(|final_cost| search.sign() * final_cost);
         }
         search.node((state, applied, (q(0), false)));
         let mut next = 0;
@@ -102,8 +103,8 @@ impl<'w> Search<'w> {
         if self.reduction.maximize { q(-1) } else { q(1) }
     }
 
-    fn event_time(&self, at: usize) -> Option<Q> {
-        self.world.events.get(at).map(|(time, _)| *time)
+    fn event_time(&self, number: usize) -> Option<Q> {
+        self.world.events.get(number).map(|(time, _)| *time)
     }
 
     fn node(&mut self, node: Node) -> usize {
@@ -116,25 +117,25 @@ impl<'w> Search<'w> {
         self.nodes.len() - 1
     }
 
-    /// All edges out of a node.
+    /// Adds all edges out of a node.
     fn expand(&mut self, from: usize) {
         let (state, applied, clock) = self.nodes[from].clone();
         if let Some((time, event)) = self.world.events.get(applied) {
             match event.apply(&state) {
                 Ok(after) => {
-                    let to = self.node((after, applied + 1, (*time, false)));
-                    self.edges.push(Edge { from, to, cost: q(0), step: None });
+                    let target = self.node((after, applied + 1, (*time, false)));
+                    self.edges.push(Edge { from, target, cost: q(0), step: None });
                 }
                 Err(_) => self.open = true,
             }
         }
         for instance in 0..self.world.instances.len() {
-            // At the event, and after it.
+            // Starts at the event itself and later starts are separate choices.
             let at_event = applied > 0 && applied < self.world.events.len() && !clock.1;
             let event = self.event_time(applied.wrapping_sub(1)).filter(|time| at_event && *time == clock.0);
             let starts = match event {
                 Some(time) => vec![((time, false), Some(time)), ((time, true), None)],
-                // After the last event, starting just after it is as good as at it.
+                // After the last event, a start just after it is as good as one at it, and cannot interfere with it.
                 None if applied > 0 && applied == self.world.events.len() => vec![((q(0), true), None)],
                 None => vec![(clock, None)],
             };
@@ -146,7 +147,7 @@ impl<'w> Search<'w> {
         }
     }
 
-    /// An action that starts from `lower` on, or at `point` only.
+    /// Adds edges for an action that starts from `lower` on, or at `point` only.
     fn action(
         &mut self,
         from: usize,
@@ -166,48 +167,51 @@ impl<'w> Search<'w> {
         if duration < q(0) {
             return Ok(());
         }
-        let lasts = duration > q(0);
-        let first = world.happening(instance, if lasts { End::Start } else { End::Both }, &state)?;
-        if point.is_some() && first.interferes(&world.events[applied - 1].1) {
+        let is_durative = duration > q(0);
+        let start_happening =
+            world.happening(instance, if is_durative { End::Start } else { End::Both }, &state)?;
+        if point.is_some() && start_happening.interferes(&world.events[applied - 1].1) {
             return Ok(());
         }
-        let mut state = first.apply(&state)?;
-        // Upper bound of the start, exclusive.
+        let mut state = start_happening.apply(&state)?;
+        // Exclusive upper bound of the start.
         let next = self.event_time(applied);
-        if !lasts {
+        if !is_durative {
             let gap = next.map(|next| next - lower.0);
             self.reach((from, instance, duration), (lower, gap), state, applied);
             return Ok(());
         }
         let over_all = over_all.expect("it lasts");
-        for ended in applied.. {
-            // Ends between the event before and the next one.
+        for event_count in applied.. {
+            // Case 1: the end lies strictly between two events.
             if !world.holds(over_all, &state, objects)? {
                 return Ok(());
             }
-            let after = if ended > applied { self.event_time(ended - 1) } else { None };
-            let before = self.event_time(ended);
-            if let Some(found) = start_times(lower, point, next, duration, (after, before)) {
+            let after = if event_count > applied { self.event_time(event_count - 1) } else { None };
+            let before = self.event_time(event_count);
+            if let Some(start_bound) = start_times(lower, point, next, duration, (after, before)) {
                 match world.happening(instance, End::Finish, &state).and_then(|end| end.apply(&state)) {
-                    Ok(end) => self.reach((from, instance, duration), found, end, ended),
+                    Ok(end) => self.reach((from, instance, duration), start_bound, end, event_count),
                     Err(Obstacle::TooLarge) => self.open = true,
                     Err(Obstacle::Blocked(_)) => {}
                 }
             }
-            let Some((time, event)) = world.events.get(ended) else { return Ok(()) };
+            let Some((time, event)) = world.events.get(event_count) else { return Ok(()) };
             state = event.apply(&state)?;
-            // Ends at the next event.
-            let at = time - duration;
+            // Case 2: the end coincides with the next event.
+            let start = time - duration;
             let allowed = point.map_or_else(
-                || (at > lower.0 || at == lower.0 && !lower.1) && next.is_none_or(|next| at < next),
-                |point| at == point,
+                || (start > lower.0 || start == lower.0 && !lower.1) && next.is_none_or(|next| start < next),
+                |point| start == point,
             );
             if allowed {
                 let end = world.happening(instance, End::Finish, &state);
                 match end
                     .and_then(|end| if end.interferes(event) { Err(INTERFERES) } else { end.apply(&state) })
                 {
-                    Ok(end) => self.reach((from, instance, duration), ((at, false), None), end, ended + 1),
+                    Ok(end) => {
+                        self.reach((from, instance, duration), ((start, false), None), end, event_count + 1)
+                    }
                     Err(Obstacle::TooLarge) => self.open = true,
                     Err(Obstacle::Blocked(_)) => {}
                 }
@@ -216,7 +220,7 @@ impl<'w> Search<'w> {
         Ok(())
     }
 
-    /// Adds the edge of an action that ends with a state.
+    /// Adds the edge of an action whose end leads to a state.
     fn reach(
         &mut self,
         (from, instance, duration): (usize, usize, Q),
@@ -226,28 +230,28 @@ impl<'w> Search<'w> {
     ) {
         let reduced = self.reduction.reduce(state).and_then(|(state, cost)| {
             let cost = fit(cost + self.reduction.time * duration + self.reduction.step)?;
-            let rest = self.reduction.rest(&state)?;
-            let goal = self.world.holds(&self.world.task.goal, &state, &[]);
-            Ok((state, cost * self.sign(), rest * self.sign(), goal?))
+            let final_cost = self.reduction.rest(&state)?;
+            let goal_holds = self.world.holds(&self.world.task.goal, &state, &[]);
+            Ok((state, cost * self.sign(), final_cost * self.sign(), goal_holds?))
         });
-        let Ok((state, cost, rest, goal)) = reduced else {
+        let Ok((state, cost, final_cost, goal_holds)) = reduced else {
             self.open = true;
             return;
         };
         let slack = start.0 - self.nodes[from].2.0;
         let gap = [gap, Some(slack)].into_iter().flatten().filter(|gap| *gap > q(0)).min();
-        let to = self.node((state, applied, (start.0 + duration, start.1)));
-        if goal {
-            self.goals.push((self.edges.len(), rest));
+        let target = self.node((state, applied, (start.0 + duration, start.1)));
+        if goal_holds {
+            self.goals.push((self.edges.len(), final_cost));
         }
-        self.edges.push(Edge { from, to, cost, step: Some((instance, duration, start, gap)) });
+        self.edges.push(Edge { from, target, cost, step: Some((instance, duration, start, gap)) });
     }
 }
 
 const INTERFERES: Obstacle = Obstacle::Blocked("an event at the same time interferes");
 
-/// The infimum of the starts from `lower` on (or at `point`) and before `next` whose ends lie strictly between two events; and the
-/// gap above it.
+/// Infimum of the starts from `lower` on (or at `point`) and before `next` whose ends lie strictly between two events, with the size of
+/// the interval. `None` if it is empty.
 fn start_times(
     lower: Clock,
     point: Option<Q>,
@@ -257,8 +261,8 @@ fn start_times(
 ) -> Option<(Clock, Option<Q>)> {
     if let Some(point) = point {
         let end = point + duration;
-        let inside = after.is_none_or(|after| end > after) && before.is_none_or(|before| end < before);
-        return inside.then_some(((point, false), None));
+        let is_inside = after.is_none_or(|after| end > after) && before.is_none_or(|before| end < before);
+        return is_inside.then_some(((point, false), None));
     }
     let bound = after.map(|after| after - duration).filter(|bound| *bound >= lower.0);
     let infimum = bound.map_or(lower, |bound| (bound, true));

@@ -1,31 +1,33 @@
-//! Makes a task that fails smaller, while it still fails in the same way.
+//! Candidates for shrinking a failing task.
 
 use super::model::{Body, Condition, Effect, Expression, Measure, Part, Task, q};
 
-/// A task with one thing less, for each thing.
+/// All tasks with one part removed or simplified.
 pub fn smaller(task: &Task) -> Vec<Task> {
     let mut tasks = Vec::new();
-    let mut without = |change: &dyn Fn(&mut Task)| {
-        let mut less = task.clone();
-        change(&mut less);
-        tasks.push(less);
+    let mut add_changed = |change: &dyn Fn(&mut Task)| {
+        let mut smaller_task = task.clone();
+        change(&mut smaller_task);
+        tasks.push(smaller_task);
     };
-    (0..task.actions.len()).for_each(|at| without(&|less| drop(less.actions.remove(at))));
+    (0..task.actions.len()).for_each(|at| add_changed(&|smaller_task| drop(smaller_task.actions.remove(at))));
     for (at, (_, literals)) in task.events.iter().enumerate() {
-        without(&|less| drop(less.events.remove(at)));
+        add_changed(&|smaller_task| drop(smaller_task.events.remove(at)));
         for literal in (0..literals.len()).filter(|_| literals.len() > 1) {
-            without(&|less| drop(less.events[at].1.remove(literal)));
+            add_changed(&|smaller_task| drop(smaller_task.events[at].1.remove(literal)));
         }
     }
-    (0..task.atoms.len()).for_each(|at| without(&|less| drop(less.atoms.remove(at))));
+    (0..task.atoms.len()).for_each(|at| add_changed(&|smaller_task| drop(smaller_task.atoms.remove(at))));
     for goal in conditions(&task.goal) {
-        without(&|less| less.goal = goal.clone());
+        add_changed(&|smaller_task| smaller_task.goal = goal.clone());
     }
     for (at, action) in task.actions.iter().enumerate() {
         match &action.body {
             Body::Instantaneous(part) => {
                 for part in parts(part) {
-                    without(&|less| less.actions[at].body = Body::Instantaneous(part.clone()));
+                    add_changed(&|smaller_task| {
+                        smaller_task.actions[at].body = Body::Instantaneous(part.clone())
+                    });
                 }
             }
             Body::Durative { duration, start, over_all, end } => {
@@ -44,7 +46,9 @@ pub fn smaller(task: &Task) -> Vec<Task> {
                         bodies.push(body(&constant, start, over_all, end));
                     }
                 }
-                bodies.into_iter().for_each(|body| without(&|less| less.actions[at].body = body.clone()));
+                bodies.into_iter().for_each(|body| {
+                    add_changed(&|smaller_task| smaller_task.actions[at].body = body.clone())
+                });
             }
         }
     }
@@ -53,63 +57,65 @@ pub fn smaller(task: &Task) -> Vec<Task> {
             let mut functions = functions.clone();
             functions.remove(at);
             let (maximize, time) = (*maximize, *time);
-            without(&|less| less.measure = Measure::Metric { maximize, time, functions: functions.clone() });
+            add_changed(&|smaller_task| {
+                smaller_task.measure = Measure::Metric { maximize, time, functions: functions.clone() }
+            });
         }
     }
     let predicates: Vec<usize> = task.axioms.iter().map(|axiom| axiom.predicate).collect();
     if predicates.last().is_some_and(|last| last + 1 == task.predicates.len() && !task.domain_uses(*last)) {
-        without(&|less| {
-            less.axioms.pop();
-            less.predicates.pop();
+        add_changed(&|smaller_task| {
+            smaller_task.axioms.pop();
+            smaller_task.predicates.pop();
         });
     }
     tasks
 }
 
-/// A condition with one thing less.
+/// All conditions with one part removed or simplified.
 fn conditions(condition: &Condition) -> Vec<Condition> {
-    let none = Condition::All(Vec::new());
+    let always_true = Condition::All(Vec::new());
     match condition {
         Condition::All(parts) if parts.is_empty() => Vec::new(),
         Condition::All(parts) => {
-            let mut found = Vec::new();
+            let mut smaller = Vec::new();
             for at in 0..parts.len() {
-                let mut less = parts.clone();
-                less.remove(at);
-                found.push(Condition::All(less));
+                let mut remaining = parts.clone();
+                remaining.remove(at);
+                smaller.push(Condition::All(remaining));
                 for part in conditions(&parts[at]) {
-                    let mut less = parts.clone();
-                    less[at] = part;
-                    found.push(Condition::All(less));
+                    let mut remaining = parts.clone();
+                    remaining[at] = part;
+                    smaller.push(Condition::All(remaining));
                 }
             }
-            found
+            smaller
         }
         Condition::Any(parts) => parts.clone(),
         Condition::Imply(left, right) => vec![(**left).clone(), (**right).clone()],
-        Condition::Not(part) if !matches!(**part, Condition::Atom(_)) => vec![(**part).clone(), none],
-        _ => vec![none],
+        Condition::Not(part) if !matches!(**part, Condition::Atom(_)) => vec![(**part).clone(), always_true],
+        _ => vec![always_true],
     }
 }
 
-/// One end of an action with one thing less.
+/// All variants of a start or end with one part removed or simplified.
 fn parts(part: &Part) -> Vec<Part> {
-    let mut found: Vec<Part> = conditions(&part.condition)
+    let mut smaller: Vec<Part> = conditions(&part.condition)
         .into_iter()
         .map(|condition| Part { condition, effects: part.effects.clone() })
         .collect();
     for (at, effect) in part.effects.iter().enumerate() {
-        let mut with = |replacement: &[Effect]| {
+        let mut add_replaced = |replacement: &[Effect]| {
             let effects = [&part.effects[..at], replacement, &part.effects[at + 1..]].concat();
-            found.push(Part { condition: part.condition.clone(), effects });
+            smaller.push(Part { condition: part.condition.clone(), effects });
         };
-        with(&[]);
+        add_replaced(&[]);
         if let Effect::When(condition, inner) = effect {
-            with(inner);
+            add_replaced(inner);
             conditions(condition)
                 .into_iter()
-                .for_each(|condition| with(&[Effect::When(condition, inner.clone())]));
+                .for_each(|condition| add_replaced(&[Effect::When(condition, inner.clone())]));
         }
     }
-    found
+    smaller
 }

@@ -1,31 +1,31 @@
-//! Plans on a grid of whole times, executed by the definitions of PDDL 2.1 and PDDL 3.
+//! Executes and enumerates plans with integer times by the definitions of PDDL 2.1 and PDDL 3.
 
 use fastrand::Rng;
 
 use super::{Action, Amount, Constraint, Effect, Formula, Moment, State, Task};
 
-/// The number of what is paid.
+/// Index of the number that is added to the metric (`total-cost`).
 pub(super) const PAID: usize = 2;
-/// The last start that is tried.
-const LAST: i64 = 3;
-/// How many plans of three actions are tried.
+/// Latest start time of an enumerated action.
+const LAST_START: i64 = 3;
+/// Number of random plans with three actions. Shorter plans are enumerated exhaustively.
 const LONG_PLANS: usize = 200;
 
-/// An action that starts at a time and takes a time.
+/// Start, number of the action, duration.
 type Step = (i64, usize, i64);
 
 impl Formula {
     fn holds(&self, state: &State) -> bool {
         match self {
             Self::Fact(fact, value) => (state.facts >> fact & 1 == 1) == *value,
-            Self::AtLeast(number, least) => state.numbers[*number] >= *least,
-            Self::AtMost(number, most) => state.numbers[*number] <= *most,
+            Self::AtLeast(number, bound) => state.numbers[*number] >= *bound,
+            Self::AtMost(number, bound) => state.numbers[*number] <= *bound,
             Self::And(left, right) => left.holds(state) && right.holds(state),
             Self::Or(left, right) => left.holds(state) || right.holds(state),
         }
     }
 
-    /// Facts and numbers that it mentions.
+    /// Bit sets of the facts and numbers in the formula.
     fn reads(&self) -> (u8, u8) {
         match self {
             Self::Fact(fact, _) => (1 << fact, 0),
@@ -44,7 +44,7 @@ impl Amount {
     }
 }
 
-/// What a happening does and reads.
+/// Effects of the start or end of an action, with the facts and numbers that it reads. Sets are bit sets.
 #[derive(Debug, Default)]
 struct Happening {
     reads: (u8, u8),
@@ -56,33 +56,35 @@ struct Happening {
 }
 
 impl Happening {
-    /// The start or the end of an action with a duration; none if it contradicts itself.
+    /// Start or end of an action with a given duration. Returns `None` if its effects conflict.
     fn new(action: &Action, moment: Moment, duration: i64) -> Option<Self> {
-        let mut own = Self::default();
+        let mut happening = Self::default();
         for (_, condition) in action.conditions.iter().filter(|(at, _)| *at == moment) {
             let reads = condition.reads();
-            own.reads = (own.reads.0 | reads.0, own.reads.1 | reads.1);
+            happening.reads = (happening.reads.0 | reads.0, happening.reads.1 | reads.1);
         }
+        // The duration constraint reads `(charge)` at the start.
         if action.is_bounded_by_charge && moment == Moment::Start {
-            own.reads.1 |= 1 << 1;
+            happening.reads.1 |= 1 << 1;
         }
         for (_, effect) in action.effects.iter().filter(|(at, _)| *at == moment) {
             match effect {
-                Effect::Set(fact, true) => own.adds |= 1 << fact,
-                Effect::Set(fact, false) => own.deletes |= 1 << fact,
+                Effect::Set(fact, true) => happening.adds |= 1 << fact,
+                Effect::Set(fact, false) => happening.deletes |= 1 << fact,
                 Effect::Increase(number, amount) => {
-                    own.increases[*number] += amount.of(duration);
-                    own.increased |= 1 << number;
+                    happening.increases[*number] += amount.of(duration);
+                    happening.increased |= 1 << number;
                 }
                 Effect::Assign(number, amount) => {
                     let value = amount.of(duration);
-                    if own.assigned[*number].replace(value).is_some_and(|other| other != value) {
+                    if happening.assigned[*number].replace(value).is_some_and(|other| other != value) {
                         return None;
                     }
                 }
             }
         }
-        (own.assigned() & own.increased == 0).then_some(own)
+        // An assignment conflicts with an increase of the same number at the same time.
+        (happening.assigned() & happening.increased == 0).then_some(happening)
     }
 
     fn assigned(&self) -> u8 {
@@ -90,11 +92,13 @@ impl Happening {
     }
 
     fn interferes(&self, other: &Self) -> bool {
-        let disturbs = |one: &Self, other: &Self| {
-            (one.adds | one.deletes) & other.reads.0 != 0
-                || one.adds & other.deletes != 0
-                || (one.increased | one.assigned()) & other.reads.1 != 0
-                || one.assigned() & (other.increased | other.assigned()) != 0
+        // Two happenings interfere if one writes what the other one reads, or if they write one number or fact in different ways. Two
+        // increases commute.
+        let disturbs = |writer: &Self, reader: &Self| {
+            (writer.adds | writer.deletes) & reader.reads.0 != 0
+                || writer.adds & reader.deletes != 0
+                || (writer.increased | writer.assigned()) & reader.reads.1 != 0
+                || writer.assigned() & (reader.increased | reader.assigned()) != 0
         };
         disturbs(self, other) || disturbs(other, self)
     }
@@ -113,7 +117,7 @@ impl Task {
         conditions.all(|(_, condition)| condition.holds(state))
     }
 
-    /// What a plan comes to; none if it is not valid.
+    /// Value of a plan; `None` if the plan is invalid.
     fn value(&self, plan: &[Step]) -> Option<i64> {
         let mut times: Vec<i64> =
             plan.iter().flat_map(|(start, _, duration)| [*start, start + duration]).collect();
@@ -123,26 +127,29 @@ impl Task {
         let mut trajectory = vec![(0, state)];
         for time in times {
             let mut happenings: Vec<Happening> = Vec::new();
+            // Conditions of all happenings at a time are evaluated in the state before it.
             for (start, action, duration) in plan {
-                let own = &self.actions[*action];
+                let schema = &self.actions[*action];
                 for (moment, at) in [(Moment::Start, *start), (Moment::End, start + duration)] {
-                    if at != time || (moment == Moment::End && own.durations.is_none()) {
+                    if at != time || (moment == Moment::End && schema.durations.is_none()) {
                         continue;
                     }
-                    let is_short = !own.is_bounded_by_charge || *duration <= state.numbers[1] + 1;
-                    if !self.holds(*action, moment, &state) || (moment == Moment::Start && !is_short) {
+                    let is_within_charge = !schema.is_bounded_by_charge || *duration <= state.numbers[1] + 1;
+                    if !self.holds(*action, moment, &state) || (moment == Moment::Start && !is_within_charge)
+                    {
                         return None;
                     }
-                    happenings.push(Happening::new(own, moment, *duration)?);
+                    happenings.push(Happening::new(schema, moment, *duration)?);
                 }
             }
-            for (position, one) in happenings.iter().enumerate() {
-                if happenings[position + 1..].iter().any(|other| one.interferes(other)) {
+            for (position, happening) in happenings.iter().enumerate() {
+                if happenings[position + 1..].iter().any(|later| happening.interferes(later)) {
                     return None;
                 }
             }
             happenings.iter().for_each(|happening| happening.apply(&mut state));
             trajectory.push((time, state));
+            // Over-all conditions must hold in every state strictly between start and end.
             for (start, action, duration) in plan {
                 if *start <= time && time < start + duration && !self.holds(*action, Moment::OverAll, &state)
                 {
@@ -169,48 +176,51 @@ impl Task {
         Some(value)
     }
 
-    /// The least value of the plans that are tried.
+    /// Least value among the enumerated plans.
     pub(super) fn best(&self, rng: &mut Rng) -> Option<i64> {
         let mut steps: Vec<Step> = Vec::new();
         for (number, action) in self.actions.iter().enumerate() {
             let (least, most) = action.durations.unwrap_or((0, 0));
             steps.extend(
-                (0..=LAST).flat_map(|start| (least..=most).map(move |duration| (start, number, duration))),
+                (0..=LAST_START)
+                    .flat_map(|start| (least..=most).map(move |duration| (start, number, duration))),
             );
         }
         steps.sort_unstable();
         let mut best = self.value(&[]);
-        let mut see = |value: Option<i64>| best = best.into_iter().chain(value).min();
-        for (position, one) in steps.iter().enumerate() {
-            see(self.value(&[*one]));
-            steps[position..].iter().for_each(|other| see(self.value(&[*one, *other])));
+        let mut consider = |value: Option<i64>| best = best.into_iter().chain(value).min();
+        for (position, first) in steps.iter().enumerate() {
+            consider(self.value(&[*first]));
+            steps[position..].iter().for_each(|second| consider(self.value(&[*first, *second])));
         }
         for _ in 0..LONG_PLANS {
             let [a, b, c] = [0; 3].map(|_| steps[rng.usize(0..steps.len())]);
-            see(self.value(&[a, b, c]));
+            consider(self.value(&[a, b, c]));
         }
         best
     }
 }
 
 impl Constraint {
-    /// Whether it is kept in a sequence of states with their times [A. Gerevini, P. Haslum, D. Long, A. Saetti, Y. Dimopoulos:
+    /// Returns `true` if a trajectory satisfies the constraint [A. Gerevini, P. Haslum, D. Long, A. Saetti, Y. Dimopoulos:
     /// Deterministic planning in the fifth international planning competition, Artificial Intelligence 173, 2009].
     fn is_kept(&self, states: &[(i64, State)]) -> bool {
         let [first, second] = [&self.first, &self.second]
-            .map(|own| states.iter().map(|(_, state)| own.holds(state)).collect::<Vec<_>>());
+            .map(|formula| states.iter().map(|(_, state)| formula.holds(state)).collect::<Vec<_>>());
         let count = states.len();
-        let soon = |from: usize, to: usize| states[to].0 - states[from].0 <= self.time;
+        let in_time = |from: usize, to: usize| states[to].0 - states[from].0 <= self.time;
         match self.kind {
             "at end" => first[count - 1],
             "always" => first.iter().all(|holds| *holds),
             "sometime" => first.iter().any(|holds| *holds),
             "within" => (0..count).any(|i| first[i] && states[i].0 <= self.time),
-            "at-most-once" => first.chunk_by(|one, other| one == other).filter(|run| run[0]).count() <= 1,
+            "at-most-once" => first.chunk_by(|left, right| left == right).filter(|run| run[0]).count() <= 1,
             "sometime-after" => (0..count).all(|i| !first[i] || (i..count).any(|j| second[j])),
             "sometime-before" => (0..count).all(|i| !first[i] || (0..i).any(|j| second[j])),
-            "always-within" => (0..count).all(|i| !first[i] || (i..count).any(|j| second[j] && soon(i, j))),
-            other => panic!("{other}"),
+            "always-within" => {
+                (0..count).all(|i| !first[i] || (i..count).any(|j| second[j] && in_time(i, j)))
+            }
+            unknown => panic!("{unknown}"),
         }
     }
 }

@@ -1,7 +1,7 @@
-//! Overlapping actions on a grid of whole times: constraints and preferences of PDDL 3, and durations that are chosen.
+//! Concurrent actions with integer times: constraints and preferences of PDDL 3, and chosen durations.
 //!
-//! The oracle executes plans of a few actions by the definitions of PDDL 2.1 and PDDL 3. It looks at plans that start and end at whole
-//! times, so the optimum may be better than its best plan, and never worse.
+//! The oracle executes plans of a few actions by the definitions of PDDL 2.1 and PDDL 3. It enumerates plans with integer times only, so
+//! the optimum can be better than its best plan, but not worse.
 
 mod execute;
 
@@ -11,11 +11,11 @@ use fastrand::Rng;
 use metaplan::mission::Mission;
 use num_rational::BigRational;
 
-use super::{Known, Sample, whole};
+use super::{Reference, Sample, whole};
 use crate::judge::{Mode, read};
 use execute::PAID;
 
-/// Facts and numbers; a third number is what is paid.
+/// Names of facts and numbers. The third number (`total-cost`) has no entry.
 const FACTS: [&str; 3] = ["(p)", "(q)", "(h)"];
 const NUMBERS: [&str; 2] = ["(fuel)", "(charge)"];
 
@@ -28,14 +28,15 @@ struct State {
 #[derive(Debug, Clone)]
 enum Formula {
     Fact(usize, bool),
-    /// A number is at least or at most a constant.
+    /// A number is at least a constant.
     AtLeast(usize, i64),
+    /// A number is at most a constant.
     AtMost(usize, i64),
     And(Box<Formula>, Box<Formula>),
     Or(Box<Formula>, Box<Formula>),
 }
 
-/// How much: a constant, and a multiple of the duration.
+/// A linear function of the duration: constant and factor.
 #[derive(Debug, Clone, Copy)]
 struct Amount(i64, i64);
 
@@ -55,9 +56,9 @@ enum Moment {
 
 #[derive(Debug, Clone)]
 struct Action {
-    /// Least and greatest duration; none of an instantaneous action.
+    /// Least and greatest duration; `None` for an instantaneous action.
     durations: Option<(i64, i64)>,
-    /// Whether the duration is also at most the charge plus 1.
+    /// `true` if the duration is also limited by `(charge)` + 1.
     is_bounded_by_charge: bool,
     conditions: Vec<(Moment, Formula)>,
     effects: Vec<(Moment, Effect)>,
@@ -79,9 +80,9 @@ struct Task {
     initial: State,
     goal: Vec<Formula>,
     constraints: Vec<Constraint>,
-    /// A wish for the end, and what it weighs.
+    /// A preference in the goal, with its weight.
     wish: Option<(Formula, i64)>,
-    /// What a violated soft constraint weighs.
+    /// Weight of the violated soft constraints.
     weight: i64,
     is_paid: bool,
 }
@@ -114,11 +115,12 @@ impl Effect {
         let number = |number: &usize| if *number == PAID { "(total-cost)" } else { NUMBERS[*number] };
         match self {
             Self::Set(fact, value) => Formula::Fact(*fact, *value).text(),
-            Self::Increase(of, Amount(constant, factor)) if *constant <= 0 && *factor <= 0 => {
-                format!("(decrease {} {})", number(of), Amount(-constant, -factor).text())
+            // Covers `decrease`, which is not drawn as an operator of its own.
+            Self::Increase(index, Amount(constant, factor)) if *constant <= 0 && *factor <= 0 => {
+                format!("(decrease {} {})", number(index), Amount(-constant, -factor).text())
             }
-            Self::Increase(of, amount) => format!("(increase {} {})", number(of), amount.text()),
-            Self::Assign(of, amount) => format!("(assign {} {})", number(of), amount.text()),
+            Self::Increase(index, amount) => format!("(increase {} {})", number(index), amount.text()),
+            Self::Assign(index, amount) => format!("(assign {} {})", number(index), amount.text()),
         }
     }
 }
@@ -130,8 +132,8 @@ impl Task {
                 .to_owned();
         for (number, action) in self.actions.iter().enumerate() {
             let Some((least, most)) = action.durations else {
-                let conditions: String = action.conditions.iter().map(|(_, own)| own.text()).collect();
-                let effects: String = action.effects.iter().map(|(_, own)| own.text()).collect();
+                let conditions: String = action.conditions.iter().map(|(_, item)| item.text()).collect();
+                let effects: String = action.effects.iter().map(|(_, item)| item.text()).collect();
                 let _ = writeln!(
                     text,
                     "(:action a{number} :parameters () :precondition (and {conditions}) :effect (and {effects}))"
@@ -144,9 +146,9 @@ impl Task {
                 Moment::End => "at end",
             };
             let conditions =
-                action.conditions.iter().map(|(moment, own)| format!("({} {})", at(moment), own.text()));
+                action.conditions.iter().map(|(moment, item)| format!("({} {})", at(moment), item.text()));
             let effects =
-                action.effects.iter().map(|(moment, own)| format!("({} {})", at(moment), own.text()));
+                action.effects.iter().map(|(moment, item)| format!("({} {})", at(moment), item.text()));
             let by_charge = if action.is_bounded_by_charge { "(<= ?duration (+ (charge) 1))" } else { "" };
             let duration = if least == most && !action.is_bounded_by_charge {
                 format!("(= ?duration {least})")
@@ -199,7 +201,7 @@ impl Task {
             mission,
             mode: Mode::Concurrent(separation),
             maximize: false,
-            known: Known::Some(self.best(rng).map(whole)),
+            reference: Reference::Some(self.best(rng).map(whole)),
         }
     }
 }
@@ -233,7 +235,7 @@ fn set(rng: &mut Rng) -> Effect {
     Effect::Set(rng.usize(0..3), rng.u32(0..3) > 0)
 }
 
-/// A task with constraints and preferences of PDDL 3 and durations that are given.
+/// A task with constraints and preferences of PDDL 3 and fixed durations.
 pub fn trajectories(seed: u64) -> Sample {
     let mut rng = Rng::with_seed(seed);
     let rng = &mut rng;
@@ -248,11 +250,11 @@ pub fn trajectories(seed: u64) -> Sample {
         }
         let duration = rng.i64(1..3);
         let moment = |rng: &mut Rng| if rng.bool() { Moment::Start } else { Moment::End };
-        let when = if rng.bool() { Moment::Start } else { Moment::OverAll };
+        let condition_moment = if rng.bool() { Moment::Start } else { Moment::OverAll };
         Action {
             durations: Some((duration, duration)),
             is_bounded_by_charge: false,
-            conditions: vec![(when, literal(rng))],
+            conditions: vec![(condition_moment, literal(rng))],
             effects: vec![(moment(rng), set(rng)), (moment(rng), set(rng))],
         }
     });
@@ -286,7 +288,7 @@ pub fn trajectories(seed: u64) -> Sample {
     task.sample(rng)
 }
 
-/// A task with numbers and durations that are chosen.
+/// A task with numbers and chosen durations.
 pub fn durations(seed: u64) -> Sample {
     let mut rng = Rng::with_seed(seed);
     let rng = &mut rng;
@@ -318,7 +320,7 @@ pub fn durations(seed: u64) -> Sample {
                 ],
             };
         }
-        let least = rng.i64(1..3);
+        let min_duration = rng.i64(1..3);
         let conditions = (0..rng.usize(1..3))
             .map(|_| ([Moment::Start, Moment::OverAll, Moment::End][rng.usize(0..3)], condition(rng)));
         let conditions = conditions.collect();
@@ -332,7 +334,7 @@ pub fn durations(seed: u64) -> Sample {
         let price = [Amount(2, 0), Amount(0, 1), Amount(0, 2)][rng.usize(0..3)];
         effects.push((Moment::End, Effect::Increase(PAID, price)));
         Action {
-            durations: Some((least, least + rng.i64(0..3))),
+            durations: Some((min_duration, min_duration + rng.i64(0..3))),
             is_bounded_by_charge: rng.u32(0..4) == 0,
             conditions,
             effects,

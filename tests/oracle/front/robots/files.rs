@@ -1,10 +1,10 @@
-//! The files of a robot's mission: knowledge base, domain and problem.
+//! Texts of a robot's mission: knowledge base, domain and problem.
 
 use std::fmt::Write as _;
 
 use super::{CHARGING, Design, FULL, Form, Robot, Situation};
 
-/// Actions that replace one design by another, in the explicit form.
+/// Actions of the explicit form that select and replace designs.
 const CHANGES: &str = "(:derived (unset ?f - function) (not (exists (?d - functiondesign) (at_work ?d ?f))))
    (:action set :parameters (?f - function ?d - functiondesign)
       :precondition (and (unset ?f) (fd_solve_f ?d ?f) (fd_available ?d)) :effect (at_work ?d ?f))
@@ -13,14 +13,14 @@ const CHANGES: &str = "(:derived (unset ?f - function) (not (exists (?d - functi
       :effect (and (not (at_work ?old ?f)) (at_work ?new ?f) (increase (total-cost) (change ?new))))\n";
 
 impl Robot {
-    /// The knowledge base as Turtle. With other names, individuals have `k` before the names of the problem.
+    /// Knowledge base as Turtle. In the renamed form, functions and designs get the prefix `k`, which the name map removes.
     pub(super) fn document(
         form: Form,
         functions: usize,
         designs: &[Design],
         bounds: [Option<i64>; 3],
     ) -> String {
-        let own = if form == Form::Renamed { "k" } else { "" };
+        let prefix = if form == Form::Renamed { "k" } else { "" };
         let mut text = "@prefix : <urn:m#> .\n@prefix owl: <http://www.w3.org/2002/07/owl#> .\n\
             @prefix t: <http://metacontrol.org/tomasys#> .\n\
             <urn:m> a owl:Ontology ; owl:imports <http://metacontrol.org/tomasys> .\n"
@@ -34,7 +34,7 @@ impl Robot {
                 ":obs_{observed} a t:QAvalue ; t:isQAtype :{observed} ; t:isMeasured true ; t:hasValue {value}.0 ."
             );
         }
-        let required: Vec<_> = (0..functions).map(|function| format!(":{own}f{function}")).collect();
+        let required: Vec<_> = (0..functions).map(|function| format!(":{prefix}f{function}")).collect();
         let kinds = [
             ("careful", "safety", "hasMinimum", Some("narrow")),
             ("silent", "energy", "hasMaximum", Some("quiet")),
@@ -60,30 +60,31 @@ impl Robot {
             let _ = writeln!(text, ":c{component} a t:Component .");
         }
         for function in 0..functions {
-            let _ = writeln!(text, ":{own}f{function} a t:Function .");
+            let _ = writeln!(text, ":{prefix}f{function} a t:Function .");
         }
         for (number, design) in designs.iter().enumerate() {
-            let name = format!("{own}d{number}");
+            let name = format!("{prefix}d{number}");
             let mut values =
                 vec![("slowness", design.slowness), ("energy", design.energy), ("change", design.change)];
             values.extend(design.safety.map(|safety| ("safety", safety)));
-            let all: Vec<_> = values.iter().map(|(attribute, _)| format!(":{name}_{attribute}")).collect();
+            let estimations: Vec<_> =
+                values.iter().map(|(attribute, _)| format!(":{name}_{attribute}")).collect();
             let mut needs = String::new();
             if let Some(component) = design.component {
                 let _ = write!(needs, " ; t:requiresC :c{component}");
             }
-            if let Some(least) = design.visibility {
+            if let Some(min_visibility) = design.visibility {
                 let _ = write!(needs, " ; t:hasRequirement :{name}_sees");
                 let _ = writeln!(
                     text,
-                    ":{name}_sees a t:Requirement ; t:isQAtype :visibility ; t:hasMinimum {least}.0 ."
+                    ":{name}_sees a t:Requirement ; t:isQAtype :visibility ; t:hasMinimum {min_visibility}.0 ."
                 );
             }
             let _ = writeln!(
                 text,
                 ":{name} a t:FunctionDesign ; t:solvesF :{own}f{}{needs} ; t:hasQAestimation {} .",
                 design.function,
-                all.join(" , ")
+                estimations.join(" , ")
             );
             for (attribute, value) in values {
                 let _ = writeln!(
@@ -95,7 +96,7 @@ impl Robot {
         text
     }
 
-    /// A file with the names of the form.
+    /// Replaces the names in a PDDL text by those of the form.
     pub(super) fn renamed(&self, text: &str) -> String {
         let names: &[(&str, &str)] = match self.form {
             Form::Explicit | Form::Native => return text.to_owned(),
@@ -115,14 +116,14 @@ impl Robot {
         };
         let is_word = |c: char| c.is_alphanumeric() || c == '_' || c == '?' || c == '-' || c == ':';
         let mut renamed = String::new();
-        let mut rest = text;
-        while !rest.is_empty() {
-            let end = rest.find(|c| !is_word(c)).unwrap_or(rest.len());
-            let (word, more) = rest.split_at(end);
+        let mut remainder = text;
+        while !remainder.is_empty() {
+            let end = remainder.find(|c| !is_word(c)).unwrap_or(remainder.len());
+            let (word, tail) = remainder.split_at(end);
             renamed.push_str(names.iter().find(|(from, _)| *from == word).map_or(word, |(_, to)| to));
-            let gap = more.find(is_word).unwrap_or(more.len());
-            renamed.push_str(&more[..gap]);
-            rest = &more[gap..];
+            let gap = tail.find(is_word).unwrap_or(tail.len());
+            renamed.push_str(&tail[..gap]);
+            remainder = &tail[gap..];
         }
         renamed
     }
@@ -144,41 +145,41 @@ impl Robot {
             if !native && name == "squeeze" {
                 let _ = write!(text, "(>= (safety ?d0) {}) ", self.safety);
             }
-            if let Some(most) = self.quiet.filter(|_| !native) {
-                text += &each(&|f| format!("(or (not (quiet ?a)) (<= (energy ?d{f}) {most}))"));
+            if let Some(max) = self.quiet.filter(|_| !native) {
+                text += &each(&|f| format!("(or (not (quiet ?a)) (<= (energy ?d{f}) {max}))"));
             }
-            if let Some(most) = self.quick.filter(|_| !native) {
-                text += &each(&|f| format!("(<= (slowness ?d{f}) {most})"));
+            if let Some(max) = self.quick.filter(|_| !native) {
+                text += &each(&|f| format!("(<= (slowness ?d{f}) {max})"));
             }
             text
         };
         let works = |at: &str| {
             let close = if at.is_empty() { "" } else { ")" };
-            let own = |f: usize| format!("{at}(at_work ?d{f} f{f}){close}");
-            if self.reconfiguration { each(&own) } else { String::new() }
+            let condition = |f: usize| format!("{at}(at_work ?d{f} f{f}){close}");
+            if self.reconfiguration { each(&condition) } else { String::new() }
         };
         let effect =
             if self.reconfiguration && native { "(increase (total-cost) (reconfigured))" } else { "" };
         let price = format!("(+ (length ?a ?b) (* (length ?a ?b) {slowness}))");
         let moving = |name: &str, way: &str| {
             let parameters = each(&|f| format!("?d{f}")) + if native { "" } else { "- functiondesign" };
-            let suits = each(&|f| format!("(fd_solve_f ?d{f} f{f}) (fd_available ?d{f})"));
-            let conditions = format!("(at ?a) {way} {suits} {}", bounds(name));
-            let enough = format!("(>= (battery) (* (length ?a ?b) {energy}))");
-            let uses = format!("(decrease (battery) (* (length ?a ?b) {energy}))");
+            let is_usable = each(&|f| format!("(fd_solve_f ?d{f} f{f}) (fd_available ?d{f})"));
+            let conditions = format!("(at ?a) {way} {is_usable} {}", bounds(name));
+            let battery_condition = format!("(>= (battery) (* (length ?a ?b) {energy}))");
+            let battery_effect = format!("(decrease (battery) (* (length ?a ?b) {energy}))");
             if self.is_timed {
                 let effect = if effect.is_empty() { String::new() } else { format!("(at end {effect})") };
                 return format!(
                     "(:durative-action {name} :parameters (?a ?b - place {parameters}) :duration (= ?duration {price})
-                       :condition (and (at start (and {conditions} {enough})) {})
-                       :effect (and (at start (not (at ?a))) (at end (at ?b)) (at end {uses}) {effect}))\n",
+                       :condition (and (at start (and {conditions} {battery_condition})) {})
+                       :effect (and (at start (not (at ?a))) (at end (at ?b)) (at end {battery_effect}) {effect}))\n",
                     works("(over all ")
                 );
             }
             format!(
                 "(:action {name} :parameters (?a ?b - place {parameters})
-                   :precondition (and {conditions} {} {enough})
-                   :effect (and (not (at ?a)) (at ?b) {uses} (increase (total-cost) {price}) {effect}))\n",
+                   :precondition (and {conditions} {} {battery_condition})
+                   :effect (and (not (at ?a)) (at ?b) {battery_effect} (increase (total-cost) {price}) {effect}))\n",
                 works("")
             )
         };
@@ -227,8 +228,8 @@ impl Robot {
             let _ = write!(init, " (= (battery) {})", situation.battery);
         }
         for ((a, b), (is_narrow, length)) in &situation.ways {
-            let way = if *is_narrow { "narrow" } else { "wide" };
-            let _ = write!(init, " ({way} p{a} p{b}) (= (length p{a} p{b}) {length})");
+            let kind = if *is_narrow { "narrow" } else { "wide" };
+            let _ = write!(init, " ({kind} p{a} p{b}) (= (length p{a} p{b}) {length})");
         }
         for place in &situation.quiet {
             let _ = write!(init, " (quiet p{place})");

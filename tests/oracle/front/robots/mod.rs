@@ -1,8 +1,8 @@
-//! Robots: missions with a knowledge base, in explicit form, in native form with contexts, and with bindings and name maps.
+//! Robots: missions with a knowledge base, in the explicit form, in the native form with contexts, and with bindings and name maps.
 //!
-//! A robot moves over a map with a battery. Moving needs one or two functions; designs differ in slowness, energy and safety, need
-//! components and visibility, and changing one may cost something. The oracle is Dijkstra's algorithm over place, battery and designs at
-//! work, by what the documentation says of plain domains and bindings.
+//! A robot with a battery moves over a map. Moving requires one or two functions. Their designs differ in slowness, energy and safety,
+//! require components and visibility, and a change of design can have a price. The oracle is Dijkstra's algorithm over place, battery
+//! and current designs, written from the documentation of plain domains and bindings.
 
 mod files;
 
@@ -17,22 +17,23 @@ use ontology::ReadOptions;
 use pddl::Source;
 use rules::Limits as StepLimits;
 
-use super::{Known, Sample, whole};
+use super::{Reference, Sample, whole};
 use crate::judge::Mode;
 
-/// Full charge of the battery, and the price of charging.
+/// Charge of a full battery.
 const FULL: i64 = 12;
+/// Price of charging, or its duration.
 const CHARGING: i64 = 5;
 const PLACES: usize = 4;
 
-/// The form that a mission is written in.
+/// Syntactic form of a mission.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Form {
     /// Designs are parameters of actions.
     Explicit,
     /// The domain does not mention designs.
     Native,
-    /// Explicit, with other names for everything.
+    /// Explicit, with other names for types, predicates and functions.
     Renamed,
     /// Native, with other names for functions and actions.
     NativeBound,
@@ -55,35 +56,35 @@ struct Design {
     energy: i64,
     safety: Option<i64>,
     change: i64,
-    /// The component that it needs.
+    /// Required component.
     component: Option<usize>,
-    /// The least visibility that it needs.
+    /// Required least visibility.
     visibility: Option<i64>,
 }
 
-/// What the knowledge base says.
+/// A robot: the content of its knowledge base.
 #[derive(Debug)]
 pub struct Robot {
     form: Form,
     functions: usize,
     designs: Vec<Design>,
-    /// Least safety where the way is narrow.
+    /// Least safety for narrow ways.
     safety: i64,
-    /// Greatest energy of each design at a quiet place.
+    /// Greatest energy of each design at quiet places.
     quiet: Option<i64>,
-    /// Greatest slowness of each design anywhere.
+    /// Greatest slowness of each design at all places.
     quick: Option<i64>,
-    /// Whether changing designs costs something.
+    /// `true` if a change of design has a price.
     reconfiguration: bool,
-    /// Whether moving takes time, which is what is paid.
+    /// `true` if moving takes time; the metric then contains the total time.
     is_timed: bool,
     knowledge: Knowledge,
 }
 
-/// The situation in which a mission begins.
+/// Initial situation of a mission.
 #[derive(Debug)]
 struct Situation {
-    /// By place: kind and length of the ways to other places.
+    /// For each pair of places: `true` for a narrow way, and the length.
     ways: BTreeMap<(usize, usize), (bool, i64)>,
     quiet: BTreeSet<usize>,
     charger: usize,
@@ -126,8 +127,9 @@ impl Robot {
         Self { form, functions, designs, safety, quiet, quick, reconfiguration, is_timed, knowledge }
     }
 
-    /// A mission of the robot in a random situation.
+    /// The robot's mission in a random situation.
     pub fn sample(&self, seed: u64) -> Sample {
+        // The situation must not repeat the random numbers of the robot, so the seed is changed.
         let mut rng = Rng::with_seed(seed ^ 0x0b07);
         let situation = Situation::new(&mut rng);
         let (domain, problem) = self.files(&situation);
@@ -150,7 +152,7 @@ impl Robot {
             mission,
             mode: Mode::Sequential,
             maximize: false,
-            known: Known::All(self.best(&situation).map(whole)),
+            reference: Reference::All(self.best(&situation).map(whole)),
         }
     }
 
@@ -181,8 +183,8 @@ impl Robot {
                 ("charge_left", "measured:watt_hours"),
             ],
         };
-        let own = |(name, query): &(&str, &str)| ((*name).to_owned(), (*query).to_owned());
-        let bindings = Bindings::with(&bound.iter().map(own).collect()).expect("bindings");
+        let owned = |(name, query): &(&str, &str)| ((*name).to_owned(), (*query).to_owned());
+        let bindings = Bindings::with(&bound.iter().map(owned).collect()).expect("bindings");
         if self.form != Form::Renamed {
             return bindings;
         }
@@ -192,40 +194,41 @@ impl Robot {
         bindings.naming(names)
     }
 
-    /// Combinations of designs, one for each function, with which the robot can go from a place over a kind of way.
+    /// Combinations of designs, one per function, with which the robot can leave `from` on a way of the given kind.
     fn configurations(&self, situation: &Situation, from: usize, is_narrow: bool) -> Vec<Vec<usize>> {
-        let suits = |design: &Design| {
-            let works = design.component.is_none_or(|component| !situation.failed.contains(&component));
-            let sees = design.visibility.is_none_or(|least| situation.visibility >= least);
-            // The other function has no designs of which safety is estimated.
+        let is_suitable = |design: &Design| {
+            let has_component =
+                design.component.is_none_or(|component| !situation.failed.contains(&component));
+            let has_visibility = design.visibility.is_none_or(|min| situation.visibility >= min);
+            // Only designs of function 0 have an estimated safety, and only they must be safe.
             let is_safe = !is_narrow
                 || design.function != 0
                 || design.safety.is_some_and(|safety| safety >= self.safety);
             let is_silent =
-                self.quiet.is_none_or(|most| !situation.quiet.contains(&from) || design.energy <= most);
-            let is_quick = self.quick.is_none_or(|most| design.slowness <= most);
-            works && sees && is_safe && is_silent && is_quick
+                self.quiet.is_none_or(|max| !situation.quiet.contains(&from) || design.energy <= max);
+            let is_quick = self.quick.is_none_or(|max| design.slowness <= max);
+            has_component && has_visibility && is_safe && is_silent && is_quick
         };
-        let mut all = vec![Vec::new()];
+        let mut combinations = vec![Vec::new()];
         for function in 0..self.functions {
-            let own = self.designs.iter().enumerate();
-            let own: Vec<usize> = own
-                .filter(|(_, design)| design.function == function && suits(design))
+            let candidates = self.designs.iter().enumerate();
+            let candidates: Vec<usize> = candidates
+                .filter(|(_, design)| design.function == function && is_suitable(design))
                 .map(|(at, _)| at)
                 .collect();
-            all = all
+            combinations = combinations
                 .iter()
-                .flat_map(|begin| own.iter().map(move |at| [&begin[..], &[*at]].concat()))
+                .flat_map(|partial| candidates.iter().map(move |at| [&partial[..], &[*at]].concat()))
                 .collect();
         }
-        all
+        combinations
     }
 
-    /// The least cost of a plan.
+    /// Least cost of a plan.
     fn best(&self, situation: &Situation) -> Option<i64> {
-        /// Place, battery, and the design at work by function.
-        type Place = (usize, i64, Vec<Option<usize>>);
-        let start: Place = (0, situation.battery, vec![None; self.functions]);
+        /// Place, battery, and current design of each function.
+        type Node = (usize, i64, Vec<Option<usize>>);
+        let start: Node = (0, situation.battery, vec![None; self.functions]);
         let mut open = BinaryHeap::from([Reverse((0, start))]);
         let mut closed = BTreeSet::new();
         while let Some(Reverse((cost, state))) = open.pop() {
@@ -247,21 +250,22 @@ impl Robot {
                     let sum = |value: &dyn Fn(&Design) -> i64| -> i64 {
                         configuration.iter().map(|design| value(&self.designs[*design])).sum()
                     };
-                    let left = battery - length * sum(&|design| design.energy);
-                    if left < 0 {
+                    let remaining = battery - length * sum(&|design| design.energy);
+                    if remaining < 0 {
                         continue;
                     }
                     let mut price = length + length * sum(&|design| design.slowness);
                     let mut next = at_work.clone();
+                    // The first design of a function is free; only replacements have a price.
                     if self.reconfiguration {
-                        for (now, design) in next.iter_mut().zip(&configuration) {
-                            if now.is_some_and(|now| now != *design) {
+                        for (current, design) in next.iter_mut().zip(&configuration) {
+                            if current.is_some_and(|current| current != *design) {
                                 price += self.designs[*design].change;
                             }
-                            *now = Some(*design);
+                            *current = Some(*design);
                         }
                     }
-                    open.push(Reverse((cost + price, (*to, left, next))));
+                    open.push(Reverse((cost + price, (*to, remaining, next))));
                 }
             }
         }
