@@ -1,4 +1,4 @@
-//! Answers that come at a limit, and further plans: what is known by then, and nothing more.
+//! Tests of answers at a limit and of further plans: they contain the results known so far, and no false claims.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -24,41 +24,41 @@ fn ward(large: bool) -> Option<tempfile::TempDir> {
 /// Missions with several cheapest plans: directories, and their manifests.
 fn missions() -> Vec<(PathBuf, &'static str)> {
     let ward = ward(false).map(|directory| (directory.keep(), "mission.toml"));
-    let own = ["missions/templates/warehouse/mission.toml", "missions/ugv.toml", "missions/uuv.toml"];
-    own.map(|mission| (root(), mission)).into_iter().chain(ward).collect()
+    let shipped = ["missions/templates/warehouse/mission.toml", "missions/ugv.toml", "missions/uuv.toml"];
+    shipped.map(|mission| (root(), mission)).into_iter().chain(ward).collect()
 }
 
 fn plan(directory: &Path, arguments: &[&str]) -> Value {
-    let all = [&["plan"][..], arguments, &["--format", "json"]].concat();
-    metaplan_in(directory, &all, "").json()
+    let command = [&["plan"][..], arguments, &["--format", "json"]].concat();
+    metaplan_in(directory, &command, "").json()
 }
 
-/// Each further plan is valid, costs as much as the first one, and is another one; there are three, or it is proved that there are fewer.
+/// Each further plan is valid, distinct, and as cheap as the first one. There are three unless fewer are proved to exist.
 #[test]
-fn three_alternatives_come_soon() {
+fn three_alternatives_are_found_within_the_limit() {
     for (directory, mission) in missions() {
         let answer = plan(&directory, &[mission, "--alternatives", "3", "--time-limit", "60"]);
-        let found = &answer["alternatives"];
-        let plans = found["plans"].as_array().unwrap_or_else(|| panic!("{mission}: {answer:#}"));
-        assert!(plans.len() == 3 || found["complete"] == true, "{mission}: {answer:#}");
-        assert!(!found["forced"].is_null(), "{mission}: {answer:#}");
-        let mut seen = vec![answer["steps"].clone()];
+        let alternatives = &answer["alternatives"];
+        let plans = alternatives["plans"].as_array().unwrap_or_else(|| panic!("{mission}: {answer:#}"));
+        assert!(plans.len() == 3 || alternatives["complete"] == true, "{mission}: {answer:#}");
+        assert!(!alternatives["forced"].is_null(), "{mission}: {answer:#}");
+        let mut distinct_plans = vec![answer["steps"].clone()];
         for steps in plans {
             let file = tempfile::NamedTempFile::new().expect("a file");
-            let mut other = answer.clone();
-            other["steps"] = steps.clone();
-            std::fs::write(file.path(), other.to_string()).expect("a file");
+            let mut answer_with_steps = answer.clone();
+            answer_with_steps["steps"] = steps.clone();
+            std::fs::write(file.path(), answer_with_steps.to_string()).expect("a file");
             let file = file.path().display().to_string();
             let verdict =
                 metaplan_in(&directory, &["validate", mission, &file, "--format", "json"], "").json();
             assert_eq!((&verdict["valid"], &verdict["metric"]), (&json!(true), &answer["cost"]), "{mission}");
-            assert!(!seen.contains(steps), "{mission}: a plan is listed twice");
-            seen.push(steps.clone());
+            assert!(!distinct_plans.contains(steps), "{mission}: a plan is listed twice");
+            distinct_plans.push(steps.clone());
         }
     }
 }
 
-/// The sequential plan with gaps is a plan whose actions could overlap: none that is found may cost more.
+/// The sequential plan, with gaps, is also a concurrent plan. So a concurrent plan must not cost more.
 #[test]
 fn overlapping_plans_cost_no_more_than_the_sequential_one() {
     for (directory, mission) in missions() {
@@ -76,7 +76,7 @@ fn overlapping_plans_cost_no_more_than_the_sequential_one() {
 }
 
 #[test]
-fn explanations_say_why_before_they_plan() {
+fn reasons_are_explained_before_planning() {
     let Some(directory) = ward(true) else { return };
     let query = ["explain", "mission.toml", "fd_uv", "--fail", "c_uv_lamp", "--time-limit", "2"];
     let outcome = metaplan_in(directory.path(), &query, "");
@@ -91,7 +91,7 @@ fn explanations_say_why_before_they_plan() {
 
 #[cfg(unix)]
 #[test]
-fn explanations_end_with_what_they_have_on_a_signal() {
+fn partial_explanations_are_printed_on_a_signal() {
     let Some(directory) = ward(true) else { return };
     let mut child = Command::new(env!("CARGO_BIN_EXE_metaplan"))
         .args(["explain", "mission.toml", "fd_uv", "--fail", "c_uv_lamp"])
@@ -100,6 +100,7 @@ fn explanations_end_with_what_they_have_on_a_signal() {
         .stderr(Stdio::null())
         .spawn()
         .expect("the program starts");
+    // Long enough for the reasons, which come first, but not for planning.
     std::thread::sleep(Duration::from_secs(3));
     Command::new("kill").args(["-TERM", &child.id().to_string()]).status().expect("kill");
     let status = child.wait().expect("it ends");
@@ -110,16 +111,16 @@ fn explanations_end_with_what_they_have_on_a_signal() {
     assert!(text.contains("limit was reached"), "{text}");
 }
 
-/// A front that was cut short has the points that were found, and says that there may be others.
+/// An incomplete front contains the points found so far and is not reported as optimal.
 #[test]
-fn a_front_at_a_limit_has_the_points_that_were_found() {
+fn fronts_at_a_limit_have_the_points_found_so_far() {
     let Some(directory) = ward(true) else { return };
     let front = ["mission.toml", "--pareto", "(total-time),(waited)", "--time-limit", "2"];
     let answer = plan(directory.path(), &front);
     assert!(answer["status"] != "optimal" && answer["points"].is_array(), "{answer:#}");
 }
 
-/// Commands that have nothing to show before their end report that at the time limit.
+/// Commands without partial results report the time limit as an error.
 #[test]
 fn every_command_that_may_take_long_has_a_time_limit() {
     let ugv = "ontology/kb/ugv.ttl";

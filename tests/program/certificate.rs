@@ -1,4 +1,4 @@
-//! `metaplan plan --certificate` and `metaplan verify`.
+//! Tests of `metaplan plan --certificate` and `metaplan verify`.
 
 use std::path::Path;
 
@@ -6,11 +6,11 @@ use serde_json::{Value, json};
 
 use crate::common::{Outcome, metaplan, metaplan_in, root, verify_in};
 
-/// The directory of a fresh certificate.
+/// Writes a certificate and returns its directory.
 pub fn certificate(directory: &Path, arguments: &[&str]) -> String {
     let target = directory.join("certificate").display().to_string();
-    let all: Vec<&str> = arguments.iter().copied().chain(["--certificate", &target]).collect();
-    let outcome = metaplan(&all);
+    let plan_arguments: Vec<&str> = arguments.iter().copied().chain(["--certificate", &target]).collect();
+    let outcome = metaplan(&plan_arguments);
     assert!(Path::new(&target).is_dir(), "{outcome:#?}");
     target
 }
@@ -38,7 +38,7 @@ fn missions_have_certificates() {
 }
 
 #[test]
-fn that_there_is_no_plan_has_a_certificate() {
+fn unsolvability_has_a_certificate() {
     let directory = tempfile::tempdir().expect("a directory");
     let domain = "(define (domain d) (:predicates (at ?p) (way ?a ?b) (key))
       (:action go :parameters (?a ?b) :precondition (and (at ?a) (way ?a ?b)) :effect (and (at ?b) (not (at ?a))))
@@ -49,7 +49,7 @@ fn that_there_is_no_plan_has_a_certificate() {
         )
     };
     std::fs::write(directory.path().join("d.pddl"), domain).expect("a file");
-    // Out of reach even if nothing is ever deleted, and reachable only so.
+    // The first goal is unreachable even in the delete relaxation, the second one only with deletions.
     for (name, goal) in [("relaxed", "(at c)"), ("searched", "(and (at a) (at b))")] {
         std::fs::write(directory.path().join("p.pddl"), problem(goal)).expect("a file");
         let arguments = ["plan", "d.pddl", "p.pddl", "--certificate", name];
@@ -61,7 +61,7 @@ fn that_there_is_no_plan_has_a_certificate() {
 }
 
 #[test]
-fn a_verification_has_its_fields() {
+fn verification_json_has_the_documented_fields() {
     let directory = tempfile::tempdir().expect("a directory");
     let target = certificate(directory.path(), &["plan", "missions/ugv.toml"]);
     let answer = verify_in(&root(), &[&target, "--format", "json"]).json();
@@ -77,35 +77,35 @@ fn a_verification_has_its_fields() {
 }
 
 #[test]
-fn the_argument_is_written_for_other_checkers() {
+fn argument_is_exported_as_smt_lib() {
     let directory = tempfile::tempdir().expect("a directory");
     let target = certificate(directory.path(), &["plan", "missions/ugv.toml"]);
     let file = directory.path().join("argument.smt2").display().to_string();
     assert_eq!(verify_in(&root(), &[&target, "--smt", &file]).status, 0);
     let text = std::fs::read_to_string(file).expect("a file");
-    // One question for the initial state, one for goal states, and one for each of the 22 operators.
+    // One query for the initial state, one for goal states, and one for each of the 22 operators.
     assert_eq!(text.matches("(check-sat)").count(), 24, "{text}");
 }
 
-/// Changes a file of a certificate, and has the manifest say what the file is now.
+/// Edits a file of a certificate and updates its size and hash in the manifest.
 pub fn change(certificate: &str, name: &str, edit: &dyn Fn(String) -> String) {
     use sha2::{Digest as _, Sha256};
     let path = Path::new(certificate).join(name);
     let text = edit(std::fs::read_to_string(&path).expect("a file"));
     let manifest = Path::new(certificate).join("manifest.json");
-    let mut listed: Value =
+    let mut document: Value =
         serde_json::from_str(&std::fs::read_to_string(&manifest).expect("a manifest")).expect("JSON");
-    for file in listed["files"].as_array_mut().expect("files") {
+    for file in document["files"].as_array_mut().expect("files") {
         if file["name"] == name {
             file["bytes"] = json!(text.len());
             file["sha256"] = json!(format!("{:x}", Sha256::digest(text.as_bytes())));
         }
     }
     std::fs::write(path, text).expect("a file");
-    std::fs::write(manifest, listed.to_string()).expect("a manifest");
+    std::fs::write(manifest, document.to_string()).expect("a manifest");
 }
 
-/// A short text that would be a long one once its entities have been put in.
+/// A short XML text that expands to 10^12 characters ("billion laughs").
 fn bomb() -> String {
     let entity = |level: u32| format!("<!ENTITY a{} \"{}\">", level + 1, format!("&a{level};").repeat(10));
     let entities: String = (0..11).map(entity).collect();
@@ -117,7 +117,7 @@ fn bomb() -> String {
 }
 
 #[test]
-fn what_is_changed_is_rejected_with_the_first_thing_that_is_wrong() {
+fn modified_certificates_are_rejected_with_the_first_error() {
     type Edit = fn(String) -> String;
     let cases: [(&str, Edit, &str); 22] = [
         (
@@ -157,7 +157,7 @@ fn what_is_changed_is_rejected_with_the_first_thing_that_is_wrong() {
             "plan        failed",
         ),
         ("problem.pddl", |text| text.replace("(fd_available fd_amcl_kinect)", ""), "plan        failed"),
-        // A task that allows more stands for the files still, but the argument does not hold for it.
+        // A relaxed task still agrees with the PDDL files, but the argument does not hold for it.
         ("task.json", |text| text.replacen("\"constant\":", "\"constant\":1", 1), "argument    failed"),
         (
             "task.json",
@@ -200,9 +200,11 @@ fn what_is_changed_is_rejected_with_the_first_thing_that_is_wrong() {
     ];
     for (file, edit, expected) in cases {
         let directory = tempfile::tempdir().expect("a directory");
-        // The formula of the mission as it is is refuted by unit propagation alone.
-        let changed = ["plan", "missions/ugv.toml", "--fail", "c_kinect", "--set", "robot_at=wp2"];
-        let arguments = if file == "proof.drat" { &changed[..] } else { &changed[..2] };
+        // The formula of the unchanged mission is refuted by unit propagation alone, so its proof is too short to be modified.
+        let situation_arguments =
+            ["plan", "missions/ugv.toml", "--fail", "c_kinect", "--set", "robot_at=wp2"];
+        let arguments =
+            if file == "proof.drat" { &situation_arguments[..] } else { &situation_arguments[..2] };
         let target = certificate(directory.path(), arguments);
         change(&target, file, &edit);
         let outcome = verify(&target);
@@ -213,7 +215,7 @@ fn what_is_changed_is_rejected_with_the_first_thing_that_is_wrong() {
 }
 
 #[test]
-fn certificates_that_are_none_are_rejected() {
+fn malformed_certificates_are_rejected() {
     let check = |edit: &dyn Fn(&Path), expected: &str| {
         let directory = tempfile::tempdir().expect("a directory");
         let target = certificate(directory.path(), &["plan", "missions/ugv.toml"]);
@@ -249,7 +251,7 @@ fn certificates_that_are_none_are_rejected() {
         &|directory| std::fs::remove_file(directory.join("legend.txt")).expect("a file"),
         "legend.txt: cannot be read",
     );
-    // A file of many gigabytes that takes no room, as an unpacked archive may have it.
+    // A sparse file of 1 TiB, as an archive could contain.
     check(
         &|directory| {
             let file = std::fs::File::create(directory.join("proof.drat")).expect("a file");
@@ -292,12 +294,12 @@ fn certificates_that_are_none_are_rejected() {
     );
     #[cfg(unix)]
     for name in ["manifest.json", "task.json", "proof.drat", "hints.txt"] {
-        // Nobody writes into the pipe: who opens it waits for ever.
+        // A named pipe without a writer: opening it would block forever.
         let pipe = |directory: &Path| {
             let file = directory.join(name);
             std::fs::remove_file(&file).expect("a file");
-            let made = std::process::Command::new("mkfifo").arg(file).status().expect("mkfifo runs");
-            assert!(made.success());
+            let status = std::process::Command::new("mkfifo").arg(file).status().expect("mkfifo runs");
+            assert!(status.success());
         };
         check(&pipe, &format!("{name}: is not a plain file"));
     }
@@ -312,11 +314,11 @@ fn certificates_that_are_none_are_rejected() {
     );
 }
 
-/// Needs `rate`, a checker of DRAT proofs by others, named by `METAPLAN_RATE`: `cargo install rate --version 0.3.0 --root rate`,
-/// then `METAPLAN_RATE=rate/bin/rate`.
+/// Needs `rate`, an independent checker of DRAT proofs, at the path `METAPLAN_RATE`. Install it with
+/// `cargo install rate --version 0.3.0 --root rate` and set `METAPLAN_RATE=rate/bin/rate`.
 #[test]
 #[ignore = "needs a proof checker"]
-fn an_outside_checker_accepts_the_proofs() {
+fn external_checker_accepts_the_proofs() {
     let Ok(checker) = std::env::var("METAPLAN_RATE") else { panic!("METAPLAN_RATE names no checker") };
     let accepts = |certificate: &str| {
         let files = ["formula.cnf", "proof.drat"].map(|name| format!("{certificate}/{name}"));
@@ -327,13 +329,13 @@ fn an_outside_checker_accepts_the_proofs() {
         let directory = tempfile::tempdir().expect("a directory");
         let target = certificate(directory.path(), mission);
         assert!(accepts(&target), "{mission:?}");
-        // Without the claim, the formula has a model, and the proof is none.
+        // Without the clauses of the claim, the formula is satisfiable, so the proof must be rejected.
         let formula = Path::new(&target).join("formula.cnf");
         let text = std::fs::read_to_string(&formula).expect("a formula");
-        let half: Vec<&str> = text.lines().take(text.lines().count() / 2).collect();
-        let head = half[0].rsplit_once(' ').expect("a header").0;
-        let half = format!("{head} {}\n{}\n", half.len() - 1, half[1..].join("\n"));
-        std::fs::write(&formula, half).expect("a file");
+        let first_half: Vec<&str> = text.lines().take(text.lines().count() / 2).collect();
+        let head = first_half[0].rsplit_once(' ').expect("a header").0;
+        let first_half = format!("{head} {}\n{}\n", first_half.len() - 1, first_half[1..].join("\n"));
+        std::fs::write(&formula, first_half).expect("a file");
         assert!(!accepts(&target), "{mission:?}");
     }
 }
@@ -346,9 +348,9 @@ pub const MISSIONS: [&[&str]; 5] = [
     &["plan", "missions/ugv.toml", "--fail", "c_kinect", "--set", "robot_at=wp2"],
 ];
 
-/// A claim by another measure than the files' own is none about the files.
+/// A claim about another metric than the one of the files must be rejected.
 #[test]
-fn plans_are_measured_as_the_files_have_it() {
+fn claims_must_use_the_metric_of_the_files() {
     let directory = tempfile::tempdir().expect("a directory");
     let domain = "(define (domain d) (:predicates (at ?p) (way ?a ?b))
       (:action go :parameters (?a ?b) :precondition (and (at ?a) (way ?a ?b)) :effect (and (at ?b) (not (at ?a)))))";
@@ -361,14 +363,14 @@ fn plans_are_measured_as_the_files_have_it() {
     let target = directory.path().join("proof").display().to_string();
     let manifest = directory.path().join("proof/manifest.json");
     let text = std::fs::read_to_string(&manifest).expect("a manifest");
-    let mut listed: Value = serde_json::from_str(&text).expect("JSON");
-    listed["files"].as_array_mut().expect("files").retain(|file| {
+    let mut document: Value = serde_json::from_str(&text).expect("JSON");
+    document["files"].as_array_mut().expect("files").retain(|file| {
         ["formula.cnf", "legend.txt", "proof.drat", "hints.txt"].iter().all(|name| file["name"] != *name)
     });
-    listed["refutation"] = json!({ "none": "taken away" });
-    std::fs::write(&manifest, listed.to_string()).expect("a manifest");
+    document["refutation"] = json!({ "none": "taken away" });
+    std::fs::write(&manifest, document.to_string()).expect("a manifest");
     assert_eq!(verify(&target).status, 0);
-    // None of the actions takes time, so that by time the longer way is as good.
+    // No action has a duration, so the longer path is as good if total time is the metric.
     change(&target, "plan.txt", &|_| "(go a b)\n(go b c)\n".to_owned());
     change(&target, "task.json", &|text| {
         text.replace("\"cost\":{\"constant\":1}", "\"cost\":{\"constant\":0}")
@@ -379,13 +381,13 @@ fn plans_are_measured_as_the_files_have_it() {
     std::fs::write(&manifest, text.replace("\"metric\":\"1\"", "\"metric\":\"0\"")).expect("a manifest");
     let outcome = verify(&target);
     assert_eq!(outcome.status, 30, "{outcome:#?}");
-    // A task in which actions cost less bounds the files' own from below; but no plan of the files costs so little.
+    // A task with lower costs still yields valid lower bounds, but no plan of the files attains this cost.
     assert!(outcome.stdout.contains("plan        failed: its metric is 2"), "{outcome:#?}");
 }
 
-/// A certificate may ask for more than anybody can wait for.
+/// A certificate can describe an arbitrarily large task. Limits bound the work of the checker.
 #[test]
-fn a_verification_comes_to_an_end() {
+fn verification_of_a_huge_task_terminates() {
     let directory = tempfile::tempdir().expect("a directory");
     let objects: Vec<String> = (0..200).map(|number| format!("o{number}")).collect();
     let problem = format!(
@@ -412,9 +414,9 @@ fn a_verification_comes_to_an_end() {
     assert!(outcome.stdout.contains("ends at 400000 instances of wait"), "{outcome:#?}");
 }
 
-/// What is not compared gets no certificate, and the message says what it is.
+/// A task with a feature that the checker does not cover gets no certificate, and the message names the feature.
 #[test]
-fn what_cannot_be_compared_gets_no_certificate() {
+fn unsupported_features_get_no_certificate() {
     let directory = tempfile::tempdir().expect("a directory");
     let domain = "(define (domain d) (:predicates (p) (q) (r)) (:functions (p) (total-cost))
       (:derived (r) (not (p)))
@@ -429,16 +431,17 @@ fn what_cannot_be_compared_gets_no_certificate() {
     assert!(!directory.path().join("c").exists());
 }
 
-/// A start effect under a condition that contradicts another one takes that case away, and nothing else. A grounder that
-/// loses the whole action gets no certificate.
+/// A conflict between a conditional and an unconditional start effect rules out only the case in which the condition holds. If the
+/// grounder lost the whole action, no certificate could be written.
 #[test]
 fn a_lost_action_is_never_certified() {
     let action = "(:durative-action a :parameters () :duration (= ?duration 2) :condition (and)
       :effect (and (at start (q)) (at start (p)) (at start (increase (f) 5)) (at start (when (p) (assign (f) 0)))))";
-    let dear = "(:durative-action dear :parameters () :duration (= ?duration 100) :condition (and) :effect (at end (q)))";
-    for more in ["", dear] {
+    let costly_action = "(:durative-action dear :parameters () :duration (= ?duration 100) :condition (and) :effect (at end (q)))";
+    for alternative in ["", costly_action] {
         let directory = tempfile::tempdir().expect("a directory");
-        let domain = format!("(define (domain d) (:predicates (p) (q)) (:functions (f)) {action} {more})");
+        let domain =
+            format!("(define (domain d) (:predicates (p) (q)) (:functions (f)) {action} {alternative})");
         let problem = "(define (problem p) (:domain d) (:init (= (f) 2)) (:goal (q)))";
         std::fs::write(directory.path().join("d.pddl"), domain).expect("a file");
         std::fs::write(directory.path().join("p.pddl"), problem).expect("a file");

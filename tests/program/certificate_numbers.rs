@@ -1,9 +1,9 @@
-//! Certificates of plans found in fractions, and of formulas that say one thing twice.
+//! Certificates of plans that are computed in fractions, and of formulas with duplicate literals.
 
 use crate::certificate::change;
 use crate::common::{metaplan_in, verify_in};
 
-/// Numbers whose products fit no machine integer, and one that halves: planned in fractions.
+/// Products that exceed all machine integers and a scaling effect force the planner to compute in fractions.
 #[test]
 fn plans_found_in_fractions_have_certificates() {
     let directory = tempfile::tempdir().expect("a directory");
@@ -40,21 +40,21 @@ fn plans_found_in_fractions_have_certificates() {
         assert_eq!(planned.status, 0, "{planned:#?}");
         let outcome = verify_in(directory.path(), &[name]);
         assert_eq!(outcome.status, 0, "{outcome:#?}");
-        // What no machine integer holds is told apart to the last digit.
+        // A change of the last digit must be detected, even in numbers that exceed all machine integers.
         let target = directory.path().join(name).display().to_string();
         change(&target, "task.json", &|text| {
-            let mut numbers = text.split(|own: char| !own.is_ascii_digit());
-            let long = numbers.find(|digits| digits.len() > 39).expect("a long number");
-            let last = if long.ends_with('5') { "6" } else { "5" };
-            text.replacen(long, &format!("{}{last}", &long[..long.len() - 1]), 1)
+            let mut numbers = text.split(|character: char| !character.is_ascii_digit());
+            let long_number = numbers.find(|digits| digits.len() > 39).expect("a long number");
+            let last_digit = if long_number.ends_with('5') { "6" } else { "5" };
+            text.replacen(long_number, &format!("{}{last_digit}", &long_number[..long.len() - 1]), 1)
         });
         assert_eq!(verify_in(directory.path(), &[name]).status, 30);
     }
 }
 
-/// A goal that says one thing twice makes a clause with a literal twice.
+/// A goal with two equal disjuncts yields a clause with a duplicate literal.
 #[test]
-fn what_is_said_twice_is_proved_once() {
+fn duplicate_literals_are_certified() {
     let directory = tempfile::tempdir().expect("a directory");
     let domain = "(define (domain d) (:predicates (p) (seen ?a))
       (:derived (seen ?a) (p))
@@ -70,9 +70,9 @@ fn what_is_said_twice_is_proved_once() {
     assert_eq!(outcome.status, 0, "{outcome:#?}");
 }
 
-/// A start that is off by less than the tolerance is put off, and judged where it then is.
+/// A start that is too early by less than the tolerance is moved to the permitted time, and the plan is judged there.
 #[test]
-fn the_tolerance_moves_no_plan_into_a_window() {
+fn tolerance_does_not_move_plans_into_a_window() {
     let directory = tempfile::tempdir().expect("a directory");
     let domain = "(define (domain d) (:requirements :durative-actions :timed-initial-literals :fluents)
       (:predicates (ready) (open) (over)) (:functions (total-cost))
@@ -95,7 +95,7 @@ fn the_tolerance_moves_no_plan_into_a_window() {
             &["6.9995", "7.000", "9.0005", "9.001"][..],
             &["7.001", "8.500"][..],
         ),
-        // Nothing but `prepare` may end before 5, and from then on the way is closed.
+        // Only `prepare` can end before 5, and from 5 on the way is closed.
         ("(open) (at 4.9998 (not (open)))", &["4.9995", "4.9998", "5.000"], &[]),
         ("(open) (at 5.5 (not (open)))", &["4.9985", "5.5005"], &["4.9995", "5.000", "5.200"]),
     ];

@@ -1,4 +1,4 @@
-//! `metaplan check`: what is refused, and policies in files.
+//! Tests of `metaplan check`: refused inputs, and policies in files.
 
 use std::path::Path;
 
@@ -9,9 +9,9 @@ const MODEL: &str =
     "mdp\nmodule m\n  s:[0..2] init 0;\n  [a] s=0 -> PROBABILITIES;\nendmodule\nlabel \"goal\" = s=1;\n";
 
 #[test]
-fn bad_models_and_properties_are_refused_with_their_place() {
+fn invalid_models_and_properties_are_refused_with_their_position() {
     let good = "0.5:(s'=1) + 0.5:(s'=2)";
-    // What the updates say, the property; status, and what is said.
+    // Updates, property, exit status, and a part of the output.
     let cases = [
         (good, "Pmax=? [ F \"goal\" ]", 0, "0.5"),
         ("0.5:(s'=1) + 0.4:(s'=2)", "Pmax=? [ F \"goal\" ]", 3, "<stdin>:4:3: error[Q301]"),
@@ -22,14 +22,14 @@ fn bad_models_and_properties_are_refused_with_their_place() {
         (good, "S=? [ \"goal\" ]", 3, "property:1:1: error[Q403]"),
         (good, "R{\"time\"}min=? [ F \"goal\" ]", 3, "error[Q202]"),
     ];
-    for (updates, property, status, said) in cases {
+    for (updates, property, status, expected) in cases {
         let model = MODEL.replace("PROBABILITIES", updates);
         let outcome = metaplan_in(&root(), &["check", "-", property], &model);
-        let all = format!("{}{}", outcome.stdout, headlines(&outcome.stderr));
-        // Standard input goes by the name that was given for it.
-        let all = all.replace("-:", "<stdin>:");
+        let output = format!("{}{}", outcome.stdout, headlines(&outcome.stderr));
+        // Standard input is reported under the name of the argument, `-`.
+        let output = output.replace("-:", "<stdin>:");
         assert_eq!(outcome.status, status, "{updates} {property}: {outcome:#?}");
-        assert!(all.contains(said), "{said} in {all}");
+        assert!(output.contains(expected), "{expected} in {output}");
     }
     let limited = metaplan_in(
         &root(),
@@ -44,7 +44,7 @@ fn bad_models_and_properties_are_refused_with_their_place() {
 }
 
 #[test]
-fn a_policy_is_written_and_evaluated() {
+fn policies_are_written_and_evaluated() {
     let Some(folder) = shared("reference/prism_cases") else { return };
     let model = folder.join("c12_det_plan_vs_policy.prism");
     let directory = tempfile::tempdir().expect("a directory");
@@ -52,10 +52,10 @@ fn a_policy_is_written_and_evaluated() {
     let (model, policy): (&Path, &Path) = (&model, &policy);
     let (model, policy) = (model.to_str().expect("UTF-8"), policy.to_str().expect("UTF-8"));
     let question = "R{\"time\"}min=? [ F \"goal\" ]";
-    let open = metaplan(&["check", model, question, "--const", "FIXED=false", "--policy", policy]);
-    assert_eq!((open.status, open.stdout.as_str()), (0, "3\n"), "{open:#?}");
-    let again = metaplan(&["check", model, question, "--const", "FIXED=false", "--evaluate", policy]);
-    assert_eq!((again.status, again.stdout.as_str()), (0, "3\n"), "{again:#?}");
+    let computed = metaplan(&["check", model, question, "--const", "FIXED=false", "--policy", policy]);
+    assert_eq!((computed.status, computed.stdout.as_str()), (0, "3\n"), "{computed:#?}");
+    let evaluated = metaplan(&["check", model, question, "--const", "FIXED=false", "--evaluate", policy]);
+    assert_eq!((evaluated.status, evaluated.stdout.as_str()), (0, "3\n"), "{evaluated:#?}");
     let fixed = metaplan(&["check", model, question, "--const", "FIXED=true", "--evaluate", policy]);
     assert_eq!(fixed.status, 3, "the policy is about another model: {fixed:#?}");
 }

@@ -1,8 +1,8 @@
-//! Exit statuses and messages of the command line.
+//! Tests of exit statuses and messages of the command line.
 
 use crate::common::{Outcome, copy_of_mission, edit, metaplan, metaplan_in, root};
 
-/// Checks the exit status and that the messages (or the answer) contain each text; no fault is ever reported.
+/// Checks the exit status, and that standard error or output contains each text. Internal errors (panic, M170) always fail.
 fn check(outcome: &Outcome, status: i32, texts: &[&str]) {
     assert_eq!(outcome.status, status, "{outcome:#?}");
     for text in texts {
@@ -24,13 +24,14 @@ const PROBLEM: &str = "(define (problem p) (:domain d)
   (:init (at a) (way a b) (way b c))
   (:goal (at c)))";
 
-/// Plans with a domain and a problem in a directory of their own.
+/// Plans with a domain and a problem in a temporary directory.
 fn plan(domain: &str, problem: &str, arguments: &[&str]) -> Outcome {
     let directory = tempfile::tempdir().expect("a temporary directory");
     std::fs::write(directory.path().join("domain.pddl"), domain).expect("a file");
     std::fs::write(directory.path().join("problem.pddl"), problem).expect("a file");
-    let all: Vec<&str> = ["plan", "domain.pddl", "problem.pddl"].iter().chain(arguments).copied().collect();
-    metaplan_in(directory.path(), &all, "")
+    let plan_arguments: Vec<&str> =
+        ["plan", "domain.pddl", "problem.pddl"].iter().chain(arguments).copied().collect();
+    metaplan_in(directory.path(), &plan_arguments, "")
 }
 
 #[test]
@@ -44,7 +45,7 @@ fn plans_without_a_knowledge_base() {
 }
 
 #[test]
-fn an_answer_goes_to_a_file_as_a_whole() {
+fn answers_are_written_to_files() {
     let directory = copy_of_mission("ugv");
     let arguments = ["plan", "missions/ugv.toml", "--format", "json", "-o", "plan.json"];
     check(&metaplan_in(directory.path(), &arguments, ""), 0, &[]);
@@ -55,7 +56,7 @@ fn an_answer_goes_to_a_file_as_a_whole() {
 }
 
 #[test]
-fn limits_have_statuses_of_their_own() {
+fn limits_have_their_own_exit_status() {
     check(&plan(DOMAIN, PROBLEM, &["--horizon", "1"]), 11, &["no plan with up to 1 step, proved"]);
     check(&plan(DOMAIN, PROBLEM, &["--horizon", "2"]), 0, &["optimal, proved"]);
     let outcome = plan(DOMAIN, PROBLEM, &["--horizon", "1", "--format", "json"]);
@@ -65,18 +66,18 @@ fn limits_have_statuses_of_their_own() {
 }
 
 #[test]
-fn a_task_without_a_plan_is_said_to_have_none() {
+fn unsolvable_tasks_are_reported() {
     let unreachable = PROBLEM.replace("(way b c)", "");
     check(&plan(DOMAIN, &unreachable, &[]), 10, &["no plan exists, proved", "(at c)"]);
-    // One cannot be at two places; no relaxation of single facts sees it.
-    let both = PROBLEM.replace("(at c)", "(and (at b) (at c))");
-    check(&plan(DOMAIN, &both, &[]), 10, &["no plan exists, proved"]);
+    // The two atoms are mutually exclusive, which the delete relaxation does not detect.
+    let exclusive = PROBLEM.replace("(at c)", "(and (at b) (at c))");
+    check(&plan(DOMAIN, &exclusive, &[]), 10, &["no plan exists, proved"]);
     let empty = PROBLEM.replace("(at c)", "(at a)");
     check(&plan(DOMAIN, &empty, &[]), 0, &["cost 0", "optimal, proved"]);
 }
 
 #[test]
-fn bad_pddl_is_reported_with_its_place() {
+fn pddl_errors_are_reported_with_their_position() {
     check(
         &plan(&DOMAIN.replace("(way ?a ?b))", "(waay ?a ?b))"), PROBLEM, &[]),
         3,
@@ -85,9 +86,9 @@ fn bad_pddl_is_reported_with_its_place() {
     check(&plan(&DOMAIN[..DOMAIN.len() - 1], PROBLEM, &[]), 3, &["domain.pddl:1:1"]);
     check(&plan(DOMAIN, &PROBLEM.replace("way b c", "way b d"), &[]), 3, &["problem.pddl:3:"]);
     check(&plan(DOMAIN, "", &[]), 3, &["problem.pddl"]);
-    // All problems at once, also as JSON.
-    let twice = PROBLEM.replace("(at a)", "(on a)").replace("(way a b)", "(rail a b)");
-    let outcome = plan(DOMAIN, &twice, &["--format", "json"]);
+    // Several errors are reported together, also as JSON.
+    let two_errors = PROBLEM.replace("(at a)", "(on a)").replace("(way a b)", "(rail a b)");
+    let outcome = plan(DOMAIN, &two_errors, &["--format", "json"]);
     check(&outcome, 3, &[]);
     let answer = outcome.json();
     assert_eq!(answer["format"], "metaplan-error/1");
@@ -97,7 +98,7 @@ fn bad_pddl_is_reported_with_its_place() {
 }
 
 #[test]
-fn what_the_planner_does_not_handle_is_refused_with_its_place() {
+fn unsupported_features_are_refused_with_their_position() {
     let counting = DOMAIN
         .replace("(:action", "(:functions (used)) (:action")
         .replace("(at ?b))", "(at ?b) (increase (used) 1))");
@@ -117,14 +118,14 @@ fn what_the_planner_does_not_handle_is_refused_with_its_place() {
 }
 
 #[test]
-fn what_happens_by_itself_is_waited_for() {
+fn timed_initial_literals_are_waited_for() {
     let timed = PROBLEM.replace("(way b c)", "(at 5 (way b c))");
     let outcome = plan(DOMAIN, &timed, &["--plan-format", "ipc"]);
     assert_eq!(outcome.stdout, "0.000: (go a b)  [0.000]\n5.001: (go b c)  [0.000]\n");
 }
 
 #[test]
-fn objectives_take_the_place_of_the_metric() {
+fn objectives_replace_the_metric() {
     let domain = DOMAIN
         .replace("(:action", "(:functions (toll ?a ?b) (used) (distance)) (:action")
         .replace("(at ?b))", "(at ?b) (increase (used) (toll ?a ?b)) (increase (distance) 1))");
@@ -160,7 +161,7 @@ fn missing_and_malformed_files_are_reported() {
 }
 
 #[test]
-fn arguments_that_fit_nothing_are_a_usage_error() {
+fn invalid_arguments_are_usage_errors() {
     check(&metaplan(&["plan"]), 2, &["Usage"]);
     check(&metaplan(&["plan", "missions/ugv.toml", "--fail", "c_kinekt"]), 2, &["c_kinekt", "c_kinect"]);
     check(
@@ -185,14 +186,14 @@ fn arguments_that_fit_nothing_are_a_usage_error() {
 }
 
 #[test]
-fn objects_from_settings_are_not_blamed_on_the_file() {
+fn errors_in_settings_do_not_name_a_file() {
     let outcome = metaplan(&["plan", "missions/ugv.toml", "--set", "robot_at=wp99"]);
     check(&outcome, 3, &["wp99", "from a setting"]);
     assert!(!outcome.stderr.contains("problem.pddl"), "{outcome:#?}");
 }
 
 #[test]
-fn messages_for_programs_have_their_place_in_fields() {
+fn json_messages_have_file_and_line_fields() {
     let mission = copy_of_mission("ugv");
     edit(mission.path(), "ontology/kb/ugv.ttl", "a owl:Ontology ;", "a owl:Ontology ; ; oops");
     let answer =
@@ -211,7 +212,7 @@ fn messages_for_programs_have_their_place_in_fields() {
 }
 
 #[test]
-fn formats_for_other_tools_say_on_standard_error_that_there_is_no_plan() {
+fn plan_formats_report_unsolvability_on_standard_error() {
     let outcome =
         metaplan(&["plan", "missions/uuv.toml", "--set", "water_visibility=1", "--plan-format", "ipc"]);
     assert_eq!((outcome.status, outcome.stdout.as_str()), (10, ""));
@@ -233,7 +234,7 @@ fn an_answer_that_cannot_be_written_is_an_error() {
 }
 
 #[test]
-fn a_manifest_may_come_from_standard_input() {
+fn manifests_can_come_from_standard_input() {
     let manifest =
         std::fs::read_to_string(root().join("missions/ugv.toml")).expect("the manifest").replace("../", "");
     check(&metaplan_in(&root(), &["plan", "-", "--scenario", "kinect_failure"], &manifest), 0, &["cost 412"]);
@@ -248,7 +249,7 @@ fn a_manifest_may_come_from_standard_input() {
 }
 
 #[test]
-fn contradictory_knowledge_is_not_planned_with() {
+fn inconsistent_knowledge_is_refused() {
     let mission = copy_of_mission("ugv");
     let old = ":fd_amcl_lidar a owl:NamedIndividual , t:FunctionDesign ;";
     edit(
@@ -281,7 +282,7 @@ fn invalid_plans_are_refused_with_the_reason() {
     check(&validate("(fly a c)\n"), 30, &["fly"]);
     check(&validate("go a b\n)("), 3, &[":1:"]);
     check(&validate("{\"format\": 1"), 3, &["not JSON"]);
-    // A mission's plan after the world has changed.
+    // A plan becomes invalid if a component fails after planning.
     let plan = metaplan(&["plan", "missions/ugv.toml", "--format", "json"]).stdout;
     let arguments = ["validate", "missions/ugv.toml", "-", "--fail", "c_kinect"];
     check(&metaplan_in(&root(), &arguments, &plan), 30, &["invalid", "fd_available fd_amcl_kinect"]);
@@ -295,7 +296,7 @@ fn reads_standard_input() {
 }
 
 #[test]
-fn a_bounded_reading_stands_in_for_a_metric_without_a_best_value() {
+fn metrics_without_a_best_value_get_a_bounded_reading() {
     let domain = "(define (domain d) (:requirements :fluents) (:predicates (p)) (:functions (profit))
       (:action earn :parameters () :precondition () :effect (and (p) (increase (profit) 3)))
       (:action waste :parameters () :precondition () :effect (and (p) (increase (profit) 1))))";
@@ -313,7 +314,7 @@ fn a_bounded_reading_stands_in_for_a_metric_without_a_best_value() {
 }
 
 #[test]
-fn numbers_of_any_size_are_planned_with() {
+fn numbers_of_any_size_are_supported() {
     let domain = "(define (domain d) (:requirements :fluents) (:predicates (p)) (:functions (total-cost) (big) (level))
       (:action dear :parameters () :precondition (<= (level) 1)
         :effect (and (p) (increase (total-cost) (* (big) (big)))))
@@ -326,7 +327,7 @@ fn numbers_of_any_size_are_planned_with() {
         outcome.stdout.contains("cost 340282366920938463463374607431768211456.2: optimal"),
         "{outcome:?}"
     );
-    // What rests on formulas is refused or warned of.
+    // Options that need SAT formulas are refused.
     let directory = tempfile::tempdir().expect("a directory");
     let certificate = directory.path().join("certificate").display().to_string();
     check(&plan(domain, problem, &["--certificate", &certificate]), 3, &["M120", "multiplied by fractions"]);
@@ -334,7 +335,7 @@ fn numbers_of_any_size_are_planned_with() {
 }
 
 #[test]
-fn every_solver_proves_the_same() {
+fn all_solvers_give_the_same_answer() {
     let cheapest = metaplan(&["plan", "missions/ugv.toml"]);
     for solver in planner::Backend::BUILT_IN {
         let answer = metaplan(&["plan", "missions/ugv.toml", "--solver", solver]);
@@ -355,19 +356,19 @@ fn every_solver_proves_the_same() {
 
 #[test]
 #[cfg(unix)]
-fn the_word_of_a_program_is_not_a_proof() {
+fn claims_of_external_solvers_are_not_proofs() {
     let directory = tempfile::tempdir().expect("a directory");
     let script = directory.path().join("solver.sh");
-    // It answers right as long as it is asked whether it serves.
+    // The script answers correctly only during the test whether it is a usable solver.
     let text = "case $(grep -vc '^p') in 1) printf 's SATISFIABLE\\nv 1 0\\n'; exit 10;; *) echo s UNSATISFIABLE; exit $1;; esac";
     std::fs::write(&script, text).expect("a file");
-    let plan = |status: &str, more: &[&str]| {
+    let plan = |status: &str, options: &[&str]| {
         let solver = format!("sh {} {status}", script.display());
-        metaplan(&[&["plan", "missions/ugv.toml", "--solver", &solver], more].concat())
+        metaplan(&[&["plan", "missions/ugv.toml", "--solver", &solver], options].concat())
     };
-    let unproved = plan("20", &["--horizon", "2"]);
-    check(&unproved, 11, &["no plan with up to 2 steps, by the word of `sh ", "solver.sh 20`, unchecked"]);
-    // What the search has proved is proved.
+    let unchecked = plan("20", &["--horizon", "2"]);
+    check(&unchecked, 11, &["no plan with up to 2 steps, by the word of `sh ", "solver.sh 20`, unchecked"]);
+    // A claim that the search has proved does not depend on the external solver.
     check(&plan("20", &[]), 0, &["optimal, proved: the"]);
     check(&plan("7", &[]), 2, &["does not serve", "it failed: exit status: 7"]);
 }
@@ -376,40 +377,40 @@ fn the_word_of_a_program_is_not_a_proof() {
 fn memory_is_limited() {
     check(&metaplan(&["plan", "missions/ugv.toml", "--memory-limit", "0"]), 2, &["0 is not in"]);
     check(&metaplan(&["plan", "missions/ugv.toml", "--memory-limit", "4000"]), 0, &["optimal, proved"]);
-    let enough = ["--memory-limit", "40"];
+    let memory_limit = ["--memory-limit", "40"];
     check(
-        &plan(&sliding_tiles(""), &tiles_in_reverse(), &enough),
+        &plan(&sliding_tiles(""), &tiles_in_reverse(), &memory_limit),
         12,
         &["a limit was reached", "no plan has a better metric than"],
     );
     let help = "(:action ask_for_help :parameters () :effect (and (solved) (increase (total-cost) 1000)))";
-    let found = plan(&sliding_tiles(help), &tiles_in_reverse(), &enough);
-    check(&found, 1, &["ask_for_help", "cost 1000", "not proved optimal"]);
+    let suboptimal = plan(&sliding_tiles(help), &tiles_in_reverse(), &memory_limit);
+    check(&suboptimal, 1, &["ask_for_help", "cost 1000", "not proved optimal"]);
 }
 
-/// The puzzle of fifteen tiles, of which no search comes to an end.
-fn sliding_tiles(further: &str) -> String {
-    let right: Vec<String> = (1..16).map(|tile| format!("(on t{tile} c{tile})")).collect();
+/// The 15-puzzle, which no search exhausts.
+fn sliding_tiles(extra_action: &str) -> String {
+    let goal_atoms: Vec<String> = (1..16).map(|tile| format!("(on t{tile} c{tile})")).collect();
     let constants: Vec<String> = (1..16).map(|tile| format!("t{tile} - tile c{tile} - cell")).collect();
     format!(
         "(define (domain tiles) (:requirements :typing :action-costs) (:types tile cell)
           (:constants {constants})
           (:predicates (on ?t - tile ?c - cell) (blank ?c - cell) (beside ?a ?b - cell) (solved))
           (:functions (total-cost) - number)
-          {further}
-          (:action finish :parameters () :precondition (and {right}) :effect (solved))
+          {extra_action}
+          (:action finish :parameters () :precondition (and {goal_atoms}) :effect (solved))
           (:action slide :parameters (?t - tile ?from ?to - cell)
             :precondition (and (beside ?from ?to) (on ?t ?from) (blank ?to))
             :effect (and (not (on ?t ?from)) (not (blank ?to)) (on ?t ?to) (blank ?from) (increase (total-cost) 1))))",
         constants = constants.join(" "),
-        right = right.join(" "),
+        goal_atoms = goal_atoms.join(" "),
     )
 }
 
 fn tiles_in_reverse() -> String {
     let place = |tile: i32| (tile / 4, tile % 4);
-    let beside = |a: i32, b: i32| (place(a).0 - place(b).0).abs() + (place(a).1 - place(b).1).abs() == 1;
-    let pairs = (0..16).flat_map(|a| (0..16).map(move |b| (a, b))).filter(|(a, b)| beside(*a, *b));
+    let is_adjacent = |a: i32, b: i32| (place(a).0 - place(b).0).abs() + (place(a).1 - place(b).1).abs() == 1;
+    let pairs = (0..16).flat_map(|a| (0..16).map(move |b| (a, b))).filter(|(a, b)| is_adjacent(*a, *b));
     let pairs: Vec<String> = pairs.map(|(a, b)| format!("(beside c{a} c{b})")).collect();
     let tiles: Vec<String> = (1..16).map(|tile| format!("(on t{tile} c{})", 16 - tile)).collect();
     format!(
@@ -421,10 +422,10 @@ fn tiles_in_reverse() -> String {
 }
 
 #[test]
-fn alternatives_are_listed_with_what_is_forced() {
-    let only = metaplan(&["plan", "missions/ugv.toml", "--alternatives", "3"]);
+fn alternatives_are_listed_with_forced_steps() {
+    let unique = metaplan(&["plan", "missions/ugv.toml", "--alternatives", "3"]);
     check(
-        &only,
+        &unique,
         0,
         &[
             "the only one that is as good, idle actions apart, proved",
@@ -449,9 +450,9 @@ fn alternatives_are_listed_with_what_is_forced() {
     assert_eq!(answer["alternatives"]["forced"][0]["action"].as_bool(), Some(false), "{answer:#}");
 }
 
-/// A free action whose effect nothing reads makes other plans that are as good, which are not counted.
+/// A free action whose effect nothing reads yields further plans of equal cost. They are not counted.
 #[test]
-fn what_is_said_of_all_plans_leaves_out_idle_actions() {
+fn alternatives_exclude_idle_actions() {
     let domain = "(define (domain d) (:predicates (p) (q) (seen)) (:functions (total-cost))
       (:action look :effect (seen))
       (:action a :effect (and (p) (increase (total-cost) 1)))

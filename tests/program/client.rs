@@ -1,4 +1,4 @@
-//! The protocol of `metaplan run`: what is said while planning takes long.
+//! Tests of the protocol of `metaplan run`: the progress answers during planning.
 
 use std::fmt::Write as _;
 
@@ -15,13 +15,13 @@ const DOMAIN: &str = "(define (domain d) (:requirements :typing) (:types place i
   (:action put :parameters (?i - item ?p - place) :precondition (and (at ?p) (has ?i))
     :effect (and (lies ?i ?p) (not (has ?i)) (free))))";
 
-/// More than can be planned in a few seconds: parcels on a grid, each to be brought elsewhere.
+/// A problem that takes more than a few seconds to solve: parcels on a grid, each with another destination.
 fn parcels() -> String {
     let (side, count) = (9, 14);
     let mut text = "(define (problem p) (:domain d) (:objects".to_owned();
     let place = |x: usize, y: usize| format!("p{x}_{y}");
-    let all = || (0..side).flat_map(move |x| (0..side).map(move |y| (x, y)));
-    for (x, y) in all() {
+    let cells = || (0..side).flat_map(move |x| (0..side).map(move |y| (x, y)));
+    for (x, y) in cells() {
         let _ = write!(text, " {}", place(x, y));
     }
     text += " - place";
@@ -29,7 +29,7 @@ fn parcels() -> String {
         let _ = write!(text, " i{item}");
     }
     let _ = write!(text, " - item) (:init (at {}) (free)", place(0, 0));
-    for (x, y) in all() {
+    for (x, y) in cells() {
         for (other_x, other_y) in [(x + 1, y), (x, y + 1)] {
             if other_x < side && other_y < side {
                 let (a, b) = (place(x, y), place(other_x, other_y));
@@ -49,7 +49,7 @@ fn parcels() -> String {
 }
 
 #[test]
-fn ready_comes_first_and_planning_says_that_it_goes_on() {
+fn ready_is_followed_by_progress_during_search() {
     let directory = tempfile::tempdir().expect("a directory");
     let manifest = "name = \"parcels\"\n[knowledge]\nfiles = [\"kb.ttl\"]\n[planning]\ndomain = \"d.pddl\"\n\
         problem = \"p.pddl\"\n[adaptation]\ntime_limit = 2.6\n";
@@ -66,7 +66,7 @@ fn ready_comes_first_and_planning_says_that_it_goes_on() {
     let kinds: Vec<&str> = answers.iter().filter_map(|answer| answer["answer"].as_str()).collect();
     assert_eq!(kinds[..3], ["ready", "planning", "planning"], "{kinds:?}");
     assert_eq!(answers[2]["seconds"], 2, "{answers:#?}");
-    // The planner says how far it is, once it has ground and begun to search.
+    // Bound and cost are reported only after grounding, once the search has begun.
     for planning in answers.iter().filter(|answer| answer["answer"] == "planning") {
         let (bound, cost) = (planning["lower_bound"].as_f64(), planning["cost"].as_f64());
         assert!(bound.is_none_or(|bound| bound > 0.0), "{planning}");
@@ -78,13 +78,13 @@ fn ready_comes_first_and_planning_says_that_it_goes_on() {
     assert!(kinds[..end].contains(&"plan_requested"), "{kinds:?}");
 }
 
-/// A domain of which a few objects make hundreds of thousands of operators.
+/// A domain for which a few objects yield hundreds of thousands of operators.
 const WIDE: &str = "(define (domain wide) (:predicates (p ?a ?b) (q ?a ?b ?c ?d) (done))
     (:action a :parameters (?a ?b ?c ?d) :precondition (and (p ?a ?b) (p ?c ?d)) :effect (q ?a ?b ?c ?d))
     (:action b :parameters (?a ?b ?c ?d) :precondition (q ?a ?b ?c ?d) :effect (done)))";
 
 #[test]
-fn planning_says_that_it_goes_on_while_it_grounds() {
+fn progress_is_reported_during_grounding() {
     let directory = tempfile::tempdir().expect("a directory");
     let names: Vec<String> = (0..20).map(|number| format!("o{number}")).collect();
     let mut problem = format!("(define (problem p) (:domain wide) (:objects {}) (:init", names.join(" "));
@@ -103,8 +103,8 @@ fn planning_says_that_it_goes_on_while_it_grounds() {
     assert_eq!(outcome.status, 0, "{outcome:#?}");
     let answers: Vec<Value> =
         outcome.stdout.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
-    let none = answers.iter().find(|answer| answer["answer"] == "plan_none").expect("there is no time");
-    assert_eq!(none["because"], "a limit was reached while grounding", "{outcome:#?}");
+    let failure = answers.iter().find(|answer| answer["answer"] == "plan_none").expect("there is no time");
+    assert_eq!(failure["because"], "a limit was reached while grounding", "{outcome:#?}");
     let planning: Vec<&Value> = answers.iter().filter(|answer| answer["answer"] == "planning").collect();
     assert!(planning.len() >= 2, "{outcome:#?}");
     for (number, answer) in (1..).zip(planning) {

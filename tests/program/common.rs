@@ -1,4 +1,4 @@
-//! Running the program as its users do.
+//! Functions that run the program like a user, and prepare files for it.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 
 use serde_json::Value;
 
-/// What a run of the program came to.
+/// Exit status and output of a run.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Outcome {
     pub status: i32,
@@ -15,13 +15,13 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// The answer as JSON.
+    /// Parses standard output as JSON.
     pub fn json(&self) -> Value {
         serde_json::from_str(&self.stdout).unwrap_or_else(|error| panic!("{error}: {self:#?}"))
     }
 }
 
-/// Messages of standard error, each as one line `PLACE: SEVERITY[CODE]: SENTENCE`, without source lines and help.
+/// The messages on standard error, one line `PLACE: SEVERITY[CODE]: SENTENCE` each, without source lines and help.
 pub fn headlines(stderr: &str) -> String {
     let mut lines: Vec<String> = Vec::new();
     for line in stderr.lines() {
@@ -32,33 +32,33 @@ pub fn headlines(stderr: &str) -> String {
             _ => {}
         }
     }
-    lines.iter().fold(String::new(), |all, line| all + line + "\n")
+    lines.iter().fold(String::new(), |text, line| text + line + "\n")
 }
 
-/// A text without the lines that say every few seconds what is being done, as `planning, 3 s: cost 4`: when they come depends on what else the
-/// machine has to do.
+/// Removes the progress lines, such as `planning, 3 s: cost 4`. They are printed at intervals of seconds, so their number depends on the
+/// load of the machine.
 pub fn without_progress(text: &str) -> String {
     let is_progress = |line: &&str| {
-        let Some((word, rest)) = line.trim_end().split_once(", ") else { return false };
-        let digits = rest.trim_start_matches(|own: char| own.is_ascii_digit());
-        let is_word = !word.is_empty() && word.chars().all(|own| own.is_ascii_lowercase());
-        is_word && digits.len() < rest.len() && (digits == " s" || digits.starts_with(" s: "))
+        let Some((word, remainder)) = line.trim_end().split_once(", ") else { return false };
+        let digits = remainder.trim_start_matches(|character: char| character.is_ascii_digit());
+        let is_word = !word.is_empty() && word.chars().all(|character| character.is_ascii_lowercase());
+        is_word && digits.len() < remainder.len() && (digits == " s" || digits.starts_with(" s: "))
     };
     text.split_inclusive('\n').filter(|line| !is_progress(line)).collect()
 }
 
-/// The root of the project.
+/// Root directory of the project.
 pub fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Runs the program in the root of the project.
+/// Runs the program in the root directory of the project.
 pub fn metaplan(arguments: &[&str]) -> Outcome {
     metaplan_in(&root(), arguments, "")
 }
 
-/// The program that is tested: the one that cargo has built for the tests, or `metaplan` in the directory that `METAPLAN_PROGRAMS` names.
-/// CI names that of `cargo install`, whose release build runs these tests in a fraction of the time.
+/// Path of the tested program: built by cargo for the tests, or `metaplan` in the directory `METAPLAN_PROGRAMS`.
+/// CI sets the directory of `cargo install`, as these tests take a fraction of the time with a release build.
 pub fn program() -> PathBuf {
     match std::env::var_os("METAPLAN_PROGRAMS") {
         Some(directory) => Path::new(&directory).join(format!("metaplan{}", std::env::consts::EXE_SUFFIX)),
@@ -66,27 +66,27 @@ pub fn program() -> PathBuf {
     }
 }
 
-/// Runs the program in a directory with a text on standard input.
+/// Runs the program in a directory with a text as standard input.
 pub fn metaplan_in(directory: &Path, arguments: &[&str], input: &str) -> Outcome {
     outcome(&program(), directory, arguments, input)
 }
 
-/// Runs `metaplan verify` and `metaplan-verify` in a directory: whatever they are given, they answer the same.
+/// Runs `metaplan verify` and `metaplan-verify` in a directory. Their outcomes must be equal.
 pub fn verify_in(directory: &Path, arguments: &[&str]) -> Outcome {
-    let all: Vec<&str> = ["verify"].iter().chain(arguments).copied().collect();
-    let own = metaplan_in(directory, &all, "");
-    let other = outcome(verifier(), directory, arguments, "");
-    assert_eq!(own, other, "`metaplan verify` and `metaplan-verify`: {arguments:?}");
-    own
+    let arguments_of_subcommand: Vec<&str> = ["verify"].iter().chain(arguments).copied().collect();
+    let subcommand = metaplan_in(directory, &arguments_of_subcommand, "");
+    let standalone = outcome(verifier(), directory, arguments, "");
+    assert_eq!(subcommand, standalone, "`metaplan verify` and `metaplan-verify`: {arguments:?}");
+    subcommand
 }
 
-/// The program `metaplan-verify`. It belongs to another package, which has a test so that cargo makes it with all tests; where only
-/// these are made, it is asked for in the same way, so that nothing else is compiled anew.
+/// Path of the program `metaplan-verify`. Cargo does not build it for these tests, as it belongs to another package. So it is built
+/// here, through the test of its package, with the same options. This avoids a second compilation of the dependencies.
 pub fn verifier() -> &'static Path {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
     PROGRAM.get_or_init(|| {
-        let own = Path::new(env!("CARGO_BIN_EXE_metaplan"));
-        let folder = own.parent().expect("a folder");
+        let tested_program = Path::new(env!("CARGO_BIN_EXE_metaplan"));
+        let folder = tested_program.parent().expect("a folder");
         let mut cargo = Command::new(env!("CARGO"));
         cargo.args(["test", "--no-run", "--quiet", "--offline", "--locked", "--test", "verifier"]);
         if folder.ends_with("release") {
@@ -101,7 +101,7 @@ pub fn verifier() -> &'static Path {
 
 fn outcome(program: &Path, directory: &Path, arguments: &[&str], input: &str) -> Outcome {
     use std::io::{Seek as _, Write as _};
-    // A file, so that `run` answers each line before it reads the next one.
+    // A file instead of a pipe: `run` then answers each line before it reads the next one.
     let mut stdin = tempfile::tempfile().expect("a file");
     stdin.write_all(input.as_bytes()).and_then(|()| stdin.rewind()).expect("written");
     let child = Command::new(program)
@@ -121,7 +121,7 @@ fn outcome(program: &Path, directory: &Path, arguments: &[&str], input: &str) ->
     }
 }
 
-/// The processor time of a run of the program in seconds, user's and system's, the median of three. Needs python3.
+/// Processor time of a run in seconds (user and system), as the median of three runs. Needs python3.
 pub fn processor_time(directory: &Path, arguments: &[&str]) -> f64 {
     let script = "import resource as r, subprocess as s, sys\n\
         def once():\n \
@@ -137,7 +137,7 @@ pub fn processor_time(directory: &Path, arguments: &[&str]) -> f64 {
     text.trim().parse().unwrap_or_else(|error| panic!("{error}: {output:?}"))
 }
 
-/// A copy of the files of a mission in a directory of its own, to be edited.
+/// A temporary directory with an editable copy of a mission's files.
 pub fn copy_of_mission(name: &str) -> tempfile::TempDir {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let files = [
@@ -155,7 +155,7 @@ pub fn copy_of_mission(name: &str) -> tempfile::TempDir {
     directory
 }
 
-/// Copies the files of a folder, and of those below it.
+/// Copies a folder recursively.
 pub fn copy_folder(from: &Path, to: &Path) {
     std::fs::create_dir_all(to).expect("a folder");
     for entry in std::fs::read_dir(from).expect("a folder").map(|entry| entry.expect("an entry")) {
@@ -168,7 +168,7 @@ pub fn copy_folder(from: &Path, to: &Path) {
     }
 }
 
-/// Replaces a text that must be there in a file.
+/// Replaces all occurrences of a text in a file. Panics if there is no occurrence.
 pub fn edit(directory: &Path, file: &str, old: &str, new: &str) {
     let path = directory.join(file);
     let text = std::fs::read_to_string(&path).expect("the file is read");
@@ -176,14 +176,15 @@ pub fn edit(directory: &Path, file: &str, old: &str, new: &str) {
     std::fs::write(path, text.replace(old, new)).expect("the file is written");
 }
 
-/// Steps as `action arguments | design, design`, without functions and designs among the arguments.
+/// Steps as `action arguments | design, design`; functions and designs are removed from the arguments.
 pub fn steps(answer: &Value) -> Vec<String> {
     let step = |step: &Value| {
         let configuration = step["configuration"].as_object().expect("a configuration");
         let designs: Vec<&str> = configuration.values().filter_map(Value::as_str).collect();
-        let configured = |a: &&str| designs.contains(a) || configuration.contains_key(*a);
+        // Functions and designs can also be parameters of the action.
+        let is_configured = |a: &&str| designs.contains(a) || configuration.contains_key(*a);
         let arguments = step["arguments"].as_array().expect("arguments").iter().filter_map(Value::as_str);
-        let route: Vec<&str> = arguments.filter(|argument| !configured(argument)).collect();
+        let route: Vec<&str> = arguments.filter(|argument| !is_configured(argument)).collect();
         format!(
             "{} {} | {}",
             step["action"].as_str().expect("an action"),

@@ -1,4 +1,4 @@
-//! `metaplan plan --concurrent`: what it prints, and that `validate` agrees.
+//! Tests of `metaplan plan --concurrent`: output formats, and agreement with `validate`.
 
 use serde_json::json;
 
@@ -21,8 +21,8 @@ fn plan(domain: &str, problem: &str, arguments: &[&str]) -> Outcome {
     for (name, text) in [("domain.pddl", domain), ("problem.pddl", problem)] {
         std::fs::write(directory.path().join(name), text).expect("a file");
     }
-    let all = ["plan", "domain.pddl", "problem.pddl", "--concurrent"].iter().chain(arguments);
-    metaplan_in(directory.path(), &all.copied().collect::<Vec<_>>(), "")
+    let command = ["plan", "domain.pddl", "problem.pddl", "--concurrent"].iter().chain(arguments);
+    metaplan_in(directory.path(), &command.copied().collect::<Vec<_>>(), "")
 }
 
 #[test]
@@ -47,7 +47,7 @@ fn plans_in_every_format() {
 }
 
 #[test]
-fn a_sequence_does_not_do() {
+fn concurrency_can_be_required() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     for (name, text) in [("domain.pddl", DOMAIN), ("problem.pddl", PROBLEM)] {
         std::fs::write(directory.path().join(name), text).expect("a file");
@@ -63,7 +63,7 @@ fn a_sequence_does_not_do() {
 }
 
 #[test]
-fn what_does_not_go_with_it_is_refused() {
+fn incompatible_options_are_refused() {
     let refused = |arguments: &[&str], status: i32, expected: &str| {
         let outcome = plan(DOMAIN, PROBLEM, arguments);
         assert_eq!(outcome.status, status, "{arguments:?}: {}", outcome.stderr);
@@ -77,7 +77,7 @@ fn what_does_not_go_with_it_is_refused() {
 }
 
 #[test]
-fn durations_that_are_chosen_are_proved_and_effects_under_changing_conditions_are_not() {
+fn chosen_durations_are_proved_optimal_but_conditional_end_effects_are_not() {
     let bounded = DOMAIN.replace("(= ?duration 2)", "(>= ?duration 2)");
     let conditional = DOMAIN.replace("(at end (mended ?f))", "(at end (when (light) (mended ?f)))");
     for (domain, status) in [(bounded, 0), (conditional, 1)] {
@@ -87,7 +87,7 @@ fn durations_that_are_chosen_are_proved_and_effects_under_changing_conditions_ar
 }
 
 #[test]
-fn missions_take_their_sequences_with_gaps() {
+fn missions_are_planned_with_separation() {
     for (mission, status, cost) in [
         ("ugv", "optimal", 408.3),
         ("ugv_plain", "optimal", 408.3),

@@ -1,6 +1,6 @@
-//! `metaplan configure` and `metaplan run --configure`: SUAVE's knowledge base, and what is refused.
+//! Tests of `metaplan configure` and `metaplan run --configure`: SUAVE's knowledge base, and refused arguments.
 
-#![allow(clippy::print_stdout)] // a skipped test says so
+#![allow(clippy::print_stdout)] // A skipped test prints the reason.
 
 use crate::common::{metaplan, metaplan_in, root};
 
@@ -13,9 +13,9 @@ fn suave_is_configured() {
         println!("skipped: SUAVE's knowledge base is not there");
         return;
     }
-    let choose = |further: &[&str]| {
+    let choose = |options: &[&str]| {
         let arguments =
-            [&["configure", &file, "--directory", &directory, "--format", "json"], further].concat();
+            [&["configure", &file, "--directory", &directory, "--format", "json"], options].concat();
         let outcome = metaplan(&arguments);
         let answer = outcome.json();
         let choices = answer["choices"].as_array().expect("choices");
@@ -37,20 +37,20 @@ fn vec_of<const N: usize>(names: [&str; N]) -> Vec<String> {
 }
 
 #[test]
-fn all_wrong_names_are_told() {
+fn all_unknown_names_are_reported() {
     let base = ["configure", "ontology/kb/ugv.ttl", "--rules", "coadaptation"];
-    let wrong = [
+    let wrong_arguments = [
         &base[..],
         &["--objective", "f_localisation", "--exclusive", "c_kinekt", "--budget", "energi=3"],
         &["--require", "f_move.safety=0.5"],
     ]
     .concat();
-    let outcome = metaplan(&wrong);
+    let outcome = metaplan(&wrong_arguments);
     assert_eq!(outcome.status, 2);
     for part in ["c_kinect", "`energi`", "f_localization", "`--require f_move"] {
         assert!(outcome.stderr.contains(part), "{part}: {}", outcome.stderr);
     }
-    for (further, part) in [
+    for (options, part) in [
         (&["--budget", "safety"][..], "NAME=VALUE"),
         (&["--budget", "safety=many"], "decimal number"),
         (&["--budget", "safety=-1"], "the budget of `safety` is -1, but should not be negative"),
@@ -60,9 +60,9 @@ fn all_wrong_names_are_told() {
         (&["--set", "safety=x"], "not a decimal number"),
         (&["--fail", "c_none"], "c_none"),
     ] {
-        let outcome = metaplan(&[&base[..], further].concat());
-        assert_eq!(outcome.status, 2, "{further:?}: {}", outcome.stderr);
-        assert!(outcome.stderr.contains(part), "{further:?}: {}", outcome.stderr);
+        let outcome = metaplan(&[&base[..], options].concat());
+        assert_eq!(outcome.status, 2, "{options:?}: {}", outcome.stderr);
+        assert!(outcome.stderr.contains(part), "{options:?}: {}", outcome.stderr);
     }
     for arguments in [
         &["run", "missions/ugv.toml", "--budget", "safety=1"][..],
@@ -83,12 +83,12 @@ fn the_loop_reconfigures() {
     assert_eq!(outcome.status, 0, "{}", outcome.stderr);
     let lines =
         outcome.stdout.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).expect("JSON"));
-    let said: Vec<(String, Option<String>)> = lines
+    let answers: Vec<(String, Option<String>)> = lines
         .map(|line| {
             (line["answer"].as_str().expect("a kind").to_owned(), line["to"].as_str().map(ToOwned::to_owned))
         })
         .collect();
-    let kinds: Vec<&str> = said.iter().map(|(kind, _)| kind.as_str()).collect();
+    let kinds: Vec<&str> = answers.iter().map(|(kind, _)| kind.as_str()).collect();
     let expected = [
         "ready",
         "reconfigure",
@@ -101,6 +101,6 @@ fn the_loop_reconfigures() {
         "handled",
     ];
     assert_eq!(kinds, expected);
-    assert_eq!(said[1].1.as_deref(), Some("fd_amcl_kinect"));
-    assert_eq!(said[4].1.as_deref(), Some("fd_aruco"));
+    assert_eq!(answers[1].1.as_deref(), Some("fd_amcl_kinect"));
+    assert_eq!(answers[4].1.as_deref(), Some("fd_aruco"));
 }

@@ -1,10 +1,10 @@
-//! Models that are silently less than their authors meant, files of the wrong kind, and files that nobody should read.
+//! Tests of warnings and refusals: models that mean less than intended, files of the wrong kind, hostile files.
 
 use std::path::Path;
 
 use crate::common::{Outcome, copy_of_mission, edit, metaplan, metaplan_in, root};
 
-/// Plans a copy of a mission in which something was replaced; standard error must have these words.
+/// Plans a copy of a mission after a replacement in one file. Standard error must contain all `words`.
 fn check(mission: &str, (file, old, new): (&str, &str, &str), words: &[&str]) -> Outcome {
     let copy = copy_of_mission(mission.trim_end_matches("_plain"));
     for plain in [
@@ -25,7 +25,7 @@ fn check(mission: &str, (file, old, new): (&str, &str, &str), words: &[&str]) ->
 }
 
 #[test]
-fn names_that_meet_nothing_are_warned_of_with_their_place() {
+fn unused_names_are_reported_with_their_position() {
     let kb = "ontology/kb/ugv.ttl";
     check(
         "ugv",
@@ -54,9 +54,9 @@ fn names_that_meet_nothing_are_warned_of_with_their_place() {
     assert_eq!(outcome.status, 0, "{outcome:#?}");
 }
 
-/// A name that stands in an imported file is shown where it stands there.
+/// A name in an imported file is reported with its position in that file.
 #[test]
-fn names_in_imported_files_have_a_place() {
+fn names_in_imported_files_have_a_position() {
     let copy = copy_of_mission("ugv");
     let path = copy.path().join("ontology/kb/ugv.ttl");
     let text = std::fs::read_to_string(&path)
@@ -71,7 +71,7 @@ fn names_in_imported_files_have_a_place() {
 }
 
 #[test]
-fn a_plain_domain_that_meets_nothing_is_warned_of() {
+fn unbound_names_of_plain_domains_are_reported() {
     let kb = "ontology/kb/ugv.ttl";
     check("ugv_plain", (kb, ":a_move a", ":a_mvoe a"), &["M205", "a_mvoe", "if it is `move`", "ugv.ttl:"]);
     let domain = "encodings/ugv/plain.pddl";
@@ -83,7 +83,7 @@ fn a_plain_domain_that_meets_nothing_is_warned_of() {
     check("ugv_plain", (domain, old, "(batery_usage)"), &["M206", "batery_usage", "plain.pddl"]);
 }
 
-/// The ground vehicle in plain PDDL with a function for what changed designs use.
+/// The ground vehicle as a plain domain, with a function for the battery usage of changed designs.
 fn changing_mission() -> tempfile::TempDir {
     let copy = copy_of_mission("ugv");
     let read = |file: &str| std::fs::read_to_string(root().join(file)).expect("text");
@@ -98,25 +98,25 @@ fn changing_mission() -> tempfile::TempDir {
     copy
 }
 
-/// What a change of designs costs counts where a number grows or shrinks; elsewhere it would silently count nothing.
+/// Costs of design changes are supported in increase and decrease effects. Elsewhere they would have no effect and are refused.
 #[test]
-fn a_change_of_designs_is_counted_or_refused() {
-    let outcome = |place: &str, counted: &str| {
+fn design_change_costs_are_counted_or_refused() {
+    let outcome = |place: &str, replacement: &str| {
         let copy = changing_mission();
-        edit(copy.path(), "plain.pddl", place, counted);
+        edit(copy.path(), "plain.pddl", place, replacement);
         metaplan_in(copy.path(), &["plan", "mission.toml"], "")
     };
-    let move_takes = "(= ?duration (travel_time ?from ?to))";
-    let refused = outcome(move_takes, "(= ?duration (+ (travel_time ?from ?to) (change)))");
+    let duration = "(= ?duration (travel_time ?from ?to))";
+    let refused = outcome(duration, "(= ?duration (+ (travel_time ?from ?to) (change)))");
     assert_eq!(refused.status, 3, "{refused:#?}");
     assert!(refused.stderr.contains("M228") && refused.stderr.contains("`(change)`"), "{refused:#?}");
-    let grows = "(at end (robot_at ?to))";
-    let counted = outcome(grows, &format!("{grows} (at end (increase (battery_used) (change)))"));
+    let arrival = "(at end (robot_at ?to))";
+    let counted = outcome(arrival, &format!("{arrival} (at end (increase (battery_used) (change)))"));
     assert_eq!((counted.status, counted.stderr.as_str()), (0, ""), "{counted:#?}");
 }
 
 #[test]
-fn shipped_missions_raise_no_doubts() {
+fn shipped_missions_have_no_warnings() {
     for mission in ["ugv", "uuv", "ugv_plain", "uuv_plain", "camara_like"] {
         let outcome = metaplan(&["plan", &format!("missions/{mission}.toml")]);
         assert!(!outcome.stderr.contains("warning"), "{mission}: {outcome:#?}");
@@ -124,9 +124,9 @@ fn shipped_missions_raise_no_doubts() {
 }
 
 #[test]
-fn who_misspells_a_name_is_told_which_one_was_meant() {
+fn misspelt_names_get_a_suggestion() {
     let ugv = "missions/ugv.toml";
-    for (arguments, meant) in [
+    for (arguments, suggestion) in [
         (&["plan", ugv, "--fail", "c_kinct"][..], "c_kinect"),
         (&["plan", ugv, "--set", "batery=3"], "battery"),
         (&["plan", ugv, "--set", "ambient_ligt=3"], "ambient_light"),
@@ -135,7 +135,7 @@ fn who_misspells_a_name_is_told_which_one_was_meant() {
         (&["explain", ugv, "fd_amcl_kinct"], "fd_amcl_kinect"),
     ] {
         let outcome = metaplan(arguments);
-        assert!(outcome.stderr.contains(&format!("did you mean `{meant}`?")), "{outcome:#?}");
+        assert!(outcome.stderr.contains(&format!("did you mean `{suggestion}`?")), "{outcome:#?}");
     }
     let copy = copy_of_mission("ugv");
     edit(copy.path(), ugv, "[planning]", "[plannning]");
@@ -143,8 +143,8 @@ fn who_misspells_a_name_is_told_which_one_was_meant() {
     assert!(outcome.stderr.contains("did you mean `planning`?"), "{outcome:#?}");
     let lines = "{\"event\":\"mesured\",\"attribute\":\"x\",\"value\":1}\n{\"event\":\"measured\",\"attribute\":\"batery\",\"value\":1}\n";
     let outcome = metaplan_in(&root(), &["run", ugv], lines);
-    for meant in ["measured", "battery"] {
-        assert!(outcome.stdout.contains(&format!("did you mean `{meant}`?")), "{outcome:#?}");
+    for suggestion in ["measured", "battery"] {
+        assert!(outcome.stdout.contains(&format!("did you mean `{suggestion}`?")), "{outcome:#?}");
     }
 }
 
@@ -167,16 +167,16 @@ fn the_wrong_kind_of_file_is_recognised() {
 }
 
 #[test]
-fn a_hostile_manifest_learns_nothing_and_hangs_nobody() {
+fn hostile_manifests_read_no_secrets_and_do_not_block() {
     let copy = copy_of_mission("ugv");
     let secret = copy.path().join("secret");
     std::fs::write(&secret, "root:*:20228:0:99999:7:::\ndaemon:*:20228:0:99999:7:::\n").expect("a file");
     let manifest = "missions/ugv.toml";
-    let plan = |directory: &Path, what: &str| {
+    let plan = |directory: &Path, case: &str| {
         let outcome = metaplan_in(directory, &["plan", manifest, "--time-limit", "300"], "");
-        assert!(outcome.status == 3, "{what}: {outcome:#?}");
+        assert!(outcome.status == 3, "{case}: {outcome:#?}");
         let leaks = ["20228", "root", "daemon"].iter().any(|word| outcome.stderr.contains(word));
-        assert!(!leaks, "{what}: {outcome:#?}");
+        assert!(!leaks, "{case}: {outcome:#?}");
     };
     let text = std::fs::read_to_string(copy.path().join(manifest)).expect("text");
     let parts = ["../ontology/kb/ugv.ttl", "../encodings/ugv/domain.pddl", "../encodings/ugv/problem.pddl"];
@@ -197,7 +197,7 @@ fn a_hostile_manifest_learns_nothing_and_hangs_nobody() {
 }
 
 #[test]
-fn names_do_not_change_what_a_terminal_shows() {
+fn control_characters_in_names_are_escaped() {
     let copy = copy_of_mission("ugv");
     edit(copy.path(), "missions/ugv.toml", "name = \"ugv\"", "name = \"u\\u001b[31mg\\u202ev\"");
     for format in ["text", "json"] {
@@ -211,7 +211,7 @@ fn names_do_not_change_what_a_terminal_shows() {
 }
 
 #[test]
-fn small_things() {
+fn duplicate_fields_and_missing_simulations_are_reported() {
     let doubled = "{\"event\":\"tick\",\"event\":\"tick\"}\n";
     let outcome = metaplan_in(&root(), &["run", "missions/ugv.toml"], doubled);
     assert!(outcome.stdout.contains("the field `event` is there twice"), "{outcome:#?}");

@@ -1,4 +1,4 @@
-//! The examples of all packages run, and say what they are to say.
+//! Tests of the examples of all packages: they run and print the expected output.
 
 use std::path::Path;
 use std::process::Command;
@@ -6,25 +6,25 @@ use std::sync::OnceLock;
 
 use crate::common::root;
 
-/// The folder of the examples. They belong to other packages, too, for which cargo makes them with all tests; where only these tests are
-/// made, they are asked for here; nothing else is compiled anew.
+/// Folder of the compiled examples. Cargo does not build the examples of other packages for these tests, so they are built here with the
+/// same options. This avoids a second compilation of the dependencies.
 fn folder() -> &'static Path {
     static FOLDER: OnceLock<std::path::PathBuf> = OnceLock::new();
     FOLDER.get_or_init(|| {
-        let own = Path::new(env!("CARGO_BIN_EXE_metaplan")).parent().expect("a folder");
+        let build_folder = Path::new(env!("CARGO_BIN_EXE_metaplan")).parent().expect("a folder");
         let mut cargo = Command::new(env!("CARGO"));
         cargo.args(["build", "--quiet", "--offline", "--locked", "--examples"]);
-        if own.ends_with("release") {
+        if build_folder.ends_with("release") {
             cargo.arg("--release");
         }
-        cargo.arg("--target-dir").arg(own.parent().expect("a folder")).current_dir(root());
+        cargo.arg("--target-dir").arg(build_folder.parent().expect("a folder")).current_dir(root());
         let output = cargo.output().expect("cargo runs");
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        own.join("examples")
+        build_folder.join("examples")
     })
 }
 
-/// What an example prints.
+/// Output of an example.
 fn printed(example: &str) -> String {
     let program = folder().join(format!("{example}{}", std::env::consts::EXE_SUFFIX));
     let output = Command::new(program).current_dir(root()).output().expect("the example starts");
@@ -33,7 +33,7 @@ fn printed(example: &str) -> String {
 }
 
 #[test]
-fn examples_say_what_they_are_to_say() {
+fn examples_print_the_expected_output() {
     assert_eq!(
         printed("numbers"),
         "2 errors:\ninvalid digit found in string\nnumber too large to fit in target type\n"

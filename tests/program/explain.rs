@@ -1,19 +1,20 @@
-//! `metaplan explain`: reasons, costs of alternatives, and what would change the answer.
+//! Tests of `metaplan explain`: reasons, costs of alternatives, and changes that would lead to another answer.
 
 use serde_json::{Value, json};
 
 use crate::common::metaplan;
 
 fn explain(arguments: &[&str]) -> Value {
-    let all: Vec<&str> = ["explain"].iter().chain(arguments).copied().chain(["--format", "json"]).collect();
-    let outcome = metaplan(&all);
+    let command: Vec<&str> =
+        ["explain"].iter().chain(arguments).copied().chain(["--format", "json"]).collect();
+    let outcome = metaplan(&command);
     assert_eq!(outcome.status, 0, "{outcome:#?}");
     let answer = outcome.json();
     assert_eq!(answer["format"], "metaplan-explain/1");
     answer
 }
 
-/// Name, relation, bound and cost then of each change.
+/// Name, relation, bound and resulting cost of each change.
 fn changes(answer: &Value) -> Vec<Value> {
     let change =
         |change: &Value| json!([change["name"], change["relation"], change["bound"], change["then"]["cost"]]);
@@ -33,7 +34,7 @@ fn why_not_another_design() {
     assert_eq!(figures, json!([true, 408, 516, 408, []]));
     assert_eq!(changes(&answer), [json!(["c_lidar", "failed", null, 408])]);
     let answer = explain(&["missions/ugv.toml", "fd_amcl_kinect"]);
-    // The other Kinect design is the next best.
+    // The second design with the Kinect is the next best.
     let figures = json!([answer["alone"]["cost"], answer["without"]["cost"], answer["used"]]);
     assert_eq!(figures, json!([408, 416, [1, 2, 3, 4]]));
     let expected = [json!(["c_kinect", "failed", null, 516]), json!(["ambient_light", "above", 0.8, 516])];
@@ -48,7 +49,7 @@ fn why_a_design_is_not_available() {
     assert_eq!(answer["available"], false);
     let because = answer["because"].to_string();
     assert!(because.contains("c_status(c_kinect"), "{because}");
-    // Both causes are listed; neither alone brings it back.
+    // Both causes are listed. Removing only one of them does not make the design available.
     let expected =
         [json!(["c_kinect", "recovered", null, 516]), json!(["ambient_light", "at_most", 0.8, 516])];
     assert_eq!(changes(&answer), expected);
@@ -56,20 +57,20 @@ fn why_a_design_is_not_available() {
 }
 
 #[test]
-fn what_would_change_the_plan() {
+fn changes_that_affect_the_plan_are_listed() {
     assert_eq!(
         changes(&explain(&["missions/ugv.toml"])),
         [json!(["ambient_light", "above", 0.8, 516]), json!(["battery", "below", 8, null])]
     );
     let answer = explain(&["missions/uuv.toml"]);
-    let found = changes(&answer);
-    assert_eq!(found[0], json!(["water_visibility", "below", 3.25, 34]));
-    // 77 percent and a reserve of 10 are needed. The bound is exact to a millionth.
-    assert_eq!(found[1][2], json!(87), "{answer:#}");
+    let changes_of_plan = changes(&answer);
+    assert_eq!(changes_of_plan[0], json!(["water_visibility", "below", 3.25, 34]));
+    // The plan uses 77 percent of the battery, and the reserve is 10. The bound is exact to 10^-6.
+    assert_eq!(changes_of_plan[1][2], json!(87), "{answer:#}");
 }
 
 #[test]
-fn an_unknown_design_is_a_mistake_of_usage() {
+fn unknown_designs_are_usage_errors() {
     let outcome = metaplan(&["explain", "missions/ugv.toml", "fd_none"]);
     assert_eq!(outcome.status, 2);
     assert!(outcome.stderr.contains("there are: fd_amcl_kinect"), "{outcome:#?}");

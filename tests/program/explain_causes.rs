@@ -1,4 +1,4 @@
-//! `metaplan explain` of designs with several causes, against an oracle: every subset of what has failed and of what was measured is tried.
+//! Tests of `metaplan explain` for designs with several causes. The oracle tries every subset of failed components and measured values.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use crate::common::{copy_folder, metaplan_in, root};
 
-/// Numbers that are the same in each run.
+/// A deterministic pseudorandom number generator (LCG).
 struct Random(u64);
 
 impl Random {
@@ -21,7 +21,7 @@ impl Random {
 const COMPONENTS: u64 = 4;
 const ATTRIBUTES: u64 = 2;
 
-/// A bound on an attribute: at most, or else at least.
+/// A bound on an attribute: upper if `is_most`, otherwise lower.
 #[derive(Debug, Clone, Copy)]
 struct Bound {
     attribute: u64,
@@ -31,8 +31,8 @@ struct Bound {
 
 impl Bound {
     fn holds(self, measured: &[u64]) -> bool {
-        let own = measured[self.attribute as usize];
-        if self.is_most { own <= self.value } else { own >= self.value }
+        let value = measured[self.attribute as usize];
+        if self.is_most { value <= self.value } else { value >= self.value }
     }
 }
 
@@ -41,20 +41,20 @@ struct Design {
     components: BTreeSet<u64>,
     bounds: Vec<Bound>,
     effort: u64,
-    /// It is ruled out, too, if both have failed.
+    /// Two components whose simultaneous failure also makes the design unavailable.
     both: Option<(u64, u64)>,
 }
 
 impl Design {
-    /// By definition: what it needs works, its bounds hold, and not both of two components have failed.
+    /// Availability by definition: required components work, bounds hold, and not both components of `both` have failed.
     fn is_available(&self, failed: &BTreeSet<u64>, measured: &[u64]) -> bool {
         self.components.is_disjoint(failed)
             && self.bounds.iter().all(|bound| bound.holds(measured))
-            && !self.both.is_some_and(|(one, other)| failed.contains(&one) && failed.contains(&other))
+            && !self.both.is_some_and(|(first, second)| failed.contains(&first) && failed.contains(&second))
     }
 }
 
-/// Designs of one function, and a situation.
+/// Designs of one function in a situation.
 #[derive(Debug)]
 struct World {
     designs: Vec<Design>,
@@ -119,10 +119,10 @@ impl World {
                      t:isQAtype :q_{attribute} ; t:{property} {value} ."
                 );
             }
-            if let Some((one, other)) = design.both {
+            if let Some((first, second)) = design.both {
                 let _ = writeln!(
                     rules,
-                    "[both {number}] t:c_status(k:c_{one}, \"FALSE\") ^ t:c_status(k:c_{other}, \"FALSE\") -> \
+                    "[both {number}] t:c_status(k:c_{first}, \"FALSE\") ^ t:c_status(k:c_{second}, \"FALSE\") -> \
                      t:fd_realisability(k:fd_{number}, false) ."
                 );
             }
@@ -136,7 +136,7 @@ impl World {
         }
     }
 
-    /// The options of the program for a situation.
+    /// Command-line options that establish a situation.
     fn options(failed: &BTreeSet<u64>, measured: &[u64]) -> Vec<String> {
         let fail = failed.iter().flat_map(|component| ["--fail".to_owned(), format!("c_{component}")]);
         let set = measured.iter().zip(0..);
@@ -144,39 +144,42 @@ impl World {
         fail.chain(set).collect()
     }
 
-    /// Minimal sets of names whose alteration makes the design available, each with the best effort then. All subsets
-    /// are tried.
+    /// Minimal sets of changes that make the design available, by names, with the least effort of an available design afterwards.
+    /// Computed by brute force over all subsets.
     fn repairs(&self, design: &Design) -> BTreeSet<(BTreeSet<String>, Option<u64>)> {
         let broken: Vec<Bound> =
             design.bounds.iter().copied().filter(|bound| !bound.holds(&self.measured)).collect();
         let failed: Vec<u64> = self.failed.iter().copied().collect();
         let count = failed.len() + broken.len();
-        let mut all: Vec<(BTreeSet<String>, Option<u64>)> = Vec::new();
+        let mut sufficient_sets: Vec<(BTreeSet<String>, Option<u64>)> = Vec::new();
         for mask in 0_u32..1 << count {
             let is_in = |position: usize| mask >> position & 1 == 1;
-            let (mut left, mut measured, mut names) =
+            let (mut still_failed, mut measured, mut names) =
                 (self.failed.clone(), self.measured.clone(), BTreeSet::new());
             for (component, _) in failed.iter().zip(0..).filter(|(_, position)| is_in(*position)) {
-                left.remove(component);
+                still_failed.remove(component);
                 names.insert(format!("c_{component}"));
             }
             for (bound, _) in broken.iter().zip(failed.len()..).filter(|(_, position)| is_in(*position)) {
                 measured[bound.attribute as usize] = bound.value;
                 names.insert(format!("q_{}", bound.attribute));
             }
-            if design.is_available(&left, &measured) {
-                let usable = self.designs.iter().filter(|own| own.is_available(&left, &measured));
-                all.push((names, usable.map(|own| own.effort).min()));
+            if design.is_available(&still_failed, &measured) {
+                let usable =
+                    self.designs.iter().filter(|candidate| candidate.is_available(&still_failed, &measured));
+                sufficient_sets.push((names, usable.map(|candidate| candidate.effort).min()));
             }
         }
-        let is_minimal = |own: &&(BTreeSet<String>, _)| {
-            all.iter().all(|other| other.0 == own.0 || !other.0.is_subset(&own.0))
+        let is_minimal = |candidate: &&(BTreeSet<String>, _)| {
+            sufficient_sets
+                .iter()
+                .all(|alternative| alternative.0 == candidate.0 || !alternative.0.is_subset(&candidate.0))
         };
-        all.iter().filter(is_minimal).cloned().collect()
+        sufficient_sets.iter().filter(is_minimal).cloned().collect()
     }
 }
 
-/// Returns how many causes and how many repairs were seen, at most, of a design that is not available.
+/// Checks all designs. Returns the greatest number of causes and of repairs of an unavailable design.
 fn check(seed: u64) -> (usize, usize) {
     let world = World::random(seed);
     let directory = tempfile::tempdir().expect("a directory");
@@ -199,29 +202,29 @@ fn check(seed: u64) -> (usize, usize) {
         let named = |changes: &Value| -> BTreeSet<String> {
             list(changes).iter().map(|change| change["name"].as_str().expect("a name").to_owned()).collect()
         };
-        let found: BTreeSet<_> = list(&answer["repairs"])
+        let repair_sets: BTreeSet<_> = list(&answer["repairs"])
             .iter()
             .map(|repair| (named(&repair["changes"]), repair["then"]["cost"].as_u64()))
             .collect();
         let expected = world.repairs(design);
-        assert_eq!(found, expected, "seed {seed}, {name}: {world:#?}");
-        // A single change is said to suffice only if it does.
+        assert_eq!(repair_sets, expected, "seed {seed}, {name}: {world:#?}");
+        // A change is reported as sufficient exactly if it is a repair by itself.
         for change in list(&answer["changes"]) {
-            let alone = BTreeSet::from([change["name"].as_str().expect("a name").to_owned()]);
-            let suffices = expected.iter().any(|(names, _)| *names == alone);
+            let single_change = BTreeSet::from([change["name"].as_str().expect("a name").to_owned()]);
+            let suffices = expected.iter().any(|(names, _)| *names == single_change);
             assert_eq!(change["suffices"], json!(suffices), "seed {seed}, {name}: {change} {world:#?}");
         }
         causes = causes.max(list(&answer["causes"]).len());
-        repairs = repairs.max(found.len());
+        repairs = repairs.max(repair_sets.len());
     }
     (causes, repairs)
 }
 
 #[test]
 fn repairs_are_all_minimal_sets_of_changes() {
-    let seen: Vec<(usize, usize)> = (0..12).map(check).collect();
-    assert!(seen.iter().any(|(causes, _)| *causes > 1), "{seen:?}");
-    assert!(seen.iter().any(|(_, repairs)| *repairs > 1), "{seen:?}");
+    let counts: Vec<(usize, usize)> = (0..12).map(check).collect();
+    assert!(counts.iter().any(|(causes, _)| *causes > 1), "{counts:?}");
+    assert!(counts.iter().any(|(_, repairs)| *repairs > 1), "{counts:?}");
 }
 
 #[test]
@@ -232,9 +235,9 @@ fn repairs_are_all_minimal_sets_of_changes_in_many_worlds() {
     });
 }
 
-/// The report of a newcomer: neither cause alone gives the plan of 110.8, both together do.
+/// Regression test for a user report: only both changes together lead to the plan of cost 110.8.
 #[test]
-fn two_causes_have_to_go_together() {
+fn joint_causes_are_repaired_together() {
     let mission = ["explain", "missions/templates/warehouse/mission.toml", "fd_suction"];
     let situation = ["--fail", "c_suction_cup", "--set", "air_dust=0.8"];
     let outcome = metaplan_in(&root(), &[&mission[..], &situation].concat(), "");

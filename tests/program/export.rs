@@ -1,4 +1,4 @@
-//! `export`: what other planners get, and that it is the same mission.
+//! Tests of `metaplan export`: input for other planners with the same optimum as the mission.
 
 use crate::common::{metaplan, metaplan_in, root};
 
@@ -10,7 +10,7 @@ const MISSIONS: [(&str, &[&str], i64); 4] = [
 ];
 
 #[test]
-fn what_is_exported_has_the_same_optimum_without_the_knowledge_base() {
+fn exported_files_have_the_optimum_of_the_mission() {
     for (mission, situation, cost) in MISSIONS {
         let directory = tempfile::tempdir().expect("a temporary directory");
         let target = directory.path().join("new/folder");
@@ -47,11 +47,11 @@ const PROBLEM: &str =
  (:init (at a) (at a) (not (at home)) (= (total-cost) 0)) (:goal (at home)) (:metric minimize (total-cost)))";
 
 #[test]
-fn quirks_are_gone() {
+fn exported_files_are_normalised() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     std::fs::write(directory.path().join("d.pddl"), DOMAIN).expect("a file");
     std::fs::write(directory.path().join("p.pddl"), PROBLEM).expect("a file");
-    // The domain uses `a`, which is an object of the problem.
+    // The domain mentions `a`, which is an object of the problem. The export declares it as a constant.
     let arguments = ["export", "d.pddl", "p.pddl", "--to", "pddl", "--quiet", "--format", "json"];
     let outcome = metaplan_in(directory.path(), &arguments, "");
     assert_eq!(outcome.status, 0, "{outcome:#?}");
@@ -78,7 +78,7 @@ fn quirks_are_gone() {
 }
 
 #[test]
-fn what_cannot_be_written_is_said() {
+fn unwritable_targets_are_reported() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let file = directory.path().join("file");
     std::fs::write(&file, "").expect("a file");
@@ -89,11 +89,11 @@ fn what_cannot_be_written_is_said() {
     assert_eq!(metaplan(&["export", "missions/ugv.toml"]).status, 2);
 }
 
-/// Plans of LPG and the reader of the unified planning framework, on what is exported. Needs a Python with both
-/// (`python3 -m venv peers; peers/bin/pip install unified-planning up-lpg`), named by `METAPLAN_PEERS=peers/bin/python`.
+/// Validates plans of LPG for exported files, and parses the files with the unified planning framework. Needs a Python with both
+/// (`python3 -m venv peers; peers/bin/pip install unified-planning up-lpg`) at the path `METAPLAN_PEERS=peers/bin/python`.
 #[test]
 #[ignore = "needs peers"]
-fn peers_read_what_is_exported() {
+fn peers_read_exported_files() {
     let Ok(python) = std::env::var("METAPLAN_PEERS") else { panic!("METAPLAN_PEERS names no Python") };
     let run = |script: &str, directory: &std::path::Path| {
         let output = std::process::Command::new(&python).args(["-c", script]).current_dir(directory).output();
@@ -111,7 +111,7 @@ assert PDDLReader().parse_problem('domain.pddl', 'problem.pddl').actions";
         let target = directory.path().to_str().expect("UTF-8");
         let outcome = metaplan(&[&["export", mission, "--to", "pddl", "-o", target], situation].concat());
         assert_eq!(outcome.status, 0, "{outcome:#?}");
-        // The framework has no metric over time and a fluent together.
+        // The framework does not support metrics that combine total time with a fluent.
         if mission.contains("uuv") {
             run(reader, directory.path());
         }
@@ -119,7 +119,7 @@ assert PDDLReader().parse_problem('domain.pddl', 'problem.pddl').actions";
         let arguments = ["validate", "domain.pddl", "problem.pddl", "plan_1.SOL", "--format", "json"];
         let verdict = metaplan_in(directory.path(), &arguments, "");
         assert_eq!(verdict.status, 0, "{verdict:#?}");
-        assert!(verdict.json()["metric"].as_i64().is_some_and(|found| found >= cost), "{verdict:#?}");
+        assert!(verdict.json()["metric"].as_i64().is_some_and(|metric| metric >= cost), "{verdict:#?}");
         let concurrent = [&arguments[..], &["--concurrent", "--tolerance", "0.0001"]].concat();
         assert_eq!(metaplan_in(directory.path(), &concurrent, "").status, 0);
         assert_eq!(

@@ -1,8 +1,8 @@
-//! What `metaplan help` shows works.
+//! Test of the examples in `metaplan help`.
 
 use crate::common::{copy_folder, metaplan, metaplan_in, root};
 
-/// Each example does what it says, in the order of the commands: some need what earlier ones have written.
+/// Runs the examples in the order of the commands. Some examples need the output of earlier ones.
 #[test]
 fn every_example_works() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -12,10 +12,10 @@ fn every_example_works() {
             copy_folder(&from, &folder.path().join(part));
         }
     }
-    let all = metaplan(&["help"]).stdout;
-    let (_, commands) = all.split_once("\nCommands:\n").expect("commands");
+    let overview = metaplan(&["help"]).stdout;
+    let (_, commands) = overview.split_once("\nCommands:\n").expect("commands");
     let names = commands.lines().take_while(|line| !line.is_empty());
-    // What a command does may take several lines.
+    // A description can take several lines. Only the first one begins with the command.
     let names = names.filter_map(|line| line.strip_prefix("  ").filter(|line| !line.starts_with(' ')));
     let names = names.filter_map(|line| line.split_whitespace().next()).filter(|name| *name != "help");
     let mut count = 0;

@@ -1,10 +1,10 @@
-//! Missions to start from: each plans at once without a word of doubt, and what is written is whole.
+//! Tests of `metaplan init`: each template can be planned at once without warnings, and no existing file is overwritten.
 
 use std::path::Path;
 
 use crate::common::{headlines, metaplan_in, root};
 
-/// A template in a new directory: what plans of it cost, as its files have it and in each scenario.
+/// Creates a mission from a template and checks the costs of its plans, without a scenario and in each scenario.
 fn check(template: &str, cost: &str, scenarios: &[(&str, &str)]) {
     let directory = tempfile::tempdir().expect("a directory");
     let here = directory.path();
@@ -47,23 +47,23 @@ fn check(template: &str, cost: &str, scenarios: &[(&str, &str)]) {
 }
 
 #[test]
-fn blank_plans_at_once() {
+fn blank_template_can_be_planned() {
     check("blank", "1", &[("first_fails", "2")]);
 }
 
 #[test]
-fn the_ground_vehicle_plans_at_once() {
+fn ugv_template_can_be_planned() {
     check("ugv", "408", &[("kinect_failure", "412"), ("bright_sun", "516")]);
 }
 
 #[test]
-fn the_warehouse_plans_at_once() {
+fn warehouse_template_can_be_planned() {
     let scenarios =
         [("lidar_fails", "113.2"), ("suction_fails", "118.8"), ("dusty", "118.8"), ("more_battery", "54.8")];
     check("warehouse", "110.8", &scenarios);
 }
 
-/// The names of what lies in a directory.
+/// Names of the entries of a directory.
 fn names(directory: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(directory).expect("a directory");
     entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned()).collect()
@@ -94,9 +94,9 @@ fn nothing_is_overwritten() {
     assert_eq!(names(here).len(), 2, "{:?}", names(here));
 }
 
-/// A name of any form becomes the name in the manifest, and the answer names the files.
+/// Every directory name is accepted as the name of the mission. The answer lists the files.
 #[test]
-fn names_are_taken_as_they_are() {
+fn directory_names_become_mission_names() {
     let directory = tempfile::tempdir().expect("a directory");
     let name = "robot \"7\" of the 2nd \u{e9}tage";
     let outcome =
@@ -105,10 +105,10 @@ fn names_are_taken_as_they_are() {
     assert_eq!(answer["format"], "metaplan-init/1");
     let mut files = names(&directory.path().join(name));
     files.sort();
-    let mut said: Vec<_> =
+    let mut reported_files: Vec<_> =
         answer["files"].as_array().expect("files").iter().map(|file| file.as_str()).collect();
-    said.sort_unstable();
-    assert_eq!(said, files.iter().map(|file| Some(file.as_str())).collect::<Vec<_>>());
+    reported_files.sort_unstable();
+    assert_eq!(reported_files, files.iter().map(|file| Some(file.as_str())).collect::<Vec<_>>());
     let manifest = directory.path().join(name).join("mission.toml").display().to_string();
     let planned = metaplan_in(&root(), &["plan", &manifest, "--format", "json"], "");
     assert_eq!(planned.json()["mission"], name);

@@ -1,5 +1,5 @@
-//! Commands with several results: at a time limit and at Ctrl-C they show the results that are complete, and say that
-//! others are missing.
+//! Tests of commands with several results: at a time limit and at Ctrl-C they show the complete results and report that others are
+//! missing.
 
 use std::fs;
 use std::path::Path;
@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use crate::common::{Outcome, metaplan, metaplan_in, root};
 
-/// Limits in seconds: on a machine with much else to do the first of them may end before anything is done.
+/// Limits in seconds. On a busy machine the first ones can end before there is any result.
 const SECONDS: [u32; 4] = [5, 15, 60, 180];
 
 const SIMULATE: [&str; 6] =
@@ -38,28 +38,33 @@ fn interrupted(directory: &Path, arguments: &[&str], seconds: u32) -> Outcome {
     }
 }
 
-/// Each way to end a command early, with growing limits, until something was done; `done` counts what an answer has.
-fn check(directory: &Path, arguments: &[&str], status: i32, done: impl Fn(&Value) -> usize) -> Vec<Value> {
+/// Ends a command early, by limit and by signal, with growing times until there is a result. `done` counts the results of an answer.
+fn check(
+    directory: &Path,
+    arguments: &[&str],
+    status: i32,
+    count_results: impl Fn(&Value) -> usize,
+) -> Vec<Value> {
     let json = ["--format", "json", "--quiet"];
     let by_limit = |seconds: u32| {
         let limit = seconds.to_string();
         metaplan_in(directory, &[arguments, &["--time-limit", &limit], &json].concat(), "")
     };
-    let mut ways: Vec<Box<dyn Fn(u32) -> Outcome + '_>> = vec![Box::new(by_limit)];
+    let mut interruptions: Vec<Box<dyn Fn(u32) -> Outcome + '_>> = vec![Box::new(by_limit)];
     #[cfg(unix)]
     if !is_ignored() {
-        ways.push(Box::new(|seconds| interrupted(directory, &[arguments, &json].concat(), seconds)));
+        interruptions.push(Box::new(|seconds| interrupted(directory, &[arguments, &json].concat(), seconds)));
     }
-    let answers = ways.iter().map(|way| {
-        let found = SECONDS.iter().find_map(|&seconds| {
-            let outcome = way(seconds);
-            // While files are read there is nothing to show.
+    let answers = interruptions.iter().map(|interrupt| {
+        let answer_with_results = SECONDS.iter().find_map(|&seconds| {
+            let outcome = interrupt(seconds);
+            // Nothing is printed as JSON while the input files are read.
             let answer: Value = serde_json::from_str(&outcome.stdout).ok()?;
-            let is_some = answer["format"] != "metaplan-error/1" && done(&answer) > 0;
-            assert!(!is_some || outcome.status == status, "{outcome:#?}");
-            is_some.then_some(answer)
+            let has_results = answer["format"] != "metaplan-error/1" && count_results(&answer) > 0;
+            assert!(!has_results || outcome.status == status, "{outcome:#?}");
+            has_results.then_some(answer)
         });
-        found.unwrap_or_else(|| panic!("{arguments:?} never shows anything"))
+        answer_with_results.unwrap_or_else(|| panic!("{arguments:?} never shows anything"))
     });
     let answers: Vec<Value> = answers.collect();
     for answer in &answers {
@@ -68,7 +73,7 @@ fn check(directory: &Path, arguments: &[&str], status: i32, done: impl Fn(&Value
     answers
 }
 
-/// Whether what a shell has started in the background ignores Ctrl-C.
+/// Returns `true` if SIGINT is ignored, as in background processes of a shell.
 #[cfg(unix)]
 fn is_ignored() -> bool {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -77,31 +82,31 @@ fn is_ignored() -> bool {
 }
 
 #[test]
-fn simulations_show_the_missions_that_are_done() {
+fn interrupted_simulations_show_the_finished_runs() {
     let arguments = [&SIMULATE[..], &["--strategy", "none", "--runs", "100000"]].concat();
     let count = |answer: &Value| answer["runs"].as_array().map_or(0, Vec::len);
     for answer in check(&root(), &arguments, 12, count) {
         assert_eq!((&answer["complete"], &answer["missions"]), (&json!(false), &json!(200_000)));
-        let of = |strategy: &str| -> Vec<Value> {
+        let runs_of = |strategy: &str| -> Vec<Value> {
             let runs = answer["runs"].as_array().expect("runs").iter();
             runs.filter(|run| run["strategy"] == strategy).cloned().collect()
         };
-        // Each seed with all strategies before the next one; and what is there is what a run without a limit has.
-        let (joint, none) = (of("joint"), of("none"));
+        // Each seed is simulated with all strategies before the next seed. The runs are the first runs of a simulation without a limit.
+        let (joint, none) = (runs_of("joint"), runs_of("none"));
         assert!(joint.len() - none.len() <= 1, "{} and {}", joint.len(), none.len());
         let count = joint.len().min(5).to_string();
-        let whole =
+        let uninterrupted =
             metaplan(&[&SIMULATE[..], &["--runs", &count, "--format", "json", "--quiet"]].concat()).json();
-        assert_eq!(whole["complete"], true);
-        assert_eq!(whole["runs"].as_array().expect("runs")[..], joint[..joint.len().min(5)]);
+        assert_eq!(uninterrupted["complete"], true);
+        assert_eq!(uninterrupted["runs"].as_array().expect("runs")[..], joint[..joint.len().min(5)]);
     }
-    let text = metaplan(&[&SIMULATE[..], &["--runs", "100000", "--time-limit", "3"]].concat());
-    assert_eq!(text.status, 12, "{text:#?}");
-    assert!(text.stderr.contains("M130"), "{text:#?}");
+    let text_outcome = metaplan(&[&SIMULATE[..], &["--runs", "100000", "--time-limit", "3"]].concat());
+    assert_eq!(text_outcome.status, 12, "{text_outcome:#?}");
+    assert!(text_outcome.stderr.contains("M130"), "{text_outcome:#?}");
 }
 
 #[test]
-fn studies_keep_the_runs_that_are_done_and_go_on() {
+fn interrupted_studies_can_be_resumed() {
     let folder = tempfile::tempdir().expect("a directory");
     let mission = root().join("missions/ugv.toml");
     let study = format!(
@@ -113,8 +118,9 @@ fn studies_keep_the_runs_that_are_done_and_go_on() {
     let sweep = ["sweep", "study.toml", "--output", "results", "--resume"];
     let count = |answer: &Value| answer["done"].as_u64().map_or(0, |done| done as usize);
     let answers = check(folder.path(), &sweep, 1, count);
+    // With `--resume`, later interruptions start from the results of earlier ones.
     assert!(answers.windows(2).all(|pair| count(&pair[0]) <= count(&pair[1])), "{answers:#?}");
-    // No run that was ended counts as done.
+    // An interrupted run is not counted as a failure.
     for answer in &answers {
         assert_eq!((&answer["failed"], &answer["timed_out"]), (&json!(0), &json!(0)), "{answer:#}");
     }
@@ -126,7 +132,7 @@ fn studies_keep_the_runs_that_are_done_and_go_on() {
 }
 
 #[test]
-fn comparisons_show_what_is_compared() {
+fn interrupted_comparisons_show_finished_results() {
     let arguments = ["compare", "missions/camara_like.toml", "--no-battery", "--pairs", "1000"];
     let count = |answer: &Value| answer["comparisons"].as_array().map_or(0, Vec::len);
     for answer in check(&root(), &arguments, 12, count) {

@@ -1,9 +1,9 @@
-//! `metaplan journal`: what is in a journal, and whether it can be used.
+//! Tests of `metaplan journal`: the content of a journal and its check.
 
 use crate::common::{metaplan, metaplan_in, root};
 
 #[test]
-fn a_journal_is_checked_and_shown() {
+fn journals_are_checked_and_shown() {
     let directory = tempfile::tempdir().expect("a directory");
     let journal = directory.path().display().to_string();
     let lines = "{\"event\":\"tick\"}\n{\"event\":\"component_status\",\"component\":\"c_kinect\",\"status\":\"FALSE\"}\n";
@@ -12,12 +12,12 @@ fn a_journal_is_checked_and_shown() {
     let check = metaplan(&["journal", "check", &journal]);
     assert_eq!(check.status, 0, "{check:#?}");
     assert!(check.stdout.ends_with("the journal can be used\n"), "{check:#?}");
-    // The same mission resumes it, and another one does not.
+    // The same mission can resume it, another mission cannot.
     let resumed = metaplan(&["journal", "check", &journal, "--mission", "missions/ugv.toml"]);
     assert_eq!(resumed.status, 0, "{resumed:#?}");
-    let other = metaplan(&["journal", "check", &journal, "--mission", "missions/uuv.toml"]);
-    assert_eq!(other.status, 3, "{other:#?}");
-    assert!(other.stderr.contains("it belongs to another mission"), "{other:#?}");
+    let other_mission = metaplan(&["journal", "check", &journal, "--mission", "missions/uuv.toml"]);
+    assert_eq!(other_mission.status, 3, "{other_mission:#?}");
+    assert!(other_mission.stderr.contains("it belongs to another mission"), "{other_mission:#?}");
     let show = metaplan(&["journal", "show", &journal]);
     assert!(
         show.stdout.contains("c_kinect") && show.stdout.contains("inferred, plan_requested"),
@@ -31,7 +31,7 @@ fn a_journal_is_checked_and_shown() {
     assert_eq!(kinds, ["decision", "event", "decision", "event", "decision"]);
     assert_eq!(json["records"][0]["answers"][0]["answer"], "plan_requested");
 
-    // Every line with a carriage return, as an editor may leave it: nothing is deleted, and nothing begins anew.
+    // Carriage returns, as inserted by an editor, make the journal unusable. It is neither changed nor restarted.
     let file = directory.path().join("journal-000000");
     let text = std::fs::read_to_string(&file).expect("text").replace('\n', "\r\n");
     std::fs::write(&file, &text).expect("written");
@@ -42,6 +42,6 @@ fn a_journal_is_checked_and_shown() {
     let check = metaplan(&["journal", "check", &journal]);
     assert_eq!(check.status, 3, "{check:#?}");
     assert!(check.stdout.ends_with("the journal cannot be used\n"), "{check:#?}");
-    let nothing = metaplan(&["journal", "check", "missions"]);
-    assert_eq!(nothing.status, 3, "{nothing:#?}");
+    let no_journal = metaplan(&["journal", "check", "missions"]);
+    assert_eq!(no_journal.status, 3, "{no_journal:#?}");
 }

@@ -1,4 +1,4 @@
-//! Limits and signals from the first file read, and certificates that could not be written or say what they are not.
+//! Tests of limits and signals in early phases, and of certificates: write errors, and statements about their scope.
 #![expect(clippy::print_stdout, reason = "what is skipped says so")]
 
 use std::process::{Child, Command, Stdio};
@@ -9,10 +9,10 @@ use serde_json::{Value, json};
 use crate::certificate::{certificate, change};
 use crate::common::{copy_of_mission, edit, metaplan, metaplan_in, root, verify_in};
 
-/// Waits for the program to end, at most so long.
+/// Waits up to 20 s for the program to end, then kills it.
 fn wait(child: &mut Child) -> Option<std::process::ExitStatus> {
-    let begun = Instant::now();
-    while begun.elapsed() < Duration::from_secs(20) {
+    let started = Instant::now();
+    while started.elapsed() < Duration::from_secs(20) {
         if let Some(status) = child.try_wait().expect("it is ours") {
             return Some(status);
         }
@@ -33,7 +33,7 @@ fn start(arguments: &[&str]) -> Child {
         .expect("the program starts")
 }
 
-/// Whether this process, and what it starts, ignores a signal, as what a shell runs in the background does.
+/// Returns `true` if this process and its children ignore a signal, as background processes of a shell do.
 #[cfg(unix)]
 fn is_ignored(signal: i32) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -44,7 +44,7 @@ fn is_ignored(signal: i32) -> bool {
 
 #[cfg(unix)]
 #[test]
-fn a_signal_ends_the_program_while_it_reads() {
+fn signals_end_the_program_while_it_reads() {
     use std::os::unix::process::ExitStatusExt as _;
     for arguments in
         [&["plan", "-", "encodings/ugv/problem.pddl"][..], &["plan", "encodings/ugv/domain.pddl", "-"]]
@@ -54,7 +54,7 @@ fn a_signal_ends_the_program_while_it_reads() {
                 println!("skipped: who runs the tests ignores {name}, and so does all that is started");
                 continue;
             }
-            // Its standard input stays open, so that it has more to read.
+            // Standard input stays open, so the program keeps reading.
             let mut child = start(arguments);
             std::thread::sleep(Duration::from_millis(300));
             let status = Command::new("kill").args([name, &child.id().to_string()]).status().expect("kill");
@@ -65,7 +65,7 @@ fn a_signal_ends_the_program_while_it_reads() {
     }
 }
 
-/// A round trip through so many places, whose best order takes long to prove.
+/// A round trip through a number of places. Its optimum takes long to prove.
 #[cfg(unix)]
 pub fn round_trip(places: u32) -> (String, String) {
     use std::fmt::Write as _;
@@ -74,13 +74,13 @@ pub fn round_trip(places: u32) -> (String, String) {
           :effect (and (not (at ?a)) (at ?b) (seen ?b) (increase (total-cost) (far ?a ?b)))))";
     let (mut objects, mut init, mut goal) = (String::new(), String::new(), String::new());
     let place = |number: u32| (number * 37 % 101, number * 59 % 97);
-    for one in 0..places {
-        let _ = write!(objects, " p{one}");
-        let _ = write!(goal, " (seen p{one})");
-        for other in (0..places).filter(|other| *other != one) {
-            let ((x, y), (u, v)) = (place(one), place(other));
-            let far = x.abs_diff(u) + y.abs_diff(v);
-            let _ = write!(init, " (= (far p{one} p{other}) {far})");
+    for from in 0..places {
+        let _ = write!(objects, " p{from}");
+        let _ = write!(goal, " (seen p{from})");
+        for to in (0..places).filter(|to| *to != from) {
+            let ((x, y), (u, v)) = (place(from), place(to));
+            let distance = x.abs_diff(u) + y.abs_diff(v);
+            let _ = write!(init, " (= (far p{from} p{to}) {distance})");
         }
     }
     let problem = format!(
@@ -90,10 +90,10 @@ pub fn round_trip(places: u32) -> (String, String) {
     (domain.to_owned(), problem)
 }
 
-/// The best plan so far is the answer where the soft limit on processor time is reached.
+/// At the soft limit of processor time, the answer is the best plan so far.
 #[cfg(unix)]
 #[test]
-fn the_processor_time_that_a_shell_allows_is_a_limit() {
+fn soft_cpu_limit_of_the_shell_is_respected() {
     let directory = tempfile::tempdir().expect("a directory");
     let (domain, problem) = round_trip(24);
     std::fs::write(directory.path().join("domain.pddl"), domain).expect("a file");
@@ -118,39 +118,42 @@ fn the_processor_time_that_a_shell_allows_is_a_limit() {
 }
 
 #[test]
-fn the_time_limit_covers_reading() {
+fn time_limit_includes_reading() {
     let mut child = start(&["plan", "-", "encodings/ugv/problem.pddl", "--time-limit", "0.3"]);
     let status = wait(&mut child).expect("it ends");
     assert_eq!(status.code(), Some(12));
 }
 
-/// What was compared is shown, and that it is not all.
+/// A comparison at its limit shows the finished results and reports that they are incomplete.
 #[test]
-fn a_comparison_shows_what_it_has_when_time_is_up() {
+fn comparisons_at_a_limit_show_finished_results() {
     let outcome = metaplan(&["compare", "missions/camara_like.toml", "--time-limit", "0"]);
     assert_eq!(outcome.status, 12, "{outcome:#?}");
     assert!(outcome.stderr.contains("M130") && outcome.stdout.is_empty(), "{outcome:#?}");
     let directory = tempfile::tempdir().expect("a directory");
     let table = directory.path().join("table.csv").display().to_string();
     let arguments = ["compare", "missions/camara_like.toml", "--no-battery", "--format", "json"];
-    let whole = metaplan(&[&arguments[..], &["--pairs", "2"]].concat());
-    let whole: Value = serde_json::from_str(&whole.stdout).expect("JSON");
-    assert_eq!((&whole["complete"], &whole["messages"]), (&json!(true), &json!([])));
+    let complete_answer = metaplan(&[&arguments[..], &["--pairs", "2"]].concat());
+    let complete_answer: Value = serde_json::from_str(&complete_answer.stdout).expect("JSON");
+    assert_eq!((&complete_answer["complete"], &complete_answer["messages"]), (&json!(true), &json!([])));
     let mut rows = 0;
-    // More pairs than can be compared in any of these times.
+    // More pairs than can be compared within any of these limits.
     for time in ["4", "16", "64"] {
-        let more = ["--pairs", "1000", "--time-limit", time, "--csv", &table];
-        let outcome = metaplan(&[&arguments[..], &more].concat());
+        let limits = ["--pairs", "1000", "--time-limit", time, "--csv", &table];
+        let outcome = metaplan(&[&arguments[..], &limits].concat());
         assert_eq!(outcome.status, 12, "{outcome:#?}");
         let answer: Value = serde_json::from_str(&outcome.stdout).expect("JSON");
         let text = answer["messages"][0]["message"].as_str().expect("a sentence");
         assert!(answer["messages"][0]["code"] == "M130" && text.contains("before"), "{answer:#}");
         assert!(answer["format"] == "metaplan-error/1" || answer["complete"] == false, "{answer:#}");
-        let Some(all) = answer["comparisons"].as_array() else { continue };
-        for comparison in &all[..all.len().saturating_sub(1)] {
+        let Some(comparisons) = answer["comparisons"].as_array() else { continue };
+        for comparison in &comparisons[..all.len().saturating_sub(1)] {
             assert_eq!(comparison["complete"], true);
         }
-        rows = all.iter().map(|own| own["candidates"].as_array().map_or(0, Vec::len)).sum();
+        rows = comparisons
+            .iter()
+            .map(|comparison| comparison["candidates"].as_array().map_or(0, Vec::len))
+            .sum();
         if rows > 0 {
             let written = std::fs::read_to_string(&table).expect("the table");
             assert_eq!(written.lines().count(), rows + 1, "{written}");
@@ -161,7 +164,7 @@ fn a_comparison_shows_what_it_has_when_time_is_up() {
 }
 
 #[test]
-fn a_comparison_says_in_text_that_it_is_incomplete() {
+fn incomplete_comparisons_are_reported_in_text_output() {
     for time in ["8", "32", "128"] {
         let arguments = ["compare", "missions/camara_like.toml", "--no-battery"];
         let outcome = metaplan(&[&arguments[..], &["--pairs", "1000", "--time-limit", time]].concat());
@@ -177,16 +180,16 @@ fn a_comparison_says_in_text_that_it_is_incomplete() {
 }
 
 #[test]
-fn a_certificate_that_cannot_be_written_is_an_error() {
+fn unwritable_certificates_are_errors() {
     let directory = tempfile::tempdir().expect("a directory");
-    let full = directory.path().join("full");
-    std::fs::create_dir(&full).expect("a directory");
-    std::fs::write(full.join("a"), "").expect("a file");
-    let full = full.display().to_string();
-    for more in [&[][..], &["-q"], &["--format", "json"], &["-q", "--format", "json"]] {
-        let arguments: Vec<&str> = ["plan", "missions/ugv.toml", "--certificate", &full]
+    let nonempty = directory.path().join("full");
+    std::fs::create_dir(&nonempty).expect("a directory");
+    std::fs::write(nonempty.join("a"), "").expect("a file");
+    let nonempty = nonempty.display().to_string();
+    for options in [&[][..], &["-q"], &["--format", "json"], &["-q", "--format", "json"]] {
+        let arguments: Vec<&str> = ["plan", "missions/ugv.toml", "--certificate", &nonempty]
             .into_iter()
-            .chain(more.iter().copied())
+            .chain(options.iter().copied())
             .collect();
         let outcome = metaplan(&arguments);
         assert_eq!(outcome.status, 3, "{outcome:#?}");
@@ -196,7 +199,7 @@ fn a_certificate_that_cannot_be_written_is_an_error() {
 }
 
 #[test]
-fn a_verification_that_takes_longer_fails_however_short_it_is() {
+fn verification_respects_the_time_limit() {
     let directory = tempfile::tempdir().expect("a directory");
     let target = certificate(directory.path(), &["plan", "missions/ugv.toml"]);
     let outcome = verify_in(&root(), &[&target, "--time-limit", "0"]);
@@ -204,9 +207,9 @@ fn a_verification_that_takes_longer_fails_however_short_it_is() {
     assert!(outcome.stdout.contains("limits"), "{outcome:#?}");
 }
 
-/// Rules with one more, so that the claim is another one, are not taken for ours whatever they are called.
+/// A rule file with an additional rule proves another claim. It must not be reported as shipped, whatever its name.
 #[test]
-fn rules_are_shipped_only_if_they_are_ours() {
+fn modified_rules_are_not_reported_as_shipped() {
     let directory = tempfile::tempdir().expect("a directory");
     let target = certificate(directory.path(), &["plan", "missions/ugv.toml"]);
     let outcome = verify_in(&root(), &[&target]);
@@ -214,17 +217,17 @@ fn rules_are_shipped_only_if_they_are_ours() {
 
     let copy = copy_of_mission("ugv");
     let rules = std::fs::read_to_string(root().join("rules/swrl/coadaptation.swrl")).expect("the rules");
-    let more = "[more] t:FunctionDesign(?fd) ^ t:requiresC(?fd, ?c) ^ t:solvesF(?fd, ?f) -> t:fd_efficacy(?fd, 1) .\n";
-    std::fs::write(copy.path().join("missions/my.swrl"), rules + more).expect("written");
+    let extra_rule = "[more] t:FunctionDesign(?fd) ^ t:requiresC(?fd, ?c) ^ t:solvesF(?fd, ?f) -> t:fd_efficacy(?fd, 1) .\n";
+    std::fs::write(copy.path().join("missions/my.swrl"), rules + extra_rule).expect("written");
     edit(copy.path(), "missions/ugv.toml", "[planning]", "rules = [\"my.swrl\"]\n\n[planning]");
-    let made = metaplan_in(copy.path(), &["plan", "missions/ugv.toml", "--certificate", "c"], "");
-    assert_eq!(made.status, 0, "{made:#?}");
+    let planned = metaplan_in(copy.path(), &["plan", "missions/ugv.toml", "--certificate", "c"], "");
+    assert_eq!(planned.status, 0, "{planned:#?}");
     let outcome = verify_in(copy.path(), &["c"]);
     assert_eq!(outcome.status, 0, "{outcome:#?}");
     assert!(outcome.stdout.contains("`my.swrl` (not shipped"), "{outcome:#?}");
 
-    // Relabelled in both files that name it.
-    let own = copy.path().join("c").display().to_string();
+    // Both files that name the rules are relabelled, with updated hashes.
+    let target_of_copy = copy.path().join("c").display().to_string();
     let relabel = |text: String| {
         let mut value: Value = serde_json::from_str(&text).expect("JSON");
         let rename = |name: &mut Value| {
@@ -237,27 +240,29 @@ fn rules_are_shipped_only_if_they_are_ours() {
         });
         value.to_string()
     };
-    change(&own, "origin.json", &relabel);
-    change(&own, "derivations.json", &relabel);
+    change(&target_of_copy, "origin.json", &relabel);
+    change(&target_of_copy, "derivations.json", &relabel);
     let outcome = verify_in(copy.path(), &["c"]);
     assert!(outcome.stdout.contains("`coadaptation` (NOT the shipped rules"), "{outcome:#?}");
 }
 
 #[test]
-fn a_certificate_is_about_a_mission_or_not() {
+fn certificates_are_compared_with_missions() {
     let directory = tempfile::tempdir().expect("a directory");
     let situation = ["--fail", "c_kinect", "--set", "robot_at=wp2"];
     let plan: Vec<&str> = ["plan", "missions/ugv.toml"].into_iter().chain(situation).collect();
     let target = certificate(directory.path(), &plan);
-    let check = |more: &[&str], status: i32, words: &str| {
-        let all: Vec<&str> =
-            ["verify", target.as_str(), "--mission"].into_iter().chain(more.iter().copied()).collect();
-        let outcome = metaplan(&all);
+    let check = |mission_arguments: &[&str], status: i32, words: &str| {
+        let command: Vec<&str> = ["verify", target.as_str(), "--mission"]
+            .into_iter()
+            .chain(mission_arguments.iter().copied())
+            .collect();
+        let outcome = metaplan(&command);
         assert_eq!(outcome.status, status, "{outcome:#?}");
         assert!(outcome.stdout.contains(words), "{outcome:#?}");
     };
-    let same: Vec<&str> = ["missions/ugv.toml"].into_iter().chain(situation).collect();
-    check(&same, 0, "it is about `ugv` as it is now");
+    let same_situation: Vec<&str> = ["missions/ugv.toml"].into_iter().chain(situation).collect();
+    check(&same_situation, 0, "it is about `ugv` as it is now");
     check(&["missions/ugv.toml", "--scenario", "kinect_failure"], 0, "it is about `ugv` as it is now");
     check(&["missions/ugv.toml"], 30, "the situation");
     check(&["missions/uuv.toml"], 30, "not about `uuv`");

@@ -1,10 +1,10 @@
-//! `metaplan lint`: everything that is wrong or questionable about a mission, in one answer.
+//! Tests of `metaplan lint`: all errors and warnings about a mission in one answer.
 
 use std::path::Path;
 
 use crate::common::{Outcome, edit, metaplan, metaplan_in};
 
-/// The warehouse mission with changes, as `lint` sees it.
+/// Lints the warehouse mission after changes, as text and as JSON.
 fn check(changes: &[(&str, &str, &str)], status: i32, words: &[&str]) -> Outcome {
     let directory = tempfile::tempdir().expect("a directory");
     let here = directory.path();
@@ -51,13 +51,13 @@ fn templates_and_shipped_missions_are_clean() {
         outcome.status, 1,
         "without a knowledge base nothing gives `battery_usage` a value: {outcome:#?}"
     );
-    let with =
+    let with_knowledge_base =
         ["lint", "encodings/ugv/plain.pddl", "encodings/ugv/problem.pddl", "--kb", "ontology/kb/ugv.ttl"];
-    assert_eq!(metaplan(&with).status, 0);
+    assert_eq!(metaplan(&with_knowledge_base).status, 0);
 }
 
 #[test]
-fn what_meets_nothing_is_a_warning() {
+fn unused_names_are_warnings() {
     check(&[("robot.ttl", ":a_pick a t:Action", ":a_pickup a t:Action")], 1, &["M205", "if it is `pick`"]);
     check(
         &[("robot.ttl", "t:requiresC :c_lidar ;", "t:requiresC :c_lidra ;")],
@@ -77,9 +77,9 @@ fn what_meets_nothing_is_a_warning() {
     );
 }
 
-/// Numbers that make a design or an action useless: `lint` has the place, and `plan` warns, too.
+/// Numbers that make a design or an action unusable: `lint` reports their position, and `plan` warns as well.
 #[test]
-fn numbers_that_are_missing_or_negative_are_warnings() {
+fn missing_and_negative_numbers_are_warnings() {
     let misspelt = (
         "robot.ttl",
         ":fd_lidar a t:FunctionDesign ; t:solvesF :f_navigate ;\n    t:requiresC :c_lidar ;\n    t:hasQAestimation\n        \
@@ -100,9 +100,9 @@ fn numbers_that_are_missing_or_negative_are_warnings() {
             "0 errors, 2 warnings",
         ],
     );
-    let one = "(= (distance dock packing) 4)";
+    let distance = "(= (distance dock packing) 4)";
     check(
-        &[("problem.pddl", one, "")],
+        &[("problem.pddl", distance, "")],
         1,
         &["M231", "`(distance dock packing)` has no value", "`move`", "problem.pddl:", "0 errors, 1 warning"],
     );
@@ -123,10 +123,10 @@ fn numbers_that_are_missing_or_negative_are_warnings() {
     );
 }
 
-/// Without a plan, `plan` names the missing numbers, and `explain` gives them as the reason why an available design
-/// cannot be used.
+/// If there is no plan, `plan` lists the missing numbers, and `explain` gives them as the reason why an available design is not
+/// applicable.
 #[test]
-fn missing_numbers_are_named_where_there_is_no_plan() {
+fn missing_numbers_are_listed_if_there_is_no_plan() {
     let directory = tempfile::tempdir().expect("a directory");
     let here = directory.path();
     assert_eq!(metaplan_in(here, &["init", "m", "--from", "warehouse"], "").status, 0);
@@ -148,7 +148,7 @@ fn missing_numbers_are_named_where_there_is_no_plan() {
     }
     let answer = metaplan_in(here, &["plan", "m/mission.toml", "--format", "json"], "").json();
     let missing = answer["missing_values"].as_array().expect("a list");
-    let battery = missing.iter().find(|own| own["function"] == "(battery)").expect("the battery");
+    let battery = missing.iter().find(|value| value["function"] == "(battery)").expect("the battery");
     assert_eq!(
         (&battery["needed_by"], &battery["file"]),
         (&serde_json::json!(["move", "pick"]), &"m/problem.pddl".into())
@@ -158,9 +158,9 @@ fn missing_numbers_are_named_where_there_is_no_plan() {
     assert!(outcome.stdout.contains(words), "{outcome:#?}");
 }
 
-/// Domains that omit values on purpose: between places without a way, and from a place to itself.
+/// A domain that omits values on purpose: distances between places without a way, and from a place to itself.
 #[test]
-fn numbers_that_nothing_needs_are_no_warnings() {
+fn unneeded_missing_numbers_are_not_reported() {
     let domain = "(define (domain d) (:requirements :typing :numeric-fluents) (:types place)
         (:predicates (at ?p - place) (road ?a ?b - place)) (:functions (far ?a ?b - place) (spent) (toll ?a ?b - place) (started))
         (:action go :parameters (?a ?b - place) :precondition (and (at ?a) (road ?a ?b))
@@ -180,18 +180,18 @@ fn numbers_that_nothing_needs_are_no_warnings() {
     };
     let outcome = lint(problem);
     assert_eq!((outcome.status, outcome.stdout.as_str()), (0, "nothing to complain about\n"), "{outcome:#?}");
-    for (missing, needing) in [("(= (far y z) 2)", "go"), ("(= (toll z y) 1)", "fly")] {
+    for (missing, action) in [("(= (far y z) 2)", "go"), ("(= (toll z y) 1)", "fly")] {
         let outcome = lint(&problem.replace(missing, ""));
         assert_eq!(outcome.status, 1, "{missing}: {outcome:#?}");
         assert!(
-            outcome.stdout.contains("M231") && outcome.stdout.contains(&format!("`{needing}`")),
+            outcome.stdout.contains("M231") && outcome.stdout.contains(&format!("`{action}`")),
             "{outcome:#?}"
         );
     }
 }
 
 #[test]
-fn all_errors_of_all_files_are_told_at_once() {
+fn errors_of_all_files_are_reported_together() {
     let broken = ("robot.ttl", ":f_grasp a t:Function .", ":f_grasp a t:Function");
     let outcome = check(
         &[broken, ("problem.pddl", "(:goal (and", "(:gaol (and")],
@@ -231,7 +231,7 @@ fn all_errors_of_all_files_are_told_at_once() {
 }
 
 #[test]
-fn what_cannot_be_planned_with_is_told_without_planning() {
+fn unsupported_features_are_reported_without_planning() {
     check(
         &[
             ("domain.pddl", "(= ?duration (grasp_time))", "(= ?duration (battery))"),
@@ -243,7 +243,7 @@ fn what_cannot_be_planned_with_is_told_without_planning() {
 }
 
 #[test]
-fn a_contradiction_is_an_error() {
+fn inconsistent_knowledge_is_an_error() {
     let outcome = check(
         &[("robot.ttl", ":c_lamp a t:Component .", ":c_lamp a t:Component , t:Function .")],
         3,
@@ -253,7 +253,7 @@ fn a_contradiction_is_an_error() {
 }
 
 #[test]
-fn what_cannot_be_read_is_an_error_and_what_cannot_be_meant_is_usage() {
+fn unreadable_files_are_errors_and_unknown_scenarios_are_usage_errors() {
     let outcome = metaplan_in(Path::new("/"), &["lint", "no/such.toml"], "");
     assert_eq!(outcome.status, 3, "{outcome:#?}");
     assert!(outcome.stdout.contains("M101"), "{outcome:#?}");

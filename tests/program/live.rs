@@ -1,4 +1,4 @@
-//! `metaplan run --serve`, looked at by a client of TCP.
+//! Tests of `metaplan run --serve` with a plain TCP client.
 
 use std::io::{BufRead as _, BufReader, ErrorKind, Read as _, Write as _};
 use std::net::TcpStream;
@@ -10,10 +10,10 @@ use serde_json::{Value, json};
 
 use crate::common::{metaplan_in, root};
 
-/// What is waited for on a busy machine.
-const PATIENCE: Duration = Duration::from_secs(60);
+/// Timeout for each expected event, generous for busy machines.
+const TIMEOUT: Duration = Duration::from_secs(60);
 
-/// A run that is being looked at.
+/// A running loop with a live server.
 pub struct Run {
     child: Child,
     stdin: Option<ChildStdin>,
@@ -32,11 +32,11 @@ impl Run {
             .stderr(Stdio::piped())
             .spawn()
             .expect("the program starts");
-        let mut said = String::new();
+        let mut first_line = String::new();
         let mut stderr = BufReader::new(child.stderr.take().expect("a pipe"));
-        stderr.read_line(&mut said).expect("a line");
-        let address = said.split("http://").nth(1).and_then(|rest| rest.split('/').next());
-        let address = address.unwrap_or_else(|| panic!("no address: {said}")).to_owned();
+        stderr.read_line(&mut first_line).expect("a line");
+        let address = first_line.split("http://").nth(1).and_then(|remainder| remainder.split('/').next());
+        let address = address.unwrap_or_else(|| panic!("no address: {first_line}")).to_owned();
         let (sender, answers) = channel();
         let stdout = BufReader::new(child.stdout.take().expect("a pipe"));
         std::thread::spawn(move || {
@@ -48,8 +48,8 @@ impl Run {
         Self { stdin: child.stdin.take(), child, answers, address }
     }
 
-    /// Tells the loop lines; the last answer has to come.
-    pub fn tell(&mut self, lines: impl IntoIterator<Item = String>, last: u64) {
+    /// Sends lines to the loop and waits until line `last` is handled.
+    pub fn send(&mut self, lines: impl IntoIterator<Item = String>, last: u64) {
         let stdin = self.stdin.as_mut().expect("a pipe");
         for line in lines {
             stdin.write_all(format!("{line}\n").as_bytes()).expect("the loop reads");
@@ -57,11 +57,11 @@ impl Run {
         self.handled(last);
     }
 
-    /// All answers until a line is handled.
+    /// Receives all answers until a line is handled.
     fn handled(&mut self, line: u64) -> Vec<Value> {
         let mut answers = Vec::new();
         loop {
-            let answer = self.answers.recv_timeout(PATIENCE).expect("the loop goes on");
+            let answer = self.answers.recv_timeout(TIMEOUT).expect("the loop goes on");
             let is_last = answer["answer"] == "handled" && answer["line"] == line;
             answers.push(answer);
             if is_last {
@@ -70,26 +70,26 @@ impl Run {
         }
     }
 
-    /// A connection on which a path was asked for.
-    fn ask(&self, path: &str, headers: &str) -> TcpStream {
+    /// Opens a connection and requests a path.
+    fn request(&self, path: &str, headers: &str) -> TcpStream {
         let mut stream = TcpStream::connect(&self.address).expect("a connection");
-        stream.set_read_timeout(Some(PATIENCE)).expect("a timeout");
+        stream.set_read_timeout(Some(TIMEOUT)).expect("a timeout");
         let host = &self.address;
         let request = format!("GET {path} HTTP/1.1\r\nHost: {host}\r\n{headers}\r\n");
         stream.write_all(request.as_bytes()).expect("sent");
         stream
     }
 
-    /// The head and the body of an answer that ends.
+    /// Head and body of a finite response.
     pub fn get(&self, path: &str, headers: &str) -> (String, String) {
         let mut text = String::new();
-        self.ask(path, headers).read_to_string(&mut text).expect("an answer");
+        self.request(path, headers).read_to_string(&mut text).expect("an answer");
         let (head, body) = text.split_once("\r\n\r\n").expect("a head");
         (head.to_owned(), body.to_owned())
     }
 
     pub fn events(&self) -> Events {
-        let mut reader = BufReader::new(self.ask("/events", ""));
+        let mut reader = BufReader::new(self.request("/events", ""));
         let mut head = String::new();
         while !head.ends_with("\r\n\r\n") {
             assert!(reader.read_line(&mut head).expect("a head") > 0, "{head}");
@@ -99,7 +99,7 @@ impl Run {
         Events(reader)
     }
 
-    /// Ends its input; the program ends well.
+    /// Closes standard input. The program must end with status 0.
     pub fn end(mut self) {
         drop(self.stdin.take());
         assert!(self.child.wait().expect("it ends").success());
@@ -113,11 +113,11 @@ impl Drop for Run {
     }
 }
 
-/// Server-sent events, by their definition: lines up to a blank one.
+/// A stream of server-sent events.
 pub struct Events(BufReader<TcpStream>);
 
 impl Events {
-    /// The kind and the data of the next one; none at the end.
+    /// Kind and data of the next event; `None` at the end.
     fn next(&mut self) -> Option<(String, Value)> {
         let (mut kind, mut data) = ("message".to_owned(), None);
         loop {
@@ -132,7 +132,7 @@ impl Events {
                 Some(("event", value)) => value.trim_start().clone_into(&mut kind),
                 Some(("data", value)) => data = Some(serde_json::from_str(value).expect("JSON")),
                 Some(("", _)) => {}
-                Some(other) => panic!("{other:?}"),
+                Some(unexpected) => panic!("{unexpected:?}"),
                 None => {
                     if let Some(data) = data {
                         return Some((kind, data));
@@ -142,22 +142,22 @@ impl Events {
         }
     }
 
-    /// All up to one that has something; none if the page ends before.
-    pub fn before_the_end(&mut self, is_last: impl Fn(&Value) -> bool) -> Option<Vec<Value>> {
-        let mut all = Vec::new();
+    /// Events up to the first one that satisfies the predicate; `None` if the stream ends before.
+    pub fn until_or_end(&mut self, is_last: impl Fn(&Value) -> bool) -> Option<Vec<Value>> {
+        let mut received = Vec::new();
         loop {
             let (_, data) = self.next()?;
-            let found = is_last(&data);
-            all.push(data);
-            if found {
-                return Some(all);
+            let is_found = is_last(&data);
+            received.push(data);
+            if is_found {
+                return Some(received);
             }
         }
     }
 
-    /// All up to one that has something.
+    /// Events up to the first one that satisfies the predicate.
     pub fn until(&mut self, is_last: impl Fn(&Value) -> bool) -> Vec<Value> {
-        self.before_the_end(is_last).expect("it does not end before")
+        self.until_or_end(is_last).expect("it does not end before")
     }
 }
 
@@ -165,13 +165,17 @@ fn note(text: &str) -> String {
     json!({"event": "note", "text": text}).to_string()
 }
 
-/// The answers among what was seen.
-fn said(seen: &[Value]) -> Vec<&Value> {
-    seen.iter().filter_map(|news| news.get("said")).filter(|said| said["answer"] != "planning").collect()
+/// The answers among the messages, without progress reports.
+fn answers_in(messages: &[Value]) -> Vec<&Value> {
+    messages
+        .iter()
+        .filter_map(|news| news.get("said"))
+        .filter(|answer| answer["answer"] != "planning")
+        .collect()
 }
 
 #[test]
-fn what_is_heard_and_answered_is_seen_as_it_comes() {
+fn input_and_answers_are_streamed_as_they_come() {
     let mut run = Run::begin(&["--serve=0"]);
     let mut answers = run.handled(0);
     let mut events = run.events();
@@ -188,30 +192,30 @@ fn what_is_heard_and_answered_is_seen_as_it_comes() {
     }
     answers.extend(run.handled(3));
     answers.retain(|answer| answer["answer"] != "planning");
-    let seen = events.until(|news| news["said"]["answer"] == "handled" && news["said"]["line"] == 3);
-    assert_eq!(said(&seen), answers.iter().collect::<Vec<_>>());
-    let heard: Vec<(&Value, &Value)> = seen
+    let messages = events.until(|news| news["said"]["answer"] == "handled" && news["said"]["line"] == 3);
+    assert_eq!(answers_in(&messages), answers.iter().collect::<Vec<_>>());
+    let inputs: Vec<(&Value, &Value)> = messages
         .iter()
         .filter(|news| news.get("heard").is_some())
         .map(|news| (&news["line"], &news["heard"]))
         .collect();
     let expected: Vec<(Value, Value)> = (1..).zip(&lines).map(|(n, line)| (json!(n), json!(line))).collect();
-    assert_eq!(heard, expected.iter().map(|(number, line)| (number, line)).collect::<Vec<_>>());
-    assert!(seen.iter().all(|news| news["at"].as_f64().is_some_and(|at| at >= 0.0)), "{seen:#?}");
+    assert_eq!(inputs, expected.iter().map(|(number, line)| (number, line)).collect::<Vec<_>>());
+    assert!(messages.iter().all(|news| news["at"].as_f64().is_some_and(|at| at >= 0.0)), "{messages:#?}");
     run.end();
-    let rest: Vec<String> = std::iter::from_fn(|| events.next()).map(|(kind, _)| kind).collect();
-    assert_eq!(rest, ["end"]);
+    let remaining_kinds: Vec<String> = std::iter::from_fn(|| events.next()).map(|(kind, _)| kind).collect();
+    assert_eq!(remaining_kinds, ["end"]);
 }
 
-/// The plan is drawn as it is now, with names that are only text.
+/// The page draws the current plan. Names are escaped.
 #[test]
-fn the_plan_can_be_seen() {
+fn current_plan_is_drawn() {
     let mut run = Run::begin(&["--serve=0"]);
     run.handled(0);
     let mut events = run.events();
-    let planned = |news: &Value| news.get("planned").is_some();
+    let has_plan = |news: &Value| news.get("planned").is_some();
     assert_eq!(
-        events.until(planned).pop().expect("a line")["planned"],
+        events.until(has_plan).pop().expect("a line")["planned"],
         json!({"exists": true, "under_way": 1})
     );
     let (head, plan) = run.get("/plan", "");
@@ -228,13 +232,13 @@ fn the_plan_can_be_seen() {
     }
     assert!(!plan.contains("style="), "the policy of the page forbids it");
     assert_eq!(run.get("/plan", "").1, plan);
-    let told = [
+    let input_lines = [
         r#"{"event":"action_started","action":1}"#,
         r#"{"event":"component_status","component":"c_kinect","status":"FALSE"}"#,
     ];
-    run.tell(told.map(str::to_owned), 2);
+    run.send(input_lines.map(str::to_owned), 2);
     assert_eq!(
-        events.until(planned).pop().expect("a line")["planned"],
+        events.until(has_plan).pop().expect("a line")["planned"],
         json!({"exists": true, "under_way": 1})
     );
     let (_, changed) = run.get("/plan", "");
@@ -243,33 +247,33 @@ fn the_plan_can_be_seen() {
 }
 
 #[test]
-fn who_comes_late_sees_how_things_are() {
+fn late_clients_receive_the_current_state() {
     let mut run = Run::begin(&["--serve=127.0.0.1:0"]);
     run.handled(0);
-    let failed = r#"{"event":"component_status","component":"c_flashlight","status":"FALSE"}"#.to_owned();
-    run.tell([failed].into_iter().chain((0..3000).map(|_| note("x"))), 3001);
-    let begun = Instant::now();
+    let failure = r#"{"event":"component_status","component":"c_flashlight","status":"FALSE"}"#.to_owned();
+    run.send([failure].into_iter().chain((0..3000).map(|_| note("x"))), 3001);
+    let started = Instant::now();
     loop {
-        assert!(begun.elapsed() < PATIENCE, "it always ends before something new");
+        assert!(started.elapsed() < TIMEOUT, "it always ends before something new");
         let is_new = |news: &Value| news.get("heard").is_some() || news.get("left_out").is_some();
-        // Who is too slow for what passes is dropped, and comes again.
-        let Some(seen) = run.events().before_the_end(is_new) else { continue };
-        let words: Vec<&Value> = said(&seen).into_iter().map(|said| &said["answer"]).collect();
-        // The first lines are gone once all have been taken.
-        if words.len() < 8 {
+        // A client that is too slow is disconnected and connects again.
+        let Some(messages) = run.events().until_or_end(is_new) else { continue };
+        let kinds: Vec<&Value> = answers_in(&messages).into_iter().map(|answer| &answer["answer"]).collect();
+        // The first lines are discarded once the server has processed all lines.
+        if kinds.len() < 8 {
             assert_eq!(
-                words[..5],
+                kinds[..5],
                 ["ready", "plan_found", "reconfigure", "request_action", "inferred"],
-                "{seen:#?}"
+                "{messages:#?}"
             );
             return;
         }
-        assert!(begun.elapsed() < PATIENCE, "{words:?}");
+        assert!(started.elapsed() < TIMEOUT, "{kinds:?}");
         std::thread::sleep(Duration::from_millis(50));
     }
 }
 
-/// The greatest memory of a process so far in kB, where the system tells.
+/// Peak memory of the process in kB, on systems that report it.
 fn memory(run: &Run) -> Option<u64> {
     let status = std::fs::read_to_string(format!("/proc/{}/status", run.child.id())).ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
@@ -277,26 +281,26 @@ fn memory(run: &Run) -> Option<u64> {
 }
 
 #[test]
-fn who_does_not_read_is_dropped_and_holds_nobody_up() {
+fn clients_that_do_not_read_are_disconnected_and_do_not_block() {
     let mut run = Run::begin(&["--serve=0"]);
     run.handled(0);
     let before = memory(&run);
-    let mut idle = run.ask("/events", "");
-    // So many that neither sockets nor anything else holds them all.
+    let mut idle = run.request("/events", "");
+    // More data than socket buffers can hold.
     let text = "x".repeat(4000);
-    run.tell((0..20_000).map(|_| note(&text)), 20_000);
+    run.send((0..20_000).map(|_| note(&text)), 20_000);
     if let (Some(before), Some(after)) = (before, memory(&run)) {
         assert!(after - before < 60_000, "{before} kB and then {after} kB, where 80 MB went through");
     }
-    // Who reads now sees what is new.
-    run.tell([note("the last")], 20_001);
+    // A client that connects now receives new events.
+    run.send([note("the last")], 20_001);
     let last = note("the last");
-    let begun = Instant::now();
-    // On a busy machine a reader may be too slow for what was kept, and comes again, as pages do.
-    while run.events().before_the_end(|news| news["heard"] == json!(last)).is_none() {
-        assert!(begun.elapsed() < PATIENCE, "it always ends before");
+    let started = Instant::now();
+    // On a busy machine the client can be too slow and must connect again, like the page does.
+    while run.events().until_or_end(|news| news["heard"] == json!(last)).is_none() {
+        assert!(started.elapsed() < TIMEOUT, "it always ends before");
     }
-    // Who did not read has lost the connection, and what was in it is far from all.
+    // The client that did not read was disconnected, after a small part of the data.
     let mut bytes = Vec::new();
     let ended = idle.read_to_end(&mut bytes);
     assert!(ended.is_ok() || ended.is_err_and(|error| error.kind() == ErrorKind::ConnectionReset));
@@ -306,23 +310,23 @@ fn who_does_not_read_is_dropped_and_holds_nobody_up() {
 }
 
 #[test]
-fn who_does_not_read_leaves_room_for_others() {
+fn clients_that_do_not_read_release_their_connections() {
     let mut run = Run::begin(&["--serve=0"]);
     run.handled(0);
-    let idle: Vec<TcpStream> = (0..16).map(|_| run.ask("/events", "")).collect();
+    let idle: Vec<TcpStream> = (0..16).map(|_| run.request("/events", "")).collect();
     let text = "x".repeat(4000);
-    let begun = Instant::now();
+    let started = Instant::now();
     let (mut line, mut refused) = (0, false);
     loop {
-        // More than sockets hold: nobody of these reads.
-        run.tell((0..2000).map(|_| note(&text)), line + 2000);
+        // More data than socket buffers can hold, as no client reads.
+        run.send((0..2000).map(|_| note(&text)), line + 2000);
         line += 2000;
         let (head, _) = run.get("/", "");
         if head.starts_with("HTTP/1.1 200") && refused {
             break;
         }
         refused |= head.starts_with("HTTP/1.1 503");
-        assert!(begun.elapsed() < PATIENCE, "{head}");
+        assert!(started.elapsed() < TIMEOUT, "{head}");
         std::thread::sleep(Duration::from_millis(100));
     }
     drop(idle);
@@ -330,7 +334,7 @@ fn who_does_not_read_leaves_room_for_others() {
 }
 
 #[test]
-fn the_page_is_made_of_text_only() {
+fn page_inserts_data_as_text_only() {
     let run = Run::begin(&["--serve=0"]);
     let (head, page) = run.get("/", "");
     assert!(head.starts_with("HTTP/1.1 200 OK\r\n"), "{head}");
@@ -345,17 +349,17 @@ fn the_page_is_made_of_text_only() {
         assert!(page.contains(path), "{path}");
         let (head, body) = run.get(path, "");
         assert!(head.contains(kind) && !body.is_empty(), "{head}");
-        for way in
+        for forbidden in
             ["innerHTML", "outerHTML", "insertAdjacentHTML", "document.write", "eval(", "http:", "https:"]
         {
-            assert!(!body.contains(way) && !page.contains(way), "{path}: {way}");
+            assert!(!body.contains(forbidden) && !page.contains(forbidden), "{path}: {forbidden}");
         }
     }
     let (head, _) = run.get("/etc/passwd", "");
     assert!(head.starts_with("HTTP/1.1 404"), "{head}");
     let status = |request: &str| {
         let mut stream = TcpStream::connect(&run.address).expect("a connection");
-        stream.set_read_timeout(Some(PATIENCE)).expect("a timeout");
+        stream.set_read_timeout(Some(TIMEOUT)).expect("a timeout");
         stream.write_all(request.as_bytes()).expect("sent");
         let mut text = String::new();
         stream.read_to_string(&mut text).expect("an answer");
@@ -364,29 +368,29 @@ fn the_page_is_made_of_text_only() {
     assert_eq!(status("POST / HTTP/1.1\r\nHost: localhost\r\n\r\n"), "405");
     assert_eq!(status("nonsense\r\n\r\n"), "400");
     assert_eq!(status("GET / HTTP/1.1\r\nHost: localhost\r\n\r\n"), "200");
-    // A page of another site whose name leads here.
+    // Protection against DNS rebinding: a foreign host name that resolves to this address.
     assert_eq!(status("GET /events HTTP/1.1\r\nHost: evil.example\r\n\r\n"), "403");
     assert_eq!(status("GET / HTTP/1.1\r\n\r\n"), "403");
     run.end();
 }
 
 #[test]
-fn other_machines_need_the_token() {
+fn remote_clients_need_the_token() {
     let refused = metaplan_in(&root(), &["run", "missions/ugv.toml", "--serve=0.0.0.0:0"], "");
     assert_eq!((refused.status, refused.stdout.as_str()), (3, ""), "{refused:#?}");
     assert!(refused.stderr.contains("M332") && refused.stderr.contains("a token is needed"), "{refused:#?}");
     let directory = tempfile::tempdir().expect("a directory");
     let file = directory.path().join("token");
     let name = file.display().to_string();
-    for wrong in
+    for invalid_token in
         ["short", "", "two words of some length", "\u{e4}\u{e4}\u{e4}\u{e4}\u{e4}\u{e4}\u{e4}\u{e4}\u{e4}"]
     {
-        std::fs::write(&file, wrong).expect("a file");
+        std::fs::write(&file, invalid_token).expect("a file");
         let arguments = ["run", "missions/ugv.toml", "--serve=0.0.0.0:0", "--serve-token", &name];
         let refused = metaplan_in(&root(), &arguments, "");
-        assert_eq!(refused.status, 3, "{wrong}: {refused:#?}");
+        assert_eq!(refused.status, 3, "{invalid_token}: {refused:#?}");
         assert!(refused.stderr.contains("M332"), "{refused:#?}");
-        assert!(wrong.is_empty() || !refused.stderr.contains(wrong), "{refused:#?}");
+        assert!(invalid_token.is_empty() || !refused.stderr.contains(invalid_token), "{refused:#?}");
     }
     std::fs::write(&file, "Zk3-sesame-open-9\n").expect("a file");
     let mut run = Run::begin(&["--serve=0.0.0.0:0", "--serve-token", &name]);
@@ -397,7 +401,7 @@ fn other_machines_need_the_token() {
     assert_eq!(status("Authorization: Bearer Zk3-sesame-open-9\r\n"), "200");
     assert_eq!(status("Authorization: Bearer Zk3-sesame-open-8\r\n"), "401");
     assert_eq!(status("Authorization: Bearer Zk3-sesame-open-\r\n"), "401");
-    // `me:Zk3-sesame-open-9` and `me:Zk3-sesame-open-8`, by RFC 4648.
+    // Base64 (RFC 4648) of `me:Zk3-sesame-open-9` and `me:Zk3-sesame-open-8`.
     assert_eq!(status("Authorization: Basic bWU6WmszLXNlc2FtZS1vcGVuLTk=\r\n"), "200");
     assert_eq!(status("Authorization: Basic bWU6WmszLXNlc2FtZS1vcGVuLTg=\r\n"), "401");
     assert!(run.get("/events", "").0.starts_with("HTTP/1.1 401"));

@@ -1,4 +1,4 @@
-//! The whole, end to end: the program run as its users run it.
+//! End-to-end tests: the program is run like by a user.
 
 mod anytime;
 mod browser;

@@ -1,8 +1,8 @@
-//! Mistakes in a manifest: whichever room a section belongs to, every command that reads the manifest refuses it, with the place.
+//! Tests of errors in manifests: every command reports them with their position, even in sections that the command does not use.
 
 use crate::common::{headlines, metaplan_in, root};
 
-/// A manifest with further lines, which begin in line 9; all commands refuse it with this message.
+/// Appends lines to a manifest, from line 9 on. All commands must refuse it with this message.
 fn check(lines: &str, expected: &str) {
     let directory = tempfile::tempdir().expect("a directory");
     let root = root().display().to_string();
@@ -22,14 +22,14 @@ fn check(lines: &str, expected: &str) {
         let outcome = metaplan_in(directory.path(), command, "");
         assert_eq!(outcome.status, 3, "{command:?}: {outcome:#?}");
         assert_eq!(headlines(&outcome.stderr), format!("m.toml:{expected}\n"), "{command:?}");
-        // Each has its line of the file.
+        // Each message shows its source line.
         assert_eq!(outcome.stderr.matches(" │ ").count(), expected.lines().count() * 2, "{outcome:#?}");
         assert!(outcome.stdout.is_empty(), "{command:?}: {outcome:#?}");
     }
 }
 
 #[test]
-fn a_section_is_refused_whoever_uses_it() {
+fn invalid_sections_are_refused_by_all_commands() {
     check(
         "[scenaros.s]",
         "9:2: error[M104]: unknown field `scenaros`, expected one of `name`, `description`, `knowledge`, `planning`, \
@@ -68,8 +68,8 @@ fn a_section_is_refused_whoever_uses_it() {
 }
 
 #[test]
-fn all_mistakes_of_a_manifest_are_told() {
-    // What is missing only because it is wrong is not told.
+fn all_errors_of_a_manifest_are_reported() {
+    // A required field that is present but invalid is not reported as missing.
     check(
         "[probabilistic]\nbattery_unit = \"x\"\n[scenaros.s]\nfail = [\"c_kinect\"]\n[adaptation]\nsetle = 1\nsettle = \"x\"\nmin = 2",
         "10:16: error[M104]: invalid type: string \"x\", expected u32\n\

@@ -1,4 +1,4 @@
-//! `metaplan import camara-map` on maps of 2017, which have `coord` and no measurements. The map is made up.
+//! Tests of `metaplan import camara-map` on maps in the format of 2017, with `coord` and without measurements. The map is invented.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -7,7 +7,7 @@ use metaplan::comparison::{MapOptions, import_map};
 
 use crate::common::{Outcome, headlines, metaplan_in, steps};
 
-/// Places, where they lie, and where arcs lead that the other end need not name, too.
+/// Name, coordinates, and neighbours. An arc is listed at one of its ends at least.
 const PLACES: [(&str, f64, f64, &str); 6] = [
     ("h1", 0.0, 0.0, "\"h2\", \"c1\""),
     ("h2", 6.8, 0.0, "\"h1\", \"h3\""),
@@ -17,38 +17,40 @@ const PLACES: [(&str, f64, f64, &str); 6] = [
     ("hs", 30.0, 10.2, ""),
 ];
 
-/// A map in the form of 2017.
+/// The map as JSON in the format of 2017.
 pub fn map() -> String {
     let mut text = "{\"map\": [\n".to_owned();
-    for (number, (id, x, y, next)) in (1..).zip(PLACES) {
+    for (number, (id, x, y, neighbours)) in (1..).zip(PLACES) {
         let end = if number == PLACES.len() { "" } else { "," };
         let _ = writeln!(
             text,
-            "  {{\"node-id\": \"{id}\", \"coord\" : {{\"x\" : {x}, \"y\" : {y}}}, \"connected-to\": [{next}] }}{end}"
+            "  {{\"node-id\": \"{id}\", \"coord\" : {{\"x\" : {x}, \"y\" : {y}}}, \"connected-to\": [{neighbours}] }}{end}"
         );
     }
     text + "],\n\"unsafe-rects\": [\n  {\"top_y\": 2, \"right_x\": 5.5, \"left_x\": 1.5, \"bottom_y\": 1}\n]\n}\n"
 }
 
-fn import(directory: &Path, text: &str, more: &[&str]) -> Outcome {
+fn import(directory: &Path, text: &str, options: &[&str]) -> Outcome {
     std::fs::write(directory.join("map.json"), text).expect("written");
     let arguments = ["import", "camara-map", "map.json", "--start", "h1", "--goal", "h4", "-o", "out"];
-    metaplan_in(directory, &[&arguments[..], more].concat(), "")
+    metaplan_in(directory, &[&arguments[..], options].concat(), "")
 }
 
-/// The length of the shortest way, by trying all ways without a place twice.
-fn shortest(from: &str, to: &str, before: &[&str]) -> f64 {
+/// Length of the shortest path, by enumeration of all simple paths.
+fn shortest(from: &str, to: &str, visited: &[&str]) -> f64 {
     let at = |name: &str| PLACES.iter().find(|place| place.0 == name).expect("a place");
-    let leads =
+    let are_connected =
         |a: &str, b: &str| at(a).3.contains(&format!("\"{b}\"")) || at(b).3.contains(&format!("\"{a}\""));
     if from == to {
         return 0.0;
     }
-    let seen: Vec<&str> = before.iter().copied().chain([from]).collect();
-    let next = PLACES.iter().filter(|place| leads(from, place.0) && !seen.contains(&place.0));
-    let ways =
-        next.map(|place| (at(from).1 - place.1).hypot(at(from).2 - place.2) + shortest(place.0, to, &seen));
-    ways.fold(f64::INFINITY, f64::min)
+    let visited_here: Vec<&str> = visited.iter().copied().chain([from]).collect();
+    let neighbours =
+        PLACES.iter().filter(|place| are_connected(from, place.0) && !visited_here.contains(&place.0));
+    let lengths = neighbours.map(|place| {
+        (at(from).1 - place.1).hypot(at(from).2 - place.2) + shortest(place.0, to, &visited_here)
+    });
+    lengths.fold(f64::INFINITY, f64::min)
 }
 
 #[test]
@@ -67,33 +69,33 @@ fn maps_of_2017_become_missions() {
     let outcome = metaplan_in(directory.path(), &["plan", "out/camara.toml", "--format", "json"], "");
     assert_eq!((outcome.status, outcome.stderr.as_str()), (0, ""), "{outcome:#?}");
     let answer = outcome.json();
-    // At 0.68 metres a second.
+    // The robot's full speed is 0.68 m/s.
     let seconds = shortest("h1", "h4", &[]) / 0.68;
     assert!((answer["cost"].as_f64().expect("a cost") - seconds).abs() < 1e-3, "{seconds}: {answer:#}");
     let route: Vec<String> =
         steps(&answer).iter().map(|step| step.split(" | ").next().unwrap_or_default().to_owned()).collect();
     assert_eq!(route.len(), 3, "{route:?}");
-    // Nothing leads to `hs`.
+    // `hs` is unreachable, but the repeated option is reported first.
     let outcome = import(directory.path(), &map(), &["--goal", "hs"]);
     assert_eq!(outcome.status, 2, "an option is there twice: {outcome:#?}");
 }
 
-/// With the same numbers, both forms are the same mission.
+/// The formats with `coord` and with `coords` yield the same mission.
 #[test]
-fn both_forms_say_the_same() {
+fn both_map_formats_give_the_same_mission() {
     let options = MapOptions { start: "h1".to_owned(), goal: "h4".to_owned(), ..MapOptions::default() };
     let (old, new) = (map(), map().replace("\"coord\"", "\"coords\""));
     let [old, new] = [old, new].map(|text| import_map("map", &text, &options).expect("a map"));
     assert_eq!((&old.manifest, &old.knowledge, &old.domain), (&new.manifest, &new.knowledge, &new.domain));
     assert_eq!(old.problem, new.problem);
-    // The energy of the first arc at full speed: metres, by speed, by power in milliwatts, by the factor of the unit.
+    // Energy of the first arc at full speed: metres · speed · power in milliwatts · factor of the unit.
     let energy = (6.8 * 0.68 * 17_790.0 * 0.01_f64).trunc();
     assert!(old.problem.contains(&format!("(= (energy h1 h2 fd_amcl_kinect) {energy})")), "{}", old.problem);
     assert!(old.problem.contains("(= (time h1 h2 fd_amcl_kinect) 10)"), "{}", old.problem);
 }
 
 #[test]
-fn malformed_maps_have_a_place() {
+fn map_errors_have_a_position() {
     let check = |old: &str, new: &str, place: &str, words: &str| {
         let text = map();
         assert!(text.contains(old), "no `{old}`");
@@ -127,7 +129,7 @@ fn malformed_maps_have_a_place() {
 }
 
 #[test]
-fn all_that_is_wrong_with_a_map_is_said() {
+fn all_errors_of_a_map_are_reported() {
     let directory = tempfile::tempdir().expect("a directory");
     let text = map()
         .replace("\"h3\", \"c1\"", "\"h9\", \"c9\"")
@@ -146,9 +148,9 @@ fn all_that_is_wrong_with_a_map_is_said() {
     }
 }
 
-/// Pictures have the places where the map has them, upwards as there.
+/// Pictures show the places at their coordinates, with the y axis upwards.
 #[test]
-fn places_are_drawn_where_the_map_has_them() {
+fn places_are_drawn_at_their_coordinates() {
     let directory = tempfile::tempdir().expect("a directory");
     assert_eq!(import(directory.path(), &map(), &["--speeds", "full", "--battery", "1000000"]).status, 0);
     let outcome =
@@ -161,8 +163,9 @@ fn places_are_drawn_where_the_map_has_them() {
         let mut nodes = document.descendants();
         let place = nodes.find(|node| node.attribute("data-place") == Some(name)).expect("a place");
         let circle = place.children().find(|node| node.tag_name().name() == "circle").expect("a circle");
-        ["cx", "cy"]
-            .map(|own| circle.attribute(own).and_then(|text| text.parse::<f64>().ok()).expect("a number"))
+        ["cx", "cy"].map(|attribute| {
+            circle.attribute(attribute).and_then(|text| text.parse::<f64>().ok()).expect("a number")
+        })
     };
     let scale = (at("h2")[0] - at("h1")[0]) / 6.8;
     assert!(scale > 0.0);

@@ -1,10 +1,10 @@
-//! Messages are for people: whatever is done to the files of a mission, no message shows how the program is made, and each has the one form.
+//! Tests of messages: after random changes to the files of a mission, no message contains internal names or debug output.
 
 use std::path::Path;
 
 use crate::common::{Outcome, metaplan_in};
 
-/// What no message has: values as Rust prints them, names that only the explicit form of a domain has, and types of the program.
+/// Texts that must not occur in messages: Rust debug output, names that exist only in the explicit form of a domain, and internal types.
 const INTERNAL: [&str; 14] = [
     "Some(",
     "None)",
@@ -22,27 +22,30 @@ const INTERNAL: [&str; 14] = [
     "{:?}",
 ];
 
-/// A word as Rust writes a type, followed by what it holds: `Violation { step`, `InvalidUri(`.
+/// Returns `true` if a capitalised word is followed by its content, like Rust debug output: `Violation { step`, `InvalidUri(`.
 fn is_debug_text(text: &str) -> bool {
     text.char_indices().filter(|(_, c)| "({".contains(*c)).any(|(at, c)| {
-        let before = if c == '{' { text[..at].trim_end() } else { &text[..at] };
-        let word = before.rsplit(|c: char| !c.is_alphanumeric()).next().unwrap_or_default();
+        let prefix = if c == '{' { text[..at].trim_end() } else { &text[..at] };
+        let word = prefix.rsplit(|c: char| !c.is_alphanumeric()).next().unwrap_or_default();
         word.starts_with(|c: char| c.is_ascii_uppercase()) && word.chars().any(char::is_lowercase)
     })
 }
 
-/// What is wrong with the messages of an outcome; source lines and places are the user's own.
+/// Faulty messages of an outcome. Source lines and positions are excluded, as they are content of the user's files.
 fn faults(outcome: &Outcome) -> Vec<String> {
-    let all = format!("{}{}", outcome.stdout, outcome.stderr);
-    let own = all.lines().filter(|line| !line.contains(" │"));
+    let output = format!("{}{}", outcome.stdout, outcome.stderr);
+    let message_lines = output.lines().filter(|line| !line.contains(" │"));
     let mut faults = Vec::new();
-    for line in own {
-        // What is quoted, and IRIs, are of the files.
-        let quoted: String = line.split('`').step_by(2).collect();
-        let spoken: String =
-            quoted.split('<').map(|part| part.split_once('>').map_or(part, |(_, rest)| rest)).collect();
-        let shown = INTERNAL.iter().find(|word| spoken.contains(**word) || line.contains("fd_meets_"));
-        if shown.is_some() || is_debug_text(&spoken) || line.contains("..") && line.contains('/') {
+    for line in message_lines {
+        // Quoted texts and IRIs are content of the files, too.
+        let unquoted: String = line.split('`').step_by(2).collect();
+        let own_words: String = unquoted
+            .split('<')
+            .map(|part| part.split_once('>').map_or(part, |(_, after_iri)| after_iri))
+            .collect();
+        let internal_word =
+            INTERNAL.iter().find(|word| own_words.contains(**word) || line.contains("fd_meets_"));
+        if internal_word.is_some() || is_debug_text(&own_words) || line.contains("..") && line.contains('/') {
             faults.push(line.to_owned());
         }
     }
@@ -52,7 +55,7 @@ fn faults(outcome: &Outcome) -> Vec<String> {
     faults
 }
 
-/// A file with one thing wrong: `number` says which line, and what happens to it.
+/// A copy of a file with one error. `number` determines the line and the kind of error.
 fn mangled(text: &str, number: usize) -> String {
     let lines: Vec<&str> = text.lines().collect();
     let at = number / 5 * 7 % lines.len();
@@ -65,12 +68,12 @@ fn mangled(text: &str, number: usize) -> String {
         3 => format!("{}(\"{}", &line[..middle], &line[middle..]),
         _ => line.replacen('_', "x", 1),
     };
-    let mut all: Vec<&str> = lines.clone();
-    all[at] = &changed;
-    all.join("\n") + "\n"
+    let mut changed_lines: Vec<&str> = lines.clone();
+    changed_lines[at] = &changed;
+    changed_lines.join("\n") + "\n"
 }
 
-/// Runs a command on every mangled copy, on two threads.
+/// Runs the commands for `count` errors in each file, on two threads.
 fn check(files: &[&str], template: &str, count: usize, commands: &[&[&str]]) {
     let work: Vec<(&str, usize)> =
         files.iter().flat_map(|file| (0..count).map(move |number| (*file, number))).collect();
@@ -82,36 +85,39 @@ fn check(files: &[&str], template: &str, count: usize, commands: &[&[&str]]) {
                 let here = directory.path();
                 assert_eq!(metaplan_in(here, &["init", "m", "--from", template], "").status, 0);
                 for (file, number) in half {
-                    one(here, file, *number, commands);
+                    check_error(here, file, *number, commands);
                 }
             });
         }
     });
 }
 
-fn one(here: &Path, file: &str, number: usize, commands: &[&[&str]]) {
+fn check_error(here: &Path, file: &str, number: usize, commands: &[&[&str]]) {
     let path = here.join("m").join(file);
     let text = std::fs::read_to_string(&path).expect("text");
-    let bad = mangled(&text, number);
-    std::fs::write(&path, &bad).expect("written");
+    let mangled_text = mangled(&text, number);
+    std::fs::write(&path, &mangled_text).expect("written");
     for command in commands {
         let outcome = metaplan_in(here, command, "");
-        let found = faults(&outcome);
-        assert!(found.is_empty(), "{file} {number} {command:?}: {found:#?}\n{bad}\n{outcome:#?}");
+        let faulty_lines = faults(&outcome);
+        assert!(
+            faulty_lines.is_empty(),
+            "{file} {number} {command:?}: {faulty_lines:#?}\n{mangled_text}\n{outcome:#?}"
+        );
     }
     std::fs::write(&path, text).expect("written");
 }
 
 #[test]
-fn no_message_shows_how_the_program_is_made() {
+fn messages_about_files_contain_no_internals() {
     let files = ["mission.toml", "domain.pddl", "problem.pddl", "robot.ttl", "places.csv"];
     check(&files, "warehouse", 24, &[&["lint", "m/mission.toml"]]);
     check(&["problem.pddl"], "blank", 10, &[&["plan", "m/mission.toml", "--time-limit", "2"]]);
 }
 
-/// Names and values that do not fit, in every place that takes one.
+/// Unknown names and invalid values for all kinds of arguments.
 #[test]
-fn no_message_about_an_argument_does_either() {
+fn messages_about_arguments_contain_no_internals() {
     let directory = tempfile::tempdir().expect("a directory");
     let here = directory.path();
     assert_eq!(metaplan_in(here, &["init", "m", "--from", "warehouse"], "").status, 0);
@@ -150,25 +156,25 @@ fn no_message_about_an_argument_does_either() {
         &["configure", "m/robot.ttl", "--objective", "f_grsp"],
         &["simulate", mission, "--scenario", "dusty"],
     ];
-    let mut wrong = Vec::new();
+    let mut failures = Vec::new();
     for command in commands {
         let outcome = metaplan_in(here, command, "");
-        let found = faults(&outcome);
-        if !found.is_empty() {
-            wrong.push(format!("{command:?}: {found:#?}"));
+        let faulty_lines = faults(&outcome);
+        if !faulty_lines.is_empty() {
+            failures.push(format!("{command:?}: {faulty_lines:#?}"));
         }
     }
-    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
-/// The same sentence with colours or without; without a terminal there are none, unless asked for.
+/// Messages are equal with and without colours. The default without a terminal is no colours.
 #[test]
-fn colours_are_asked_for_or_of_a_terminal() {
+fn colours_depend_on_option_and_terminal() {
     let directory = tempfile::tempdir().expect("a directory");
     let here = directory.path();
     std::fs::write(here.join("m.prism"), "mdp zzz // \u{1b}[2J\n").expect("written");
-    let check = |more: &[&str]| {
-        metaplan_in(here, &[&["check", "m.prism", "Pmax=? [ F true ]"], more].concat(), "").stderr
+    let check = |options: &[&str]| {
+        metaplan_in(here, &[&["check", "m.prism", "Pmax=? [ F true ]"], options].concat(), "").stderr
     };
     let plain = check(&[]);
     assert!(plain.starts_with("error[Q102]: ") && !plain.contains('\u{1b}'), "{plain:?}");
@@ -181,7 +187,7 @@ fn colours_are_asked_for_or_of_a_terminal() {
 }
 
 #[test]
-fn debug_text_is_found() {
+fn debug_text_is_detected() {
     for text in ["Violation { step: 1 }", "a (InvalidUri(\"x\"))", "found NoPlan(3)"] {
         assert!(is_debug_text(text), "{text}");
     }

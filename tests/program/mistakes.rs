@@ -1,10 +1,10 @@
-//! Scenarios and studies with unknown names: all mistakes are reported with their places, and nothing is simulated.
+//! Tests of unknown names in scenarios and studies: all errors are reported with their positions, and nothing is simulated.
 
 use std::fs;
 
 use crate::common::{edit, metaplan_in};
 
-/// The warehouse mission with changes: what `lint` and `simulate` report, and where.
+/// Checks the errors of `lint` and `simulate` for the warehouse mission after changes. Each error begins at the given text.
 fn check(changes: &[(&str, &str, &str)], expected: &[(&str, &[&str])]) {
     let directory = tempfile::tempdir().expect("a directory");
     let here = directory.path();
@@ -31,20 +31,20 @@ fn check(changes: &[(&str, &str, &str)], expected: &[(&str, &[&str])]) {
         let errors = messages.iter().filter(|message| message["severity"] == "error");
         assert_eq!(errors.count(), expected.len(), "{arguments:?}: {answer:#}");
         for (place, words) in expected {
-            // The place of a text is where it begins in the manifest.
+            // The position of an error is the first occurrence of the text in the manifest.
             let offset = text.find(place).unwrap_or_else(|| panic!("no {place}"));
             let line = text[..offset].matches('\n').count() + 1;
             let column = offset - text[..offset].rfind('\n').map_or(0, |end| end + 1) + 1;
-            let is_it = |message: &&serde_json::Value| {
+            let is_at_place = |message: &&serde_json::Value| {
                 message["line"] == line && message["column"] == column && message["file"] == "m/mission.toml"
             };
-            let found = messages
+            let error = messages
                 .iter()
-                .find(is_it)
+                .find(is_at_place)
                 .unwrap_or_else(|| panic!("nothing at {line}:{column}: {answer:#}"));
-            let shown = found.to_string();
+            let error_text = error.to_string();
             for word in *words {
-                assert!(shown.contains(word), "no `{word}`: {found:#}");
+                assert!(error_text.contains(word), "no `{word}`: {error:#}");
             }
         }
     }
@@ -54,7 +54,7 @@ const MISSION: &str = "mission.toml";
 const WHEN: &str = "when = \"robot_at dock\"";
 
 #[test]
-fn conditions_of_events_name_what_there_is() {
+fn unknown_names_in_event_conditions_are_reported() {
     for (new, place, words) in [
         ("when = \"robot_a dock\"", "robot_a dock", &["P121", "`robot_a`", "did you mean `robot_at`?"][..]),
         ("when = \"robot_at dok\"", "dok\"", &["`dok`", "did you mean `dock`?"]),
@@ -65,7 +65,7 @@ fn conditions_of_events_name_what_there_is() {
         ("when = \"\"", "\"\"\nwithin", &["M135", "is not a condition"]),
         ("when = \"(< (batery) 3)\"", "(batery)", &["P122", "did you mean `battery`?"]),
     ] {
-        // The predicate of an atom begins behind its parenthesis.
+        // The position of an atom is the one of its predicate, after the parenthesis.
         let place = if place == "(batery)" { "batery" } else { place };
         check(&[(MISSION, WHEN, new)], &[(place, words)]);
     }
@@ -84,7 +84,7 @@ fn events_have_a_time_or_a_condition_and_do_something() {
 }
 
 #[test]
-fn all_names_of_a_scenario_are_checked_at_once() {
+fn all_unknown_names_of_a_scenario_are_reported_together() {
     check(
         &[
             (MISSION, "patience = 5 ", "lifeline = \"batery\"\npatience = 0 "),
@@ -102,14 +102,14 @@ fn all_names_of_a_scenario_are_checked_at_once() {
             ("\"dok\"", &["`dok`", "did you mean `dock`?"]),
         ],
     );
-    let more = "\n[[scenarios.lidar_under_way.simulation.signals]]\nattribute = \"air_dst\"\nmean = 0.3\namplitude = 0.1\nperiod = -5\n\
+    let extra_sections = "\n[[scenarios.lidar_under_way.simulation.signals]]\nattribute = \"air_dst\"\nmean = 0.3\namplitude = 0.1\nperiod = -5\n\
         [[scenarios.lidar_under_way.simulation.failures]]\ncomponent = \"c_arn\"\nmean_time = 9\n\
         [scenarios.lidar_under_way.simulation.suave]\nfound = \"carries vas\"\ninspect = \"mve\"\nlength = \"distanc dock packing\"\n";
     check(
         &[(
             MISSION,
             "within = 70\nfail = [\"c_lidar\"]",
-            &format!("within = 70\nfail = [\"c_lidar\"]{more}"),
+            &format!("within = 70\nfail = [\"c_lidar\"]{extra_sections}"),
         )],
         &[
             ("\"air_dst\"", &["did you mean `air_dust`?"]),
@@ -122,9 +122,9 @@ fn all_names_of_a_scenario_are_checked_at_once() {
     );
 }
 
-/// `plan` and `run` also report all mistakes in the parts of a scenario that they use.
+/// `plan` and `run`, too, report all errors in the parts of a scenario that they use.
 #[test]
-fn situations_that_do_not_fit_are_reported_at_once() {
+fn all_errors_of_a_situation_are_reported_together() {
     let directory = tempfile::tempdir().expect("a directory");
     let here = directory.path();
     assert_eq!(metaplan_in(here, &["init", "m", "--from", "warehouse"], "").status, 0);
@@ -145,20 +145,20 @@ fn situations_that_do_not_fit_are_reported_at_once() {
     }
 }
 
-/// A condition may be written with or without its parentheses, and be any condition of PDDL.
+/// A condition can be any PDDL condition; a single atom can be written without parentheses.
 #[test]
-fn conditions_mean_the_same_with_and_without_parentheses() {
+fn parentheses_of_conditions_are_optional() {
     let costs = [
         "robot_at dock",
         "(robot_at dock)",
         " ( robot_at  dock ) ",
         "(and (robot_at dock) (<= (battery) 100))",
     ]
-    .map(|when| {
+    .map(|condition| {
         let directory = tempfile::tempdir().expect("a directory");
         let here = directory.path();
         assert_eq!(metaplan_in(here, &["init", "m", "--from", "warehouse"], "").status, 0);
-        edit(&here.join("m"), MISSION, WHEN, &format!("when = \"{when}\""));
+        edit(&here.join("m"), MISSION, WHEN, &format!("when = \"{condition}\""));
         let arguments = [
             "simulate",
             "m/mission.toml",
@@ -172,16 +172,16 @@ fn conditions_mean_the_same_with_and_without_parentheses() {
         let outcome = metaplan_in(here, &arguments, "");
         assert_eq!(outcome.status, 0, "{outcome:#?}");
         let run = outcome.json()["runs"][0].clone();
-        // Something fails: without the event there are two reconfigurations, and the mission is cheaper.
+        // The event must take place: without it, there is no failure and the mission is cheaper.
         assert_eq!(run["accomplished"], true);
         run["cost"].as_f64().expect("a cost")
     });
     assert!(costs.iter().all(|cost| (cost - costs[0]).abs() < 1e-9 && *cost > 111.0), "{costs:?}");
 }
 
-/// A study whose commands cannot be run is refused as a whole, before anything is run.
+/// A study with an invalid command is refused before anything is run.
 #[test]
-fn studies_name_what_there_is() {
+fn unknown_names_in_studies_are_reported() {
     for (study, place, words) in [
         ("command = [\"simulte\", \"m/mission.toml\"]\n", "command", &["simulte", "simulate"][..]),
         (
@@ -228,9 +228,9 @@ fn studies_name_what_there_is() {
     }
 }
 
-/// A pointer to rows that no answer has would make a table without figures.
+/// A pointer to nonexistent rows would yield a table without figures.
 #[test]
-fn rows_that_no_answer_has_are_an_error() {
+fn nonexistent_rows_are_an_error() {
     let directory = tempfile::tempdir().expect("a directory");
     let here = directory.path();
     assert_eq!(metaplan_in(here, &["init", "m", "--from", "warehouse"], "").status, 0);
@@ -245,9 +245,9 @@ fn rows_that_no_answer_has_are_an_error() {
     );
 }
 
-/// The unit of the domain's times is one of three, and a misspelt one is an error with a proposal.
+/// There are three units of time. A misspelt unit gets a suggestion.
 #[test]
-fn a_unit_that_there_is_not_is_an_error() {
+fn unknown_time_units_are_an_error() {
     let directory = tempfile::tempdir().expect("a directory");
     let here = directory.path();
     assert_eq!(metaplan_in(here, &["init", "m", "--from", "warehouse"], "").status, 0);

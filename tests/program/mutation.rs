@@ -1,4 +1,4 @@
-//! Certificates that were changed at random: what is still accepted must be true.
+//! Tests of randomly changed certificates: every accepted claim must be true.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use crate::certificate::{MISSIONS, certificate, change, verify};
 use crate::common::metaplan;
 
-/// Numbers for changes, the same in every run (`SplitMix64`).
+/// Deterministic pseudorandom numbers (`SplitMix64`).
 struct Random(u64);
 
 impl Random {
@@ -21,7 +21,7 @@ impl Random {
     }
 }
 
-/// Changes a text somewhere: a line goes, comes twice or changes places, or a number or a word becomes another one of the text.
+/// Changes a random part of a text: a line is removed, duplicated or swapped, or a word is replaced by a number or another word.
 fn mutate(text: &str, random: &mut Random) -> String {
     let mut lines: Vec<&str> = text.split_inclusive('\n').collect();
     let line = random.below(lines.len());
@@ -29,8 +29,8 @@ fn mutate(text: &str, random: &mut Random) -> String {
         0 => drop(lines.remove(line)),
         1 => lines.insert(line, lines[line]),
         2 => {
-            let other = random.below(lines.len());
-            lines.swap(line, other);
+            let other_line = random.below(lines.len());
+            lines.swap(line, other_line);
         }
         _ => {
             let is_part = |c: char| c.is_alphanumeric() || "_-.".contains(c);
@@ -40,17 +40,18 @@ fn mutate(text: &str, random: &mut Random) -> String {
                 .map(|(at, _)| (at, text[at..].split(|c| !is_part(c)).next().unwrap_or_default()))
                 .collect();
             let (at, word) = words[random.below(words.len())];
-            let digits = word.bytes().all(|byte| byte.is_ascii_digit());
-            let other = words[random.below(words.len())].1.to_owned();
+            let is_number = word.bytes().all(|byte| byte.is_ascii_digit());
+            let replacement = words[random.below(words.len())].1.to_owned();
             let numbers = ["0", "1", "7", "-1", "9999"];
-            let other = if digits { numbers[random.below(numbers.len())].to_owned() } else { other };
-            return format!("{}{other}{}", &text[..at], &text[at + word.len()..]);
+            let replacement =
+                if is_number { numbers[random.below(numbers.len())].to_owned() } else { replacement };
+            return format!("{}{replacement}{}", &text[..at], &text[at + word.len()..]);
         }
     }
     lines.concat()
 }
 
-/// Kinds of changes that are aimed at something; the rest changes anything anywhere.
+/// Kinds of targeted changes. The last kind changes a random part of a random file.
 const KINDS: [&str; 14] = [
     "literal of the formula",
     "literal of the proof",
@@ -68,7 +69,7 @@ const KINDS: [&str; 14] = [
     "anything",
 ];
 
-/// The certificate that is changed.
+/// An unchanged certificate.
 struct Original {
     directory: tempfile::TempDir,
     target: PathBuf,
@@ -93,14 +94,14 @@ impl Original {
     }
 }
 
-/// Changes a text by lines that satisfy a condition: one goes, or comes twice.
-fn change_line(text: &str, random: &mut Random, is_meant: &dyn Fn(&str) -> bool) -> String {
+/// Removes or duplicates a random line that satisfies a condition.
+fn change_line(text: &str, random: &mut Random, is_candidate: &dyn Fn(&str) -> bool) -> String {
     let mut lines: Vec<&str> = text.split_inclusive('\n').collect();
-    let meant: Vec<usize> = (0..lines.len()).filter(|at| is_meant(lines[*at])).collect();
-    if meant.is_empty() {
+    let candidates: Vec<usize> = (0..lines.len()).filter(|at| is_candidate(lines[*at])).collect();
+    if candidates.is_empty() {
         return text.to_owned();
     }
-    let line = meant[random.below(meant.len())];
+    let line = candidates[random.below(candidates.len())];
     match random.below(3) {
         0 => lines.insert(line, lines[line]),
         _ => drop(lines.remove(line)),
@@ -108,7 +109,7 @@ fn change_line(text: &str, random: &mut Random, is_meant: &dyn Fn(&str) -> bool)
     lines.concat()
 }
 
-/// Turns the sign of a number somewhere behind the first line.
+/// Inverts the sign of a random number after the first line.
 fn flip(text: &str, random: &mut Random) -> String {
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
     if lines.len() < 2 {
@@ -125,25 +126,31 @@ fn flip(text: &str, random: &mut Random) -> String {
     lines.join("\n") + "\n"
 }
 
-/// Changes one of the numbers below the elements of a list that have a key (or are it), by a little or to nothing.
+/// Changes a random number under a key of a JSON document: by one, to its double, or to zero.
 fn change_number(document: &mut Value, key: &str, random: &mut Random) {
-    fn numbers<'v>(value: &'v mut Value, key: &str, inside: bool, found: &mut Vec<&'v mut Value>) {
+    fn numbers<'v>(value: &'v mut Value, key: &str, inside: bool, values: &mut Vec<&'v mut Value>) {
         match value {
-            Value::Array(elements) => elements.iter_mut().for_each(|own| numbers(own, key, inside, found)),
-            Value::Object(fields) => {
-                fields.iter_mut().for_each(|(name, own)| numbers(own, key, inside || name == key, found));
+            Value::Array(elements) => {
+                elements.iter_mut().for_each(|element| numbers(element, key, inside, values))
             }
-            Value::Number(_) | Value::Null if inside => found.push(value),
+            Value::Object(fields) => {
+                fields
+                    .iter_mut()
+                    .for_each(|(name, element)| numbers(element, key, inside || name == key, values));
+            }
+            // Potentials can be null (infinite).
+            Value::Number(_) | Value::Null if inside => values.push(value),
             _ => {}
         }
     }
-    let mut found = Vec::new();
-    numbers(document, key, false, &mut found);
-    if !found.is_empty() {
-        let position = random.below(found.len());
-        let value = &mut *found[position];
-        let old = value.as_i64().unwrap_or_default();
-        *value = [json!(old + 1), json!(old - 1), json!(2 * old), json!(0)][random.below(4)].clone();
+    let mut values = Vec::new();
+    numbers(document, key, false, &mut values);
+    if !values.is_empty() {
+        let position = random.below(values.len());
+        let value = &mut *values[position];
+        let previous = value.as_i64().unwrap_or_default();
+        *value = [json!(previous + 1), json!(previous - 1), json!(2 * previous), json!(0)][random.below(4)]
+            .clone();
     }
 }
 
@@ -154,7 +161,7 @@ fn edit_json(text: &str, edit: impl FnOnce(&mut Value)) -> String {
     if document == original { text.to_owned() } else { document.to_string() }
 }
 
-/// The file that a kind of change is about, and the text it has then.
+/// Name and text of the changed file, for a kind of change.
 fn mutant(kind: &str, original: &Original, random: &mut Random) -> (String, String) {
     let name = match kind {
         "literal of the formula" => "formula.cnf",
@@ -203,7 +210,7 @@ fn mutant(kind: &str, original: &Original, random: &mut Random) -> (String, Stri
     (name.to_owned(), changed)
 }
 
-/// Whether a claim is true: what planning for the files of a certificate comes to.
+/// Returns `true` if a claim agrees with the result of planning for the files of the certificate.
 fn is_true(claim: &Value, target: &Path) -> bool {
     let files = ["domain.pddl", "problem.pddl"].map(|name| target.join(name).display().to_string());
     let answer = metaplan(&["plan", &files[0], &files[1], "--format", "json", "--quiet"]).json();
@@ -214,9 +221,12 @@ fn is_true(claim: &Value, target: &Path) -> bool {
     answer["status"] == "optimal" && metric == Some(answer["cost"].to_string().as_str())
 }
 
-/// Changes certificates at random, mostly with a manifest that goes with it, so many times for each mission. What is accepted
-/// must be true. Returns how many changes of each kind there were, and how many of them were accepted.
-fn withstand(missions: &[&[&str]], seeds: std::ops::Range<u64>) -> BTreeMap<&'static str, (usize, usize)> {
+/// Changes the certificate of each mission once per seed, usually with a matching manifest. Accepted claims must be true. Returns the
+/// number of changes and of accepted changes for each kind.
+fn check_mutants(
+    missions: &[&[&str]],
+    seeds: std::ops::Range<u64>,
+) -> BTreeMap<&'static str, (usize, usize)> {
     let mut counts: BTreeMap<_, (usize, usize)> = BTreeMap::new();
     for arguments in missions {
         let original = Original::new(arguments);
@@ -234,17 +244,18 @@ fn withstand(missions: &[&[&str]], seeds: std::ops::Range<u64>) -> BTreeMap<&'st
                 change(&target, &name, &|_| text.clone());
             }
             let outcome = verify(&target);
-            let said = || format!("{arguments:?}, seed {seed}, {kind}, {name}: {outcome:#?}");
-            assert!([0, 30].contains(&outcome.status), "{}", said());
+            let description = || format!("{arguments:?}, seed {seed}, {kind}, {name}: {outcome:#?}");
+            assert!([0, 30].contains(&outcome.status), "{}", description());
             let accepted = outcome.status == 0;
             if accepted {
                 let manifest =
                     std::fs::read_to_string(original.target.join("manifest.json")).expect("a file");
                 let manifest: Value = serde_json::from_str(&manifest).expect("JSON");
-                assert!(is_true(&manifest["claim"], &original.target), "{}", said());
+                assert!(is_true(&manifest["claim"], &original.target), "{}", description());
             }
-            let strict = ["literal of the formula", "legend", "hash", "derivation step"];
-            assert!(!accepted || !strict.contains(&kind), "{}", said());
+            // Changes of these kinds are never accepted, because they break a file's syntax, hash or derivation.
+            let always_rejected = ["literal of the formula", "legend", "hash", "derivation step"];
+            assert!(!accepted || !always_rejected.contains(&kind), "{}", description());
             let count = counts.entry(kind).or_default();
             *count = (count.0 + 1, count.1 + usize::from(accepted));
             original.restore();
@@ -255,17 +266,17 @@ fn withstand(missions: &[&[&str]], seeds: std::ops::Range<u64>) -> BTreeMap<&'st
 }
 
 #[test]
-fn what_is_accepted_after_a_random_change_is_true() {
-    let counts = withstand(&MISSIONS[3..], 0..42);
+fn accepted_claims_of_mutated_certificates_are_true() {
+    let counts = check_mutants(&MISSIONS[3..], 0..42);
     assert_eq!(counts.len(), KINDS.len(), "{counts:?}");
 }
 
 #[test]
 #[ignore = "minutes"]
 #[allow(clippy::print_stdout)]
-fn what_is_accepted_after_many_random_changes_is_true() {
-    let counts = withstand(&MISSIONS, 1_000..1_280);
+fn accepted_claims_of_many_mutated_certificates_are_true() {
+    let counts = check_mutants(&MISSIONS, 1_000..1_280);
     println!("kind of change: how many, how many accepted (all of them true): {counts:#?}");
     assert_eq!(counts.len(), KINDS.len(), "{counts:?}");
-    assert!(counts.values().map(|(all, _)| all).sum::<usize>() >= 1_000, "{counts:?}");
+    assert!(counts.values().map(|(changes, _)| changes).sum::<usize>() >= 1_000, "{counts:?}");
 }

@@ -1,4 +1,4 @@
-//! Names of individuals and names of objects: the same ones, others that are mapped, and those that meet nothing.
+//! Tests of names of individuals and objects: equal names, mapped names, and names without a counterpart.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::certificate::change;
 use crate::common::{Outcome, copy_of_mission, edit, headlines, metaplan, metaplan_in, steps, verify_in};
 
-/// The objects that the problem of the mission `uuv` may declare, and gets from its knowledge base otherwise.
+/// Objects of the mission `uuv` that its knowledge base provides, and that the problem can declare as well.
 const OBJECTS: &str = "fd_speed_low fd_speed_medium fd_speed_high fd_search_low fd_search_medium fd_search_high \
     fd_follow fd_recharge - functiondesign f_maintain_motion f_generate_search_path f_follow_pipeline f_recharge - function";
 
@@ -15,20 +15,20 @@ const MANIFEST: &str = "missions/uuv.toml";
 const PROBLEM: &str = "encodings/uuv/problem.pddl";
 const KB: &str = "ontology/kb/uuv.ttl";
 
-/// A copy of the mission `uuv` whose problem declares functions and designs.
+/// A copy of the mission `uuv` in which the problem declares functions and designs.
 fn declared() -> tempfile::TempDir {
     let copy = copy_of_mission("uuv");
     edit(copy.path(), PROBLEM, "(:objects ", &format!("(:objects {OBJECTS} "));
     copy
 }
 
-/// The same with a knowledge base that has other names for functions, designs and actions, and a manifest that maps them.
+/// A copy with other names for functions, designs and actions in the knowledge base, and with these entries of the name map.
 fn renamed(entries: &str) -> tempfile::TempDir {
     let copy = declared();
     let mut text = std::fs::read_to_string(copy.path().join(KB)).expect("the knowledge base");
-    for (kind, other) in [("f", "kf"), ("fd", "kd"), ("a", "ka")] {
-        for before in [" ", "\n"] {
-            text = text.replace(&format!("{before}:{kind}_"), &format!("{before}:{other}_"));
+    for (kind, prefix) in [("f", "kf"), ("fd", "kd"), ("a", "ka")] {
+        for separator in [" ", "\n"] {
+            text = text.replace(&format!("{separator}:{kind}_"), &format!("{separator}:{prefix}_"));
         }
     }
     std::fs::write(copy.path().join(KB), text).expect("written");
@@ -38,8 +38,8 @@ fn renamed(entries: &str) -> tempfile::TempDir {
 
 const ENTRIES: &str = "\"kd_*\" = \"fd_*\"\n\"kf_*\" = \"f_*\"\n\"ka_*\" = \"a_*\"";
 
-/// What the program says, in the names of the problem, without times.
-fn said(directory: &Path, arguments: &[&str], input: &str) -> String {
+/// Output of the program in the names of the problem, without times and digests.
+fn output_in_problem_names(directory: &Path, arguments: &[&str], input: &str) -> String {
     let outcome = metaplan_in(directory, arguments, input);
     assert!(
         [0, 10].contains(&outcome.status) && !outcome.stderr.contains("M22"),
@@ -53,8 +53,8 @@ fn said(directory: &Path, arguments: &[&str], input: &str) -> String {
         .replace("ka_", "a_");
     let strip = |line: &str| match serde_json::from_str::<Value>(line) {
         Ok(mut value) => {
-            for timed in ["statistics", "mission", "digest", "time", "microseconds", "due"] {
-                value.as_object_mut().map(|own| own.remove(timed));
+            for field in ["statistics", "mission", "digest", "time", "microseconds", "due"] {
+                value.as_object_mut().map(|fields| fields.remove(field));
             }
             value.to_string()
         }
@@ -64,8 +64,8 @@ fn said(directory: &Path, arguments: &[&str], input: &str) -> String {
 }
 
 #[test]
-fn a_mission_with_mapped_names_is_the_same_mission() {
-    let (one, other) = (declared(), renamed(ENTRIES));
+fn mapped_names_do_not_change_the_mission() {
+    let (original, mapped) = (declared(), renamed(ENTRIES));
     let lines = [
         r#"{"event":"component_status","component":"c_thruster_3","status":"FALSE"}"#,
         r#"{"event":"measured","attribute":"water_visibility","value":1.5}"#,
@@ -88,26 +88,30 @@ fn a_mission_with_mapped_names_is_the_same_mission() {
         (&["run", MANIFEST], &lines),
         (&["simulate", MANIFEST, "--scenario", "suave", "--runs", "2", "--csv", "-", "--quiet"], ""),
     ] {
-        assert_eq!(said(one.path(), arguments, input), said(other.path(), arguments, input), "{arguments:?}");
+        assert_eq!(
+            output_in_problem_names(original.path(), arguments, input),
+            output_in_problem_names(mapped.path(), arguments, input),
+            "{arguments:?}"
+        );
     }
-    // Not because nothing happens.
-    assert!(said(one.path(), &["run", MANIFEST], &lines).contains("fd_search_low"));
-    // A design has its name in the knowledge base, too.
-    let explain = |name| said(other.path(), &["explain", MANIFEST, name], "");
+    // The comparison is not vacuous.
+    assert!(output_in_problem_names(original.path(), &["run", MANIFEST], &lines).contains("fd_search_low"));
+    // A design can also be given by its name in the knowledge base.
+    let explain = |name| output_in_problem_names(mapped.path(), &["explain", MANIFEST, name], "");
     assert_eq!(explain("kd_speed_high"), explain("fd_speed_high"));
 }
 
 #[test]
-fn configurations_with_mapped_names_are_compared_alike() {
+fn mapped_names_do_not_change_comparisons() {
     let copy = copy_of_mission("camara_like");
     let manifest = "missions/camara_like.toml";
-    let compare = |what: &str| {
+    let compare = |label: &str| {
         let arguments = ["compare", manifest, "--no-battery", "--pairs", "2", "--format", "json", "--quiet"];
         let outcome = metaplan_in(copy.path(), &arguments, "");
-        assert_eq!(outcome.status, 0, "{what}: {outcome:#?}");
+        assert_eq!(outcome.status, 0, "{label}: {outcome:#?}");
         let mut answer = outcome.json();
-        for own in answer["comparisons"].as_array_mut().expect("comparisons") {
-            own["costs"] = Value::Null;
+        for comparison in answer["comparisons"].as_array_mut().expect("comparisons") {
+            comparison["costs"] = Value::Null;
         }
         answer
     };
@@ -118,22 +122,22 @@ fn configurations_with_mapped_names_are_compared_alike() {
 }
 
 #[test]
-fn certificates_hold_for_mapped_names_only_with_them() {
+fn certificates_depend_on_the_name_map() {
     let copy = renamed(ENTRIES);
     let outcome = metaplan_in(copy.path(), &["plan", MANIFEST, "--certificate", "c"], "");
     assert_eq!(outcome.status, 0, "{outcome:#?}");
     let verified = verify_in(copy.path(), &["c"]);
     assert_eq!(verified.status, 0, "{verified:#?}");
-    let about = |status: i32, words: &str| {
+    let check_mission = |status: i32, words: &str| {
         let outcome = metaplan_in(copy.path(), &["verify", "c", "--mission", MANIFEST], "");
         assert_eq!(outcome.status, status, "{outcome:#?}");
         assert!(outcome.stdout.contains(words), "no `{words}`: {outcome:#?}");
     };
-    about(0, "it is about `uuv` as it is now");
-    // The same plan under other entries is another mission's.
+    check_mission(0, "it is about `uuv` as it is now");
+    // Another name map makes it another mission, although the plan is the same.
     edit(copy.path(), MANIFEST, "\"ka_*\" = \"a_*\"", "\"ka_*\" = \"a_*\"\nkd_recharge = \"fd_recharge\"");
-    about(30, "the bindings differ");
-    // A certificate in which two designs are exchanged speaks of another problem.
+    check_mission(30, "the bindings differ");
+    // Exchanged designs in the name map contradict the problem of the certificate.
     let exchange = |text: String| {
         let mut value: Value = serde_json::from_str(&text).expect("JSON");
         assert_eq!(value["names"]["kd_*"], "fd_*");
@@ -147,35 +151,39 @@ fn certificates_hold_for_mapped_names_only_with_them() {
     assert!(outcome.stdout.contains("the knowledge says"), "{outcome:#?}");
 }
 
-/// Plans the renamed mission with these entries; standard error must have these words.
+/// Plans the renamed mission with these entries of the name map. Standard error must contain the words.
 fn check(entries: &str, status: i32, words: &[&str]) -> Outcome {
     let copy = renamed(entries);
     let outcome = metaplan_in(copy.path(), &["plan", MANIFEST], "");
     assert_eq!(outcome.status, status, "{entries}: {outcome:#?}");
     for word in words {
-        let said = headlines(&outcome.stderr) + &outcome.stderr;
-        assert!(said.contains(word), "{entries}: no `{word}`: {outcome:#?}");
+        let messages = headlines(&outcome.stderr) + &outcome.stderr;
+        assert!(messages.contains(word), "{entries}: no `{word}`: {outcome:#?}");
     }
     outcome
 }
 
 #[test]
-fn entries_that_are_wrong_have_their_place() {
-    let with = |more: &str| format!("{ENTRIES}\n{more}");
+fn invalid_entries_are_reported_with_their_position() {
+    let with_entry = |entry: &str| format!("{ENTRIES}\n{entry}");
     let place = |column: u32| format!("missions/uuv.toml:11:{column}: ");
     check(
-        &with("kd_serach_low = \"fd_search_low\""),
+        &with_entry("kd_serach_low = \"fd_search_low\""),
         3,
         &[&place(1), "M223", "`kd_serach_low`; did you mean `kd_search_low`?"],
     );
-    check(&with("\"x_*\" = \"fd_*\""), 3, &[&place(1), "M223", "the pattern `x_*` meets no individual"]);
     check(
-        &with("  kd_search_low = \"fd_serach_low\""),
+        &with_entry("\"x_*\" = \"fd_*\""),
+        3,
+        &[&place(1), "M223", "the pattern `x_*` meets no individual"],
+    );
+    check(
+        &with_entry("  kd_search_low = \"fd_serach_low\""),
         3,
         &[&place(3), "M224", "there is no object `fd_serach_low`", "did you mean `fd_search_low`?"],
     );
     check(
-        &with("kd_search_low = \"pl1\""),
+        &with_entry("kd_search_low = \"pl1\""),
         3,
         &[
             &place(1),
@@ -185,35 +193,44 @@ fn entries_that_are_wrong_have_their_place() {
         ],
     );
     check(
-        &with("kd_search_low = \"fd_search_high\""),
+        &with_entry("kd_search_low = \"fd_search_high\""),
         3,
         &["M225", "`fd_search_high` would be `kd_search_high`, `kd_search_low`"],
     );
     check(
-        &with("\"kd_search_*\" = \"fd_speed_*\""),
+        &with_entry("\"kd_search_*\" = \"fd_speed_*\""),
         3,
         &[&place(1), "M225", "`kd_search_low` would be `fd_speed_low` and `fd_search_low`"],
     );
-    check(&with("\"kd_*_*\" = \"fd_*\""), 3, &[&place(1), "M223", "a pattern has one star on each side"]);
-    check(&with("\"kd_search_*\" = \"fd_search_low\""), 3, &[&place(1), "M223", "a star on both sides"]);
-    check(&with("kd_search_low = 3"), 3, &["missions/uuv.toml:11:17: ", "M104", "expected a string"]);
-    let all = check(&with("kd_x = \"fd_search_low\"\nkd_y = \"fd_search_low\""), 3, &["kd_x", "kd_y"]);
-    assert_eq!(all.stderr.matches("M223").count(), 2, "{all:#?}");
+    check(
+        &with_entry("\"kd_*_*\" = \"fd_*\""),
+        3,
+        &[&place(1), "M223", "a pattern has one star on each side"],
+    );
+    check(
+        &with_entry("\"kd_search_*\" = \"fd_search_low\""),
+        3,
+        &[&place(1), "M223", "a star on both sides"],
+    );
+    check(&with_entry("kd_search_low = 3"), 3, &["missions/uuv.toml:11:17: ", "M104", "expected a string"]);
+    let outcome =
+        check(&with_entry("kd_x = \"fd_search_low\"\nkd_y = \"fd_search_low\""), 3, &["kd_x", "kd_y"]);
+    assert_eq!(outcome.stderr.matches("M223").count(), 2, "{outcome:#?}");
 }
 
 #[test]
-fn an_exact_entry_counts_before_a_pattern() {
+fn exact_entries_take_precedence_over_patterns() {
     let entries = "\"kd_*\" = \"fd_*\"\n\"kf_*\" = \"f_*\"\n\"ka_*\" = \"a_*\"\n\
         kd_search_high = \"fd_search_low\"\n\"http://metacontrol.org/metaplan/uuv#kd_search_low\" = \"fd_search_high\"";
     let copy = renamed(entries);
     let outcome = metaplan_in(copy.path(), &["plan", MANIFEST, "--format", "json"], "");
     assert_eq!(outcome.status, 0, "{outcome:#?}");
-    // The quick design is the other one now.
+    // The names of the two search designs are exchanged.
     assert_eq!(steps(&outcome.json())[0], "search_pipeline pl1 | fd_search_low, fd_speed_high");
 }
 
 #[test]
-fn a_pattern_leaves_what_has_no_object() {
+fn patterns_skip_individuals_without_an_object() {
     let copy = renamed(ENTRIES);
     edit(copy.path(), PROBLEM, "fd_search_medium ", "");
     let outcome = metaplan_in(copy.path(), &["plan", MANIFEST], "");
@@ -223,14 +240,14 @@ fn a_pattern_leaves_what_has_no_object() {
     {
         assert!(outcome.stderr.contains(word), "no `{word}`: {outcome:#?}");
     }
-    // It is a design like others, under its own name.
+    // The design keeps its own name.
     assert!(outcome.stderr.contains("in the knowledge base only: `kd_search_medium`"), "{outcome:#?}");
 }
 
 #[test]
-fn names_that_meet_nothing_are_listed_from_both_sides() {
-    let without = renamed("kd_recharge = \"fd_recharge\"");
-    let outcome = metaplan_in(without.path(), &["plan", MANIFEST], "");
+fn unmatched_names_are_listed_from_both_sides() {
+    let unmapped = renamed("kd_recharge = \"fd_recharge\"");
+    let outcome = metaplan_in(unmapped.path(), &["plan", MANIFEST], "");
     assert_eq!(outcome.status, 3, "{outcome:#?}");
     for word in [
         "error[M222]: no design of the required function `kf_maintain_motion` is known to both sides; in the problem only: \
@@ -241,10 +258,10 @@ fn names_that_meet_nothing_are_listed_from_both_sides() {
     ] {
         assert!(outcome.stderr.contains(word), "no `{word}`: {outcome:#?}");
     }
-    // Some of them meet: warnings.
-    let some = declared();
-    edit(some.path(), PROBLEM, "fd_search_low ", "fd_serach_low ");
-    let outcome = metaplan_in(some.path(), &["plan", MANIFEST], "");
+    // If some names match, the others are only warnings.
+    let misspelt = declared();
+    edit(misspelt.path(), PROBLEM, "fd_search_low ", "fd_serach_low ");
+    let outcome = metaplan_in(misspelt.path(), &["plan", MANIFEST], "");
     assert_eq!(outcome.status, 0, "{outcome:#?}");
     for word in [
         "warning[M221]: the knowledge base does not know all designs of the problem",
@@ -254,17 +271,22 @@ fn names_that_meet_nothing_are_listed_from_both_sides() {
     ] {
         assert!(outcome.stderr.contains(word), "no `{word}`: {outcome:#?}");
     }
-    // A design that the problem never names, though it names others, has its place in the knowledge base.
-    let fewer = declared();
-    edit(fewer.path(), PROBLEM, "fd_search_low ", "");
-    let outcome = metaplan_in(fewer.path(), &["plan", MANIFEST], "");
+    // A design that the problem does not declare, although it declares others, is reported at its position in the knowledge base.
+    let incomplete = declared();
+    edit(incomplete.path(), PROBLEM, "fd_search_low ", "");
+    let outcome = metaplan_in(incomplete.path(), &["plan", MANIFEST], "");
     assert_eq!(outcome.status, 0, "{outcome:#?}");
     for word in ["uuv.ttl:", "M221", "the problem names designs, but not all", "only: `fd_search_low`"] {
         assert!(outcome.stderr.contains(word), "no `{word}`: {outcome:#?}");
     }
-    let strange = declared();
-    edit(strange.path(), "encodings/uuv/domain.pddl", "a_recharge - action", "a_recharge a_rest - action");
-    let outcome = metaplan_in(strange.path(), &["plan", MANIFEST], "");
+    let unknown_action = declared();
+    edit(
+        unknown_action.path(),
+        "encodings/uuv/domain.pddl",
+        "a_recharge - action",
+        "a_recharge a_rest - action",
+    );
+    let outcome = metaplan_in(unknown_action.path(), &["plan", MANIFEST], "");
     for word in ["domain.pddl:7:", "does not know all actions of the problem; in the problem only: `a_rest`"]
     {
         assert!(outcome.stderr.contains(word), "no `{word}`: {outcome:#?}");
@@ -272,7 +294,7 @@ fn names_that_meet_nothing_are_listed_from_both_sides() {
 }
 
 #[test]
-fn what_nobody_has_to_know_is_not_warned_of() {
+fn missions_with_optional_declarations_have_no_warnings() {
     for copy in [declared(), copy_of_mission("uuv"), copy_of_mission("ugv"), copy_of_mission("camara_like")] {
         for name in ["uuv", "ugv", "camara_like"] {
             let manifest = format!("missions/{name}.toml");
@@ -284,9 +306,9 @@ fn what_nobody_has_to_know_is_not_warned_of() {
     }
 }
 
-/// Components may be objects, too; the knowledge base's own names come first.
+/// Components can be objects as well. Names of the knowledge base take precedence.
 #[test]
-fn components_are_named_either_way() {
+fn components_have_object_and_individual_names() {
     let copy = declared();
     edit(copy.path(), "encodings/uuv/domain.pddl", "(:types pipeline", "(:types component pipeline");
     edit(copy.path(), PROBLEM, "(:objects ", "(:objects front left - component ");
@@ -299,7 +321,7 @@ fn components_are_named_either_way() {
             outcome.json()["cost"].clone()
         },
     );
-    // With two thrusters only the low speed is left; without the sonar nothing can be followed.
+    // Without a front thruster only the low speed remains. Without the sonar no pipeline can be followed.
     assert_eq!(costs, [json!(56), json!(56), json!(56), Value::Null]);
     let line = r#"{"event":"component_status","component":"front","status":"FALSE"}"#;
     let outcome = metaplan_in(copy.path(), &["run", MANIFEST], line);
@@ -308,22 +330,22 @@ fn components_are_named_either_way() {
     assert_eq!(outcome.status, 2, "{outcome:#?}");
 }
 
-/// A journal goes on under the same entries, wherever they stand, and under no others.
+/// A journal can be resumed only with the same name map. Its position in the manifest does not matter.
 #[test]
-fn journals_are_of_missions_with_these_names() {
+fn journals_depend_on_the_name_map() {
     let copy = renamed(ENTRIES);
     let run = || metaplan_in(copy.path(), &["run", MANIFEST, "--journal", "j"], "{\"event\":\"tick\"}\n");
     assert_eq!(run().status, 0);
     edit(copy.path(), MANIFEST, "[bindings.names]", "\n# The same.\n[bindings.names]");
-    let again = run();
-    assert_eq!(again.status, 0, "{again:#?}");
+    let resumed = run();
+    assert_eq!(resumed.status, 0, "{resumed:#?}");
     edit(copy.path(), MANIFEST, "\"kd_*\" = \"fd_*\"", "\"kd_*\" = \"fd_*\"\nkd_follow = \"fd_follow\"");
-    let other = run();
-    assert!(other.status == 3 && other.stderr.contains("M321"), "{other:#?}");
+    let refused = run();
+    assert!(refused.status == 3 && refused.stderr.contains("M321"), "{refused:#?}");
 }
 
 #[test]
-fn names_on_the_command_line_go_with_a_knowledge_base() {
+fn name_options_require_a_knowledge_base() {
     let (domain, problem) = ("encodings/uuv/domain.pddl", "encodings/uuv/problem.pddl");
     for (arguments, status, words) in [
         (&["plan", domain, problem, "--name", "a=b"][..], 2, "`--name` goes with `--kb`"),

@@ -1,8 +1,8 @@
-//! Output files: what is not a regular file is written through, links are followed, and a file keeps its mode, owner and other names.
+//! Tests of output files: special files are written to, links are followed, and a file keeps its mode, owner and hard links.
 //!
-//! No path here names a device of the machine: a program that replaced what it is given would take that away.
+//! No test uses a real device, because a faulty program could replace it by a file.
 
-#![allow(clippy::print_stdout)] // a skipped part says so
+#![allow(clippy::print_stdout)] // A skipped test prints the reason.
 
 use std::fs;
 use std::os::unix::fs::{FileTypeExt as _, MetadataExt as _, PermissionsExt as _, symlink};
@@ -11,7 +11,7 @@ use std::process::{Command, Stdio};
 
 use crate::common::{metaplan, root};
 
-/// Commands that write a file, `FILE`. The content is the same each time.
+/// Commands that write to `FILE`. The content is deterministic.
 const OUTPUTS: [&[&str]; 11] = [
     &["plan", "missions/ugv.toml", "-o", "FILE"],
     &["plan", "missions/ugv.toml", "--svg", "FILE"],
@@ -38,16 +38,16 @@ fn mode(path: &Path) -> u32 {
     fs::metadata(path).expect("a file").mode() & 0o7777
 }
 
-/// A FIFO, and a process that copies what is written to it into a file.
+/// Creates a FIFO, and starts a process that copies its content to a file.
 fn fifo(path: &Path, copy: &Path) -> std::process::Child {
-    let made = Command::new("mkfifo").arg(path).status().expect("mkfifo runs");
-    assert!(made.success());
+    let status = Command::new("mkfifo").arg(path).status().expect("mkfifo runs");
+    assert!(status.success());
     let script = "exec timeout 300 cat \"$1\" > \"$2\"";
     Command::new("sh").args(["-c", script, "sh"]).args([path, copy]).spawn().expect("the shell runs")
 }
 
 #[test]
-fn every_output_follows_links_and_goes_through_a_fifo() {
+fn outputs_follow_links_and_write_to_fifos() {
     let folder = tempfile::tempdir().expect("a folder");
     let within = |name: &str| folder.path().join(name);
     fs::write(within("model.prism"), MODEL).expect("a model");
@@ -82,12 +82,12 @@ fn every_output_follows_links_and_goes_through_a_fifo() {
         assert!(pipe.symlink_metadata().expect("a FIFO").file_type().is_fifo(), "{output:?}");
         assert_eq!(written, fs::read(&copy).expect("a copy"), "{output:?}");
     }
-    let rest = fs::read_dir(folder.path()).expect("a folder").count();
-    assert_eq!(rest, 2 + 4 * OUTPUTS.len(), "no temporary file is left");
+    let file_count = fs::read_dir(folder.path()).expect("a folder").count();
+    assert_eq!(file_count, 2 + 4 * OUTPUTS.len(), "no temporary file is left");
 }
 
 #[test]
-fn a_trace_goes_through_a_fifo_and_a_link() {
+fn traces_follow_links_and_write_to_fifos() {
     let folder = tempfile::tempdir().expect("a folder");
     let [link, pipe, copy] = ["link", "pipe", "copy"].map(|name| folder.path().join(name));
     let mut reader = fifo(&pipe, &copy);
@@ -101,11 +101,11 @@ fn a_trace_goes_through_a_fifo_and_a_link() {
 }
 
 #[test]
-fn a_device_stays_a_device() {
+fn devices_are_not_replaced() {
     let folder = tempfile::tempdir().expect("a folder");
     let null = folder.path().join("null");
-    let made = Command::new("mknod").arg(&null).args(["c", "1", "3"]).stderr(Stdio::null()).status();
-    if !made.is_ok_and(|status| status.success()) || fs::write(&null, "x").is_err() {
+    let created = Command::new("mknod").arg(&null).args(["c", "1", "3"]).stderr(Stdio::null()).status();
+    if !created.is_ok_and(|status| status.success()) || fs::write(&null, "x").is_err() {
         println!("skipped: devices can be made by root only");
         return;
     }
@@ -114,9 +114,9 @@ fn a_device_stays_a_device() {
 }
 
 #[test]
-fn a_file_keeps_mode_owner_and_other_names() {
+fn files_keep_mode_owner_and_hard_links() {
     let folder = tempfile::tempdir().expect("a folder");
-    let [file, other, moved] = ["file", "other", "moved"].map(|name| folder.path().join(name));
+    let [file, hard_link, moved] = ["file", "other", "moved"].map(|name| folder.path().join(name));
     let convert = || {
         let file = file.display().to_string();
         run(&["convert", "ontology/kb/ugv.ttl", "--to", "turtle", "-o", &file]);
@@ -124,18 +124,18 @@ fn a_file_keeps_mode_owner_and_other_names() {
     };
     fs::write(&file, "old".repeat(100_000)).expect("a file");
     fs::set_permissions(&file, fs::Permissions::from_mode(0o640)).expect("a mode");
-    fs::hard_link(&file, &other).expect("a link");
+    fs::hard_link(&file, &hard_link).expect("a link");
     let first = convert();
     assert!(first.starts_with('@') && first.len() < 100_000);
-    assert_eq!(fs::read_to_string(&other).expect("a file"), first);
+    assert_eq!(fs::read_to_string(&hard_link).expect("a file"), first);
     assert_eq!((mode(&file), fs::metadata(&file).expect("a file").nlink()), (0o640, 2));
-    fs::remove_file(&other).expect("removed");
-    // Alone it is replaced: a reader of the old file is not disturbed.
-    let before = fs::metadata(&file).expect("a file").ino();
+    fs::remove_file(&hard_link).expect("removed");
+    // Without further hard links the file is replaced atomically, so that a reader of the old file is not disturbed.
+    let old_inode = fs::metadata(&file).expect("a file").ino();
     assert_eq!(convert(), first);
-    assert_ne!(fs::metadata(&file).expect("a file").ino(), before);
+    assert_ne!(fs::metadata(&file).expect("a file").ino(), old_inode);
     assert_eq!(mode(&file), 0o640);
-    // Only root gives files away.
+    // Only root can change the owner of a file.
     if std::os::unix::fs::chown(&file, Some(12345), Some(23456)).is_ok() {
         convert();
         let owned = fs::metadata(&file).expect("a file");
@@ -143,14 +143,14 @@ fn a_file_keeps_mode_owner_and_other_names() {
     } else {
         println!("skipped: only root can give a file to others");
     }
-    // A link to nothing names the file to make.
+    // If the target of a link does not exist, it is created.
     fs::remove_file(&file).expect("removed");
     symlink("moved", &file).expect("a link");
     convert();
     assert!(file.symlink_metadata().expect("a link").is_symlink() && moved.is_file());
 }
 
-/// Runs a shell with the program in its path, in the root of the project; `$1` is a folder.
+/// Runs a script in the root of the project. The program is in PATH, and `$1` is a folder.
 fn shell(program: &str, script: &str, folder: &Path) -> String {
     let programs =
         Path::new(env!("CARGO_BIN_EXE_metaplan")).parent().expect("a folder").display().to_string();
@@ -167,7 +167,7 @@ fn shell(program: &str, script: &str, folder: &Path) -> String {
 }
 
 #[test]
-fn new_files_have_the_mode_that_the_mask_gives() {
+fn new_files_respect_the_umask() {
     let folder = tempfile::tempdir().expect("a folder");
     let script = "umask 027 && cd \"$1\" && metaplan init robot > made && metaplan plan robot/mission.toml \
         -q -o plan --certificate proof && metaplan plan robot/mission.toml -q --svg picture > shown";
@@ -178,12 +178,12 @@ fn new_files_have_the_mode_that_the_mask_gives() {
 }
 
 #[test]
-fn standard_output_is_a_dash_and_what_its_device_names() {
+fn dash_and_device_files_are_standard_output() {
     let folder = tempfile::tempdir().expect("a folder");
     let convert = "metaplan convert ontology/kb/ugv.ttl --to ntriples";
     let plain = shell("sh", convert, folder.path());
     assert!(plain.lines().count() > 50);
-    // What `/dev/stdout` is; the device itself is the machine's.
+    // Links like `/dev/stdout`, as the test must not touch the real device file.
     symlink("/proc/self/fd/1", folder.path().join("stdout")).expect("a link");
     symlink("/proc/self/fd/3", folder.path().join("third")).expect("a link");
     for script in [
@@ -204,7 +204,7 @@ fn standard_output_is_a_dash_and_what_its_device_names() {
     } else {
         println!("skipped: there is no bash");
     }
-    // A plan on standard output is what people read, wherever that goes.
+    // A plan on standard output has the human-readable format, by whatever name it is given.
     let plan = "metaplan plan missions/ugv.toml";
     let table = shell("sh", plan, folder.path());
     assert!(table.starts_with(" step"));
@@ -212,15 +212,15 @@ fn standard_output_is_a_dash_and_what_its_device_names() {
         assert_eq!(shell("sh", &format!("{plan} {output}"), folder.path()), table, "{output}");
     }
     let simulate = "metaplan simulate missions/uuv.toml --scenario suave --runs 1 --quiet --csv";
-    let apart = format!("{simulate} \"$1/csv\" > \"$1/table\"; cat \"$1/csv\" \"$1/table\"");
-    let apart = shell("sh", &apart, folder.path());
-    assert!(apart.starts_with("strategy,seed,"), "{apart}");
-    assert_eq!(shell("sh", &format!("{simulate} -"), folder.path()), apart);
+    let separate_outputs = format!("{simulate} \"$1/csv\" > \"$1/table\"; cat \"$1/csv\" \"$1/table\"");
+    let separate_outputs = shell("sh", &separate_outputs, folder.path());
+    assert!(separate_outputs.starts_with("strategy,seed,"), "{separate_outputs}");
+    assert_eq!(shell("sh", &format!("{simulate} -"), folder.path()), separate_outputs);
     assert!(!root().join("-").exists());
 }
 
 #[test]
-fn a_certificate_fills_an_empty_directory_through_a_link() {
+fn certificates_fill_empty_directories_through_links() {
     let folder = tempfile::tempdir().expect("a folder");
     let [proof, link] = ["proof", "link"].map(|name| folder.path().join(name));
     fs::create_dir(&proof).expect("a directory");
@@ -233,13 +233,13 @@ fn a_certificate_fills_an_empty_directory_through_a_link() {
     assert_eq!((mode(&proof), fs::metadata(&proof).expect("a directory").ino()), (0o705, inode));
     assert!(fs::read_dir(&proof).expect("files").all(|entry| entry.expect("an entry").path().is_file()));
     run(&["verify", &link.display().to_string()]);
-    let again = metaplan(&arguments);
-    assert_eq!(again.status, 3);
-    assert!(again.stderr.contains("directory not empty"), "{again:#?}");
+    let second_run = metaplan(&arguments);
+    assert_eq!(second_run.status, 3);
+    assert!(second_run.stderr.contains("directory not empty"), "{second_run:#?}");
 }
 
 #[test]
-fn several_files_do_not_go_to_standard_output() {
+fn outputs_of_several_files_refuse_standard_output() {
     for arguments in [
         &["plan", "missions/ugv.toml", "--certificate", "-"][..],
         &["report", "missions/ugv.toml", "--svg", "-"],
@@ -265,7 +265,7 @@ fn several_files_do_not_go_to_standard_output() {
 }
 
 #[test]
-fn a_recording_replaces_nothing() {
+fn recordings_do_not_replace_files() {
     let folder = tempfile::tempdir().expect("a folder");
     let [pipe, link] = ["pipe", "link"].map(|name| folder.path().join(name));
     assert!(Command::new("mkfifo").arg(&pipe).status().expect("mkfifo runs").success());

@@ -1,11 +1,11 @@
-//! The Metaplan paper's own problem with SUAVE's own knowledge base, where the two have other names.
+//! Tests of the problem of the Metaplan paper with SUAVE's knowledge base, whose names differ.
 
 use serde_json::{Value, json};
 
 use crate::common::{Outcome, metaplan, metaplan_in};
 use crate::real::shared;
 
-/// Files of the Metaplan paper and of SUAVE, if they are there.
+/// Files of the Metaplan paper and options for SUAVE's knowledge base, if available.
 fn paper() -> Option<([String; 2], Vec<String>)> {
     let real = shared()?.join("real").display().to_string();
     let file = |name: &str| format!("{real}/pddl/suave_metaplan/suave_extended_metaplan_{name}.pddl");
@@ -16,7 +16,7 @@ fn paper() -> Option<([String; 2], Vec<String>)> {
     Some(([file("domain"), file("problem")], options.collect()))
 }
 
-/// Which designs of SUAVE are which of the paper.
+/// Name map from SUAVE's designs to designs of the paper.
 const MAP: [(&str, &str); 4] = [
     ("fd_spiral_*", "fd_search_*"),
     ("fd_all_thrusters", "fd_maintain_motion"),
@@ -24,15 +24,15 @@ const MAP: [(&str, &str); 4] = [
     ("fd_follow_pipeline", "fd_follow"),
 ];
 
-fn plan(files: &[String], more: &[&str]) -> Outcome {
+fn plan(files: &[String], options: &[&str]) -> Outcome {
     let files: Vec<&str> = files.iter().map(String::as_str).collect();
-    metaplan(&[&["plan"], &files[..], more, &["--format", "json"]].concat())
+    metaplan(&[&["plan"], &files[..], options, &["--format", "json"]].concat())
 }
 
-/// The paper's problem with its own availability facts, but for these designs.
-fn by_hand(files: &[String; 2], gone: &[&str]) -> Value {
+/// Plan for the paper's problem with its own availability facts, except for the given designs.
+fn by_hand(files: &[String; 2], unavailable: &[&str]) -> Value {
     let mut text = std::fs::read_to_string(&files[1]).expect("the problem");
-    for design in gone {
+    for design in unavailable {
         let fact = format!("(fd_available {design})");
         assert!(text.contains(&fact), "{fact}");
         text = text.replace(&fact, "");
@@ -43,8 +43,8 @@ fn by_hand(files: &[String; 2], gone: &[&str]) -> Value {
     plan(&[files[0].clone(), problem.display().to_string()], &[]).json()
 }
 
-/// The most that the three actions of the shortest plan are worth: every design of the paper's table that is left, tried.
-fn most(gone: &[&str]) -> f64 {
+/// Greatest value of the three actions of the shortest plan, by brute force over the available designs of the paper's table.
+fn greatest_value(unavailable: &[&str]) -> f64 {
     let designs = [
         ("search", "fd_search_low", 0.5),
         ("search", "fd_search_medium", 0.7),
@@ -54,14 +54,16 @@ fn most(gone: &[&str]) -> f64 {
         ("follow", "fd_follow", 1.0),
         ("recharge", "fd_recharge", 1.0),
     ];
-    let of = |function: &str| {
-        let left = designs.iter().filter(|(own, design, _)| *own == function && !gone.contains(design));
-        left.map(|(.., worth)| *worth).collect::<Vec<f64>>()
+    let values_of = |function: &str| {
+        let available = designs.iter().filter(|(design_function, design, _)| {
+            *design_function == function && !unavailable.contains(design)
+        });
+        available.map(|(.., worth)| *worth).collect::<Vec<f64>>()
     };
     let mut best = f64::NEG_INFINITY;
-    let motion = of("motion");
-    for (search, follow, recharge) in of("search").iter().flat_map(|s| {
-        let (follow, recharge) = (of("follow"), of("recharge"));
+    let motion = values_of("motion");
+    for (search, follow, recharge) in values_of("search").iter().flat_map(|s| {
+        let (follow, recharge) = (values_of("follow"), values_of("recharge"));
         follow.into_iter().flat_map(move |f| recharge.clone().into_iter().map(move |r| (*s, f, r)))
     }) {
         for first in &motion {
@@ -76,13 +78,14 @@ fn most(gone: &[&str]) -> f64 {
 }
 
 #[test]
-fn the_papers_problem_with_suaves_own_knowledge_base() {
+fn problem_of_the_paper_works_with_the_knowledge_base_of_suave() {
     let Some((files, options)) = paper() else { return };
     let options: Vec<&str> = options.iter().map(String::as_str).collect();
-    let entries: Vec<String> = MAP.iter().map(|(one, other)| format!("{one}={other}")).collect();
+    let entries: Vec<String> =
+        MAP.iter().map(|(individual, object)| format!("{individual}={object}")).collect();
     let names: Vec<&str> = entries.iter().flat_map(|entry| ["--name", entry]).collect();
     let mut plans = Vec::new();
-    for (situation, gone) in [
+    for (situation, unavailable) in [
         (&[][..], &[][..]),
         (&["--fail", "c_thruster_1"], &["fd_maintain_motion"]),
         (&["--set", "water_visibility=1.5"], &["fd_search_medium", "fd_search_high"]),
@@ -94,23 +97,23 @@ fn the_papers_problem_with_suaves_own_knowledge_base() {
     ] {
         let outcome = plan(&files, &[&options, &names, situation].concat());
         assert_eq!(outcome.status, 1, "{situation:?}: {outcome:#?}");
-        let (answer, expected) = (outcome.json(), by_hand(&files, gone));
+        let (answer, expected) = (outcome.json(), by_hand(&files, unavailable));
         for field in ["steps", "cost", "status", "unbounded", "proof"] {
             assert_eq!(answer[field], expected[field], "{situation:?}: {field}");
         }
-        assert_eq!(answer["cost"].as_f64(), Some(most(gone)), "{situation:?}");
+        assert_eq!(answer["cost"].as_f64(), Some(greatest_value(unavailable)), "{situation:?}");
         assert!(!outcome.stderr.contains("P127"), "nothing is stated twice: {outcome:#?}");
         plans.push(answer["steps"].clone());
     }
     assert!(plans[1..].iter().all(|steps| *steps != plans[0]), "{plans:#?}");
-    // On recharging, of which the knowledge base knows nothing, the problem decides; on all else it does not.
+    // Recharging is unknown to the knowledge base, so its availability can be set. The availability of known designs cannot.
     let outcome =
         plan(&files, &[&options, &names, &["--set", "fd_available fd_recharge=false"][..]].concat());
     assert_eq!(outcome.status, 10, "{outcome:#?}");
     let outcome =
         plan(&files, &[&options, &names, &["--set", "fd_available fd_search_low=false"][..]].concat());
     assert!(outcome.status == 2 && outcome.stdout.contains("the knowledge base decides"), "{outcome:#?}");
-    // Too murky for any height: by the knowledge base, and not because names do not meet.
+    // Water too murky for all search designs: unsolvable because of the knowledge base, not because of unmatched names.
     let outcome = plan(&files, &[&options, &names, &["--set", "water_visibility=1"][..]].concat());
     assert_eq!(outcome.status, 10, "{outcome:#?}");
     assert_eq!(
@@ -121,7 +124,7 @@ fn the_papers_problem_with_suaves_own_knowledge_base() {
 }
 
 #[test]
-fn the_papers_problem_without_a_map_is_an_error() {
+fn problem_of_the_paper_needs_a_name_map() {
     let Some((files, options)) = paper() else { return };
     let options: Vec<&str> = options.iter().map(String::as_str).collect();
     let outcome = plan(&files, &options);
@@ -131,11 +134,11 @@ fn the_papers_problem_without_a_map_is_an_error() {
     let errors: Vec<&Value> = messages.iter().filter(|message| message["severity"] == "error").collect();
     let places: Vec<_> = errors
         .iter()
-        .map(|own| (own["code"].as_str(), own["line"].as_u64(), own["column"].as_u64()))
+        .map(|error| (error["code"].as_str(), error["line"].as_u64(), error["column"].as_u64()))
         .collect();
     let code = Some("M222");
     assert_eq!(places, [(code, Some(18), Some(3)), (code, Some(22), Some(3)), (code, Some(25), Some(3))]);
-    let said = [
+    let expected_names = [
         (
             "`fd_search_low`, `fd_search_medium`, `fd_search_high`",
             "`fd_spiral_high`, `fd_spiral_low`, `fd_spiral_medium`",
@@ -143,28 +146,29 @@ fn the_papers_problem_without_a_map_is_an_error() {
         ("`fd_maintain_motion`, `fd_recover_motion`", "`fd_all_thrusters`, `fd_recover_thrusters`"),
         ("`fd_follow`", "`fd_follow_pipeline`"),
     ];
-    for (error, (here, there)) in errors.iter().zip(said) {
-        let lists = format!("in the problem only: {here}; in the knowledge base only: {there}");
+    for (error, (in_problem, in_knowledge)) in errors.iter().zip(expected_names) {
+        let lists = format!("in the problem only: {in_problem}; in the knowledge base only: {in_knowledge}");
         assert!(error["message"].as_str().is_some_and(|text| text.ends_with(&lists)), "{error:#}");
     }
-    // What is proposed is what is right.
-    let helps: String = errors.iter().filter_map(|own| own["help"].as_str()).collect();
-    for (one, other) in MAP {
-        let entry = if one.contains('*') {
-            format!("\"{one}\" = \"{other}\"")
+    // The help texts propose the correct entries.
+    let helps: String = errors.iter().filter_map(|error| error["help"].as_str()).collect();
+    for (individual, object) in MAP {
+        let entry = if individual.contains('*') {
+            format!("\"{individual}\" = \"{object}\"")
         } else {
-            format!("{one} = \"{other}\"")
+            format!("{individual} = \"{object}\"")
         };
         assert!(helps.contains(&entry), "no `{entry}`: {helps}");
     }
 }
 
-/// What the knowledge base knows nothing of is as the problem says.
+/// The problem determines everything that the knowledge base does not know.
 #[test]
-fn functions_that_only_the_problem_has_are_its_own() {
+fn functions_unknown_to_the_knowledge_base_are_kept() {
     let Some((files, options)) = paper() else { return };
     let directory = tempfile::tempdir().expect("a directory");
-    let entries: Vec<String> = MAP.iter().map(|(one, other)| format!("\"{one}\" = \"{other}\"")).collect();
+    let entries: Vec<String> =
+        MAP.iter().map(|(individual, object)| format!("\"{individual}\" = \"{object}\"")).collect();
     let paths = |option: &str| {
         let pairs = options.chunks(2).filter(|pair| pair[0] == option);
         pairs.map(|pair| format!("{:?}", pair[1])).collect::<Vec<_>>().join(", ")
@@ -178,9 +182,9 @@ fn functions_that_only_the_problem_has_are_its_own() {
         files[1],
         entries.join("\n")
     );
-    let run = |lines: &str, more: &[&str]| {
+    let run = |lines: &str, options: &[&str]| {
         std::fs::write(directory.path().join("m.toml"), &manifest).expect("written");
-        metaplan_in(directory.path(), &[&["run", "m.toml", "--quiet"], more].concat(), lines)
+        metaplan_in(directory.path(), &[&["run", "m.toml", "--quiet"], options].concat(), lines)
     };
     let events = [
         r#"{"event":"action_succeeded","action":1}"#,
@@ -192,16 +196,21 @@ fn functions_that_only_the_problem_has_are_its_own() {
     assert_eq!(outcome.status, 0, "{outcome:#?}");
     let answers: Vec<Value> =
         outcome.stdout.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
-    let of = |kind: &str, line: u64| -> Vec<&Value> {
-        answers.iter().filter(|own| own["answer"] == kind && own["line"] == line).collect()
+    let answers_of_kind = |kind: &str, line: u64| -> Vec<&Value> {
+        answers.iter().filter(|answer| answer["answer"] == kind && answer["line"] == line).collect()
     };
-    assert!(of("error", 0).is_empty() && of("error", 1).is_empty(), "{answers:#?}");
-    let requested =
-        |line: u64| of("request_action", line).iter().map(|own| own["name"].clone()).collect::<Vec<_>>();
+    assert!(answers_of_kind("error", 0).is_empty() && answers_of_kind("error", 1).is_empty(), "{answers:#?}");
+    let requested = |line: u64| {
+        answers_of_kind("request_action", line)
+            .iter()
+            .map(|answer| answer["name"].clone())
+            .collect::<Vec<_>>()
+    };
     assert_eq!(requested(0), ["recharge"], "{answers:#?}");
     assert_eq!(requested(1), ["search_pipeline"], "{answers:#?}");
-    let lost = of("inferred", 2);
-    assert!(lost[0]["designs"].to_string().contains("fd_maintain_motion"), "{answers:#?}");
-    let text = answers.iter().filter(|own| own["line"] == 2).map(ToString::to_string).collect::<String>();
+    let inferences = answers_of_kind("inferred", 2);
+    assert!(inferences[0]["designs"].to_string().contains("fd_maintain_motion"), "{answers:#?}");
+    let text =
+        answers.iter().filter(|answer| answer["line"] == 2).map(ToString::to_string).collect::<String>();
     assert!(text.contains("fd_recover_motion"), "{answers:#?}");
 }

@@ -1,6 +1,6 @@
-//! Limits in every phase: for each phase an input that is slow in this phase, and a limit on processor time and memory.
+//! Tests of limits in every phase. For each phase there is an input that is slow in this phase, with a limit on processor time or memory.
 //!
-//! Each command has to end after a tenth more than its limit and 0.2 s at the latest, in processor time.
+//! Each command must end within 110 % of its limit plus 0.2 s of processor time.
 #![cfg(target_os = "linux")]
 
 use std::fmt::Write as _;
@@ -12,19 +12,19 @@ use serde_json::Value;
 use crate::common::{program, verify_in};
 use crate::limits::round_trip;
 
-/// The result of a command, with what it used.
+/// Outcome of a command, with its processor time and memory.
 #[derive(Debug)]
 struct Run {
     status: i64,
     stdout: String,
     stderr: String,
-    /// Processor time in seconds, of user and system.
+    /// Processor time in seconds (user and system).
     time: f64,
-    /// The largest main memory, in megabytes.
+    /// Peak resident memory in megabytes.
     memory: f64,
 }
 
-/// Runs the program, and measures it. Needs python3.
+/// Runs and measures the program. Needs python3.
 fn run(directory: &Path, arguments: &[&str]) -> Run {
     let script = "import json, resource as r, subprocess as s, sys\n\
         o = s.run(sys.argv[1:], stdout=s.PIPE, stderr=s.PIPE)\n\
@@ -46,29 +46,34 @@ fn run(directory: &Path, arguments: &[&str]) -> Run {
     }
 }
 
-/// Runs a command with a time limit in seconds, which it has to keep in one of three runs: processor time, too, is longer while caches are shared.
+/// Runs a command with a time limit in seconds and asserts that it keeps the limit in one of three runs. Several attempts are needed
+/// because shared caches increase even the processor time.
 fn limited(directory: &Path, arguments: &[&str], limit: f64) -> Run {
     let limit_text = limit.to_string();
     let allowed = 1.1 * limit + 0.2;
     let command = [arguments, &["--time-limit", &limit_text]].concat();
-    let mut last = run(directory, &command);
+    let mut latest_run = run(directory, &command);
     for _ in 0..2 {
-        if last.time > allowed {
-            last = run(directory, &command);
+        if latest_run.time > allowed {
+            latest_run = run(directory, &command);
         }
     }
-    assert!(last.time <= allowed, "{arguments:?}: {} s with a limit of {limit} s\n{last:#?}", last.time);
-    last
+    assert!(
+        latest_run.time <= allowed,
+        "{arguments:?}: {} s with a limit of {limit} s\n{latest_run:#?}",
+        latest_run.time
+    );
+    latest_run
 }
 
-/// Asserts that there was nothing to show, and that the limit is named as the reason.
-fn assert_nothing_to_show(found: &Run) {
-    assert!(found.status == 12 && found.stderr.contains("limit was reached"), "{found:#?}");
+/// Asserts that there is no result and that a limit is named as the reason.
+fn assert_nothing_to_show(outcome: &Run) {
+    assert!(outcome.status == 12 && outcome.stderr.contains("limit was reached"), "{outcome:#?}");
 }
 
-/// The texts of so many numbers, one after the other.
+/// Concatenates the texts for the numbers below `count`.
 fn repeated(count: usize, text: impl Fn(usize) -> String) -> String {
-    (0..count).fold(String::new(), |all, number| all + &text(number))
+    (0..count).fold(String::new(), |joined, number| joined + &text(number))
 }
 
 fn files(domain: &str, problem: &str) -> tempfile::TempDir {
@@ -115,7 +120,7 @@ fn reasoning_keeps_the_limit() {
     assert_nothing_to_show(&limited(directory.path(), &["reason", "chain.ttl"], 0.5));
 }
 
-/// A condition over so many variables, each with these objects, that no fact guards.
+/// A condition over a number of variables that no static fact restricts, each with the given objects.
 fn quantified(variables: usize, objects: &str) -> tempfile::TempDir {
     let names = repeated(variables, |number| format!(" ?v{number}"));
     let parts = repeated(variables, |number| format!("(not (p ?v{number}))"));
@@ -135,14 +140,14 @@ fn grounding_keeps_the_limit() {
     assert_nothing_to_show(&limited(quantified(40, "x y").path(), &PLAN, 0.5));
 }
 
-/// There is one case in all.
+/// There is only one combination.
 #[test]
-fn variables_with_one_object_cost_next_to_nothing() {
-    let found = limited(quantified(1_000, "x").path(), &PLAN, 3.0);
-    assert_eq!(found.status, 0, "{found:#?}");
+fn variables_with_one_object_are_cheap() {
+    let outcome = limited(quantified(1_000, "x").path(), &PLAN, 3.0);
+    assert_eq!(outcome.status, 0, "{outcome:#?}");
 }
 
-/// A precondition over so many variables with two objects each. Grounding joins the few edges; the validator tries all combinations.
+/// A universal precondition with two objects per variable. Grounding joins the few edges, but the validator tries all combinations.
 fn universal(variables: usize) -> tempfile::TempDir {
     let names = repeated(variables, |number| format!(" ?v{number}"));
     let edges = repeated(variables - 1, |number| format!("(not (edge ?v{number} ?v{}))", number + 1));
@@ -157,15 +162,15 @@ fn universal(variables: usize) -> tempfile::TempDir {
 #[test]
 fn validating_keeps_the_limit() {
     let directory = universal(40);
-    let found = limited(directory.path(), &PLAN, 0.5);
-    assert_nothing_to_show(&found);
-    assert!(found.stderr.contains("validator"), "the plan is found: {found:#?}");
+    let outcome = limited(directory.path(), &PLAN, 0.5);
+    assert_nothing_to_show(&outcome);
+    assert!(outcome.stderr.contains("validator"), "the plan is found: {outcome:#?}");
     std::fs::write(directory.path().join("plan"), "(a)\n").expect("a file");
     let validate = ["validate", "domain.pddl", "problem.pddl", "plan"];
     assert_nothing_to_show(&limited(directory.path(), &validate, 0.3));
 }
 
-/// A derived fact that follows along a chain, as it is written most often. It once took 10 s.
+/// A derived predicate along a chain, in its usual formulation. Regression test: it once took 10 s.
 fn chain(length: usize) -> tempfile::TempDir {
     let objects = repeated(length + 1, |number| format!(" o{number}"));
     let next = repeated(length, |number| format!("(next o{number} o{})", number + 1));
@@ -181,11 +186,11 @@ fn chain(length: usize) -> tempfile::TempDir {
 }
 
 #[test]
-fn a_plan_over_a_chain_of_derived_facts_keeps_the_limit() {
+fn planning_with_a_chain_of_derived_facts_keeps_the_limit() {
     limited(chain(700).path(), &PLAN, 1.0);
 }
 
-/// A round trip whose best order takes long to prove, with a manifest.
+/// A round trip whose optimum takes long to prove, with a manifest.
 fn trip(places: u32) -> tempfile::TempDir {
     let (domain, problem) = round_trip(places);
     let directory = files(&domain, &problem);
@@ -197,11 +202,12 @@ fn trip(places: u32) -> tempfile::TempDir {
 #[test]
 fn searching_and_encoding_keep_the_limit() {
     let directory = trip(24);
-    let found = limited(directory.path(), &PLAN, 1.0);
-    // A machine that is busy otherwise may leave no time for a first plan.
-    assert!(matches!(found.status, 1 | 12) && !found.stdout.is_empty(), "{found:#?}");
-    for more in [&["--engine", "sat"][..], &["--engine", "sat", "--strategy", "cores"], &["--concurrent"]] {
-        limited(directory.path(), &[&PLAN[..], more].concat(), 1.0);
+    let outcome = limited(directory.path(), &PLAN, 1.0);
+    // On a busy machine there may be no time for a first plan.
+    assert!(matches!(outcome.status, 1 | 12) && !outcome.stdout.is_empty(), "{outcome:#?}");
+    for options in [&["--engine", "sat"][..], &["--engine", "sat", "--strategy", "cores"], &["--concurrent"]]
+    {
+        limited(directory.path(), &[&PLAN[..], options].concat(), 1.0);
     }
     let pareto = ["--pareto", "(total-cost),(total-time)"];
     limited(directory.path(), &[&PLAN[..], &pareto].concat(), 1.0);
@@ -216,18 +222,18 @@ fn explaining_keeps_the_limit() {
 #[test]
 fn certifying_keeps_the_limit() {
     let directory = trip(8);
-    let found = limited(directory.path(), &[&PLAN[..], &["--certificate", "c"]].concat(), 1.0);
-    assert!(found.stdout.contains("go"), "the plan is shown: {found:#?}");
+    let outcome = limited(directory.path(), &[&PLAN[..], &["--certificate", "c"]].concat(), 1.0);
+    assert!(outcome.stdout.contains("go"), "the plan is shown: {outcome:#?}");
     if directory.path().join("c").exists() {
         assert_ne!(verify_in(directory.path(), &["c", "--time-limit", "0.2"]).status, -1);
     }
 }
 
-/// Residual conditions that take much memory.
+/// Residual conditions that need much memory.
 #[test]
 fn grounding_keeps_the_memory_limit() {
     let directory = quantified(40, "x y");
-    let found = run(directory.path(), &[&PLAN[..], &["--memory-limit", "150"]].concat());
-    assert!(found.memory <= 1.1 * 150.0, "{found:#?}");
-    assert_nothing_to_show(&found);
+    let outcome = run(directory.path(), &[&PLAN[..], &["--memory-limit", "150"]].concat());
+    assert!(outcome.memory <= 1.1 * 150.0, "{outcome:#?}");
+    assert_nothing_to_show(&outcome);
 }

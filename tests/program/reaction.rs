@@ -1,4 +1,4 @@
-//! `metaplan run` with lines that come as they happen: what is safe comes before any plan, and all that waits is read first.
+//! Tests of reactions of `metaplan run`: safe effects are sent before planning starts, and pending input is read first.
 
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::process::{Child, ChildStdin, Command, Stdio};
@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use crate::common::{program, root};
 
-/// A loop with a pipe.
+/// A running loop with piped input and output.
 struct Run {
     child: Child,
     input: ChildStdin,
@@ -39,21 +39,21 @@ impl Run {
         Self { child, input, answers }
     }
 
-    fn say(&mut self, line: &str) {
+    fn send(&mut self, line: &str) {
         writeln!(self.input, "{line}").expect("the program reads");
     }
 
-    /// The answers up to one that fits, signs of life apart, with the time of that one.
-    fn until(&self, fits: impl Fn(&Value) -> bool) -> (Vec<Value>, Instant) {
-        let mut all = Vec::new();
+    /// Answers up to the first one that satisfies the predicate, without progress reports, and the time of the last one.
+    fn until(&self, is_wanted: impl Fn(&Value) -> bool) -> (Vec<Value>, Instant) {
+        let mut received = Vec::new();
         loop {
             let (time, answer) = self.answers.recv_timeout(Duration::from_secs(120)).expect("an answer");
-            let is_it = fits(&answer);
+            let is_last = is_wanted(&answer);
             if answer["answer"] != "planning" {
-                all.push(answer);
+                received.push(answer);
             }
-            if is_it {
-                return (all, time);
+            if is_last {
+                return (received, time);
             }
         }
     }
@@ -61,96 +61,97 @@ impl Run {
     fn end(self) -> Vec<Value> {
         let Self { mut child, input, answers } = self;
         drop(input);
-        let rest = answers.iter().map(|(_, answer)| answer).collect();
+        let remaining_answers = answers.iter().map(|(_, answer)| answer).collect();
         assert!(child.wait().expect("the program ends").success());
-        rest
+        remaining_answers
     }
 }
 
-fn is(kind: &'static str, line: u64) -> impl Fn(&Value) -> bool {
+fn is_answer(kind: &'static str, line: u64) -> impl Fn(&Value) -> bool {
     move |answer| answer["answer"] == kind && answer["line"] == line
 }
 
-fn failed(component: &str) -> String {
+fn failure_event(component: &str) -> String {
     format!(r#"{{"event":"component_status","component":"{component}","status":"FALSE"}}"#)
 }
 
-/// Each plan of this mission takes its four seconds. The losses are answered before, and the plan is made for what is known last.
+/// Each plan of this mission takes its full limit of 4 s. The losses are answered before, and the plan reflects the latest knowledge.
 #[test]
-fn a_lost_design_is_answered_before_a_plan_is_looked_for() {
+fn lost_designs_are_answered_before_planning() {
     let journal = tempfile::tempdir().expect("a directory");
     let directory = journal.path().join("journal");
     let directory = directory.to_str().expect("a name");
     let mut run = Run::new(&["tests/program/ferry/mission.toml", "--journal", directory]);
-    let (start, _) = run.until(is("handled", 0));
+    let (start, _) = run.until(is_answer("handled", 0));
     let action = start.iter().find(|answer| answer["answer"] == "request_action").expect("an action");
     let configuration = action["configuration"].as_object().expect("designs");
-    let steers = configuration.contains_key("f_steer");
-    let lost = if steers { ["c_eye", "c_gps"] } else { ["c_winch", "c_pump"] };
-    let begun = Instant::now();
-    for component in lost {
-        run.say(&failed(component));
+    let is_steering = configuration.contains_key("f_steer");
+    let components = if is_steering { ["c_eye", "c_gps"] } else { ["c_winch", "c_pump"] };
+    let started = Instant::now();
+    for component in components {
+        run.send(&failure_event(component));
     }
     let is_safe = |answer: &Value| {
         answer["line"] == 2 && ["reconfigure", "suspend_action"].iter().any(|kind| answer["answer"] == *kind)
     };
     let (answers, time) = run.until(is_safe);
-    // Far below the time limit of plans; the bound itself is measured in the library.
-    assert!(time - begun < Duration::from_secs(2), "{:?}", time - begun);
+    // Far below the time limit of planning. The exact bound is measured in tests of the library.
+    assert!(time - started < Duration::from_secs(2), "{:?}", time - started);
     let kinds: Vec<&str> = answers.iter().filter_map(|answer| answer["answer"].as_str()).collect();
     assert!(!kinds.contains(&"plan_requested"), "{kinds:?}");
     assert_eq!(kinds[0], "inferred");
-    let (plan, _) = run.until(is("handled", 2));
+    let (plan, _) = run.until(is_answer("handled", 2));
     for step in plan.iter().filter_map(|answer| answer["steps"].as_array()).flatten() {
         let text = step["configuration"].to_string();
-        assert!(!text.contains("fd_gps") && !text.contains("fd_eye") || !steers, "{text}");
+        assert!(!text.contains("fd_gps") && !text.contains("fd_eye") || !is_steering, "{text}");
     }
     assert!(run.end().is_empty());
-    // What was decided beside the input is decided again from the journal.
-    let again = Run::new(&["tests/program/ferry/mission.toml", "--journal", directory]);
-    let (ready, _) = again.until(|answer| answer["answer"] == "ready");
+    // Decisions made while input was pending are replayed from the journal.
+    let resumed = Run::new(&["tests/program/ferry/mission.toml", "--journal", directory]);
+    let (ready, _) = resumed.until(|answer| answer["answer"] == "ready");
     assert_eq!((&ready[0]["resumed"], &ready[0]["lines"]), (&Value::Bool(true), &Value::from(2)));
-    again.end();
+    resumed.end();
 }
 
-/// A recovery that a filter has held back counts, and a better plan is looked for, without a further line.
+/// After the filter's delay, a recovery takes effect and a better plan is searched for without further input.
 #[test]
-fn time_passes_without_a_line() {
+fn timers_run_without_input() {
     let directory = tempfile::tempdir().expect("a directory");
     let manifest = directory.path().join("ugv.toml");
     let text = std::fs::read_to_string(root().join("missions/ugv.toml")).expect("a manifest");
     let text = text.replace("\"../", &format!("\"{}/", root().display()));
-    let quick = "\n[adaptation]\nheal_time = 0.2\nsettle = 0.3\n";
-    std::fs::write(&manifest, text + quick).expect("a file");
+    let short_times = "\n[adaptation]\nheal_time = 0.2\nsettle = 0.3\n";
+    std::fs::write(&manifest, text + short_times).expect("a file");
     let (manifest, journal) = (manifest.display().to_string(), directory.path().join("journal"));
     let journal = journal.display().to_string();
     let mut run = Run::new(&[&manifest, "--journal", &journal]);
-    run.until(is("handled", 0));
-    run.say(&failed("c_kinect"));
-    run.until(is("handled", 1));
-    run.say(&failed("c_kinect").replace("FALSE", "RECOVERED"));
-    let (answers, _) = run.until(is("filtered", 2));
+    run.until(is_answer("handled", 0));
+    run.send(&failure_event("c_kinect"));
+    run.until(is_answer("handled", 1));
+    run.send(&failure_event("c_kinect").replace("FALSE", "RECOVERED"));
+    let (answers, _) = run.until(is_answer("filtered", 2));
     assert_eq!(answers.last().expect("an answer")["because"], "heal");
-    run.until(is("inferred", 2));
-    let (answers, _) = run.until(is("plan_requested", 2));
+    run.until(is_answer("inferred", 2));
+    let (answers, _) = run.until(is_answer("plan_requested", 2));
     assert_eq!(answers.last().expect("an answer")["because"][0], "there may be a better plan");
-    run.until(is("plan_found", 2));
+    run.until(is_answer("plan_found", 2));
     run.end();
-    // Time that passed is a part of the journal, and not a line.
-    let again = Run::new(&[&manifest, "--journal", &journal]);
-    let (ready, _) = again.until(|answer| answer["answer"] == "ready");
+    // Elapsed time is part of the journal, but does not count as an input line.
+    let resumed = Run::new(&[&manifest, "--journal", &journal]);
+    let (ready, _) = resumed.until(|answer| answer["answer"] == "ready");
     assert_eq!((&ready[0]["resumed"], &ready[0]["lines"]), (&Value::Bool(true), &Value::from(2)));
-    again.end();
+    resumed.end();
 }
 
-/// Who pipes a script in, with reports on actions to come, gets the answers to it.
+/// A script with reports about future actions can be piped in and is answered line by line.
 #[test]
-fn a_script_can_be_piped_in() {
+fn scripts_can_be_piped_in() {
     let mut run = Run::new(&["missions/ugv.toml"]);
-    run.say(r#"{"event":"action_succeeded","action":1}"#);
-    run.say(r#"{"event":"action_succeeded","action":2}"#);
+    run.send(r#"{"event":"action_succeeded","action":1}"#);
+    run.send(r#"{"event":"action_succeeded","action":2}"#);
     let answers = run.end();
-    let kinds: Vec<String> = answers.iter().map(|own| format!("{} {}", own["line"], own["answer"])).collect();
+    let kinds: Vec<String> =
+        answers.iter().map(|answer| format!("{} {}", answer["line"], answer["answer"])).collect();
     let expected = [
         "null \"ready\"",
         "0 \"plan_requested\"",

@@ -1,4 +1,4 @@
-//! Real files of the field: knowledge bases of MROS and SUAVE, PDDL of the Metaplan paper.
+//! Tests with real files: knowledge bases of MROS and SUAVE, and PDDL files of the Metaplan paper.
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -6,13 +6,13 @@ use std::path::PathBuf;
 use crate::common::{metaplan, metaplan_in, root};
 use serde_json::Value;
 
-/// The directory with the real files, where it is there.
+/// Directory of the real files, if available.
 pub fn shared() -> Option<PathBuf> {
     let directory = root().join("../shared");
     if directory.is_dir() {
         return Some(directory);
     }
-    // The reason for the skip belongs into the test's own output.
+    // The reason for skipping should be part of the test's own output.
     #[allow(clippy::print_stderr)]
     {
         eprintln!("skipped: there is no ../shared beside the project");
@@ -20,7 +20,7 @@ pub fn shared() -> Option<PathBuf> {
     None
 }
 
-/// `metaplan reason` on SUAVE's knowledge base with its imports and the assertions of a golden case.
+/// Compares `metaplan reason` for SUAVE's knowledge base, plus the assertions of a golden case, with the reference reasoner.
 fn reason(case: &str) {
     let Some(shared) = shared() else { return };
     let text = std::fs::read_to_string(shared.join(format!("golden/kb/{case}.json"))).expect("the case");
@@ -64,7 +64,7 @@ fn reason(case: &str) {
 }
 
 #[test]
-fn suave_infers_what_the_reference_infers() {
+fn suave_has_the_inferences_of_the_reference_reasoner() {
     for case in [
         "suave_04_thruster_false_no_fg",
         "suave_05_thruster_false_grounded",
@@ -94,7 +94,7 @@ fn suave_has_27_rules() {
 }
 
 #[test]
-fn the_papers_own_problem_gets_a_bounded_reading() {
+fn problem_of_the_paper_gets_a_bounded_reading() {
     let Some(shared) = shared() else { return };
     let file =
         |name: &str| shared.join(format!("real/pddl/suave_metaplan/{name}.pddl")).display().to_string();
@@ -108,7 +108,7 @@ fn the_papers_own_problem_gets_a_bounded_reading() {
 }
 
 #[test]
-fn the_papers_mismatched_problem_is_reported_in_full() {
+fn all_errors_of_the_mismatched_problem_are_reported() {
     let Some(shared) = shared() else { return };
     let file =
         |name: &str| shared.join(format!("real/pddl/suave_metaplan/{name}.pddl")).display().to_string();

@@ -1,8 +1,8 @@
-//! `metaplan reason` and `metaplan convert` as their users run them.
+//! Tests of `metaplan reason` and `metaplan convert`.
 
 use crate::common::{Outcome, edit, metaplan, metaplan_in, processor_time, root};
 
-/// Checks the exit status and that answer or messages contain each text; no fault is ever reported.
+/// Checks the exit status, and that standard error or output contains each text. Internal errors (panic, M170) always fail.
 fn check(outcome: &Outcome, status: i32, texts: &[&str]) {
     assert_eq!(outcome.status, status, "{outcome:#?}");
     for text in texts {
@@ -11,7 +11,7 @@ fn check(outcome: &Outcome, status: i32, texts: &[&str]) {
     assert!(!outcome.stderr.contains("panicked") && !outcome.stderr.contains("M170"), "{outcome:#?}");
 }
 
-/// Runs a command on a text from standard input or, where the arguments name `model.ttl`, from a file.
+/// Runs a command on a text, as standard input if the arguments contain `-`, and as the file `model.ttl`.
 fn run(arguments: &[&str], text: &str) -> Outcome {
     let directory = tempfile::tempdir().expect("a temporary directory");
     std::fs::write(directory.path().join("model.ttl"), text).expect("a file");
@@ -31,13 +31,13 @@ fn inferred_assertions_as_turtle() {
     let arguments = ["reason", "ontology/kb/ugv.ttl", "--fail", "c_kinect", "--format", "turtle"];
     let outcome = metaplan(&arguments);
     check(&outcome, 0, &["@prefix tomasys: <http://metacontrol.org/tomasys#>", "tomasys:fd_realisability"]);
-    // What is printed is a document that can be read.
+    // The output is a valid document.
     check(&metaplan_in(&root(), &["reason", "-"], &outcome.stdout), 0, &["inferred assertions"]);
     check(&metaplan(&["plan", "missions/ugv.toml", "--format", "turtle"]), 2, &["M107", "reason"]);
 }
 
 #[test]
-fn names_may_stand_for_one_individual_or_not() {
+fn unique_names_are_optional() {
     let model = format!("{HEAD}:g a t:Function . :fd t:solvesF :g . :a a t:Action ; t:requiresF :g .");
     let merged = run(&["reason", "-", "--format", "ntriples"], &model);
     check(&merged, 0, &["<http://x#a> <http://metacontrol.org/tomasys#requiresF> <http://x#f> ."]);
@@ -46,16 +46,16 @@ fn names_may_stand_for_one_individual_or_not() {
     assert!(!unique.stdout.contains("requiresF"), "{unique:#?}");
 }
 
-/// `-` is standard input, whatever stands there.
+/// `-` means standard input for every kind of document.
 #[test]
-fn standard_input_stands_for_any_document() {
-    let failed = ":c a t:Component ; t:c_status \"FALSE\" . :fd t:requiresC :c .";
+fn standard_input_can_replace_any_document() {
+    let failure = ":c a t:Component ; t:c_status \"FALSE\" . :fd t:requiresC :c .";
     let directory = tempfile::tempdir().expect("a temporary directory");
     std::fs::write(directory.path().join("model.ttl"), HEAD).expect("a file");
     let prefixes = HEAD.lines().take(3).collect::<Vec<_>>().join("\n");
-    let more = format!("{prefixes}\n{failed}");
+    let failure_document = format!("{prefixes}\n{failure}");
     let rule = "<http://x#likes>(?x, ?y) -> <http://x#likes>(?y, ?x) .\n";
-    let stated = format!("{HEAD}{failed}");
+    let stated = format!("{HEAD}{failure}");
     std::fs::write(directory.path().join("failed.ttl"), stated).expect("a file");
     let before = metaplan_in(directory.path(), &["reason", "failed.ttl"], "");
     check(&before, 0, &["fd_realisability"]);
@@ -64,19 +64,23 @@ fn standard_input_stands_for_any_document() {
     check(&after, 0, &["inferred assertions"]);
     assert!(!after.stdout.contains("fd_realisability"), "{after:#?}");
     for (arguments, input, expected) in [
-        (&["reason", "model.ttl", "-"][..], &*more, "fd_realisability"),
-        (&["reason", "model.ttl", "--assert", "-"], &more, "fd_realisability"),
+        (&["reason", "model.ttl", "-"][..], &*failure_document, "fd_realisability"),
+        (&["reason", "model.ttl", "--assert", "-"], &failure_document, "fd_realisability"),
         (&["reason", "model.ttl", "--rules", "-"], rule, "inferred assertions"),
-        (&["convert", "-", "--to", "ntriples"], &more, "<http://metacontrol.org/tomasys#requiresC>"),
-        (&["convert", "model.ttl", "-", "--to", "turtle"], &more, "requiresC"),
+        (
+            &["convert", "-", "--to", "ntriples"],
+            &failure_document,
+            "<http://metacontrol.org/tomasys#requiresC>",
+        ),
+        (&["convert", "model.ttl", "-", "--to", "turtle"], &failure_document, "requiresC"),
     ] {
         check(&metaplan_in(directory.path(), arguments, input), 0, &[expected]);
     }
 }
 
-/// What the profile leaves out is said once each, and summed up.
+/// Axioms outside the profile are reported once each, with a summary.
 #[test]
-fn the_profile_is_summed_up() {
+fn axioms_outside_the_profile_are_summarised() {
     let model = format!(
         "{HEAD}@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> . :p a owl:ObjectProperty .
          :B a owl:Class ; rdfs:subClassOf [ a owl:Class ; owl:unionOf ( :A :B ) ] .
@@ -99,30 +103,30 @@ const ZOO: &str =
 :tom a :Cat .
 ";
 
-/// What follows is asked for, with derivations.
+/// Entailment queries, the class hierarchy, and derivations.
 #[test]
-fn questions_are_answered() {
+fn queries_are_answered_with_derivations() {
     let directory = tempfile::tempdir().expect("a temporary directory");
-    let ask = |arguments: &[&str], input: &str| {
-        let all = [&["reason", "zoo.ttl"], arguments].concat();
-        metaplan_in(directory.path(), &all, input)
+    let query = |arguments: &[&str], input: &str| {
+        let command = [&["reason", "zoo.ttl"], arguments].concat();
+        metaplan_in(directory.path(), &command, input)
     };
     let prefixes = ZOO.lines().take(2).collect::<Vec<_>>().join(" ");
     std::fs::write(directory.path().join("zoo.ttl"), ZOO).expect("a file");
     let entailed = format!(
         "{prefixes} :Cat a owl:Class ; rdfs:subClassOf :Animal . :Animal a owl:Class . :tom a :Pet ."
     );
-    let open = format!("{entailed} :tom a :Stone . :Stone a owl:Class .");
-    let answer = ask(&["--entails", "-"], &entailed);
+    let not_entailed = format!("{entailed} :tom a :Stone . :Stone a owl:Class .");
+    let answer = query(&["--entails", "-"], &entailed);
     check(&answer, 0, &["follows: SubClassOf(<http://x#Cat> <http://x#Animal>)", "2 of 2 statements follow"]);
     check(
-        &ask(&["--entails", "-"], &open),
+        &query(&["--entails", "-"], &not_entailed),
         1,
         &["not shown: ClassAssertion(<http://x#Stone> <http://x#tom>)"],
     );
-    let schema = ask(&["--schema"], "");
+    let schema = query(&["--schema"], "");
     check(&schema, 0, &["<http://x#Cat> below <http://x#Pet>\n", "<http://x#StoneCat> is always empty"]);
-    let why = ask(&["--why", "tom a Animal"], "");
+    let why = query(&["--why", "tom a Animal"], "");
     check(
         &why,
         0,
@@ -132,22 +136,26 @@ fn questions_are_answered() {
             "is stated",
         ],
     );
-    check(&ask(&["--why", ":tom a :Stone"], ""), 1, &["does not hold"]);
-    check(&ask(&["--why-not", "tom a Stone"], ""), 0, &["does not hold", "(SubClassOf(<http://x#StoneCat>"]);
-    check(&ask(&["--why", "tim a Cat"], ""), 2, &["nothing is called `tim`"]);
-    check(&ask(&["--why", "tom Cat"], ""), 2, &["SUBJECT a CLASS"]);
+    check(&query(&["--why", ":tom a :Stone"], ""), 1, &["does not hold"]);
+    check(
+        &query(&["--why-not", "tom a Stone"], ""),
+        0,
+        &["does not hold", "(SubClassOf(<http://x#StoneCat>"],
+    );
+    check(&query(&["--why", "tim a Cat"], ""), 2, &["nothing is called `tim`"]);
+    check(&query(&["--why", "tom Cat"], ""), 2, &["SUBJECT a CLASS"]);
     for arguments in [&["--schema"][..], &["--why", "tom a Pet"], &["--entails", "zoo.ttl"]] {
-        let json = ask(&[arguments, &["--format", "json"]].concat(), "").json();
+        let json = query(&[arguments, &["--format", "json"]].concat(), "").json();
         assert!(json["format"].as_str().is_some_and(|format| format.ends_with("/1")), "{json:#}");
     }
 }
 
-/// A rule that counts ends with an error that names it; a missing import need not stop anything.
+/// A diverging rule ends with an error that names it. Missing imports can be ignored.
 #[test]
-fn limits_and_missing_imports_are_options() {
-    let count = "<http://x#n>(?x, ?n) ^ swrlb:add(?m, ?n, 1) -> <http://x#n>(?x, ?m) .\n";
+fn step_limit_and_missing_imports_are_options() {
+    let counting_rule = "<http://x#n>(?x, ?n) ^ swrlb:add(?m, ?n, 1) -> <http://x#n>(?x, ?m) .\n";
     let directory = tempfile::tempdir().expect("a temporary directory");
-    std::fs::write(directory.path().join("count.swrl"), count).expect("a file");
+    std::fs::write(directory.path().join("count.swrl"), counting_rule).expect("a file");
     std::fs::write(directory.path().join("model.ttl"), "<http://x#i> <http://x#n> 1 .").expect("a file");
     let arguments = ["reason", "model.ttl", "--rules", "count.swrl", "-q", "--step-limit", "1000000"];
     check(
@@ -169,9 +177,9 @@ fn limits_and_missing_imports_are_options() {
     check(&run(&["reason", "-", "--ignore-missing-imports"], imports), 0, &["warning[O206]"]);
 }
 
-/// Of many warnings of one kind, ten are shown.
+/// At most ten warnings of one kind are printed.
 #[test]
-fn warnings_are_summed_up() {
+fn repeated_warnings_are_summarised() {
     let models: Vec<String> = (0..15).map(|n| format!("<http://x#i{n}> a <http://x#C{n}> .\n")).collect();
     let model = models.concat();
     let outcome = run(&["reason", "-"], &model);
@@ -180,7 +188,7 @@ fn warnings_are_summed_up() {
 }
 
 #[test]
-fn authors_are_warned() {
+fn modelling_mistakes_are_reported() {
     let mistakes = ":g a t:Function . :e a t:FunctionDesign . :r a t:Requirement .";
     let outcome = run(&["reason", "model.ttl"], &format!("{HEAD}{mistakes}"));
     check(&outcome, 0, &["warning[O401]", "<http://x#e>", "warning[O402]", "<http://x#g>", "warning[O403]"]);
@@ -189,12 +197,12 @@ fn authors_are_warned() {
     let contradiction =
         run(&["reason", "model.ttl"], &format!("{HEAD}:c a t:Component ; t:c_status false ."));
     check(&contradiction, 20, &["warning[O406]", "a string is expected", "inconsistent"]);
-    let none = metaplan(&["reason", "ontology/kb/ugv.ttl"]);
-    assert_eq!(none.stderr, "");
+    let shipped = metaplan(&["reason", "ontology/kb/ugv.ttl"]);
+    assert_eq!(shipped.stderr, "");
 }
 
 #[test]
-fn a_knowledge_base_in_every_syntax() {
+fn all_syntaxes_round_trip() {
     let expected = metaplan(&["reason", "ontology/kb/uuv.ttl", "--format", "ntriples"]);
     check(&expected, 0, &[]);
     let mut starts = Vec::new();
@@ -207,15 +215,15 @@ fn a_knowledge_base_in_every_syntax() {
         let written = std::fs::read_to_string(file).expect("the file is read");
         assert_eq!(answer.stdout, written, "{syntax}");
         starts.push(written.chars().take(5).collect::<String>());
-        let again = metaplan(&["reason", file, "--format", "ntriples"]);
-        check(&again, 0, &[]);
-        assert_eq!(again.stdout, expected.stdout, "{syntax}");
+        let reread = metaplan(&["reason", file, "--format", "ntriples"]);
+        check(&reread, 0, &[]);
+        assert_eq!(reread.stdout, expected.stdout, "{syntax}");
     }
     assert_eq!(starts, ["<?xml", "@pref", "<http", "<?xml", "Prefi"]);
 }
 
 #[test]
-fn what_cannot_be_read_is_bad_input() {
+fn unreadable_documents_are_input_errors() {
     for (text, message) in [
         ("@prefix : <http://x#> . :a x:b :c .", "model.ttl:1:"),
         ("<rdf:RDF xmlns:rdf=\"http://www.w3.org/1999/02/22-rdf-syntax-ns#\"><a>", "model.ttl:1:"),
@@ -233,9 +241,9 @@ fn what_cannot_be_read_is_bad_input() {
     check(&run(&["convert", "absent.ttl", "--to", "turtle"], ""), 3, &["O101"]);
 }
 
-/// Nothing of a file gets to the terminal that the terminal would obey, or that would look like another message.
+/// Control characters of a file are escaped, and its content cannot imitate a message.
 #[test]
-fn what_a_hostile_rule_file_says_is_shown_and_not_obeyed() {
+fn hostile_rule_files_are_escaped() {
     let directory = tempfile::tempdir().expect("a directory");
     let hostile = "a(?x) \u{1b}[2J\u{202e}\u{200b}\u{e0041} \"x\nerror[M999]: forged\" -> b(?x)\n\
                    [label \u{1b}]0;t\u{7}] a(?x) -> b(?y)\n";
@@ -252,12 +260,12 @@ fn what_a_hostile_rule_file_says_is_shown_and_not_obeyed() {
                 "",
             );
             assert_eq!(outcome.status, 3, "{outcome:#?}");
-            let shown = outcome.stdout + &outcome.stderr;
-            let is_odd =
+            let output = outcome.stdout + &outcome.stderr;
+            let is_unsafe =
                 |c: char| (c.is_control() && c != '\n') || "\u{202e}\u{200b}\u{2028}\u{e0041}".contains(c);
-            assert!(!shown.contains(is_odd), "{shown:?}");
-            assert!(!shown.lines().any(|line| line.starts_with("error[M999]")), "{shown:?}");
-            assert!(shown.contains(if rules == "r.swrl" { "R101" } else { "R202" }), "{shown:?}");
+            assert!(!output.contains(is_unsafe), "{output:?}");
+            assert!(!output.lines().any(|line| line.starts_with("error[M999]")), "{output:?}");
+            assert!(output.contains(if rules == "r.swrl" { "R101" } else { "R202" }), "{output:?}");
         }
     }
 }
@@ -265,16 +273,16 @@ fn what_a_hostile_rule_file_says_is_shown_and_not_obeyed() {
 const EMPTY: &str = "@prefix : <urn:x#> . @prefix owl: <http://www.w3.org/2002/07/owl#> . \
     @prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .\n";
 
-/// Asserted and retracted documents mean what the one remaining document means: status and conclusions.
+/// Asserting and retracting documents has the same status and conclusions as reading the resulting document.
 #[test]
-fn updates_mean_what_one_document_means() {
+fn updates_are_equivalent_to_the_resulting_document() {
     let negative = "[] a owl:NegativePropertyAssertion ; owl:sourceIndividual :a ; owl:assertionProperty :p ; \
         owl:targetIndividual :b .";
     let has_value =
         ":p a owl:ObjectProperty . :a a [ a owl:Restriction ; owl:onProperty :p ; owl:hasValue :b ] .";
     let names = ":a a owl:NamedIndividual . :b a owl:NamedIndividual . :A a owl:Class . :B a owl:Class .";
     let swapped = ":d a owl:NamedIndividual ; owl:sameAs :c .";
-    for (base, plus, minus, rest, status) in [
+    for (base, plus, minus, resulting, status) in [
         (
             format!("{names} :a owl:differentFrom :b ."),
             ":a owl:sameAs :b .",
@@ -307,20 +315,20 @@ fn updates_mean_what_one_document_means() {
         write("minus.ttl", minus);
         let update =
             ["reason", "base.ttl", "--assert", "plus.ttl", "--retract", "minus.ttl", "--format", "ntriples"];
-        let found = metaplan_in(directory.path(), &update, "");
-        check(&found, status, &[]);
+        let updated = metaplan_in(directory.path(), &update, "");
+        check(&updated, status, &[]);
         if status == 0 {
-            write("rest.ttl", &format!("{names} {rest}"));
+            write("rest.ttl", &format!("{names} {resulting}"));
             let expected = metaplan_in(directory.path(), &["reason", "rest.ttl", "--format", "ntriples"], "");
             check(&expected, 0, &[]);
-            assert_eq!(found.stdout, expected.stdout, "{base} {plus} {minus}: {}", found.stderr);
+            assert_eq!(updated.stdout, expected.stdout, "{base} {plus} {minus}: {}", updated.stderr);
         }
     }
 }
 
-/// What a document cannot change is named.
+/// Updates without effect, and invalid ones, are reported.
 #[test]
-fn what_an_update_cannot_change_is_named() {
+fn ineffective_updates_are_reported() {
     let change = |option: &str, text: &str| {
         let directory = tempfile::tempdir().expect("a temporary directory");
         std::fs::write(directory.path().join("base.ttl"), format!("{EMPTY}:a a :A .")).expect("a file");
@@ -336,10 +344,10 @@ fn what_an_update_cannot_change_is_named() {
     check(&change("--assert", ":A rdfs:subClassOf [ a owl:Class ; owl:unionOf ( :B :C ) ] ."), 0, &["O301"]);
 }
 
-/// A rule that multiplies its own conclusions ends each command with a message that names the rule and the value, within two
-/// seconds and with the limits that nobody has set.
+/// A rule that derives ever larger values ends each command within 2 s and with default limits. The message contains the rule and the
+/// value.
 #[test]
-fn a_rule_that_makes_larger_and_larger_values_ends_every_command() {
+fn diverging_rules_end_every_command() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let here = directory.path();
     assert_eq!(metaplan_in(here, &["init", "m", "--from", "warehouse"], "").status, 0);

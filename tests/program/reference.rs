@@ -1,9 +1,8 @@
-//! Exact optima of generated instances, known from several planners and an exact oracle.
+//! Benchmark: optima of generated instances, which are known from several planners and an exact oracle.
 //!
-//! `cargo test --release --test program reference -- --ignored --nocapture --test-threads 1` prints one line for each instance: its
-//! name, the cost, what proves it, and the processor time of the whole program; then how long the same takes with a certificate,
-//! and verifying that, which must be at most ten times as long as planning. Needs python3 (its standard library only) for the
-//! generators and for the times.
+//! `cargo test --release --test program reference -- --ignored --nocapture --test-threads 1` prints one line per instance: name, cost,
+//! kind of proof, and processor time of the program; then the time with a certificate, and the time of verification, which must be at
+//! most ten times the time of planning. Needs python3 (standard library only) for generators and measurement.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -13,7 +12,7 @@ use std::time::Instant;
 use crate::common::{metaplan_in, processor_time, root};
 use crate::real::shared;
 
-/// The rows of a table with a header, each as a look-up by column name.
+/// Rows of a CSV table, as pairs of column name and value.
 fn table(file: &Path) -> Vec<Vec<(String, String)>> {
     let text = std::fs::read_to_string(file).expect("the table");
     let mut lines = text.lines().map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
@@ -30,36 +29,36 @@ fn generate(script: &Path, arguments: &[&str]) {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
-/// What came of an instance.
+/// Results for one instance.
 #[derive(Debug)]
 struct Row {
-    /// The cost, or the status where there is no plan.
-    found: String,
+    /// The cost, or the status if there is no plan.
+    result: String,
     expected: String,
     line: String,
-    /// Processor time in seconds.
+    /// Processor times in seconds.
     planning: f64,
     verifying: f64,
 }
 
-/// Plans an instance, then once more with a certificate, and verifies that.
+/// Plans an instance without and with a certificate, and verifies the certificate.
 fn row(directory: &Path, name: &str, expected: &str) -> Row {
     let files = [format!("{name}.domain.pddl"), format!("{name}.problem.pddl")];
     let arguments = ["plan", &files[0], &files[1], "--quiet"];
     let answer = metaplan_in(directory, &[&arguments[..], &["--format", "json"]].concat(), "").json();
     let status = answer["status"].as_str().expect("a status").to_owned();
-    let found = if status == "optimal" { answer["cost"].to_string() } else { status };
-    let by = answer["proof"]["by"].as_str().unwrap_or("nothing");
-    let name = format!("{name} {found} by {by}");
+    let result = if status == "optimal" { answer["cost"].to_string() } else { status };
+    let proof_kind = answer["proof"]["by"].as_str().unwrap_or("nothing");
+    let name = format!("{name} {result} by {proof_kind}");
     let certificate = directory.join("certificate");
     let mut row = timed(directory, &name, &arguments, &certificate.display().to_string());
     std::fs::remove_dir_all(certificate).expect("a certificate");
-    row.found = found;
+    row.result = result;
     expected.clone_into(&mut row.expected);
     row
 }
 
-/// The times of planning, of doing so with a certificate, and of verifying that.
+/// Measures planning, planning with a certificate, and verification.
 fn timed(directory: &Path, name: &str, arguments: &[&str], certificate: &str) -> Row {
     let planning = processor_time(directory, arguments);
     let started = Instant::now();
@@ -69,19 +68,20 @@ fn timed(directory: &Path, name: &str, arguments: &[&str], certificate: &str) ->
     let outcome = metaplan_in(directory, &["verify", certificate], "");
     assert_eq!(outcome.status, 0, "{name}: {outcome:#?}");
     let verifying = processor_time(directory, &["verify", certificate]);
-    let said = outcome
+    let summary_lines = outcome
         .stdout
         .lines()
         .filter(|line| ["argument", "formula"].iter().any(|part| line.starts_with(part)));
     let line = format!(
         "{name} in {planning:.4} s, certified in {certifying:.2} s, verified in {verifying:.4} s ({:.1}): {}",
         verifying / planning,
-        said.collect::<Vec<_>>().join("; ")
+        summary_lines.collect::<Vec<_>>().join("; ")
     );
-    Row { found: String::new(), expected: String::new(), line, planning, verifying }
+    Row { result: String::new(), expected: String::new(), line, planning, verifying }
 }
 
-/// Prints what came of instances; the costs have to be right, and verifying may not take more than ten times as long as planning.
+/// Prints the results and asserts that the costs are right. In release builds, verification must take at most ten times the time of
+/// planning.
 #[allow(clippy::print_stdout)]
 fn report(rows: &[Row]) {
     let mut text = String::new();
@@ -101,8 +101,8 @@ fn report(rows: &[Row]) {
         ratios[ratios.len() - 1]
     );
     println!("{text}");
-    let wrong: Vec<_> = rows.iter().filter(|row| row.found != row.expected).collect();
-    assert!(wrong.is_empty(), "{wrong:#?}");
+    let unexpected: Vec<_> = rows.iter().filter(|row| row.result != row.expected).collect();
+    assert!(unexpected.is_empty(), "{unexpected:#?}");
     let slow: Vec<_> = rows.iter().filter(|row| row.verifying > 10.0 * row.planning).collect();
     assert!(cfg!(debug_assertions) || slow.is_empty(), "{slow:#?}");
 }
@@ -163,7 +163,7 @@ fn generated_missions() {
 
 #[test]
 #[ignore = "takes a minute in a release build, and needs python3"]
-fn missions_with_a_battery_that_binds() {
+fn missions_with_a_limiting_battery() {
     let Some(shared) = shared() else { return };
     let directory = tempfile::tempdir().expect("a directory");
     let out = directory.path().display().to_string();

@@ -1,4 +1,4 @@
-//! `metaplan report`, and pictures of plans: all that the answer has is in them, whatever it is called.
+//! Tests of `metaplan report` and of pictures of plans: they contain the whole answer, and hostile names are escaped.
 
 use std::time::Instant;
 
@@ -9,28 +9,28 @@ use crate::common::{copy_of_mission, edit, metaplan, metaplan_in, root};
 
 /// Number of drawings of each picture of a page, for columns of different widths. Plans shown side by side have two.
 const DRAWINGS: usize = 3;
-/// What a page may take, in bytes.
-const LARGEST: usize = 500_000;
+/// Maximum size of a page in bytes.
+const MAX_PAGE_BYTES: usize = 500_000;
 
 fn page(arguments: &[&str]) -> String {
-    let all: Vec<&str> = ["report"].iter().chain(arguments).copied().collect();
-    let outcome = metaplan(&all);
+    let command: Vec<&str> = ["report"].iter().chain(arguments).copied().collect();
+    let outcome = metaplan(&command);
     assert_eq!(outcome.status, 0, "{outcome:?}");
     outcome.stdout
 }
 
-/// How often the page has an attribute with this value.
+/// Number of occurrences of an attribute with a value.
 fn count(page: &str, attribute: &str, value: &str) -> usize {
     page.matches(&format!("{attribute}=\"{value}\"")).count()
 }
 
 #[test]
-fn the_page_has_all_that_the_answer_has() {
+fn page_contains_the_whole_answer() {
     for (mission, places) in [("ugv", 9), ("ugv_plain", 9), ("uuv", 0), ("uuv_plain", 0), ("camara_like", 24)]
     {
         let file = format!("missions/{mission}.toml");
         let page = page(&[&file]);
-        assert!(page.len() <= LARGEST, "{mission}: {} bytes", page.len());
+        assert!(page.len() <= MAX_PAGE_BYTES, "{mission}: {} bytes", page.len());
         assert_eq!(page.matches("data-place=").count(), DRAWINGS * places, "{mission}");
         let answer = metaplan(&["plan", &file, "--format", "json"]).json();
         let steps = answer["steps"].as_array().expect("steps");
@@ -57,14 +57,14 @@ fn the_page_has_all_that_the_answer_has() {
 }
 
 #[test]
-fn the_same_mission_gives_the_same_bytes() {
+fn pages_are_deterministic() {
     for arguments in [&["missions/uuv.toml"][..], &["missions/ugv.toml", "--scenario", "kinect_failure"]] {
         assert_eq!(page(arguments), page(arguments), "{arguments:?}");
     }
 }
 
 #[test]
-fn before_and_after_stand_side_by_side_with_the_reasons() {
+fn plans_before_and_after_are_compared_with_reasons() {
     let page = page(&["missions/ugv.toml", "--fail", "c_kinect", "--set", "robot_at=wp2"]);
     for text in [
         "The status of c_kinect: not said before, FALSE now.",
@@ -80,9 +80,9 @@ fn before_and_after_stand_side_by_side_with_the_reasons() {
     }
 }
 
-/// Without a plan, the comparison says so, and makes no statement about the missing plan.
+/// If there is no plan, the comparison states this and nothing about the steps of a plan.
 #[test]
-fn no_plan_is_said_in_plain_words() {
+fn missing_plan_is_stated_plainly() {
     let outcome = metaplan(&["report", "missions/ugv.toml", "--set", "battery=1"]);
     assert_eq!(outcome.status, 10, "{}", outcome.stderr);
     assert!(outcome.stdout.contains("<p>There is no plan now. The plan before costs 408.</p>"));
@@ -91,21 +91,22 @@ fn no_plan_is_said_in_plain_words() {
     }
 }
 
-/// A design that several things rule out: all of them are there, and that one alone is not enough.
+/// A design that is unavailable for several causes: all are listed, with the note that removing one is not sufficient.
 #[test]
-fn all_causes_of_a_lost_design_are_listed() {
+fn all_causes_of_an_unavailable_design_are_listed() {
     let sentence = "2 causes rule it out, and all of them have to go before it is available:";
     let kinect = "c_status(c_kinect, &quot;FALSE&quot;) is stated";
     let sun = "hasValue(obs_ambient_light, &quot;0.9&quot;^^decimal) is stated";
     let check = |situation: &[&str], has_kinect: bool, has_sun: bool| {
-        let all: Vec<&str> = ["missions/ugv.toml"].iter().chain(situation).copied().collect();
-        let page = page(&all);
+        let arguments: Vec<&str> = ["missions/ugv.toml"].iter().chain(situation).copied().collect();
+        let page = page(&arguments);
         let row = page.split("data-design=\"fd_amcl_kinect\"").nth(1).expect("a design");
         let row = row.split("</tr>").next().unwrap_or_default();
         assert_eq!(row.contains(kinect), has_kinect, "{situation:?}: {row}");
         assert_eq!(row.contains(sun), has_sun, "{situation:?}: {row}");
         assert_eq!(row.contains(sentence), has_kinect && has_sun, "{situation:?}: {row}");
-        let changes = page.split("id=\"changes\"").nth(1).and_then(|rest| rest.split("</section>").next());
+        let changes =
+            page.split("id=\"changes\"").nth(1).and_then(|section| section.split("</section>").next());
         assert_eq!(changes.expect("changes").contains(sentence), has_kinect && has_sun, "{situation:?}");
     };
     check(&["--fail", "c_kinect"], true, false);
@@ -113,57 +114,60 @@ fn all_causes_of_a_lost_design_are_listed() {
     check(&["--fail", "c_kinect", "--set", "ambient_light=0.9"], true, true);
 }
 
-/// The values of a curve in a picture: when, and what.
+/// Times and values of the points of a curve in a picture.
 fn values(picture: &str) -> Vec<(f64, f64)> {
     let document = Document::parse(picture).expect("XML");
     let points = document.descendants().filter(|node| node.attribute("class") == Some("point"));
     let value = |node: roxmltree::Node<'_, '_>| {
         let text = node.children().find_map(|child| child.text().map(str::to_owned)).expect("a title");
-        let (value, at) =
-            text.split_once(" = ").and_then(|(_, rest)| rest.split_once(" at ")).expect("a value");
+        let (value, at) = text
+            .split_once(" = ")
+            .and_then(|(_, value_and_time)| value_and_time.split_once(" at "))
+            .expect("a value");
         (at.parse().expect("a time"), value.parse().expect("a value"))
     };
     points.map(value).collect()
 }
 
-/// A page about simulated missions, and what it says of costs.
+/// Pages about simulations: they report failed missions, and figures have at most two decimals.
 #[test]
-fn simulations_that_fail_say_so_and_figures_are_rounded() {
+fn failed_simulations_are_reported_and_figures_are_rounded() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("page.html").display().to_string();
     let simulated = |mission: &str, scenario: &str, strategies: &[&str]| {
-        let mut all =
+        let mut command =
             vec!["simulate", mission, "--scenario", scenario, "--runs", "3", "--report", &file, "-q"];
-        all.extend(strategies.iter().flat_map(|name| ["--strategy", *name]));
-        let outcome = metaplan(&all);
+        command.extend(strategies.iter().flat_map(|name| ["--strategy", *name]));
+        let outcome = metaplan(&command);
         assert_eq!(outcome.status, 0, "{outcome:?}");
         std::fs::read_to_string(&file).expect("a page")
     };
-    let failed = simulated("missions/ugv.toml", "kinect_at_wp2", &["none"]);
+    let failed_page = simulated("missions/ugv.toml", "kinect_at_wp2", &["none"]);
     for text in
         ["None of the 3 missions was accomplished.", ">0 of 3 accomplished<", "<td>none accomplished</td>"]
     {
-        assert!(failed.contains(text), "{text}");
+        assert!(failed_page.contains(text), "{text}");
     }
-    let mixed = simulated("missions/ugv.toml", "kinect_comes_and_goes", &[]);
-    for page in [failed, mixed] {
-        let page = page.split("<main>").nth(1).and_then(|rest| rest.split("</main>").next()).expect("a page");
-        let numbers = page.split(|own: char| !(own.is_ascii_digit() || own == '.'));
-        let long = numbers.filter(|own| own.split_once('.').is_some_and(|(_, decimals)| decimals.len() > 2));
-        assert_eq!(long.collect::<Vec<_>>(), [""; 0], "no figure is that exact");
+    let mixed_page = simulated("missions/ugv.toml", "kinect_comes_and_goes", &[]);
+    for page in [failed_page, mixed_page] {
+        let page = page.split("<main>").nth(1).and_then(|main| main.split("</main>").next()).expect("a page");
+        let numbers = page.split(|character: char| !(character.is_ascii_digit() || character == '.'));
+        let long_numbers = numbers
+            .filter(|character| character.split_once('.').is_some_and(|(_, decimals)| decimals.len() > 2));
+        assert_eq!(long_numbers.collect::<Vec<_>>(), [""; 0], "no figure is that exact");
     }
 }
 
-/// A function that nothing was done with before had no design.
+/// A function that was not used before has no previous design.
 #[test]
-fn what_is_used_for_the_first_time_is_said() {
+fn first_uses_of_functions_are_reported() {
     let page = page(&["missions/uuv.toml", "--scenario", "battery_drop"]);
     assert!(page.contains("Designs of f_recharge: none before, fd_recharge now."));
 }
 
-/// The battery needs at least what the next move takes.
+/// Curves show the bounds of conditions, such as the battery required for the next move.
 #[test]
-fn numbers_come_with_the_bounds_that_constrain_them() {
+fn curves_show_the_bounds_of_conditions() {
     let page = page(&["missions/uuv.toml"]);
     assert!(page.contains("data-curve=\"battery\""));
     assert!(page.contains("needs battery &gt;= "), "bounds have a reserve in them");
@@ -171,18 +175,22 @@ fn numbers_come_with_the_bounds_that_constrain_them() {
 }
 
 #[test]
-fn a_certificate_is_checked_and_shown() {
+fn certificates_are_verified_and_shown() {
     let folder = tempfile::tempdir().expect("a folder");
     let certificate = folder.path().join("certificate").display().to_string();
     assert_eq!(metaplan(&["plan", "missions/ugv.toml", "--certificate", &certificate]).status, 0);
-    let good = page(&["missions/ugv.toml", "--certificate", &certificate]);
-    assert!(good.contains("What was verified") && good.contains("verified: the plan is optimal, metric 408"));
-    let other = page(&["missions/ugv.toml", "--scenario", "bright_sun", "--certificate", &certificate]);
-    assert!(other.contains("NOT verified"), "it is about another situation");
+    let verified_page = page(&["missions/ugv.toml", "--certificate", &certificate]);
+    assert!(
+        verified_page.contains("What was verified")
+            && verified_page.contains("verified: the plan is optimal, metric 408")
+    );
+    let rejected_page =
+        page(&["missions/ugv.toml", "--scenario", "bright_sun", "--certificate", &certificate]);
+    assert!(rejected_page.contains("NOT verified"), "it is about another situation");
 }
 
 #[test]
-fn hostile_names_stay_text() {
+fn hostile_names_are_escaped() {
     let hostile = "</script><script>alert(1)</script>\u{202e}";
     let mission = copy_of_mission("ugv");
     edit(mission.path(), "missions/ugv.toml", "An unmanned ground vehicle", hostile);
@@ -207,7 +215,7 @@ fn hostile_names_stay_text() {
 }
 
 #[test]
-fn places_lie_where_the_manifest_says() {
+fn places_are_drawn_at_positions_of_the_manifest() {
     let mission = copy_of_mission("ugv");
     let lines: Vec<String> =
         (0..9).map(|index| format!("wp{},{},{}", index + 1, index % 3, -(index / 3))).collect();
@@ -227,18 +235,16 @@ fn places_lie_where_the_manifest_says() {
     let map = std::fs::read_to_string(mission.path().join("pictures/map.svg")).expect("a map");
     let document = Document::parse(&map).expect("XML");
     let place = |name: &str| {
-        let own =
+        let group =
             document.descendants().find(|node| node.attribute("data-place") == Some(name)).expect("a place");
-        let circle = own.children().find(|node| node.tag_name().name() == "circle").expect("a circle");
+        let circle = group.children().find(|node| node.tag_name().name() == "circle").expect("a circle");
         let number = |attribute| {
             circle.attribute(attribute).and_then(|text| text.parse::<f64>().ok()).expect("a number")
         };
         (number("cx"), number("cy"))
     };
-    let (one, three, seven) = (place("wp1"), place("wp3"), place("wp7"));
-    assert!(
-        one.0 < three.0 && one.1 < seven.1 && (one.1 - three.1).abs() < 0.2 && (one.0 - seven.0).abs() < 0.2
-    );
+    let (wp1, wp3, wp7) = (place("wp1"), place("wp3"), place("wp7"));
+    assert!(wp1.0 < wp3.0 && wp1.1 < wp7.1 && (wp1.1 - wp3.1).abs() < 0.2 && (wp1.0 - wp7.0).abs() < 0.2);
     std::fs::write(mission.path().join("missions/places.csv"), heading + "wp1,0\nwp2,0,1\nwp2,1,1\n")
         .expect("a file");
     let outcome = report();
@@ -247,9 +253,9 @@ fn places_lie_where_the_manifest_says() {
     assert!(outcome.stderr.contains("places.csv:4:1"), "{}", outcome.stderr);
 }
 
-/// A corridor of a thousand places.
+/// A corridor of 1,001 places.
 #[test]
-fn a_thousand_steps_are_a_page_soon() {
+fn pages_of_thousand_steps_are_fast() {
     let mission = copy_of_mission("ugv");
     let places: Vec<String> = (0..=1000).map(|index| format!("w{index}")).collect();
     let ways = places.windows(2).map(|pair| {
@@ -263,16 +269,16 @@ fn a_thousand_steps_are_a_page_soon() {
         ways.collect::<Vec<_>>().concat()
     );
     std::fs::write(mission.path().join("encodings/ugv/problem.pddl"), problem).expect("a file");
-    let begun = Instant::now();
+    let planning_started = Instant::now();
     let plain = metaplan_in(mission.path(), &["plan", "missions/ugv.toml", "-q"], "");
-    let planned = begun.elapsed();
+    let planned = planning_started.elapsed();
     assert_eq!(plain.status, 0, "{}", plain.stderr);
-    let begun = Instant::now();
+    let report_started = Instant::now();
     let outcome = metaplan_in(mission.path(), &["report", "missions/ugv.toml", "-q"], "");
     assert_eq!(outcome.status, 0, "{}", outcome.stderr);
     assert!(count(&outcome.stdout, "data-step", "1000") >= 2);
-    let drawn = begun.elapsed().saturating_sub(planned);
-    // This is a debug build; a release build takes a tenth.
+    let drawn = report_started.elapsed().saturating_sub(planned);
+    // The limit is for debug builds; release builds take a tenth.
     assert!(drawn.as_secs_f64() < 20.0, "{drawn:?} beside {planned:?} for the plan");
 }
 
@@ -299,7 +305,7 @@ fn plans_are_drawn_for_papers_and_terminals() {
 }
 
 #[test]
-fn a_plan_is_a_behaviour_tree() {
+fn plans_are_exported_as_behaviour_trees() {
     let outcome =
         metaplan(&["plan", "missions/ugv.toml", "--scenario", "kinect_failure", "--plan-format", "btcpp"]);
     assert_eq!(outcome.status, 0, "{outcome:?}");
@@ -309,9 +315,10 @@ fn a_plan_is_a_behaviour_tree() {
     let nodes = sequence.children().filter(roxmltree::Node::is_element);
     let nodes: Vec<String> = nodes
         .map(|node| {
-            let attributes = node.attributes().filter(|own| !["ID", "name"].contains(&own.name()));
+            let attributes =
+                node.attributes().filter(|attribute| !["ID", "name"].contains(&attribute.name()));
             let ports: Vec<String> =
-                attributes.map(|own| format!("{}={}", own.name(), own.value())).collect();
+                attributes.map(|attribute| format!("{}={}", attribute.name(), attribute.value())).collect();
             format!("{} {}", node.attribute("ID").unwrap_or_default(), ports.join(" "))
         })
         .collect();
@@ -333,14 +340,14 @@ fn a_plan_is_a_behaviour_tree() {
 }
 
 #[test]
-fn a_report_is_a_page() {
+fn reports_have_no_json_format() {
     let refused = metaplan(&["report", "missions/ugv.toml", "--format", "json"]);
     assert_eq!(refused.status, 2);
     let error: Value = serde_json::from_str(&refused.stdout).expect("JSON");
     assert_eq!(error["messages"][0]["code"], "M107");
 }
 
-/// Actions that overlap have rows of their own, and the numbers follow both.
+/// Overlapping actions are drawn in separate rows. Curves show the effects of both.
 #[test]
 fn overlapping_actions_are_drawn() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -360,7 +367,7 @@ fn overlapping_actions_are_drawn() {
     let document = Document::parse(&timeline).expect("XML");
     let rows = document.descendants().filter(|node| node.attribute("class") == Some("action"));
     let rows: Vec<_> = rows.filter_map(|node| Some((node.attribute("x")?, node.attribute("y")?))).collect();
-    assert!(matches!(rows[..], [one, other] if one.1 != other.1), "{rows:?}");
+    assert!(matches!(rows[..], [first, second] if first.1 != second.1), "{rows:?}");
     let cost = std::fs::read_to_string(folder.path().join("pictures/number-1.svg")).expect("a picture");
     let cost = values(&cost);
     assert_eq!(cost.first(), Some(&(0.0, 0.0)), "nothing is spent before anything is done: {cost:?}");
@@ -370,9 +377,9 @@ fn overlapping_actions_are_drawn() {
     );
 }
 
-/// Each answer with pictures gives them as files, too.
+/// All answers with pictures can write them to files.
 #[test]
-fn pictures_of_all_answers_are_files() {
+fn all_answers_write_their_pictures_to_files() {
     let folder = tempfile::tempdir().expect("a folder");
     let at = |name: &str| folder.path().join(name).display().to_string();
     let commands: [(&[&str], &str, &[&str]); 3] = [
@@ -386,8 +393,8 @@ fn pictures_of_all_answers_are_files() {
     ];
     for (arguments, name, files) in commands {
         let path = at(name);
-        let all: Vec<&str> = arguments.iter().copied().chain(["--svg", &path, "-q"]).collect();
-        assert_eq!(metaplan(&all).status, 0, "{arguments:?}");
+        let command: Vec<&str> = arguments.iter().copied().chain(["--svg", &path, "-q"]).collect();
+        assert_eq!(metaplan(&command).status, 0, "{arguments:?}");
         for file in files {
             let file = if *file == "." { path.clone() } else { format!("{path}/{file}") };
             let text = std::fs::read_to_string(&file).expect("a picture");
@@ -398,17 +405,17 @@ fn pictures_of_all_answers_are_files() {
             );
             let mut points: Vec<&str> =
                 document.descendants().filter_map(|node| node.attribute("data-point")).collect();
-            let all = points.len();
+            let point_count = points.len();
             points.sort_unstable();
             points.dedup();
-            assert_eq!(points.len(), all, "{file}: each point has a name of its own");
+            assert_eq!(points.len(), point_count, "{file}: each point has a name of its own");
         }
     }
 }
 
-/// The pictures of README and book are those that the program draws.
+/// The pictures in README and book are up to date.
 #[test]
-fn pictures_of_the_book_are_made_by_the_program() {
+fn pictures_of_the_book_are_up_to_date() {
     let folder = tempfile::tempdir().expect("a folder");
     let directory = folder.path().display().to_string();
     let missions = [
@@ -417,12 +424,12 @@ fn pictures_of_the_book_are_made_by_the_program() {
     ];
     for (mission, scenario, pictures) in missions {
         page(&[&format!("missions/{mission}.toml"), "--scenario", scenario, "--svg", &directory]);
-        for (drawn, shown) in pictures {
-            let drawn =
-                std::fs::read_to_string(folder.path().join(format!("{drawn}.svg"))).expect("a picture");
-            let file = format!("docs/pictures/{mission}-{shown}.svg");
-            let shown = std::fs::read_to_string(root().join(&file)).expect("a picture");
-            assert!(drawn == shown, "{file} is another picture than `metaplan report --svg` draws");
+        for (current, published) in pictures {
+            let current =
+                std::fs::read_to_string(folder.path().join(format!("{current}.svg"))).expect("a picture");
+            let file = format!("docs/pictures/{mission}-{published}.svg");
+            let published = std::fs::read_to_string(root().join(&file)).expect("a picture");
+            assert!(current == published, "{file} is another picture than `metaplan report --svg` draws");
         }
     }
 }

@@ -1,13 +1,13 @@
-//! `metaplan run`: the program fed with lines.
+//! Tests of `metaplan run` with input lines.
 
 use serde_json::Value;
 
 use crate::common::{metaplan_in, root};
 
-/// Feeds lines; the kinds of the answers to each, line 0 first.
+/// Runs the loop on input lines and checks line numbers and kinds of the answers. Line 0 is the start.
 fn check(arguments: &[&str], input: &str, expected: &[&str]) -> Vec<Value> {
-    let all: Vec<&str> = ["run"].iter().chain(arguments).copied().collect();
-    let outcome = metaplan_in(&root(), &all, input);
+    let command: Vec<&str> = ["run"].iter().chain(arguments).copied().collect();
+    let outcome = metaplan_in(&root(), &command, input);
     assert_eq!(outcome.status, 0, "{outcome:#?}");
     let answers: Vec<Value> =
         outcome.stdout.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
@@ -22,13 +22,13 @@ fn check(arguments: &[&str], input: &str, expected: &[&str]) -> Vec<Value> {
 }
 
 #[test]
-fn errors_change_nothing_and_the_loop_goes_on() {
-    let long = format!("{{\"event\":\"{}\"}}", "x".repeat(2_000_000));
+fn invalid_lines_are_reported_and_skipped() {
+    let overlong = format!("{{\"event\":\"{}\"}}", "x".repeat(2_000_000));
     let input = [
         "nonsense",
         r#"{"event":"measured","attribute":"ambient_light","value":0.5}"#,
         "",
-        long.as_str(),
+        overlong.as_str(),
         "\u{0}",
         r#"{"event":"action_succeeded","action":1,"seq":5}"#,
         r#"{"event":"action_succeeded","action":2,"seq":5}"#,
@@ -60,12 +60,12 @@ fn errors_change_nothing_and_the_loop_goes_on() {
             "7 handled",
         ],
     );
-    let last = answers.last().expect("an answer");
-    assert!(last["microseconds"].as_u64().is_some(), "{last}");
+    let last_answer = answers.last().expect("an answer");
+    assert!(last_answer["microseconds"].as_u64().is_some(), "{last_answer}");
 }
 
 #[test]
-fn a_situation_without_a_plan_is_left_when_it_changes() {
+fn planning_resumes_after_an_unsolvable_situation() {
     let input = [
         r#"{"event":"component_status","component":"c_lidar","status":"RECOVERED"}"#,
         r#"{"event":"action_succeeded","action":1}"#,
@@ -91,7 +91,7 @@ fn a_situation_without_a_plan_is_left_when_it_changes() {
 }
 
 #[test]
-fn events_come_from_files_and_plain_pddl_runs_too() {
+fn events_can_come_from_files_and_missions_from_pddl() {
     let directory = tempfile::tempdir().expect("a directory");
     let events = directory.path().join("events.jsonl");
     std::fs::write(&events, "{\"event\":\"tick\"}\n").expect("a file");

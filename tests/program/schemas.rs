@@ -1,4 +1,4 @@
-//! JSON Schemas: what the program answers and reads fits them, and what it refuses does not.
+//! Tests of the JSON Schemas: valid outputs and inputs conform to them, and invalid ones do not.
 
 use jsonschema::Validator;
 use metaplan::mapek::Observation;
@@ -12,8 +12,8 @@ fn validator(format: &str) -> Validator {
     jsonschema::validator_for(&schema).unwrap_or_else(|error| panic!("{format}: {error}"))
 }
 
-/// A document fits, or the reasons why it does not.
-fn fits(format: &str, document: &Value) -> Result<(), String> {
+/// Validates a document. The error has the reasons.
+fn validate(format: &str, document: &Value) -> Result<(), String> {
     let faults: Vec<String> = validator(format)
         .iter_errors(document)
         .map(|error| format!("{}: {error}", error.instance_path()))
@@ -21,14 +21,14 @@ fn fits(format: &str, document: &Value) -> Result<(), String> {
     if faults.is_empty() { Ok(()) } else { Err(format!("{format}: {}\n{document:#}", faults.join("\n"))) }
 }
 
-/// The format that a document says it has.
+/// Name of the format that a document declares.
 fn format_of(document: &Value) -> &str {
     let format = document["format"].as_str().expect("a format");
     format.strip_prefix("metaplan-").and_then(|name| name.split('/').next()).expect("a name and a version")
 }
 
 #[test]
-fn answers_fit_their_schemas() {
+fn answers_conform_to_their_schemas() {
     let directory = tempfile::tempdir().expect("a directory");
     let here = directory.path();
     let json = ["--format", "json"];
@@ -60,26 +60,26 @@ fn answers_fit_their_schemas() {
         .expect("written");
     std::fs::write(here.join("study.toml"), "command = ['plan', 'm/mission.toml']\n").expect("written");
     std::fs::write(here.join("plan"), "(pick box near_rack fd_suction)\n").expect("written");
-    let mut seen = std::collections::BTreeSet::new();
+    let mut covered_formats = std::collections::BTreeSet::new();
     for command in commands {
         let answer = metaplan_in(here, &[command, &json].concat(), "");
         let document = answer.json();
-        seen.insert(format_of(&document).to_owned());
-        let checked = fits(format_of(&document), &document);
+        covered_formats.insert(format_of(&document).to_owned());
+        let checked = validate(format_of(&document), &document);
         assert!(checked.is_ok(), "{command:?}: {}", checked.unwrap_err());
     }
     metaplan_in(here, &["run", mission, "--journal", "j"], "");
     let journal = metaplan_in(here, &["journal", "show", "j", "--format", "json"], "").json();
-    seen.insert(format_of(&journal).to_owned());
-    assert_eq!(fits(format_of(&journal), &journal), Ok(()));
+    covered_formats.insert(format_of(&journal).to_owned());
+    assert_eq!(validate(format_of(&journal), &journal), Ok(()));
     for command in [
         &["plan", "missions/ugv.toml", "--pareto", "total-time,battery_used"][..],
         &["plan", "missions/ugv.toml", "--minimize", "total-time", "--minimize", "battery_used"],
         &["plan", "missions/ugv.toml", "--alternatives", "2"],
     ] {
         let document = metaplan(&[command, &json].concat()).json();
-        seen.insert(format_of(&document).to_owned());
-        assert_eq!(fits(format_of(&document), &document), Ok(()), "{command:?}");
+        covered_formats.insert(format_of(&document).to_owned());
+        assert_eq!(validate(format_of(&document), &document), Ok(()), "{command:?}");
     }
     let camara = ["compare", "missions/camara_like.toml", "--no-battery"];
     for (command, complete) in [
@@ -88,43 +88,46 @@ fn answers_fit_their_schemas() {
         ([&camara[..], &["--pairs", "100000", "--time-limit", "8"]].concat(), false),
     ] {
         let document = metaplan(&[&command[..], &json].concat()).json();
-        seen.insert(format_of(&document).to_owned());
-        assert_eq!(fits(format_of(&document), &document), Ok(()), "{command:?}");
+        covered_formats.insert(format_of(&document).to_owned());
+        assert_eq!(validate(format_of(&document), &document), Ok(()), "{command:?}");
         assert!(format_of(&document) == "error" || document["complete"] == complete, "{command:?}");
     }
     std::fs::write(here.join("map.json"), crate::maps::map()).expect("written");
     let places = ["import", "camara-map", "map.json", "--start", "h1", "--goal", "h4", "-o", "out"];
     let imported = metaplan_in(here, &[&places[..], &json].concat(), "").json();
-    seen.insert(format_of(&imported).to_owned());
-    assert_eq!(fits("import", &imported), Ok(()));
-    // What is read is tested below.
-    let silent: Vec<&str> =
-        FORMATS.iter().map(|(format, ..)| *format).filter(|format| !seen.contains(*format)).collect();
-    assert_eq!(silent, ["manifest", "study", "event", "answer"]);
+    covered_formats.insert(format_of(&imported).to_owned());
+    assert_eq!(validate("import", &imported), Ok(()));
+    // The remaining formats are covered by the other tests.
+    let uncovered_formats: Vec<&str> = FORMATS
+        .iter()
+        .map(|(format, ..)| *format)
+        .filter(|format| !covered_formats.contains(*format))
+        .collect();
+    assert_eq!(uncovered_formats, ["manifest", "study", "event", "answer"]);
 }
 
 #[test]
-fn a_schema_refuses_what_is_not_of_its_format() {
+fn schemas_refuse_other_formats() {
     let plan = metaplan(&["plan", "missions/ugv.toml", "--format", "json"]).json();
-    assert!(fits("plan", &plan).is_ok());
+    assert!(validate("plan", &plan).is_ok());
     for field in plan.as_object().expect("an object").keys() {
-        let mut other = plan.clone();
-        other[field] = json!({ "no": ["such", "value"] });
-        assert!(fits("plan", &other).is_err(), "{field} may be anything");
+        let mut changed = plan.clone();
+        changed[field] = json!({ "no": ["such", "value"] });
+        assert!(validate("plan", &changed).is_err(), "{field} may be anything");
     }
     for format in ["lint", "verdict", "init"] {
-        assert!(fits(format, &plan).is_err(), "{format}");
+        assert!(validate(format, &plan).is_err(), "{format}");
     }
 }
 
-/// A manifest as JSON.
+/// Parses a manifest to JSON.
 fn manifest(path: &std::path::Path) -> Value {
     let text = std::fs::read_to_string(path).expect("a manifest");
     toml::from_str(&text).expect("TOML")
 }
 
 #[test]
-fn manifests_fit_and_unknown_keys_do_not() {
+fn manifests_conform_and_unknown_keys_are_refused() {
     let mut paths: Vec<_> = std::fs::read_dir(root().join("missions"))
         .expect("missions")
         .map(|entry| entry.expect("an entry").path())
@@ -135,9 +138,9 @@ fn manifests_fit_and_unknown_keys_do_not() {
     );
     let mut count = 0;
     for path in paths.iter().filter(|path| path.extension().is_some_and(|extension| extension == "toml")) {
-        let whole = manifest(path);
-        assert_eq!(fits("manifest", &whole), Ok(()), "{}", path.display());
-        // Each table in turn gets a key that none has; tables of names take any key.
+        let valid_manifest = manifest(path);
+        assert_eq!(validate("manifest", &valid_manifest), Ok(()), "{}", path.display());
+        // Each table gets an unknown key in turn. Tables that map names accept any key and are left out.
         for pointer in [
             "",
             "/knowledge",
@@ -146,34 +149,34 @@ fn manifests_fit_and_unknown_keys_do_not() {
             "/scenarios/dusty",
             "/scenarios/undisturbed/simulation",
         ] {
-            let mut other = whole.clone();
-            let Some(table) = other.pointer_mut(pointer).and_then(Value::as_object_mut) else { continue };
+            let mut changed = valid_manifest.clone();
+            let Some(table) = changed.pointer_mut(pointer).and_then(Value::as_object_mut) else { continue };
             table.insert("no_such_key".to_owned(), json!(1));
-            assert!(fits("manifest", &other).is_err(), "{} {pointer}", path.display());
+            assert!(validate("manifest", &changed).is_err(), "{} {pointer}", path.display());
             count += 1;
         }
     }
     assert!(count > 20, "{count}");
-    for (section, key, wrong) in [
+    for (section, key, invalid_value) in [
         ("adaptation", "settle", json!(-1)),
         ("adaptation", "settle", json!([1])),
         ("bindings", "battery", json!(3)),
         ("report", "positions", json!(["x"])),
         ("probabilistic", "battery_unit", json!("one")),
     ] {
-        let mut other = manifest(&root().join("missions/ugv.toml"));
-        other[section] = json!({ key: wrong });
-        assert!(fits("manifest", &other).is_err(), "{section} {key}");
+        let mut changed = manifest(&root().join("missions/ugv.toml"));
+        changed[section] = json!({ key: invalid_value });
+        assert!(validate("manifest", &changed).is_err(), "{section} {key}");
     }
-    let mut right = manifest(&root().join("missions/ugv.toml"));
-    right["adaptation"] = json!({ "settle": "0.5", "time_limit": 2, "stay_close": true });
-    right["bindings"] = json!({ "battery": "measured:battery", "names": { "a": "b" } });
-    assert_eq!(fits("manifest", &right), Ok(()));
+    let mut valid_manifest = manifest(&root().join("missions/ugv.toml"));
+    valid_manifest["adaptation"] = json!({ "settle": "0.5", "time_limit": 2, "stay_close": true });
+    valid_manifest["bindings"] = json!({ "battery": "measured:battery", "names": { "a": "b" } });
+    assert_eq!(validate("manifest", &valid_manifest), Ok(()));
 }
 
-/// Every kind of event, as its reader and as its schema see it.
+/// Parser and schema must agree on all kinds of events, with removed, invalid and additional fields.
 #[test]
-fn events_fit_as_they_are_read() {
+fn event_schema_agrees_with_the_parser() {
     let events = [
         json!({"event": "measured", "attribute": "a", "value": 0.5, "seq": 1, "time": 0.25}),
         json!({"event": "component_status", "component": "c", "status": "FALSE"}),
@@ -196,43 +199,47 @@ fn events_fit_as_they_are_read() {
         json!({"event": "note", "text": "t"}),
     ];
     let validator = validator("event");
-    let agree = |event: &Value| {
-        let read = Observation::parse(&event.to_string()).events.iter().all(Result::is_ok);
-        assert_eq!(validator.is_valid(event), read, "{event}");
-        read
+    let is_accepted = |event: &Value| {
+        let is_parsed = Observation::parse(&event.to_string()).events.iter().all(Result::is_ok);
+        assert_eq!(validator.is_valid(event), is_parsed, "{event}");
+        is_parsed
     };
     let optional = ["seq", "time", "reason", "requirements", "always_improve"];
     for event in &events {
-        assert!(agree(event), "{event}");
+        assert!(is_accepted(event), "{event}");
         for field in event.as_object().expect("an object").keys() {
-            let mut less = event.clone();
-            less.as_object_mut().expect("an object").remove(field);
-            assert_eq!(agree(&less), optional.contains(&field.as_str()), "{event} without {field}");
-            let mut other = event.clone();
-            other[field] = json!([[]]);
-            assert!(!agree(&other), "{other}");
+            let mut incomplete = event.clone();
+            incomplete.as_object_mut().expect("an object").remove(field);
+            assert_eq!(
+                is_accepted(&incomplete),
+                optional.contains(&field.as_str()),
+                "{event} without {field}"
+            );
+            let mut changed = event.clone();
+            changed[field] = json!([[]]);
+            assert!(!is_accepted(&changed), "{changed}");
         }
-        let mut more = event.clone();
-        more["no_such_field"] = json!(1);
-        assert!(!agree(&more), "{more}");
+        let mut extended = event.clone();
+        extended["no_such_field"] = json!(1);
+        assert!(!is_accepted(&extended), "{extended}");
     }
-    assert!(!agree(&json!({"event": "measrued"})));
+    assert!(!is_accepted(&json!({"event": "measrued"})));
 }
 
-/// The lines of a loop fit the schema that recordings have, too.
+/// The answers of a loop conform to the schema that recordings contain as well.
 #[test]
-fn answers_of_the_loop_fit() {
+fn answers_of_the_loop_conform() {
     let lines = "{\"event\":\"component_status\",\"component\":\"c_kinect\",\"status\":\"FALSE\"}\n{\"event\":\"zzz\"}\n";
     let outcome = metaplan_in(&root(), &["run", "missions/ugv.toml"], lines);
     assert!(outcome.stdout.lines().count() > 5, "{outcome:#?}");
     for line in outcome.stdout.lines() {
         let answer: Value = serde_json::from_str(line).expect("JSON");
-        assert_eq!(fits("answer", &answer), Ok(()));
+        assert_eq!(validate("answer", &answer), Ok(()));
     }
 }
 
 #[test]
-fn the_command_prints_them() {
+fn schemas_are_printed_by_the_command() {
     let listed = metaplan(&["schema"]).stdout;
     for (format, ..) in FORMATS {
         assert!(listed.contains(format), "{format}: {listed}");

@@ -1,9 +1,9 @@
-//! What is known of the command line besides missions: codes, completions, pages for `man`.
+//! Tests of commands without a mission: error codes, shell completions, manual pages.
 
 use crate::common::{metaplan, metaplan_in};
 
 #[test]
-fn a_code_is_explained() {
+fn error_codes_are_explained() {
     let outcome = metaplan(&["explain", "M118"]);
     assert_eq!((outcome.status, outcome.stderr.as_str()), (0, ""), "{outcome:#?}");
     let lines: Vec<&str> = outcome.stdout.lines().collect();
@@ -16,7 +16,7 @@ fn a_code_is_explained() {
     let unknown = metaplan(&["explain", "M999"]);
     assert_eq!(unknown.status, 2, "{unknown:#?}");
     assert!(unknown.stderr.contains("error[M138]: there is no code `M999`"), "{unknown:#?}");
-    // A file of such a name is a mission.
+    // If a file has the name of a code, it is read as a mission.
     let directory = tempfile::tempdir().expect("a directory");
     std::fs::write(directory.path().join("M118"), "name = 1").expect("a file");
     let mission = metaplan_in(directory.path(), &["explain", "M118"], "");
@@ -35,15 +35,15 @@ fn shells_complete_every_command() {
 }
 
 #[test]
-fn every_command_has_a_page() {
+fn commands_have_manual_pages() {
     let directory = tempfile::tempdir().expect("a directory");
     let outcome = metaplan_in(directory.path(), &["man", "-o", "pages"], "");
     assert_eq!((outcome.status, outcome.stdout.as_str(), outcome.stderr.as_str()), (0, "", ""));
     let page =
         |name: &str| std::fs::read_to_string(directory.path().join("pages").join(name)).expect("a page");
-    let main = page("metaplan.1");
+    let main_page = page("metaplan.1");
     for command in ["plan", "init", "lint", "explain", "run", "verify"] {
-        assert!(main.contains(&format!("metaplan\\-{command}(1)")), "{command}");
+        assert!(main_page.contains(&format!("metaplan\\-{command}(1)")), "{command}");
         assert!(page(&format!("metaplan-{command}.1")).contains(".SH OPTIONS"), "{command}");
     }
     std::fs::write(directory.path().join("file"), "").expect("a file");

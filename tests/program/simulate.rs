@@ -1,10 +1,10 @@
-//! `metaplan simulate`: the loop beside other ways of control, in the same worlds.
+//! Tests of `metaplan simulate`: the loop and baseline strategies in identical worlds.
 
 use serde_json::Value;
 
 use crate::common::{edit, metaplan, metaplan_in, root};
 
-/// Runs a scenario; by strategy: how many missions were accomplished, and were better and worse than the loop's.
+/// Simulates a scenario. For each strategy: accomplished missions, and runs that are better and worse than the loop's.
 fn check(mission: &str, scenario: &str, runs: usize) -> Vec<(String, u64, u64, u64)> {
     let (file, count) = (format!("missions/{mission}.toml"), runs.to_string());
     let arguments =
@@ -23,36 +23,36 @@ fn check(mission: &str, scenario: &str, runs: usize) -> Vec<(String, u64, u64, u
     answer["strategies"].as_array().expect("strategies").iter().map(row).collect()
 }
 
-fn worse(rows: &[(String, u64, u64, u64)], strategy: &str) -> u64 {
+fn worse_runs(rows: &[(String, u64, u64, u64)], strategy: &str) -> u64 {
     rows.iter().find(|row| row.0 == strategy).expect("the strategy").3
 }
 
-/// The comparison over some seeds.
+/// Compares the strategies over a number of seeds.
 fn compare(runs: usize) {
-    let all = runs as u64;
+    let run_count = runs as u64;
     for (mission, scenario) in [("ugv", "kinect_at_wp2"), ("uuv", "battery_under_way")] {
         let rows = check(mission, scenario, runs);
-        assert_eq!(rows[0], ("joint".to_owned(), all, 0, 0), "{scenario}");
-        // The paper's argument: route and design, order and speed, only fit together.
+        assert_eq!(rows[0], ("joint".to_owned(), run_count, 0, 0), "{scenario}");
+        // The argument of the paper: route and designs, order and speed must be chosen together.
         for strategy in ["failure", "greedy", "random", "none"] {
-            assert_eq!(worse(&rows, strategy), all, "{strategy} in {scenario}");
+            assert_eq!(worse_runs(&rows, strategy), run_count, "{strategy} in {scenario}");
         }
     }
     for (mission, scenario) in [("ugv", "kinect_comes_and_goes"), ("uuv", "suave")] {
         let rows = check(mission, scenario, runs);
-        assert_eq!(rows[0], ("joint".to_owned(), all, 0, 0), "{scenario}");
-        assert!(worse(&rows, "failure") > 0 && worse(&rows, "none") > 0, "{scenario}: {rows:?}");
+        assert_eq!(rows[0], ("joint".to_owned(), run_count, 0, 0), "{scenario}");
+        assert!(worse_runs(&rows, "failure") > 0 && worse_runs(&rows, "none") > 0, "{scenario}: {rows:?}");
     }
 }
 
 #[test]
-fn the_loop_is_never_worse() {
+fn loop_is_never_worse() {
     compare(1);
 }
 
 #[test]
 #[ignore = "takes minutes"]
-fn the_loop_is_never_worse_over_thirty_seeds() {
+fn loop_is_never_worse_over_thirty_seeds() {
     compare(30);
 }
 
@@ -92,10 +92,10 @@ fn simulations_are_repeatable_and_logged() {
     let header = lines.next().expect("a header");
     let suave = "pipeline found,time searching pipeline (s),distance inspected (m),mean reaction time (s)";
     assert!(header.ends_with(suave), "{header}");
-    let first = lines.next().expect("a run");
+    let first_run = lines.next().expect("a run");
     assert!(
-        first.starts_with("joint,7,true,") && first.contains(",True,") && first.ends_with(",4,0"),
-        "{first}"
+        first_run.starts_with("joint,7,true,") && first_run.contains(",True,") && first_run.ends_with(",4,0"),
+        "{first_run}"
     );
     for line in log.lines() {
         let value: Value = serde_json::from_str(line).expect("JSON");
@@ -105,7 +105,7 @@ fn simulations_are_repeatable_and_logged() {
 }
 
 #[test]
-fn no_event_is_not_a_reaction_at_once() {
+fn runs_without_events_have_no_reaction_time() {
     let directory = tempfile::tempdir().expect("a directory");
     let mission = root().join("missions/ugv.toml").display().to_string();
     let arguments = [
@@ -126,14 +126,14 @@ fn no_event_is_not_a_reaction_at_once() {
 }
 
 #[test]
-fn scenarios_without_simulation_are_named() {
+fn scenarios_with_a_simulation_are_suggested() {
     let outcome = metaplan(&["simulate", "missions/ugv.toml", "--scenario", "bright_sun"]);
     assert_eq!(outcome.status, 2);
     assert!(outcome.stderr.contains("kinect_at_wp2"), "{outcome:#?}");
 }
 
-/// The warehouse, whose times are seconds unless it says otherwise, with a lidar that fails for some time.
-fn flickering(unit: &str, settle: u32) -> Vec<Value> {
+/// Log of a simulation of the warehouse in which the lidar fails for 10 units of time. The default unit is the second.
+fn simulate_lidar_outage(unit: &str, settle: u32) -> Vec<Value> {
     let directory = tempfile::tempdir().expect("a directory");
     let here = directory.path();
     assert_eq!(metaplan_in(here, &["init", "m", "--from", "warehouse"], "").status, 0);
@@ -169,9 +169,9 @@ fn flickering(unit: &str, settle: u32) -> Vec<Value> {
     log.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect()
 }
 
-/// The times of the log are seconds, whatever the unit of the domain's times, and `settle` is of the same clock.
+/// Times in the log are seconds, for every unit of the domain. `settle` is in seconds as well.
 #[test]
-fn the_clock_of_the_loop_goes_in_seconds() {
+fn clock_of_the_loop_is_in_seconds() {
     for (unit, second, settle) in [
         ("", 1.0, 30),
         ("\ntime_unit = \"seconds\"", 1.0, 30),
@@ -179,34 +179,35 @@ fn the_clock_of_the_loop_goes_in_seconds() {
         ("\ntime_unit = \"minutes\"", 60.0, 1800),
         ("\ntime_unit = \"hours\"", 3600.0, 108_000),
     ] {
-        let log = flickering(unit, settle);
-        let (mut now, mut failed, mut back, mut better) = (0.0, None, None, None);
+        let log = simulate_lidar_outage(unit, settle);
+        let (mut now, mut failure_time, mut recovery_time, mut replanning_time) = (0.0, None, None, None);
         for line in &log {
             now = line["time"].as_f64().unwrap_or(now);
             if line["event"] == "component_status" {
-                let place = if line["status"] == "FALSE" { &mut failed } else { &mut back };
+                let place = if line["status"] == "FALSE" { &mut failure_time } else { &mut recovery_time };
                 place.get_or_insert(now);
             }
-            if back.is_some() && line["answer"] == "plan_requested" {
-                better.get_or_insert(now);
+            if recovery_time.is_some() && line["answer"] == "plan_requested" {
+                replanning_time.get_or_insert(now);
             }
         }
-        // Reports come every second of the domain, and sooner where an action ends.
-        let (failed, back) = (failed.expect("it fails"), back.expect("it is back"));
+        // Reports come once per time unit of the domain, and at the ends of actions.
+        let (failure_time, recovery_time) =
+            (failure_time.expect("it fails"), recovery_time.expect("it is back"));
         assert!(
-            (failed / second - 10.0).abs() < 1.0 && (back / second - 20.0).abs() < 1.0,
-            "{unit}: {failed}, {back}"
+            (failure_time / second - 10.0).abs() < 1.0 && (recovery_time / second - 20.0).abs() < 1.0,
+            "{unit}: {failure_time}, {recovery_time}"
         );
-        let better = better.expect("a better plan is looked for");
-        let waited = better - back + 1e-6;
+        let replanning_time = replanning_time.expect("a better plan is looked for");
+        let delay = replanning_time - recovery_time + 1e-6;
         assert!(
-            waited >= f64::from(settle) && waited <= f64::from(settle) + 2.0 * second,
-            "{unit}, {settle}: {waited}"
+            delay >= f64::from(settle) && delay <= f64::from(settle) + 2.0 * second,
+            "{unit}, {settle}: {delay}"
         );
     }
 }
 
-/// Times are shown with their unit, and SUAVE's columns are in seconds.
+/// Times are printed with their unit. SUAVE's columns are in seconds.
 #[test]
 fn units_are_shown() {
     let arguments =
@@ -241,9 +242,8 @@ fn units_are_shown() {
     }
 }
 
-/// Requirements of actions in their contexts, as in the tutorial's knowledge base: no light in the dark aisle, and a
-/// gentle grip for fragile items. The strategies request no design that violates them, and complete every possible
-/// action.
+/// Requirements of actions depend on their context in the tutorial's knowledge base: no light in the dark aisle, and a gentle grip for
+/// fragile items. The baseline strategies request no design that violates them, and complete every possible action.
 #[test]
 fn greedy_control_observes_requirements() {
     let directory = tempfile::tempdir().expect("a directory");
@@ -282,7 +282,7 @@ fn greedy_control_observes_requirements() {
     }
 }
 
-/// A mission that is not ours, where it is there: what its rooms and corridors require is written out by hand.
+/// A mission from outside the project, if available. The requirements of its rooms and corridors are listed by hand.
 #[test]
 #[expect(clippy::print_stdout, reason = "what is skipped says so")]
 fn greedy_control_observes_requirements_in_a_ward() {
@@ -325,17 +325,18 @@ fn greedy_control_observes_requirements_in_a_ward() {
         requests += usize::from(!line["configuration"].is_null());
         for (action, rooms, function, design) in &forbidden {
             let arguments = line["arguments"].to_string();
-            let is_there = rooms.iter().all(|room| arguments.contains(&format!("\"{room}\"")));
-            let is_it = line["action"] == *action && is_there && line["configuration"][function] == *design;
-            assert!(!is_it, "{line}");
+            let is_in_rooms = rooms.iter().all(|room| arguments.contains(&format!("\"{room}\"")));
+            let is_forbidden =
+                line["action"] == *action && is_in_rooms && line["configuration"][function] == *design;
+            assert!(!is_forbidden, "{line}");
         }
     }
     assert!(requests > 0, "{log}");
 }
 
-/// A word for what was not accomplished, and why.
+/// Failed missions are reported with the reason.
 #[test]
-fn what_is_not_accomplished_is_said_with_the_reason() {
+fn failed_missions_are_reported_with_the_reason() {
     let arguments =
         ["simulate", "missions/ugv.toml", "--scenario", "kinect_at_wp2", "--strategy", "none", "--runs", "2"];
     let outcome = metaplan(&arguments);

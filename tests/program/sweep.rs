@@ -1,4 +1,4 @@
-//! `metaplan sweep`: shards, kills and all, come to the same table as the whole.
+//! Tests of `metaplan sweep`: interrupted shards yield the same table as an uninterrupted run.
 
 use std::fs;
 use std::path::Path;
@@ -12,14 +12,14 @@ use crate::common::{metaplan, root};
 
 const STUDY: &str = "missions/studies/kinect.toml";
 
-fn sweep(study: &str, results: &Path, more: &[&str]) -> crate::common::Outcome {
+fn sweep(study: &str, results: &Path, options: &[&str]) -> crate::common::Outcome {
     let results = results.to_string_lossy();
     let mut arguments = vec!["sweep", study, "--output", &results, "--format", "json", "--quiet"];
-    arguments.extend(more);
+    arguments.extend(options);
     metaplan(&arguments)
 }
 
-/// The merged table, and the answer.
+/// Merged table and JSON answer of a study.
 fn merged(study: &str, results: &Path) -> (String, Value) {
     let csv = results.join("table.csv");
     let outcome = sweep(study, results, &["--merge", "--csv", &csv.to_string_lossy()]);
@@ -28,23 +28,23 @@ fn merged(study: &str, results: &Path) -> (String, Value) {
 }
 
 #[test]
-fn shards_that_are_killed_come_to_the_same_table_as_the_whole() {
+fn killed_shards_give_the_same_table() {
     let folder = tempfile::tempdir().expect("a directory");
-    let (whole, parts) = (folder.path().join("whole"), folder.path().join("parts"));
-    let outcome = sweep(STUDY, &whole, &[]);
+    let (uninterrupted, shards) = (folder.path().join("whole"), folder.path().join("parts"));
+    let outcome = sweep(STUDY, &uninterrupted, &[]);
     assert_eq!((outcome.status, &outcome.json()["done"]), (0, &12.into()), "{outcome:#?}");
-    let (table, answer) = merged(STUDY, &whole);
+    let (table, answer) = merged(STUDY, &uninterrupted);
     assert_eq!(table.lines().count(), 13, "{table}");
     let groups = answer["groups"].as_array().expect("groups");
     assert!(groups.iter().all(|group| group["common"]["seed"].is_null()), "{groups:?}");
-    let fits = jsonschema::validator_for(&schema("sweep").expect("a schema")).expect("it is one");
-    assert!(fits.is_valid(&answer), "{answer:#}");
+    let validator = jsonschema::validator_for(&schema("sweep").expect("a schema")).expect("it is one");
+    assert!(validator.is_valid(&answer), "{answer:#}");
     for shard in ["1/3", "2/3", "3/3"] {
-        // Killed once, somewhere; the second shard twice.
+        // Each shard is killed once at an early point; the second shard is killed twice.
         for kill in 0..=u64::from(shard == "2/3") {
             let mut child = Command::new(env!("CARGO_BIN_EXE_metaplan"))
                 .args(["sweep", STUDY, "--resume", "--shard", shard, "--output"])
-                .arg(&parts)
+                .arg(&shards)
                 .current_dir(root())
                 .stdout(Stdio::null())
                 .stderr(Stdio::null())
@@ -54,23 +54,23 @@ fn shards_that_are_killed_come_to_the_same_table_as_the_whole() {
             child.kill().expect("it can be killed");
             child.wait().expect("it ends");
         }
-        // What a kill may leave of a line.
+        // A kill can leave an incomplete line at the end of the file.
         let index = &shard[..1];
-        let file = parts.join(format!("shard-000{index}-of-0003.jsonl"));
+        let file = shards.join(format!("shard-000{index}-of-0003.jsonl"));
         let mut text = fs::read_to_string(&file).unwrap_or_default();
         text.push_str("{\"run\": 1, \"va");
-        fs::create_dir_all(&parts).expect("it can be made");
+        fs::create_dir_all(&shards).expect("it can be made");
         fs::write(&file, text).expect("it can be written");
-        let outcome = sweep(STUDY, &parts, &["--shard", shard, "--resume"]);
+        let outcome = sweep(STUDY, &shards, &["--shard", shard, "--resume"]);
         assert_eq!((outcome.status, &outcome.json()["done"]), (0, &4.into()), "{outcome:#?}");
     }
-    let (same, same_answer) = merged(STUDY, &parts);
-    assert_eq!(same, table);
-    assert_eq!(same_answer, answer);
+    let (shard_table, shard_answer) = merged(STUDY, &shards);
+    assert_eq!(shard_table, table);
+    assert_eq!(shard_answer, answer);
 }
 
 #[test]
-fn results_are_not_mixed_up() {
+fn results_of_different_studies_are_not_mixed() {
     let folder = tempfile::tempdir().expect("a directory");
     let study = folder.path().join("study.toml");
     let domain = root().join("encodings/ugv");
@@ -85,22 +85,32 @@ fn results_are_not_mixed_up() {
     fs::write(&study, text(60)).expect("it can be written");
     let (name, results) = (study.to_string_lossy().into_owned(), folder.path().join("results"));
     assert_eq!(sweep(&name, &results, &["--shard", "1/2"]).status, 0);
-    let again = sweep(&name, &results, &["--shard", "1/2"]);
-    assert!(again.status == 3 && again.stdout.contains("--resume"), "{again:#?}");
-    // A part is not taken for the whole.
-    let part = sweep(&name, &results, &["--merge"]);
-    assert_eq!((part.status, &part.json()["missing"]), (1, &serde_json::json!([1])), "{part:#?}");
+    let repeated = sweep(&name, &results, &["--shard", "1/2"]);
+    assert!(repeated.status == 3 && repeated.stdout.contains("--resume"), "{repeated:#?}");
+    // Merging incomplete results reports the missing runs.
+    let incomplete = sweep(&name, &results, &["--merge"]);
+    assert_eq!(
+        (incomplete.status, &incomplete.json()["missing"]),
+        (1, &serde_json::json!([1])),
+        "{incomplete:#?}"
+    );
     fs::write(&study, text(61)).expect("it can be written");
-    for more in [["--resume", "--shard", "1/2"].as_slice(), &["--merge"]] {
-        let other = sweep(&name, &results, more);
-        assert!(other.status == 3 && other.stdout.contains("another study"), "{other:#?}");
+    for options in [["--resume", "--shard", "1/2"].as_slice(), &["--merge"]] {
+        let changed_study = sweep(&name, &results, options);
+        assert!(
+            changed_study.status == 3 && changed_study.stdout.contains("another study"),
+            "{changed_study:#?}"
+        );
     }
     let file = results.join("shard-0001-of-0002.jsonl");
     let damaged = fs::read_to_string(&file).expect("lines").replacen("\"run\":0", "\"run\":}", 1);
     fs::write(&file, damaged).expect("it can be written");
     fs::write(&study, text(60)).expect("it can be written");
-    let other = sweep(&name, &results, &["--merge"]);
-    assert!(other.status == 3 && other.stdout.contains("line 2 is damaged"), "{other:#?}");
+    let damaged_results = sweep(&name, &results, &["--merge"]);
+    assert!(
+        damaged_results.status == 3 && damaged_results.stdout.contains("line 2 is damaged"),
+        "{damaged_results:#?}"
+    );
 }
 
 #[test]
@@ -128,9 +138,9 @@ fn runs_end_at_their_time_limit_and_files_are_generated() {
     assert_eq!((outcome.status, &outcome.json()["timed_out"]), (1, &1.into()), "{outcome:#?}");
 }
 
-/// All ordered pairs of the made-up map, as its comparison has them.
+/// All ordered pairs of places of the invented map are runs of a study, with the same results as the comparison of the map.
 #[test]
-fn pairs_of_a_map_are_a_key() {
+fn pairs_of_a_map_can_be_varied() {
     let folder = tempfile::tempdir().expect("a directory");
     let study = folder.path().join("study.toml");
     let run = root().join("missions/camara_like.toml");
@@ -151,11 +161,11 @@ fn pairs_of_a_map_are_a_key() {
         .as_array()
         .expect("comparisons")
         .iter()
-        .flat_map(|one| one["candidates"].as_array().expect("candidates"))
+        .flat_map(|comparison| comparison["candidates"].as_array().expect("candidates"))
         .collect();
     let mut reader = csv::Reader::from_reader(table.as_bytes());
     let header = reader.headers().expect("a header").clone();
-    let column = |name: &str| header.iter().position(|own| own == name).expect("a column");
+    let column = |name: &str| header.iter().position(|title| title == name).expect("a column");
     let rows: Vec<csv::StringRecord> = reader.records().map(|row| row.expect("a row")).collect();
     assert_eq!(rows.len(), expected.len());
     for (row, candidate) in rows.iter().zip(expected) {

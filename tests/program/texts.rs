@@ -1,17 +1,17 @@
-//! Letters of other scripts in names, byte order marks, and documents that say nothing.
+//! Tests of non-ASCII names, byte order marks, and empty documents.
 
 use std::fs;
 use std::path::Path;
 
 use crate::common::{Outcome, copy_folder, copy_of_mission, edit, headlines, metaplan, metaplan_in, root};
 
-/// Files of text in a folder, with those below it.
+/// Files below a folder, recursively.
 fn texts(folder: &Path) -> Vec<std::path::PathBuf> {
     let entries = fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path());
     entries.flat_map(|path| if path.is_dir() { texts(&path) } else { vec![path] }).collect()
 }
 
-/// A copy of the tutorial's mission in which a name is another one everywhere.
+/// A copy of the tutorial's mission in which a name is replaced in all files.
 fn warehouse_with(old: &str, new: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     copy_folder(&root().join("missions/templates/warehouse"), folder.path());
@@ -25,18 +25,18 @@ fn warehouse_with(old: &str, new: &str) -> tempfile::TempDir {
     folder
 }
 
-fn ok(folder: &Path, arguments: &[&str]) -> Outcome {
+fn run_successfully(folder: &Path, arguments: &[&str]) -> Outcome {
     let outcome = metaplan_in(folder, arguments, "");
     assert_eq!(outcome.status, 0, "{arguments:?}: {outcome:#?}");
     outcome
 }
 
 #[test]
-fn designs_functions_and_components_have_letters_of_any_script() {
+fn names_can_have_letters_of_any_script() {
     for (old, new) in [
         ("fd_lidar", "fd_lidär"),
         ("fd_lidar", "激光雷达"),
-        // A letter and a mark that is written above it.
+        // A base letter with a combining mark.
         ("fd_lidar", "fd_lida\u{308}r"),
         ("f_navigate", "f_überqueren"),
         ("c_lidar", "c_лидар"),
@@ -44,10 +44,10 @@ fn designs_functions_and_components_have_letters_of_any_script() {
         let plain = warehouse_with("name = ", "name = ");
         let folder = warehouse_with(old, new);
         let folder = folder.path();
-        let expected = ok(plain.path(), &["plan", "mission.toml"]).stdout.replace(old, new);
-        let shown = ok(folder, &["plan", "mission.toml"]).stdout;
+        let expected = run_successfully(plain.path(), &["plan", "mission.toml"]).stdout.replace(old, new);
+        let table = run_successfully(folder, &["plan", "mission.toml"]).stdout;
         let cells = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
-        assert_eq!(cells(&shown), cells(&expected), "{new}");
+        assert_eq!(cells(&table), cells(&expected), "{new}");
         for arguments in [
             &["plan", "mission.toml", "-o", "plan.txt", "--certificate", "proof"][..],
             &["validate", "mission.toml", "plan.txt"],
@@ -63,35 +63,35 @@ fn designs_functions_and_components_have_letters_of_any_script() {
             &["lint", "mission.toml"],
             &["report", "mission.toml", "-o", "report.html"],
         ] {
-            ok(folder, arguments);
+            run_successfully(folder, arguments);
         }
         assert_eq!(
-            ok(folder, &["lint", "mission.toml"]),
-            ok(plain.path(), &["lint", "mission.toml"]),
+            run_successfully(folder, &["lint", "mission.toml"]),
+            run_successfully(plain.path(), &["lint", "mission.toml"]),
             "{new}"
         );
         if new.starts_with('c') {
-            ok(folder, &["plan", "mission.toml", "--fail", new]);
+            run_successfully(folder, &["plan", "mission.toml", "--fail", new]);
         } else if old.starts_with("fd") {
-            ok(folder, &["explain", "mission.toml", new]);
+            run_successfully(folder, &["explain", "mission.toml", new]);
         }
     }
 }
 
 #[test]
-fn a_design_that_cannot_be_named_is_left_out() {
+fn designs_without_a_valid_pddl_name_are_omitted() {
     let copy = copy_of_mission("ugv");
     edit(copy.path(), "ontology/kb/ugv.ttl", ":fd_amcl_kinect", ":fd_amcl%28kinect%29");
     let manifest = ["plan", "missions/ugv.toml"];
-    let outcome = ok(copy.path(), &manifest);
+    let outcome = run_successfully(copy.path(), &manifest);
     assert!(outcome.stdout.contains("cost "), "{outcome:#?}");
     assert!(outcome.stderr.contains("M201") && outcome.stderr.contains("[bindings.names]"), "{outcome:#?}");
-    let without = metaplan(&["plan", "missions/ugv.toml", "--fail", "c_kinect"]);
-    assert_eq!(without.status, 0);
+    let without_kinect = metaplan(&["plan", "missions/ugv.toml", "--fail", "c_kinect"]);
+    assert_eq!(without_kinect.status, 0);
 }
 
 #[test]
-fn byte_order_marks_are_read_over() {
+fn byte_order_marks_are_ignored() {
     const MARK: &[u8] = b"\xef\xbb\xbf";
     let folder = tempfile::tempdir().expect("a folder");
     let within = |name: &str| folder.path().join(name);
@@ -112,7 +112,7 @@ fn byte_order_marks_are_read_over() {
         &["convert", "ontology/kb/ugv.ttl", "--to", "owlxml", "-o", "kb.owx"],
         &["convert", "ontology/kb/ugv.ttl", "--to", "rdfxml", "-o", "kb.owl"],
     ] {
-        ok(folder.path(), arguments);
+        run_successfully(folder.path(), arguments);
     }
     let answers = || -> Vec<Outcome> {
         let commands = [
@@ -134,16 +134,18 @@ fn byte_order_marks_are_read_over() {
             &["check", "model.prism", "--props", "props"],
             &["run", ugv, "--events", "events.jsonl"],
         ];
-        commands.iter().map(|command| ok(folder.path(), command)).collect()
+        commands.iter().map(|command| run_successfully(folder.path(), command)).collect()
     };
-    let untimed = |outcomes: Vec<Outcome>| -> Vec<String> {
+    let without_times = |outcomes: Vec<Outcome>| -> Vec<String> {
         let is_measured = |line: &&str| !line.contains("microseconds");
         outcomes
             .into_iter()
-            .map(|own| (own.stdout + &own.stderr).lines().filter(is_measured).collect::<Vec<_>>().join("\n"))
+            .map(|outcome| {
+                (outcome.stdout + &outcome.stderr).lines().filter(is_measured).collect::<Vec<_>>().join("\n")
+            })
             .collect()
     };
-    let expected = untimed(answers());
+    let expected = without_times(answers());
     let mut count = 0;
     for file in texts(folder.path()) {
         let text = fs::read(&file).expect("a text");
@@ -153,30 +155,30 @@ fn byte_order_marks_are_read_over() {
         }
     }
     assert!(count > 20, "{count} files");
-    assert_eq!(untimed(answers()), expected);
-    // As `>` of Windows PowerShell writes a plan.
+    assert_eq!(without_times(answers()), expected);
+    // UTF-16 with CRLF, like the output of `>` in Windows PowerShell.
     let plan = fs::read_to_string(within("plan.txt")).expect("a plan").replace('\n', "\r\n");
     let bytes: Vec<u8> = plan.encode_utf16().flat_map(u16::to_le_bytes).collect();
     fs::write(within("plan.txt"), bytes).expect("written");
-    ok(folder.path(), &["validate", ugv, "plan.txt"]);
+    run_successfully(folder.path(), &["validate", ugv, "plan.txt"]);
 }
 
 #[test]
-fn an_empty_document_adds_and_takes_nothing() {
+fn empty_documents_change_nothing() {
     let folder = tempfile::tempdir().expect("a folder");
     let kb = root().join("ontology/kb/ugv.ttl").display().to_string();
     let reason = ["reason", &kb, "--rules", "coadaptation"];
-    let expected = ok(folder.path(), &reason).stdout;
+    let expected = run_successfully(folder.path(), &reason).stdout;
     for text in ["", "\n \r\n\t\n", "# nothing\n\n# at all", "\u{feff}"] {
         fs::write(folder.path().join("nothing.nt"), text).expect("written");
         for option in ["--assert", "--retract"] {
-            let outcome = ok(folder.path(), &[&reason[..], &[option, "nothing.nt"]].concat());
+            let outcome = run_successfully(folder.path(), &[&reason[..], &[option, "nothing.nt"]].concat());
             assert_eq!(outcome.stdout, expected, "{text:?} {option}");
             let piped = metaplan_in(folder.path(), &[&reason[..], &[option, "-"]].concat(), text);
             assert_eq!((piped.status, piped.stdout), (0, expected.clone()), "{text:?} {option}");
         }
     }
-    // A knowledge base says something, and what is in another syntax is no change.
+    // A knowledge base must not be empty, and a document in an unknown syntax is an error.
     fs::write(folder.path().join("other.nt"), "{\"@context\": {}}").expect("written");
     for arguments in [&["reason", "nothing.nt"][..], &[&reason[..], &["--assert", "other.nt"]].concat()] {
         let outcome = metaplan_in(folder.path(), arguments, "");
@@ -186,7 +188,7 @@ fn an_empty_document_adds_and_takes_nothing() {
 }
 
 #[test]
-fn a_plan_in_a_file_is_one_that_is_read() {
+fn plans_in_files_can_be_validated() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("plan.txt").display().to_string();
     for mission in ["missions/ugv.toml", "missions/uuv.toml", "missions/templates/warehouse/mission.toml"] {
@@ -197,7 +199,7 @@ fn a_plan_in_a_file_is_one_that_is_read() {
         assert_eq!(text, metaplan(&["plan", mission, "--plan-format", "ipc"]).stdout, "{mission}");
         let valid = metaplan(&["validate", mission, &file]);
         assert!(valid.status == 0 && valid.stdout.starts_with("valid"), "{mission}: {valid:#?}");
-        // A table is refused once, with what to do.
+        // A table is refused with one message, which names the remedy.
         for table in [&["--plan-format", "table"][..], &["--plan-format", "table", "--verbose"]] {
             assert_eq!(metaplan(&[&["plan", mission, "-o", &file], table].concat()).status, 0);
             let refused = metaplan(&["validate", mission, &file]);
@@ -206,13 +208,13 @@ fn a_plan_in_a_file_is_one_that_is_read() {
             assert!(refused.stderr.contains("M111") && refused.stderr.contains("--plan-format ipc"));
         }
     }
-    // Content that no plan format can hold is printed to standard error, or is written to the file as it would be to
-    // standard output.
+    // Answers that are not a plan cannot be written in a plan format. They go to standard error, or into the file in the format of standard
+    // output.
     let unsolvable = metaplan(&["plan", "missions/uuv.toml", "--set", "water_visibility=1", "-o", &file]);
     assert_eq!(unsolvable.status, 10);
-    let shown = metaplan(&["plan", "missions/uuv.toml", "--set", "water_visibility=1"]);
-    assert_eq!(unsolvable.stderr, shown.stdout);
-    let further = ["plan", "missions/ugv.toml", "--alternatives", "1"];
-    assert_eq!(metaplan(&[&further[..], &["-o", &file]].concat()).status, 0);
-    assert_eq!(fs::read_to_string(&file).expect("an answer"), metaplan(&further).stdout);
+    let printed = metaplan(&["plan", "missions/uuv.toml", "--set", "water_visibility=1"]);
+    assert_eq!(unsolvable.stderr, printed.stdout);
+    let with_alternatives = ["plan", "missions/ugv.toml", "--alternatives", "1"];
+    assert_eq!(metaplan(&[&with_alternatives[..], &["-o", &file]].concat()).status, 0);
+    assert_eq!(fs::read_to_string(&file).expect("an answer"), metaplan(&with_alternatives).stdout);
 }

@@ -1,4 +1,4 @@
-//! `--trace`: spans with their counts, whole or not there at all.
+//! Tests of `--trace`: complete spans with counts, or no file.
 
 use std::collections::BTreeMap;
 
@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::common::{metaplan, root};
 
-/// Spans by name, each with what is known of it when it ends.
+/// Spans by name, each with its fields at the end.
 fn spans(text: &str) -> BTreeMap<String, Vec<Value>> {
     let events: Vec<Value> = serde_json::from_str(text).expect("JSON");
     let mut spans: BTreeMap<String, Vec<Value>> = BTreeMap::new();
@@ -30,7 +30,7 @@ fn spans(text: &str) -> BTreeMap<String, Vec<Value>> {
 }
 
 #[test]
-fn a_trace_has_the_stations_with_their_counts() {
+fn traces_have_all_stages_with_counts() {
     let directory = tempfile::tempdir().expect("a directory");
     let file = directory.path().join("trace.json");
     let file = file.to_str().expect("UTF-8");
@@ -58,7 +58,7 @@ fn a_trace_has_the_stations_with_their_counts() {
 }
 
 #[test]
-fn a_trace_that_cannot_be_written_is_an_error() {
+fn unwritable_traces_are_errors() {
     let file = root().join("missions/ugv.toml/trace.json");
     let output = metaplan(&["plan", "missions/ugv.toml", "--trace", file.to_str().expect("UTF-8")]);
     assert_eq!(output.status, 3);

@@ -1,17 +1,17 @@
-//! The UGV mission of the paper: both plans, their uniqueness by brute force, and the three modifications.
+//! Tests of the UGV mission of the paper: both plans, their uniqueness by brute force, and the three modifications.
 
 use crate::common::{copy_of_mission, edit, metaplan, metaplan_in, steps};
 
-/// Plans with these arguments; checks the steps and the cost, that the optimum is proved and the plan validates.
+/// Plans with these arguments. Checks steps, cost, the proof of optimality, and the plan by validation.
 fn check(arguments: &[&str], expected: &[&str], cost: i64) {
     let directory = crate::common::root();
     check_in(&directory, arguments, expected, cost);
 }
 
 fn check_in(directory: &std::path::Path, arguments: &[&str], expected: &[&str], cost: i64) {
-    let all: Vec<&str> =
+    let command: Vec<&str> =
         ["plan", "missions/ugv.toml", "--format", "json"].iter().chain(arguments).copied().collect();
-    let outcome = metaplan_in(directory, &all, "");
+    let outcome = metaplan_in(directory, &command, "");
     assert_eq!(outcome.status, 0, "{outcome:#?}");
     let answer = outcome.json();
     assert_eq!(answer["format"], "metaplan-plan/1");
@@ -39,12 +39,12 @@ const THROUGH_THE_DARK: [&str; 3] = [
 ];
 
 #[test]
-fn everything_works() {
+fn plan_without_failures() {
     check(&[], &THROUGH_THE_OBSTACLES, 408);
 }
 
 #[test]
-fn the_kinect_fails_at_wp2() {
+fn plan_after_kinect_failure_at_wp2() {
     check(&["--fail", "c_kinect", "--set", "robot_at=wp2"], &THROUGH_THE_DARK, 412);
     check(&["--scenario", "kinect_failure"], &THROUGH_THE_DARK, 412);
 }
@@ -56,7 +56,7 @@ fn small_missions_are_proved_by_the_sat_solver() {
     assert!(answer["statistics"]["clauses"].as_i64() > Some(100), "{answer:#}");
 }
 
-/// The designs of the table: battery for each move, safety in tenths, needs light, components.
+/// The designs in the table: battery per move, safety in tenths, whether it needs light, components.
 const DESIGNS: [(&str, i64, i64, bool, &[&str]); 6] = [
     ("fd_amcl_lidar", 4, 4, false, &["c_lidar"]),
     ("fd_amcl_kinect", 2, 10, false, &["c_kinect"]),
@@ -66,22 +66,24 @@ const DESIGNS: [(&str, i64, i64, bool, &[&str]); 6] = [
     ("fd_aruco_with_light", 10, 7, false, &["c_camera", "c_flashlight"]),
 ];
 
-/// All plans from a waypoint to wp9 with cost at most `limit`, by plain enumeration.
+/// All plans from a waypoint to wp9 with a cost of at most `limit`, by enumeration.
 fn enumerate(
-    at: usize,
+    waypoint: usize,
     failed: &str,
     limit: i64,
     prefix: &mut Vec<String>,
-    found: &mut Vec<(i64, Vec<String>)>,
+    plans: &mut Vec<(i64, Vec<String>)>,
 ) {
     fn spent(prefix: &[String]) -> i64 {
         prefix.iter().filter_map(|step| step.rsplit(' ').next()?.parse::<i64>().ok()).sum()
     }
-    if at == 9 {
-        found.push((spent(prefix), prefix.clone()));
+    if waypoint == 9 {
+        plans.push((spent(prefix), prefix.clone()));
     }
     let corridors = [(1, 2), (2, 3), (4, 5), (5, 6), (7, 8), (8, 9), (2, 5), (3, 6), (4, 7), (5, 8), (6, 9)];
-    for (a, b) in corridors.into_iter().flat_map(|(a, b)| [(a, b), (b, a)]).filter(|(from, _)| *from == at) {
+    for (a, b) in
+        corridors.into_iter().flat_map(|(a, b)| [(a, b), (b, a)]).filter(|(from, _)| *from == waypoint)
+    {
         let (low, high) = (a.min(b), a.max(b));
         let (obstacles, dark) = ((low, high) == (2, 5), (low, high) == (6, 9));
         for (name, battery, safety, needs_light, components) in DESIGNS {
@@ -89,7 +91,7 @@ fn enumerate(
             let cost = 100 * if dark { 2 } else { 1 } + battery;
             if !unsuitable && spent(prefix) + cost <= limit {
                 prefix.push(format!("{a} {b} {name} {cost}"));
-                enumerate(b, failed, limit, prefix, found);
+                enumerate(b, failed, limit, prefix, plans);
                 prefix.pop();
             }
         }
@@ -97,18 +99,18 @@ fn enumerate(
 }
 
 #[test]
-fn brute_force_finds_one_optimum_each() {
+fn optima_are_unique_by_brute_force() {
     for (start, failed, cost, moves) in [(1, "none", 408, 4), (2, "c_kinect", 412, 3)] {
-        let mut found = Vec::new();
-        enumerate(start, failed, cost + 1, &mut Vec::new(), &mut found);
-        let least = found.iter().map(|(cost, _)| *cost).min();
-        let optima: Vec<_> = found.iter().filter(|(c, _)| Some(*c) == least).collect();
-        assert_eq!((least, optima.len(), optima[0].1.len()), (Some(cost), 1, moves), "{optima:?}");
+        let mut plans = Vec::new();
+        enumerate(start, failed, cost + 1, &mut Vec::new(), &mut plans);
+        let least_cost = plans.iter().map(|(cost, _)| *cost).min();
+        let optima: Vec<_> = plans.iter().filter(|(c, _)| Some(*c) == least_cost).collect();
+        assert_eq!((least_cost, optima.len(), optima[0].1.len()), (Some(cost), 1, moves), "{optima:?}");
     }
 }
 
 #[test]
-fn another_start_goal_or_map_changes_the_problem_only() {
+fn start_goal_and_map_are_defined_in_the_problem() {
     let mission = copy_of_mission("ugv");
     let problem = "encodings/ugv/problem.pddl";
     edit(mission.path(), problem, "(robot_at wp1)", "(robot_at wp4)");
@@ -127,28 +129,30 @@ fn another_start_goal_or_map_changes_the_problem_only() {
 }
 
 #[test]
-fn obstacles_that_cost_more_battery_change_the_domain_only() {
+fn battery_usage_is_defined_in_the_domain() {
     let mission = copy_of_mission("ugv");
     let domain = "encodings/ugv/domain.pddl";
     let text = std::fs::read_to_string(mission.path().join(domain)).expect("the domain");
-    let (before, obstacles) = text.split_once("move_with_obstacles").expect("the action");
-    let (obstacles, after) =
+    let (text_before, obstacles) = text.split_once("move_with_obstacles").expect("the action");
+    let (obstacles, text_after) =
         obstacles.split_once("(:durative-action move_in_the_dark").expect("the next action");
-    let thirsty = obstacles.replace("(battery_usage ?fd)", "(* 60 (battery_usage ?fd))");
-    let text = format!("{before}move_with_obstacles{thirsty}(:durative-action move_in_the_dark{after}");
+    let expensive_obstacles = obstacles.replace("(battery_usage ?fd)", "(* 60 (battery_usage ?fd))");
+    let text = format!(
+        "{text_before}move_with_obstacles{expensive_obstacles}(:durative-action move_in_the_dark{text_after}"
+    );
     std::fs::write(mission.path().join(domain), text).expect("the domain is written");
-    // 60 times the battery is more than there is: the obstacles are avoided.
-    let around = [
+    // 60 times the usual consumption exceeds the battery, so the plan avoids the obstacles.
+    let detour = [
         "move wp1 wp2 | fd_amcl_kinect",
         "move wp2 wp3 | fd_amcl_kinect",
         "move wp3 wp6 | fd_amcl_kinect",
         "move_in_the_dark wp6 wp9 | fd_amcl_kinect",
     ];
-    check_in(mission.path(), &[], &around, 508);
+    check_in(mission.path(), &[], &detour, 508);
 }
 
 #[test]
-fn a_safer_mrpt_changes_the_knowledge_base_only() {
+fn safety_of_designs_is_defined_in_the_knowledge_base() {
     let mission = copy_of_mission("ugv");
     let old = ":qa_mrpt_lidar_safety a owl:NamedIndividual , t:QAvalue ; t:isQAtype :safety ; t:hasValue 0.3";
     edit(mission.path(), "ontology/kb/ugv.ttl", old, &old.replace("0.3", "0.9"));
@@ -161,33 +165,33 @@ fn a_safer_mrpt_changes_the_knowledge_base_only() {
 }
 
 #[test]
-fn availability_flows_from_the_knowledge_base() {
+fn availability_comes_from_the_knowledge_base() {
     for file in ["encodings/ugv/problem.pddl", "encodings/uuv/problem.pddl"] {
         let text = std::fs::read_to_string(crate::common::root().join(file)).expect("the problem");
         assert!(!text.contains("fd_"), "{file} says something about designs");
     }
-    let around = [
+    let detour = [
         "move wp1 wp2 | fd_amcl_lidar",
         "move wp2 wp3 | fd_amcl_lidar",
         "move wp3 wp6 | fd_amcl_lidar",
         "move_in_the_dark wp6 wp9 | fd_amcl_lidar",
     ];
-    // A measurement beyond what a design bears.
-    check(&["--set", "ambient_light=0.9"], &around, 516);
+    // A measurement outside the range of the Kinect designs.
+    check(&["--set", "ambient_light=0.9"], &detour, 516);
     check(&["--set", "ambient_light=0.8"], &THROUGH_THE_OBSTACLES, 408);
-    // Two components at once leave the camera: its plain design cannot work in the dark.
+    // If both fail, the camera remains. Its design without flashlight does not work in the dark.
     let camera = [
         "move wp2 wp3 | fd_aruco",
         "move wp3 wp6 | fd_aruco",
         "move_in_the_dark wp6 wp9 | fd_aruco_with_light",
     ];
     check(&["--set", "robot_at=wp2", "--fail", "c_kinect", "--fail", "c_lidar"], &camera, 424);
-    // Of the lidar alone nobody depends.
+    // The optimal plan does not use the lidar.
     check(&["--fail", "c_lidar"], &THROUGH_THE_OBSTACLES, 408);
-    // The knowledge base itself.
+    // The limit is a value of the knowledge base.
     let mission = copy_of_mission("ugv");
     edit(mission.path(), "ontology/kb/ugv.ttl", "t:hasMaximum 0.8", "t:hasMaximum 0.2");
-    check_in(mission.path(), &[], &around, 516);
+    check_in(mission.path(), &[], &detour, 516);
 }
 
 #[test]
@@ -213,12 +217,12 @@ fn without_any_sensor_there_is_no_plan() {
 }
 
 #[test]
-fn the_same_input_gives_the_same_answer() {
+fn answers_are_deterministic() {
     let run = || {
         let mut answer = metaplan(&["plan", "missions/ugv.toml", "--format", "json"]).json();
         answer["statistics"].as_object_mut().expect("statistics").remove("milliseconds");
         answer
     };
-    let first = run();
-    (0..5).for_each(|_| assert_eq!(run(), first));
+    let first_answer = run();
+    (0..5).for_each(|_| assert_eq!(run(), first_answer));
 }

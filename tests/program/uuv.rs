@@ -1,11 +1,11 @@
-//! The UUV mission: before and after the battery drops, and in murky water.
+//! Tests of the UUV mission: with a full and with a low battery, and in murky water.
 
 use crate::common::{metaplan, metaplan_in, root, steps};
 
 fn check(arguments: &[&str], expected: &[&str], cost: i64) {
-    let all: Vec<&str> =
+    let command: Vec<&str> =
         ["plan", "missions/uuv.toml", "--format", "json"].iter().chain(arguments).copied().collect();
-    let outcome = metaplan(&all);
+    let outcome = metaplan(&command);
     assert_eq!(outcome.status, 0, "{outcome:#?}");
     let answer = outcome.json();
     assert_eq!(steps(&answer), expected);
@@ -20,12 +20,12 @@ const INSPECTION: [&str; 2] =
     ["search_pipeline pl1 | fd_search_high, fd_speed_high", "follow_pipeline pl1 | fd_follow, fd_speed_high"];
 
 #[test]
-fn with_a_full_battery_it_searches_and_follows() {
+fn plan_with_a_full_battery() {
     check(&[], &INSPECTION, 28);
 }
 
 #[test]
-fn when_the_battery_drops_it_recharges_first_and_slowly() {
+fn plan_with_a_low_battery_recharges_first() {
     let expected = ["recharge  | fd_speed_low, fd_recharge", INSPECTION[0], INSPECTION[1]];
     check(&["--scenario", "battery_drop"], &expected, 60);
     let answer =
@@ -34,7 +34,7 @@ fn when_the_battery_drops_it_recharges_first_and_slowly() {
 }
 
 #[test]
-fn the_visibility_limits_the_search_height() {
+fn visibility_limits_the_search_height() {
     let low = ["search_pipeline pl1 | fd_search_low, fd_speed_high", INSPECTION[1]];
     check(&["--set", "water_visibility=1.5"], &low, 40);
     let medium = ["search_pipeline pl1 | fd_search_medium, fd_speed_high", INSPECTION[1]];
@@ -43,18 +43,19 @@ fn the_visibility_limits_the_search_height() {
     assert_eq!(outcome.status, 10, "{outcome:#?}");
 }
 
-/// Designs of moving (time, battery for each unit) and of searching (time; battery 1).
+/// Designs for motion (time, battery per unit).
 const SPEEDS: [(i64, i64); 3] = [(6, 2), (4, 5), (2, 10)];
+/// Designs for searching, by their time. Each uses 1 unit of battery.
 const HEIGHTS: [i64; 3] = [6, 4, 2];
 const RESERVE: i64 = 10;
 
-/// All plans with at most five actions and cost at most `limit`, by plain enumeration; each as its cost.
-fn enumerate(battery: i64, stage: usize, actions: usize, cost: i64, limit: i64, found: &mut Vec<i64>) {
+/// Costs of all plans with at most five actions and a cost of at most `limit`, by enumeration.
+fn enumerate(battery: i64, stage: usize, actions: usize, cost: i64, limit: i64, costs: &mut Vec<i64>) {
     if cost > limit || actions > 5 {
         return;
     }
     if stage == 2 {
-        found.push(cost);
+        costs.push(cost);
         return;
     }
     for (time, usage) in SPEEDS {
@@ -64,29 +65,29 @@ fn enumerate(battery: i64, stage: usize, actions: usize, cost: i64, limit: i64, 
         };
         for (duration, used) in work {
             if battery >= used + RESERVE {
-                enumerate(battery - used, stage + 1, actions + 1, cost + duration, limit, found);
+                enumerate(battery - used, stage + 1, actions + 1, cost + duration, limit, costs);
             }
         }
         if battery >= 2 * usage + RESERVE {
-            enumerate(100, stage, actions + 1, cost + 2 * (10 + time), limit, found);
+            enumerate(100, stage, actions + 1, cost + 2 * (10 + time), limit, costs);
         }
     }
 }
 
 #[test]
-fn brute_force_finds_one_optimum_each() {
+fn optima_are_unique_by_brute_force() {
     for (battery, cost) in [(100, 28), (15, 60)] {
-        let mut found = Vec::new();
-        enumerate(battery, 0, 0, 0, 2 * cost, &mut found);
-        found.sort_unstable();
-        assert_eq!(found.first(), Some(&cost), "battery {battery}");
-        assert_ne!(found.get(1), Some(&cost), "battery {battery}: the optimum is not unique");
+        let mut costs = Vec::new();
+        enumerate(battery, 0, 0, 0, 2 * cost, &mut costs);
+        costs.sort_unstable();
+        assert_eq!(costs.first(), Some(&cost), "battery {battery}");
+        assert_ne!(costs.get(1), Some(&cost), "battery {battery}: the optimum is not unique");
     }
 }
 
 #[test]
-fn only_the_designs_that_block_are_named() {
-    // Without thruster 3 only the low speed is left, which would do.
+fn only_blocking_designs_are_listed() {
+    // Without thruster 3 only the low speed is available, but it is sufficient.
     let arguments = ["plan", "missions/uuv.toml", "--fail", "c_sonar", "--fail", "c_thruster_3"];
     let answer = metaplan(&[&arguments[..], &["--format", "json"]].concat());
     assert_eq!((answer.status, answer.json()["blocking"].clone()), (10, serde_json::json!(["fd_follow"])));

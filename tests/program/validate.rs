@@ -1,4 +1,4 @@
-//! `metaplan validate`: the fields of its answer, and the places of its messages.
+//! Tests of `metaplan validate`: the fields of its answer, and the positions of its messages.
 
 use serde_json::{Value, json};
 
@@ -26,18 +26,18 @@ fn validate(domain: &str, problem: &str, plan: &str, arguments: &[&str]) -> Outc
     for (name, text) in [("domain.pddl", domain), ("problem.pddl", problem), ("plan.txt", plan)] {
         std::fs::write(directory.path().join(name), text).expect("a file");
     }
-    let all = ["validate", "domain.pddl", "problem.pddl", "plan.txt"].iter().chain(arguments);
-    metaplan_in(directory.path(), &all.copied().collect::<Vec<_>>(), "")
+    let command = ["validate", "domain.pddl", "problem.pddl", "plan.txt"].iter().chain(arguments);
+    metaplan_in(directory.path(), &command.copied().collect::<Vec<_>>(), "")
 }
 
-/// The exit status and the whole answer.
+/// Checks the exit status and the complete JSON answer.
 fn check(plan: &str, status: i32, expected: &Value) {
     let outcome = validate(DOMAIN, PROBLEM, plan, &["--format", "json"]);
     assert_eq!((outcome.status, &outcome.json()), (status, expected), "{plan}");
 }
 
 #[test]
-fn a_verdict_has_its_fields() {
+fn verdicts_have_the_documented_fields() {
     check(
         "0: (go a b) [5]\n5: (look b) [0.5]",
         0,
@@ -65,7 +65,7 @@ fn a_verdict_has_its_fields() {
 }
 
 #[test]
-fn messages_have_their_place_and_say_what_would_be_right() {
+fn messages_have_a_position_and_a_suggestion() {
     let typo = DOMAIN.replace("(at start (at ?a))", "(at start (att ?a))");
     let outcome = validate(&typo, PROBLEM, "0: (go a b) [5]", &["--format", "json"]);
     assert_eq!(outcome.status, 3, "{outcome:#?}");
@@ -80,9 +80,9 @@ fn messages_have_their_place_and_say_what_would_be_right() {
     assert!(message["help"].as_str().is_some_and(|help| help.contains("`at`")), "{message}");
 }
 
-/// What `plan` writes is a plan, in each format, of plain domains and of explicit ones.
+/// Plans written by `plan` are valid in each format, for plain and explicit domains.
 #[test]
-fn what_is_planned_is_valid_in_each_format() {
+fn plans_are_valid_in_each_format() {
     for mission in ["ugv", "ugv_plain", "uuv", "uuv_plain"] {
         let file = format!("missions/{mission}.toml");
         let cost = metaplan(&["plan", &file, "--format", "json"]).json()["cost"].to_string();

@@ -1,4 +1,4 @@
-//! `metaplan verify` and `metaplan-verify` side by side. All tests of certificates run both, see [`verify_in`].
+//! Agreement of `metaplan verify` and `metaplan-verify`. All tests of certificates run both programs, see [`verify_in`].
 
 use std::path::Path;
 
@@ -7,9 +7,9 @@ use serde_json::{Value, json};
 use crate::certificate::{certificate, change};
 use crate::common::{metaplan, root, verify_in};
 
-/// What is not a certificate at all, what cannot be written, and what takes too long.
+/// Missing certificates, unwritable outputs, and time limits.
 #[test]
-fn both_programs_refuse_alike() {
+fn both_programs_give_the_same_refusals() {
     let directory = tempfile::tempdir().expect("a directory");
     let target = certificate(directory.path(), &["plan", "missions/uuv_plain.toml"]);
     let (nowhere, file) = (format!("{target}/nowhere"), format!("{target}/argument.smt2"));
@@ -29,10 +29,10 @@ fn both_programs_refuse_alike() {
     }
 }
 
-/// Without its knowledge files, which anyone can take out of the manifest, a certificate is about its PDDL files only, and the verdict
-/// says so. With a mission it is about that, and otherwise refused.
+/// The knowledge files can be removed from the manifest. The certificate then covers its PDDL files only, and the verdict states this. If a
+/// mission is given, the certificate must be about this mission.
 #[test]
-fn the_verdict_names_what_was_checked() {
+fn verdicts_state_the_subject_of_the_certificate() {
     use sha2::{Digest as _, Sha256};
     let directory = tempfile::tempdir().expect("a directory");
     let target = certificate(directory.path(), &["plan", "missions/ugv.toml"]);
@@ -41,9 +41,9 @@ fn the_verdict_names_what_was_checked() {
         outcome.stdout.lines().last().unwrap_or_default().to_owned()
     };
     let optimal = "verified: the plan is optimal, metric 408, for";
-    let whole = format!("{optimal} these PDDL files and their knowledge base; not checked: mission");
-    assert_eq!(verdict(&[]), whole);
-    // The digest is what `sha256sum` prints of what it prints of the files.
+    let full_verdict = format!("{optimal} these PDDL files and their knowledge base; not checked: mission");
+    assert_eq!(verdict(&[]), full_verdict);
+    // The digest is the hash of the output of `sha256sum` for these files.
     let lines = ["domain.pddl", "problem.pddl", "knowledge.nt", "origin.json"].map(|name| {
         let text = std::fs::read(Path::new(&target).join(name)).expect("a file");
         format!("{:x}  {name}\n", Sha256::digest(text))
@@ -55,14 +55,14 @@ fn the_verdict_names_what_was_checked() {
     let last = of_mission.stdout.lines().last().unwrap_or_default();
     assert_eq!(last, format!("{optimal} the mission `ugv` with digest {}", &digest[..12]));
     let manifest = Path::new(&target).join("manifest.json");
-    let mut listed: Value =
+    let mut document: Value =
         serde_json::from_str(&std::fs::read_to_string(&manifest).expect("a manifest")).expect("JSON");
-    let files = listed["files"].as_array_mut().expect("files");
+    let files = document["files"].as_array_mut().expect("files");
     files.retain(|file| {
         !["knowledge.nt", "origin.json", "derivations.json"]
             .contains(&file["name"].as_str().unwrap_or_default())
     });
-    std::fs::write(&manifest, listed.to_string()).expect("a manifest");
+    std::fs::write(&manifest, document.to_string()).expect("a manifest");
     change(&target, "problem.pddl", &|text| text.replace("(define (problem ", "(define (problem another-"));
     assert_eq!(
         verdict(&[]),

@@ -1,10 +1,10 @@
-//! Tables and help fit into `COLUMNS`. Without a terminal, tables are not wrapped.
+//! Tests of widths: tables and help fit into `COLUMNS`. Without a terminal, tables are not wrapped.
 
 use std::process::Command;
 
 use crate::common::root;
 
-/// The answer, with `COLUMNS` or without.
+/// Output with the given value of `COLUMNS`, or without it.
 fn answer(arguments: &[&str], columns: Option<&str>) -> String {
     let mut program = Command::new(env!("CARGO_BIN_EXE_metaplan"));
     program.args(arguments).current_dir(root()).env_remove("COLUMNS");
@@ -20,14 +20,14 @@ fn width(text: &str) -> usize {
     text.lines().map(|line| line.chars().count()).max().unwrap_or(0)
 }
 
-/// All words of a text, sorted.
+/// Words of a text, sorted.
 fn words(text: &str) -> Vec<&str> {
     let mut words: Vec<&str> = text.split_whitespace().collect();
     words.sort_unstable();
     words
 }
 
-/// All visible characters.
+/// Visible characters of a text, sorted.
 fn characters(text: &str) -> Vec<char> {
     let mut characters: Vec<char> = text.chars().filter(|character| !character.is_whitespace()).collect();
     characters.sort_unstable();
@@ -35,8 +35,8 @@ fn characters(text: &str) -> Vec<char> {
 }
 
 #[test]
-fn tables_fit_into_the_columns() {
-    for (arguments, columns, fits) in [
+fn tables_fit_into_the_terminal_width() {
+    for (arguments, columns, keeps_words) in [
         (&["plan", "missions/uuv.toml"][..], 80, true),
         (&["plan", "missions/templates/warehouse/mission.toml"], 80, true),
         (&["plan", "missions/templates/warehouse/mission.toml"], 60, true),
@@ -52,7 +52,7 @@ fn tables_fit_into_the_columns() {
         assert!(width(&table(&wide)) > columns, "{arguments:?} is narrow anyway:\n{wide}");
         assert!(width(&table(&narrow)) <= columns, "{arguments:?}:\n{narrow}");
         // Words are broken only if the longest words of the columns do not fit next to each other.
-        if fits {
+        if keeps_words {
             assert_eq!(words(&wide), words(&narrow), "{arguments:?}");
         } else {
             assert_eq!(characters(&wide), characters(&narrow), "{arguments:?}");
@@ -63,7 +63,7 @@ fn tables_fit_into_the_columns() {
 }
 
 #[test]
-fn a_table_in_a_file_is_not_wrapped() {
+fn tables_in_files_are_not_wrapped() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("table").display().to_string();
     let plan = ["plan", "missions/uuv.toml"];
@@ -72,9 +72,9 @@ fn a_table_in_a_file_is_not_wrapped() {
 }
 
 #[test]
-fn help_fits_into_a_line() {
-    let all = answer(&["help"], None);
-    let (_, commands) = all.split_once("\nCommands:\n").expect("commands");
+fn help_fits_into_the_terminal_width() {
+    let overview = answer(&["help"], None);
+    let (_, commands) = overview.split_once("\nCommands:\n").expect("commands");
     let commands = commands.lines().take_while(|line| !line.is_empty());
     let names: Vec<&str> = commands
         .filter_map(|line| line.strip_prefix("  ").filter(|line| !line.starts_with(' ')))
@@ -82,13 +82,13 @@ fn help_fits_into_a_line() {
         .collect();
     assert!(names.len() > 15, "{names:?}");
     for name in names.iter().filter(|name| **name != "help") {
-        for (columns, most) in [(None, 80), (Some("60"), 60), (Some("100"), 100), (Some("300"), 100)] {
+        for (columns, max_width) in [(None, 80), (Some("60"), 60), (Some("100"), 100), (Some("300"), 100)] {
             let help = answer(&["help", name], columns);
-            // Command lines to type are not wrapped.
+            // Command lines are not wrapped, so that they can be copied.
             let is_text = |line: &&str| !line.starts_with("Usage:") && !line.starts_with("  metaplan ");
-            let wide: Vec<&str> =
-                help.lines().filter(is_text).filter(|line| line.chars().count() > most).collect();
-            assert!(wide.is_empty(), "help {name}, {columns:?}: {wide:#?}");
+            let overlong_lines: Vec<&str> =
+                help.lines().filter(is_text).filter(|line| line.chars().count() > max_width).collect();
+            assert!(overlong_lines.is_empty(), "help {name}, {columns:?}: {overlong_lines:#?}");
         }
         let examples = answer(&["help", name], None);
         let examples = examples.split_once("\nExamples:\n").map_or("", |(_, examples)| examples);

@@ -1,4 +1,4 @@
-//! What a crash leaves of a recording.
+//! Tests of recordings after a crash.
 
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::Path;
@@ -11,20 +11,20 @@ use serde_json::Value;
 use super::{decision, decisions, input, run};
 use crate::common::root;
 
-/// So long a message may take to the file; a busy machine is given more.
-const PATIENCE: Duration = Duration::from_secs(30);
+/// Timeout for messages to reach the file, generous for busy machines.
+const TIMEOUT: Duration = Duration::from_secs(30);
 
-/// How many messages of a topic are in a file that may break off.
-pub(super) fn salvaged(file: &Path, topic: &str) -> usize {
+/// Number of messages of a topic in a file that can be truncated.
+pub(super) fn count_readable_messages(file: &Path, topic: &str) -> usize {
     let bytes = std::fs::read(file).expect("the file is read");
     let stream = MessageStream::new_with_options(&bytes, Options::IgnoreEndMagic.into());
     let Ok(stream) = stream else { return 0 };
     stream.map_while(Result::ok).filter(|message| message.channel.topic == topic).count()
 }
 
-/// Starts a run that is recorded, sends each line when the one before is answered, as a replay reads them, and waits until all
-/// answers are in the file.
-fn begun(file: &Path) -> (Child, Vec<Value>) {
+/// Starts a recorded run and sends each line once the previous one is answered, in the order of a replay. Returns when all answers are in
+/// the file.
+fn start_recorded_run(file: &Path) -> (Child, Vec<Value>) {
     let mut child = Command::new(env!("CARGO_BIN_EXE_metaplan"))
         .args(["run", "missions/ugv.toml", "--mcap"])
         .arg(file)
@@ -48,42 +48,42 @@ fn begun(file: &Path) -> (Child, Vec<Value>) {
         }
     }
     child.stdin = Some(pipe);
-    let begun = Instant::now();
-    let handled = |answer: &&Value| {
+    let started = Instant::now();
+    let is_loop_answer = |answer: &&Value| {
         ["ready", "error", "duplicate", "handled"].iter().any(|kind| answer["answer"] == *kind)
     };
-    let wanted = answers.iter().filter(handled).count();
-    while salvaged(file, "/metaplan/loop") < wanted {
-        assert!(begun.elapsed() < PATIENCE, "what was answered is not in the file");
+    let expected_count = answers.iter().filter(is_loop_answer).count();
+    while count_readable_messages(file, "/metaplan/loop") < expected_count {
+        assert!(started.elapsed() < TIMEOUT, "what was answered is not in the file");
         std::thread::sleep(Duration::from_millis(20));
     }
     (child, answers)
 }
 
 #[test]
-fn a_run_that_is_killed_leaves_a_recording_that_can_be_recovered() {
+fn recordings_of_killed_runs_can_be_replayed() {
     let directory = tempfile::tempdir().expect("a directory");
     let file = directory.path().join("run.mcap");
-    let (mut child, answers) = begun(&file);
+    let (mut child, answers) = start_recorded_run(&file);
     child.kill().expect("it is killed");
     child.wait().expect("it ends");
     let bytes = std::fs::read(&file).expect("the file");
     assert!(mcap::read::footer(&bytes).is_err(), "the file was not finished");
-    assert_eq!(salvaged(&file, "/metaplan/events"), input().lines().count());
-    assert_eq!(salvaged(&file, "/diagnostics"), 4);
+    assert_eq!(count_readable_messages(&file, "/metaplan/events"), input().lines().count());
+    assert_eq!(count_readable_messages(&file, "/diagnostics"), 4);
     let replayed = run(&["--events", &file.display().to_string()], "");
     let original: Vec<Value> = answers.into_iter().filter(|answer| answer["answer"] != "planning").collect();
     assert_eq!(decisions(&replayed), original);
     assert!(replayed.stderr.contains("warning[M330]"), "{replayed:#?}");
-    super::others::salvages(&file, input().lines().count());
+    super::others::assert_readable_by_python(&file, input().lines().count());
 }
 
-/// Wherever a file breaks off, all chunks before are read, and nothing else is.
+/// A file that is truncated at any point is read up to its last complete chunk.
 #[test]
-fn a_recording_that_breaks_off_anywhere_is_read_so_far() {
+fn truncated_recordings_are_read_up_to_the_last_chunk() {
     let directory = tempfile::tempdir().expect("a directory");
     let file = directory.path().join("run.mcap");
-    let (mut child, _) = begun(&file);
+    let (mut child, _) = start_recorded_run(&file);
     drop(child.stdin.take());
     child.wait().expect("it ends");
     let bytes = std::fs::read(&file).expect("the file");
@@ -93,11 +93,11 @@ fn a_recording_that_breaks_off_anywhere_is_read_so_far() {
         std::fs::write(&file, &bytes[..length]).expect("a file");
         let outcome = run(&["--events", &file.display().to_string()], "");
         assert_eq!(outcome.status, 0, "{length}: {outcome:#?}");
-        let breaks_off = (1..data_end).contains(&length);
-        assert_eq!(outcome.stderr.contains("M330"), breaks_off, "{length}: {outcome:#?}");
+        let is_truncated = (1..data_end).contains(&length);
+        assert_eq!(outcome.stderr.contains("M330"), is_truncated, "{length}: {outcome:#?}");
         let handled = decisions(&outcome).iter().filter(|answer| answer["answer"] == "handled").count();
-        let whole = salvaged(&file, "/metaplan/events");
-        assert!(handled <= whole + 1, "{length}: {handled} of {whole}");
+        let readable_events = count_readable_messages(&file, "/metaplan/events");
+        assert!(handled <= readable_events + 1, "{length}: {handled} of {readable_events}");
         counts.push(handled);
     }
     assert!(counts.is_sorted() && counts.first() == Some(&1), "{counts:?}");
@@ -106,12 +106,12 @@ fn a_recording_that_breaks_off_anywhere_is_read_so_far() {
 
 #[cfg(unix)]
 #[test]
-fn a_signal_ends_a_recording_as_a_whole() {
+fn signals_complete_the_recording() {
     let directory = tempfile::tempdir().expect("a directory");
     for signal in ["-INT", "-TERM"] {
         let file = directory.path().join(signal);
-        let (mut child, _) = begun(&file);
-        // The end of its input would end it, too.
+        let (mut child, _) = start_recorded_run(&file);
+        // Standard input stays open, as its end would also end the run.
         let input_pipe = child.stdin.take();
         let killed = Command::new("kill").args([signal, &child.id().to_string()]).status().expect("kill");
         assert!(killed.success());

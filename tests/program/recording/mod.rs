@@ -1,4 +1,4 @@
-//! `metaplan run --mcap`, and `--events` of an MCAP file: read by the library of the format, and by others.
+//! Tests of `metaplan run --mcap`, and of `--events` with MCAP files, by the reference library and other implementations.
 
 mod crash;
 mod others;
@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use crate::common::{Outcome, metaplan_in, root};
 
-/// A mission as it may go: measurements, a failure, what is not an event, and what ROS 2 says.
+/// A run with measurements, a failure, invalid lines, and a ROS 2 diagnostics message.
 const EVENTS: [&str; 9] = [
     r#"{"event":"measured","attribute":"ambient_light","value":0.50,"time":1.5}"#,
     r#"{"event":"action_succeeded","action":1}"#,
@@ -28,7 +28,7 @@ fn input() -> String {
     EVENTS.map(|line| line.replace('\n', " ")).join("\n")
 }
 
-/// The answers of a run without what differs from run to run.
+/// Answers of a run without times and progress reports.
 fn decisions(outcome: &Outcome) -> Vec<Value> {
     assert_eq!(outcome.status, 0, "{outcome:#?}");
     outcome.stdout.lines().map(decision).filter(|answer| answer["answer"] != "planning").collect()
@@ -41,11 +41,11 @@ fn decision(line: &str) -> Value {
 }
 
 fn run(arguments: &[&str], input: &str) -> Outcome {
-    let all: Vec<&str> = ["run", "missions/ugv.toml"].iter().chain(arguments).copied().collect();
-    metaplan_in(&root(), &all, input)
+    let command: Vec<&str> = ["run", "missions/ugv.toml"].iter().chain(arguments).copied().collect();
+    metaplan_in(&root(), &command, input)
 }
 
-/// A recorded message: topic, schema, its time, its bytes.
+/// A recorded message: topic, schema, log time, data.
 type Recorded = (String, String, u64, Vec<u8>);
 
 fn messages(file: &Path) -> Vec<Recorded> {
@@ -59,8 +59,8 @@ fn messages(file: &Path) -> Vec<Recorded> {
     stream.map(message).collect()
 }
 
-/// Bytes of CDR, by its definition: each number at a multiple of its size, counted from behind the four octets that say which CDR it is;
-/// texts with their length and a zero at their end; the low byte first.
+/// An encoder of CDR (little-endian): numbers are aligned to their size, counted after the encapsulation header of four octets; strings
+/// have a length prefix and a terminating zero.
 #[derive(Default)]
 struct Cdr(Vec<u8>);
 
@@ -77,9 +77,9 @@ impl Cdr {
     }
 
     fn text(self, text: &str) -> Self {
-        let mut own = self.number(text.len() as u32 + 1);
-        own.0.extend(text.bytes().chain([0]));
-        own
+        let mut encoded = self.number(text.len() as u32 + 1);
+        encoded.0.extend(text.bytes().chain([0]));
+        encoded
     }
 
     fn bytes(self) -> Vec<u8> {
@@ -88,7 +88,7 @@ impl Cdr {
 }
 
 #[test]
-fn what_is_heard_and_answered_is_recorded() {
+fn input_and_answers_are_recorded() {
     let directory = tempfile::tempdir().expect("a directory");
     let file = directory.path().join("run.mcap");
     let name = file.display().to_string();
@@ -132,10 +132,10 @@ fn what_is_heard_and_answered_is_recorded() {
 
     let diagnostics: Vec<&Recorded> = messages.iter().filter(|message| message.0 == "/diagnostics").collect();
     let array = |time: &u64| {
-        let (seconds, rest) = (*time / 1_000_000_000, *time % 1_000_000_000);
-        Cdr::default().number(seconds as u32).number(rest as u32).text("")
+        let (seconds, nanoseconds) = (*time / 1_000_000_000, *time % 1_000_000_000);
+        Cdr::default().number(seconds as u32).number(nanoseconds as u32).text("")
     };
-    let one = |cdr: Cdr, level: u8, message: &str, key: &str, value: &str| {
+    let diagnostic_status = |cdr: Cdr, level: u8, message: &str, key: &str, value: &str| {
         cdr.octet(level).text("").text(message).text("").number(1).text(key).text(value)
     };
     let expected: [&[(u8, &str, &str, &str)]; 4] = [
@@ -149,26 +149,30 @@ fn what_is_heard_and_answered_is_recorded() {
         assert_eq!(schema, "diagnostic_msgs/msg/DiagnosticArray");
         let mut cdr = array(time).number(statuses.len() as u32);
         for (level, message, key, value) in statuses {
-            cdr = one(cdr, *level, message, key, value);
+            cdr = diagnostic_status(cdr, *level, message, key, value);
         }
         assert_eq!(*data, cdr.bytes(), "{statuses:?}");
     }
 }
 
 #[test]
-fn a_recording_replays_to_the_same_decisions() {
+fn replayed_recordings_give_the_same_decisions() {
     let original = decisions(&run(&[], &input()));
     for form in ["json", "string"] {
         let directory = tempfile::tempdir().expect("a directory");
         let file = directory.path().join("run.mcap").display().to_string();
-        let again = directory.path().join("again.mcap").display().to_string();
+        let second_file = directory.path().join("again.mcap").display().to_string();
         let recorded = run(&["--mcap", &file, "--mcap-events", form], &input());
         assert_eq!(decisions(&recorded), original);
-        let replayed = run(&["--events", &file, "--mcap", &again], "");
+        let replayed = run(&["--events", &file, "--mcap", &second_file], "");
         assert_eq!(decisions(&replayed), original, "{form}");
         assert_eq!(replayed.stderr, "");
-        assert_eq!(decisions(&run(&["--events", &again], "")), original, "{form}: a recording of a replay");
-        // From standard input, too, where bytes come as they come.
+        assert_eq!(
+            decisions(&run(&["--events", &second_file], "")),
+            original,
+            "{form}: a recording of a replay"
+        );
+        // Replay from standard input, which is not seekable in general.
         let bytes = std::fs::File::open(&file).expect("the file");
         let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_metaplan"));
         let output = child.args(["run", "missions/ugv.toml"]).current_dir(root()).stdin(bytes).output();
@@ -179,9 +183,9 @@ fn a_recording_replays_to_the_same_decisions() {
     }
 }
 
-/// Times decide, too: a design that has come back counts after `settle` seconds.
+/// A replay must use the recorded times, because decisions depend on time (a recovered design is used after `settle` seconds).
 #[test]
-fn a_replay_has_the_times_of_the_recording() {
+fn replays_use_the_recorded_times() {
     let directory = tempfile::tempdir().expect("a directory");
     let file = directory.path().join("run.mcap");
     let name = file.display().to_string();
@@ -192,14 +196,14 @@ fn a_replay_has_the_times_of_the_recording() {
             |bytes: Vec<u8>| serde_json::from_slice::<Value>(&bytes).expect("JSON")["nanoseconds"].clone();
         events.map(|(.., bytes)| time(bytes)).collect()
     };
-    let again = directory.path().join("again.mcap");
-    run(&["--events", &name, "--mcap", &again.display().to_string()], "");
-    assert_eq!(times(&file), times(&again));
+    let second_file = directory.path().join("again.mcap");
+    run(&["--events", &name, "--mcap", &second_file.display().to_string()], "");
+    assert_eq!(times(&file), times(&second_file));
     assert_eq!(times(&file).len(), 2);
 }
 
 #[test]
-fn every_channel_says_how_it_is_read() {
+fn channels_declare_their_encoding_and_schema() {
     let directory = tempfile::tempdir().expect("a directory");
     for (form, encoding, schemas) in [
         ("json", "json", [("metaplan.Event", "jsonschema"), ("metaplan.Answer", "jsonschema")]),
@@ -214,13 +218,14 @@ fn every_channel_says_how_it_is_read() {
         assert!(summary.chunk_indexes.iter().all(|chunk| chunk.message_start_time > 0));
         for channel in summary.channels.values() {
             let schema = channel.schema.as_ref().expect("a schema");
-            let found = (channel.message_encoding.as_str(), schema.name.as_str(), schema.encoding.as_str());
+            let declared =
+                (channel.message_encoding.as_str(), schema.name.as_str(), schema.encoding.as_str());
             let expected = match channel.topic.as_str() {
                 "/diagnostics" => ("cdr", "diagnostic_msgs/msg/DiagnosticArray", "ros2msg"),
                 "/metaplan/events" => (encoding, schemas[0].0, schemas[0].1),
                 _ => (encoding, schemas[1].0, schemas[1].1),
             };
-            assert_eq!(found, expected, "{}", channel.topic);
+            assert_eq!(declared, expected, "{}", channel.topic);
             if schema.encoding == "jsonschema" {
                 let definition: Value = serde_json::from_slice(&schema.data).expect("JSON");
                 assert_eq!(definition["type"], "object");
@@ -230,9 +235,9 @@ fn every_channel_says_how_it_is_read() {
     }
 }
 
-/// The definitions in recordings are those that the node for ROS 2 speaks.
+/// The message definitions in recordings are the ones of the ROS 2 interfaces.
 #[test]
-fn definitions_are_those_of_ros() {
+fn message_definitions_match_the_ros_interfaces() {
     let directory = tempfile::tempdir().expect("a directory");
     let file = directory.path().join("run.mcap");
     run(&["--mcap", &file.display().to_string()], "");
@@ -242,21 +247,21 @@ fn definitions_are_those_of_ros() {
     let text = String::from_utf8(schema.data.to_vec()).expect("text");
     let rule = format!("{}\nMSG: ", "=".repeat(80));
     let mut parts = text.split(&rule);
-    let first = ("diagnostic_msgs/DiagnosticArray", parts.next().expect("the array"));
-    let rest = parts.map(|part| part.split_once('\n').expect("a name and a definition"));
-    let all: Vec<(&str, &str)> = std::iter::once(first).chain(rest).collect();
-    assert_eq!(all.len(), 5);
-    for (name, definition) in all {
+    let main_definition = ("diagnostic_msgs/DiagnosticArray", parts.next().expect("the array"));
+    let dependencies = parts.map(|part| part.split_once('\n').expect("a name and a definition"));
+    let definitions: Vec<(&str, &str)> = std::iter::once(main_definition).chain(dependencies).collect();
+    assert_eq!(definitions.len(), 5);
+    for (name, definition) in definitions {
         let (package, message) = name.split_once('/').expect("a package");
         let file = root().join(format!("integrations/ros/interfaces/{package}/msg/{message}.msg"));
-        let own = std::fs::read_to_string(&file).expect("the definition");
+        let interface = std::fs::read_to_string(&file).expect("the definition");
         let plain = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
-        assert_eq!(plain(definition), plain(&own), "{name}");
+        assert_eq!(plain(definition), plain(&interface), "{name}");
     }
 }
 
 #[test]
-fn nothing_is_overwritten_and_what_is_no_recording_is_refused() {
+fn files_are_not_overwritten_and_invalid_recordings_are_refused() {
     let directory = tempfile::tempdir().expect("a directory");
     let file = directory.path().join("run.mcap");
     let name = file.display().to_string();
@@ -271,19 +276,19 @@ fn nothing_is_overwritten_and_what_is_no_recording_is_refused() {
     let nowhere = run(&["--mcap", "nowhere/run.mcap"], "");
     assert_eq!(nowhere.status, 3, "{nowhere:#?}");
 
-    let replay = |bytes: &[u8], said: &str| {
+    let replay = |bytes: &[u8], reason: &str| {
         std::fs::write(&file, bytes).expect("a file");
         let outcome = run(&["--events", &name], "");
         assert_eq!(outcome.status, 3, "{outcome:#?}");
-        assert!(outcome.stderr.contains("M101") && outcome.stderr.contains(said), "{said}: {outcome:#?}");
+        assert!(outcome.stderr.contains("M101") && outcome.stderr.contains(reason), "{reason}: {outcome:#?}");
     };
     replay(b"\x89PNG\r\n\x1a\n and more that is a picture", "it is not an MCAP file");
     let mut empty = std::io::Cursor::new(Vec::new());
     mcap::Writer::new(&mut empty).expect("a writer").finish().expect("a file");
     replay(empty.get_ref(), "neither /metaplan/events nor diagnostic_msgs/msg/DiagnosticArray");
-    let whole = directory.path().join("whole.mcap");
-    run(&["--mcap", &whole.display().to_string()], &input());
-    let mut damaged = std::fs::read(&whole).expect("the file");
+    let complete = directory.path().join("whole.mcap");
+    run(&["--mcap", &complete.display().to_string()], &input());
+    let mut damaged = std::fs::read(&complete).expect("the file");
     let place = damaged.windows(10).position(|bytes| bytes == b"ambient_li").expect("an event");
     damaged[place] = b'A';
     replay(&damaged, "CRC");

@@ -1,4 +1,4 @@
-//! Recordings read by others, and files of others read: `mcap` and `mcap-ros2-support` for Python. `.ci/mcap-peers` installs them.
+//! Exchange of recordings with other implementations: `mcap` and `mcap-ros2-support` for Python, installed by `.ci/mcap-peers`.
 #![expect(clippy::print_stdout, reason = "what is skipped says so")]
 
 use std::io::Write as _;
@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use super::{decisions, input, run};
 use crate::common::root;
 
-/// The Python to be used, if it has the packages; otherwise it is said why not.
+/// Python executable with the packages, if available. Otherwise prints the reason for skipping.
 fn python() -> Option<String> {
     let python = std::env::var("METAPLAN_PYTHON").unwrap_or_else(|_| "python3".to_owned());
     let output = Command::new(&python).args(["-c", "import mcap.reader, mcap_ros2.decoder"]).output();
@@ -28,7 +28,7 @@ fn python() -> Option<String> {
     }
 }
 
-/// What the script says, line by line.
+/// Output of the script, one JSON value per line.
 fn peer(python: &str, arguments: &[&str], input: &str) -> Vec<Value> {
     let mut child = Command::new(python)
         .arg(root().join("tests/recording/peer.py"))
@@ -45,23 +45,23 @@ fn peer(python: &str, arguments: &[&str], input: &str) -> Vec<Value> {
     text.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect()
 }
 
-/// That `mcap` for Python finds so many events in a file that breaks off.
-pub(super) fn salvages(file: &Path, events: usize) {
+/// Asserts that `mcap` for Python reads this number of events from a truncated file.
+pub(super) fn assert_readable_by_python(file: &Path, events: usize) {
     let Some(python) = python() else { return };
-    let found = peer(&python, &["salvage", &file.display().to_string()], "");
-    assert_eq!(found[0]["/metaplan/events"], events, "{found:?}");
-    assert_eq!(found[0]["/diagnostics"], 4, "{found:?}");
+    let counts = peer(&python, &["salvage", &file.display().to_string()], "");
+    assert_eq!(counts[0]["/metaplan/events"], events, "{counts:?}");
+    assert_eq!(counts[0]["/diagnostics"], 4, "{counts:?}");
 }
 
 #[test]
-fn a_recording_is_read_by_python() {
+fn python_reads_recordings() {
     let Some(python) = python() else { return };
     let directory = tempfile::tempdir().expect("a directory");
     for form in ["json", "string"] {
         let file = directory.path().join(form).display().to_string();
         let outcome = run(&["--mcap", &file, "--mcap-events", form], &input());
         let messages = peer(&python, &["read", &file], "");
-        let of = |topic: &str| -> Vec<&Value> { messages.iter().filter(|m| m[0] == topic).collect() };
+        let on_topic = |topic: &str| -> Vec<&Value> { messages.iter().filter(|m| m[0] == topic).collect() };
         let unwrapped = |message: &Value| match form {
             "json" => message[3].clone(),
             _ => serde_json::from_str(message[3]["data"].as_str().expect("a text")).expect("JSON"),
@@ -72,9 +72,9 @@ fn a_recording_is_read_by_python() {
             outcome.stdout.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
         assert_eq!(answers, written, "{form}");
         let lines: Vec<Value> =
-            of("/metaplan/events").into_iter().map(|m| unwrapped(m)["line"].clone()).collect();
+            on_topic("/metaplan/events").into_iter().map(|m| unwrapped(m)["line"].clone()).collect();
         assert_eq!(lines, (1..=input().lines().count()).map(|line| json!(line)).collect::<Vec<_>>());
-        let arrays = of("/diagnostics");
+        let arrays = on_topic("/diagnostics");
         assert_eq!(arrays.len(), 4);
         for array in &arrays {
             let (time, stamp) = (array[2].as_u64().expect("a time"), &array[3]["header"]["stamp"]);
@@ -94,9 +94,9 @@ fn a_recording_is_read_by_python() {
     }
 }
 
-/// What ROS 2 records, in each way of compression.
+/// Replays recordings with ROS 2 diagnostics, for each compression method.
 #[test]
-fn a_file_of_others_is_replayed() {
+fn recordings_of_other_tools_are_replayed() {
     let Some(python) = python() else { return };
     let directory = tempfile::tempdir().expect("a directory");
     let array = |message: &str, key: &str, value: &str| {
