@@ -1,4 +1,4 @@
-//! Tables of the fields of formats, from their JSON Schemas.
+//! Generates the tables of fields in the documentation of formats, from their JSON Schemas.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -6,51 +6,51 @@ use std::fmt::Write as _;
 use metaplan::schemas::{FORMATS, schema};
 use serde_json::{Map, Value};
 
-/// All formats of answers.
+/// Tables for all formats of answers.
 pub fn answers() -> String {
     let mut text = String::new();
     for (name, about, _) in FORMATS {
         if ["manifest", "study", "event", "answer"].contains(&name) {
             continue;
         }
-        let whole = schema(name).expect("a schema");
-        let alternatives = match whole["anyOf"].as_array() {
+        let schema_of_format = schema(name).expect("a schema");
+        let alternatives = match schema_of_format["anyOf"].as_array() {
             Some(alternatives) => alternatives.clone(),
-            None => vec![whole.clone()],
+            None => vec![schema_of_format.clone()],
         };
-        let mut last = String::new();
+        let mut previous_format = String::new();
         for alternative in alternatives {
             let format = alternative["properties"]["format"]["const"].as_str().expect("a format").to_owned();
-            if format != last {
+            if format != previous_format {
                 let _ = writeln!(text, "{}## {format}\n", if text.is_empty() { "" } else { "\n" });
             }
-            let from =
+            let source =
                 about.strip_prefix("metaplan ").map_or(about.to_owned(), |command| format!("`{command}`"));
-            let said = alternative["description"].as_str().expect("a description");
-            let _ = writeln!(text, "From {from}. {said}\n\n| field | type | means |\n|---|---|---|");
-            for row in Table::of(&whole, &alternative, &format, "") {
+            let description = alternative["description"].as_str().expect("a description");
+            let _ = writeln!(text, "From {source}. {description}\n\n| field | type | means |\n|---|---|---|");
+            for row in Table::of(&schema_of_format, &alternative, &format, "") {
                 let _ = writeln!(text, "| `{}` | {} | {} |", row.path, row.kind, row.means);
             }
-            last = format;
+            previous_format = format;
         }
     }
     text
 }
 
-/// All keys of a manifest.
+/// Table of all keys of a manifest.
 pub fn manifest() -> String {
     keys("manifest")
 }
 
-/// All keys of a study.
+/// Table of all keys of a study.
 pub fn study() -> String {
     keys("study")
 }
 
 fn keys(format: &str) -> String {
-    let whole = schema(format).expect("a schema");
+    let root_schema = schema(format).expect("a schema");
     let mut text = "| key | type | means | unless said otherwise |\n|---|---|---|---|\n".to_owned();
-    for row in Table::of(&whole, &whole, format, "NAME") {
+    for row in Table::of(&root_schema, &root_schema, format, "NAME") {
         let _ = writeln!(text, "| `{}` | {} | {} | {} |", row.path, row.kind, row.means, row.default);
     }
     text
@@ -63,21 +63,22 @@ struct Row {
     default: String,
 }
 
-/// The fields of a format, by the places where they stand.
+/// The rows of a table, in the order of the schema.
 struct Table<'a> {
     definitions: &'a Value,
     format: &'a str,
-    /// What stands for the name of a field that has any name; none where such fields are not listed.
+    /// Placeholder for fields with arbitrary names. Empty if such fields are not listed.
     any: &'a str,
     rows: Vec<Row>,
+    /// Paths that have a row.
     seen: BTreeSet<String>,
-    /// Parts that are listed already, and where.
+    /// Definitions whose fields are listed already, with their paths.
     listed: Vec<(String, String)>,
 }
 
 impl<'a> Table<'a> {
-    fn of(whole: &'a Value, part: &Value, format: &'a str, any: &'a str) -> Vec<Row> {
-        let definitions = &whole["$defs"];
+    fn of(root_schema: &'a Value, part: &Value, format: &'a str, any: &'a str) -> Vec<Row> {
+        let definitions = &root_schema["$defs"];
         let (rows, seen, listed) = (Vec::new(), BTreeSet::new(), Vec::new());
         let mut table = Self { definitions, format, any, rows, seen, listed };
         table.object(part, "");
@@ -99,7 +100,7 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// Lists fields that say of which kind an object is.
+    /// Adds rows for fields with a constant per variant, which determine the kind of an object.
     fn kinds(&mut self, schema: &Value, path: &str) {
         let variants = variants(schema);
         let first = variants.first().and_then(|first| first["properties"].as_object()).into_iter().flatten();
@@ -122,25 +123,25 @@ impl<'a> Table<'a> {
         if !self.seen.insert(path.clone()) {
             return;
         }
-        let own = field["description"].as_str().map(ToOwned::to_owned);
+        let description = field["description"].as_str().map(ToOwned::to_owned);
         let mut kind = self.kind(field);
         let mut inner = self.inside(field, &mut path);
         let described = inner.as_ref().and_then(|(_, schema)| schema["description"].as_str());
-        let mut means = own.or_else(|| described.map(ToOwned::to_owned)).unwrap_or_default();
+        let mut means = description.or_else(|| described.map(ToOwned::to_owned)).unwrap_or_default();
         if let Some((name, schema)) = &inner {
             let root = schema["properties"]["format"]["const"].as_str();
-            let elsewhere = match (root, name.as_str()) {
+            let reference = match (root, name.as_str()) {
                 (Some(format), _) => Some(format!("As `{format}`.")),
                 (_, "Details") if self.format != "metaplan-error/1" => {
                     Some("Each as in `metaplan-error/1`.".to_owned())
                 }
                 _ => {
-                    let before = self.listed.iter().find(|(listed, _)| !name.is_empty() && listed == name);
-                    before.map(|(_, path)| format!("As `{path}`."))
+                    let earlier = self.listed.iter().find(|(listed, _)| !name.is_empty() && listed == name);
+                    earlier.map(|(_, path)| format!("As `{path}`."))
                 }
             };
-            if let Some(elsewhere) = elsewhere {
-                means.extend([if means.is_empty() { "" } else { " " }, &elsewhere]);
+            if let Some(reference) = reference {
+                means.extend([if means.is_empty() { "" } else { " " }, &reference]);
                 inner = None;
             }
         }
@@ -157,7 +158,7 @@ impl<'a> Table<'a> {
             Value::Null | Value::Object(_) => String::new(),
             Value::Array(list) if list.is_empty() => "none".to_owned(),
             Value::String(text) if text.is_empty() => "empty".to_owned(),
-            other => format!("`{other}`"),
+            value => format!("`{value}`"),
         };
         let cells = |text: &str| text.replace('|', "\\|").replace('\n', " ");
         self.rows.push(Row { path: path.clone(), kind, means: cells(&means), default });
@@ -167,7 +168,8 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// Where the fields of a value lie: through references, lists, and what may be null.
+    /// Name and schema of the object that contains the fields of a value, found through references, lists and nullable types.
+    /// Extends the path accordingly.
     fn inside(&self, field: &Value, path: &mut String) -> Option<(String, Value)> {
         let (mut name, mut schema) = (String::new(), field.clone());
         loop {
@@ -181,17 +183,17 @@ impl<'a> Table<'a> {
                 let _ = write!(path, ".{}", self.any);
                 schema = schema["additionalProperties"].clone();
             } else {
-                let some: Vec<&Value> =
+                let alternatives: Vec<&Value> =
                     variants(&schema).into_iter().filter(|variant| variant["type"] != "null").collect();
-                match some[..] {
-                    [only] if !has_properties(&schema) => schema = only.clone(),
+                match alternatives[..] {
+                    [alternative] if !has_properties(&schema) => schema = alternative.clone(),
                     _ => return Some((name, schema)),
                 }
             }
         }
     }
 
-    /// The type of a value in words.
+    /// The type of a value, in words.
     fn kind(&self, field: &Value) -> String {
         let mut kinds: Vec<String> = Vec::new();
         let mut add = |kind: String| {
@@ -201,8 +203,8 @@ impl<'a> Table<'a> {
         };
         match &field["type"] {
             Value::String(kind) => add(self.plain(kind, field)),
-            Value::Array(several) => {
-                several.iter().filter_map(Value::as_str).for_each(|kind| add(self.plain(kind, field)));
+            Value::Array(types) => {
+                types.iter().filter_map(Value::as_str).for_each(|kind| add(self.plain(kind, field)));
             }
             _ => {}
         }
@@ -221,14 +223,14 @@ impl<'a> Table<'a> {
                 format!("list of {}", plural(&self.kind(&field["items"])))
             }
             "array" => "list".to_owned(),
-            // The path ends in a name, and this is the type of what has it.
+            // The path already ends with the placeholder, so the row describes the values.
             "object" if field["additionalProperties"].is_object() && !self.any.is_empty() => {
                 self.kind(&field["additionalProperties"])
             }
             "object" if field["additionalProperties"].is_object() => {
                 format!("object of {}", plural(&self.kind(&field["additionalProperties"])))
             }
-            other => other.to_owned(),
+            simple => simple.to_owned(),
         }
     }
 
@@ -245,7 +247,7 @@ impl<'a> Table<'a> {
 
 fn plural(kind: &str) -> String {
     match kind.split_once(' ') {
-        Some((first, rest)) => format!("{first}s {rest}"),
+        Some((noun, qualifier)) => format!("{noun}s {qualifier}"),
         None if kind == "any" => "any".to_owned(),
         None => format!("{kind}s"),
     }
@@ -259,7 +261,7 @@ fn has_properties(schema: &Value) -> bool {
     schema["properties"].as_object().is_some_and(|fields: &Map<String, Value>| !fields.is_empty())
 }
 
-/// Whether a value has fields. What may be a word, too, is described in its own row.
+/// Returns `true` if a value has fields of its own. Enumerations that also have object variants are described in their own row.
 fn has_fields(schema: &Value) -> bool {
     if variants(schema).iter().any(|variant| variant["type"] == "string") {
         return false;

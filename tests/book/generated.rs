@@ -1,4 +1,4 @@
-//! Parts of the book that are generated, between `<!-- generated: NAME -->` and `<!-- end of NAME -->`. A part that is out of date fails;
+//! Generated parts of the book, between `<!-- generated: NAME -->` and `<!-- end of NAME -->`. An outdated part fails the test.
 //! `METAPLAN_BLESS=1` rewrites it.
 
 use std::fmt::Write as _;
@@ -10,7 +10,7 @@ use metaplan::codes;
 use crate::common::{metaplan, root};
 use crate::{formats, help, is_blessing};
 
-/// A page, the name of a part of it, and what makes that.
+/// Page, name of the part, and its generator.
 type Part = (&'static str, &'static str, fn() -> String);
 
 const PARTS: [Part; 8] = [
@@ -24,7 +24,7 @@ const PARTS: [Part; 8] = [
     ("docs/reference/tomasys.md", "values", || terms("owl:DatatypeProperty")),
 ];
 
-/// One test for each part, and one for the picture of the tutorial.
+/// One test per part, and one for the picture of the tutorial.
 pub fn trials() -> Vec<Trial> {
     let mut trials: Vec<Trial> = PARTS
         .into_iter()
@@ -36,27 +36,30 @@ pub fn trials() -> Vec<Trial> {
     trials
 }
 
-/// Compares a generated part of a page with what it is generated from.
+/// Compares a part of a page with the generated content.
 fn check(page: &str, name: &str, content: &str) -> Result<(), Failed> {
-    // Several tests rewrite the same page as a whole.
+    // Several tests can rewrite the same page, each as a whole, so they must not run concurrently.
     static WRITING: Mutex<()> = Mutex::new(());
     let _guard = WRITING.lock();
     let path = root().join(page);
     let text = std::fs::read_to_string(&path).expect("a page");
     let (begin, end) = (format!("<!-- generated: {name} -->\n"), format!("<!-- end of {name} -->"));
-    let (before, rest) = text.split_once(&begin).ok_or_else(|| format!("{page} has no part {name}"))?;
-    let (shown, after) = rest.split_once(&end).ok_or_else(|| format!("{page}: {name} has no end"))?;
+    let (text_before, remainder) =
+        text.split_once(&begin).ok_or_else(|| format!("{page} has no part {name}"))?;
+    let (current, text_after) =
+        remainder.split_once(&end).ok_or_else(|| format!("{page}: {name} has no end"))?;
     let content = format!("\n{content}\n");
-    if shown == content {
+    if current == content {
         return Ok(());
     }
     if is_blessing() {
-        std::fs::write(&path, format!("{before}{begin}{content}{end}{after}")).expect("the page is written");
+        std::fs::write(&path, format!("{text_before}{begin}{content}{end}{text_after}"))
+            .expect("the page is written");
     }
     Err("out of date; METAPLAN_BLESS=1 rewrites it".into())
 }
 
-/// The picture of the tutorial is what the program draws.
+/// Compares the picture of the tutorial with the one that the program draws.
 fn check_picture() -> Result<(), Failed> {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("plan.svg").display().to_string();
@@ -64,7 +67,7 @@ fn check_picture() -> Result<(), Failed> {
     assert_eq!(outcome.status, 0, "{outcome:?}");
     let drawn = std::fs::read_to_string(&file).expect("a picture");
     let path = root().join("docs/pictures/warehouse-timeline.svg");
-    if std::fs::read_to_string(&path).is_ok_and(|shown| shown == drawn) {
+    if std::fs::read_to_string(&path).is_ok_and(|published| published == drawn) {
         return Ok(());
     }
     if is_blessing() {
@@ -73,7 +76,7 @@ fn check_picture() -> Result<(), Failed> {
     Err("out of date; METAPLAN_BLESS=1 redraws it".into())
 }
 
-/// All codes, by their first letter.
+/// Tables of all codes, by their first letter.
 fn codes() -> String {
     let mut text = String::new();
     let mut letter = "";
@@ -92,11 +95,11 @@ fn codes() -> String {
     text
 }
 
-/// The terms of the TOMASys metamodel that are of this kind, with what it says of them.
+/// Table of the terms of the TOMASys metamodel of a kind, with their descriptions from the metamodel.
 fn terms(kind: &str) -> String {
     let metamodel = std::fs::read_to_string(root().join("ontology/kb/tomasys.ttl")).expect("the metamodel");
-    let properties = kind != "owl:Class";
-    let mut table = if properties {
+    let is_property = kind != "owl:Class";
+    let mut table = if is_property {
         "| term | of | is | means |\n|---|---|---|---|\n".to_owned()
     } else {
         "| term | means |\n|---|---|\n".to_owned()
@@ -105,20 +108,26 @@ fn terms(kind: &str) -> String {
     for statement in metamodel.split("\n\n").filter(|statement| statement.starts_with(':')) {
         let (head, _) = statement.split_once(" ;").expect("a statement");
         let (term, kinds) = head.split_once(" a ").expect("a type");
-        if !kinds.split(" , ").any(|its| its == kind) {
+        if !kinds.split(" , ").any(|term_kind| term_kind == kind) {
             continue;
         }
-        let said = |property: &str| {
+        let value_of = |property: &str| {
             let line = statement.lines().find_map(|line| line.trim().strip_prefix(property))?;
             Some(line.trim().trim_end_matches([';', '.']).trim().to_owned())
         };
-        let comment = said("rdfs:comment").unwrap_or_else(|| panic!("{term} has no comment"));
+        let comment = value_of("rdfs:comment").unwrap_or_else(|| panic!("{term} has no comment"));
         let comment = comment.trim_end_matches("@en").trim_matches('"').to_owned();
         let name = term.trim_start_matches(':');
         count += 1;
-        if properties {
-            let (of, is) = (said("rdfs:domain").expect("a domain"), said("rdfs:range").expect("a range"));
-            let _ = writeln!(table, "| `{name}` | {} | {} | {comment} |", classes(&of), range(&is));
+        if is_property {
+            let (domain, range_of_term) =
+                (value_of("rdfs:domain").expect("a domain"), value_of("rdfs:range").expect("a range"));
+            let _ = writeln!(
+                table,
+                "| `{name}` | {} | {} | {comment} |",
+                classes(&domain),
+                range(&range_of_term)
+            );
         } else {
             let _ = writeln!(table, "| `{name}` | {comment} |");
         }
@@ -134,7 +143,7 @@ fn classes(list: &str) -> String {
     names.collect::<Vec<_>>().join(", ")
 }
 
-/// A range as the page says it: classes, a datatype, or the values of an enumeration.
+/// Text of a range: classes, a datatype, or the values of an enumeration.
 fn range(text: &str) -> String {
     let Some((_, values)) = text.split_once("owl:oneOf (") else { return classes(text) };
     let values = values.split(')').next().expect("a list").split_whitespace();

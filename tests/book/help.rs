@@ -1,19 +1,19 @@
-//! The commands as the program's own help has them, in tables.
+//! Generates the tables of commands from the program's help.
 
 use std::fmt::Write as _;
 
 use crate::common::metaplan;
 
-/// What every command has, and the page says once.
+/// Options of all commands, which the page describes once.
 const COMMON: [&str; 4] = ["--format", "-q, --quiet", "-v, --verbose", "-h, --help"];
 
-/// An argument or an option, with what the help says of it.
+/// An argument or option, with its description.
 struct Entry {
     head: String,
     text: String,
 }
 
-/// All commands, each with its arguments and options.
+/// Sections for all commands, with their arguments and options.
 pub fn commands() -> String {
     let mut text = String::new();
     for (name, _) in subcommands(&help(&[])) {
@@ -35,15 +35,15 @@ fn help(command: &[&str]) -> String {
     outcome.stdout
 }
 
-/// The commands that a help lists, but for `help` itself.
+/// Names and descriptions of the commands in a help text, except `help`.
 fn subcommands(help: &str) -> Vec<(String, String)> {
-    let Some((_, rest)) = help.split_once("\nCommands:\n") else { return Vec::new() };
-    let lines = rest.lines().take_while(|line| !line.is_empty());
-    // The description of a command may take several lines; further lines are indented more.
+    let Some((_, command_lines)) = help.split_once("\nCommands:\n") else { return Vec::new() };
+    let lines = command_lines.lines().take_while(|line| !line.is_empty());
+    // Continuation lines of a description are indented more than the first line.
     let lines = lines.filter_map(|line| line.strip_prefix("  ").filter(|line| !line.starts_with(' ')));
-    let named = lines.filter_map(|line| line.split_once("  "));
-    let named = named.map(|(name, about)| (name.to_owned(), about.trim().to_owned()));
-    named.filter(|(name, _)| name != "help").collect()
+    let entries = lines.filter_map(|line| line.split_once("  "));
+    let entries = entries.map(|(name, about)| (name.to_owned(), about.trim().to_owned()));
+    entries.filter(|(name, _)| name != "help").collect()
 }
 
 fn describe(command: &[&str], help: &str, text: &mut String) {
@@ -65,24 +65,24 @@ fn is_common(head: &str) -> bool {
     COMMON.iter().any(|common| head == *common || head.starts_with(&format!("{common} ")))
 }
 
-/// The arguments and options of a help: each begins less than ten columns from the left, and its text follows farther in. Paragraphs
-/// are wrapped; an empty line, or a value of an enumeration, begins another one.
+/// Arguments and options in a help text. An entry is indented by less than ten columns, its description by more. Paragraphs are wrapped; an
+/// empty line or a value of an enumeration begins a new paragraph.
 fn entries(help: &str) -> Vec<Entry> {
-    let mut found: Vec<Entry> = Vec::new();
-    let (mut is_list, mut begins) = (false, true);
+    let mut entries: Vec<Entry> = Vec::new();
+    let (mut is_list, mut begins_paragraph) = (false, true);
     for line in help.lines() {
         let indent = line.len() - line.trim_start().len();
         let content = line.trim();
         if line.ends_with(':') && indent == 0 {
             is_list = matches!(content, "Arguments:" | "Options:");
         } else if is_list && (1..10).contains(&indent) && content.starts_with(['-', '<', '[']) {
-            found.push(Entry { head: content.replace('|', "\\|"), text: String::new() });
-            begins = true;
+            entries.push(Entry { head: content.replace('|', "\\|"), text: String::new() });
+            begins_paragraph = true;
         } else if content.is_empty() {
-            begins = true;
-        } else if let Some(entry) = found.last_mut().filter(|_| is_list) {
+            begins_paragraph = true;
+        } else if let Some(entry) = entries.last_mut().filter(|_| is_list) {
             let content = content.replace('|', "\\|");
-            let begins = std::mem::take(&mut begins);
+            let begins_paragraph = std::mem::take(&mut begins_paragraph);
             match content.strip_prefix("- ").and_then(|value| value.split_once(':')) {
                 Some((value, text)) => {
                     let separator = if entry.text.ends_with(':') { ' ' } else { ';' };
@@ -90,7 +90,7 @@ fn entries(help: &str) -> Vec<Entry> {
                     let _ = write!(entry.text, "{separator}{space}`{value}`: {}", text.trim());
                 }
                 None if content == "Possible values:" => entry.text.push_str(". Values:"),
-                None if !begins => {
+                None if !begins_paragraph => {
                     let _ = write!(entry.text, " {content}");
                 }
                 None if content.starts_with('[') => {
@@ -103,5 +103,5 @@ fn entries(help: &str) -> Vec<Entry> {
             }
         }
     }
-    found
+    entries
 }

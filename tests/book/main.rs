@@ -1,23 +1,23 @@
-//! The README and the book: every block of every page is run as a reader would run it, or compared with the file that it shows.
+//! Tests of README and book: every block of every page is run like a reader would run it, or compared with the file that it shows.
 //!
-//! Each page is one test, run in a shell in a fresh copy of the project, with `metaplan` and `metaplan-verify` in the path. By default these
-//! are the programs that cargo has built for the tests; with `METAPLAN_PROGRAMS=DIR` in the environment, `metaplan` is the program that
-//! `cargo install` has put into that directory, as in `.ci/newcomer`.
+//! Each page is one test. It runs in a shell in a fresh copy of the project, with `metaplan` and `metaplan-verify` in the path. By default
+//! these are the programs that cargo builds for the tests. With `METAPLAN_PROGRAMS=DIR`, `metaplan` is the program in that directory,
+//! where `cargo install` has put it, as in `.ci/newcomer`.
 //!
-//! The fence of a block, and the comment before the block, say how it is checked:
+//! The fence of a block, and the comment before the block, determine the check:
 //!
-//! | block | is checked how |
+//! | block | check |
 //! |---|---|
-//! | `console` | A session: a line `$ COMMAND`, then its output, standard error included. `[..]` matches anything within a line, a line `...` any lines. A status other than 0 must be shown by `$ echo $?`. |
-//! | `sh` | A script, which must succeed; its output is not shown. For commands of several lines, so that they can be pasted. |
+//! | `console` | A session: lines `$ COMMAND`, each with its output, including standard error. `[..]` matches any text within a line, and a line `...` matches any lines. A status other than 0 must be shown by `$ echo $?`. |
+//! | `sh` | A script, which must succeed. Its output is not shown. For commands of several lines, so that they can be pasted. |
 //! | `rust` | A doctest, see `src/lib.rs`. |
-//! | `text` | Not at all: output of earlier commands, or a drawing. |
-//! | any, after `<!-- file: PATH -->` | It must be a part of that file, line by line. |
-//! | `console`, `sh`, after `<!-- needs: NAME, … -->` | As above, where each of these programs is in the path and each of the [`page::Fixture`]s is there. `METAPLAN_BOOK_REQUIRES=NAME,…` makes it an error that one of these is missing. |
-//! | `console`, after `<!-- input ends after: SECONDS -->` | As above; the standard input of its last command stays open for that time. |
-//! | any, after `<!-- not run: REASON -->` | Not at all. The reason names the CI stage or the test that runs it, if there is one. |
+//! | `text` | None: output of earlier commands, or a drawing. |
+//! | any, after `<!-- file: PATH -->` | The block must be a part of that file, line by line. |
+//! | `console`, `sh`, after `<!-- needs: NAME, … -->` | As above, if each name is a program in the path or an available [`page::Fixture`]. With `METAPLAN_BOOK_REQUIRES=NAME,…`, missing ones are an error. |
+//! | `console`, after `<!-- input ends after: SECONDS -->` | As above; the standard input of the last command stays open for this time. |
+//! | any, after `<!-- not run: REASON -->` | None. The reason names the CI stage or the test that runs the block, if any. |
 //!
-//! `METAPLAN_BLESS=1` in the environment writes the output that differs into the pages. Elided parts stay elided where they still match.
+//! `METAPLAN_BLESS=1` writes differing output into the pages. Elided parts remain elided if they still match.
 
 mod formats;
 mod generated;
@@ -74,7 +74,7 @@ fn pages() -> Vec<String> {
     pages
 }
 
-/// Runs the pages of the book one after another in one copy of the project, as for a reader of the whole book.
+/// Runs the pages of the book in order in one copy of the project, like a reader of the whole book.
 fn pages_in_one_clone() -> Result<(), Failed> {
     let summary = std::fs::read_to_string(root().join("docs/SUMMARY.md")).expect("the summary");
     let links = summary.lines().filter_map(|line| line.split_once("](")?.1.split_once(')'));
@@ -113,7 +113,7 @@ impl Page {
         self.blocks.iter().any(Block::has_commands)
     }
 
-    /// The test of this page. Its kind, which the runner prints, lists what is missing for some of the blocks.
+    /// The test of this page. Its kind, which the runner prints, lists missing programs and fixtures.
     fn trial(self) -> Trial {
         let mut missing: Vec<String> = self.blocks.iter().flat_map(Block::missing).collect();
         missing.sort();
@@ -146,7 +146,7 @@ impl Page {
         if faults.is_empty() { Ok(()) } else { Err(Failed::from(faults.join("\n"))) }
     }
 
-    /// Runs blocks in their order in one session. Returns the differences from what the page shows.
+    /// Runs blocks in order in one session. Returns the differences from the page.
     fn run(&self, session: &Session, blocks: &[&Block]) -> Vec<String> {
         let mut blessed = self.text.clone();
         let mut faults = Vec::new();
@@ -176,6 +176,6 @@ impl Page {
 }
 
 fn is_part_of(lines: &str, file: &str) -> bool {
-    let whole = std::fs::read_to_string(root().join(Path::new(file))).unwrap_or_default();
-    format!("\n{whole}").contains(&format!("\n{lines}"))
+    let file_text = std::fs::read_to_string(root().join(Path::new(file))).unwrap_or_default();
+    format!("\n{file_text}").contains(&format!("\n{lines}"))
 }

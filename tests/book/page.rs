@@ -1,4 +1,4 @@
-//! The fenced blocks of a page, with what the comment before each block says of it.
+//! Fenced blocks of a page, with the instructions in the comment before each block.
 
 use std::path::{Path, PathBuf};
 
@@ -40,7 +40,7 @@ impl Block {
         self.has_commands() && self.missing().next().is_none()
     }
 
-    /// Returns what the block needs and this machine does not have.
+    /// Programs and fixtures that the block needs and this machine does not have.
     pub fn missing(&self) -> impl Iterator<Item = String> {
         self.needs.iter().filter(|name| !is_available(name)).cloned()
     }
@@ -108,8 +108,8 @@ pub fn blocks(page: &str) -> Vec<Block> {
 /// An empty block with this fence, after this comment.
 fn block(line: usize, fence: &str, comment: &str) -> Block {
     let mark = |name: &str| {
-        let rest = comment.trim().strip_prefix("<!--")?.trim_start().strip_prefix(name)?;
-        Some(rest.trim().trim_end_matches("-->").trim().to_owned())
+        let argument = comment.trim().strip_prefix("<!--")?.trim_start().strip_prefix(name)?;
+        Some(argument.trim().trim_end_matches("-->").trim().to_owned())
     };
     let kind = if let Some(file) = mark("file:") {
         Kind::File(file)
@@ -121,7 +121,7 @@ fn block(line: usize, fence: &str, comment: &str) -> Block {
             "sh" => Kind::Script,
             "rust" => Kind::Rust,
             "text" => Kind::Text,
-            other => Kind::Unknown(other.to_owned()),
+            unknown => Kind::Unknown(unknown.to_owned()),
         }
     };
     let names = mark("needs:").unwrap_or_default();

@@ -1,7 +1,6 @@
 //! The shell in which the commands of a page are run.
-//!
-//! All commands of a page become one script, so that directories, variables and the status of the last command carry over as they do at a
-//! prompt. After each command the script prints a separator with the command's status.
+//! All commands of a page become one script. So directories, variables and the status of the last command carry over, as at a prompt.
+//! After each command the script prints a separator with the command's status.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -37,7 +36,7 @@ pub struct Outcome {
 }
 
 impl Session {
-    /// Returns `true` if this machine has a shell of Unix.
+    /// Returns `true` if this machine has a Unix shell.
     pub fn is_possible() -> bool {
         cfg!(unix) && Command::new("sh").args(["-c", "true"]).status().is_ok()
     }
@@ -45,7 +44,7 @@ impl Session {
     pub fn new() -> Self {
         let directory = tempfile::tempdir().expect("a directory");
         copy_project(&directory);
-        // `metaplan-verify` is built with the tests in any case: installing it would compile everything with other features.
+        // `metaplan-verify` is always the one built with the tests. Installing it would compile everything again with other features.
         let built = verifier().parent().expect("a folder").display().to_string();
         let installed = std::env::var("METAPLAN_PROGRAMS").ok();
         let path = std::env::var("PATH").unwrap_or_default();
@@ -53,7 +52,7 @@ impl Session {
         Self { directory, path: folders.join(":") }
     }
 
-    /// Runs blocks one after another. Returns an outcome for each block.
+    /// Runs blocks in order. Returns an outcome per block.
     pub fn run(&self, blocks: &[&Block]) -> Vec<Outcome> {
         for fixture in FIXTURES
             .iter()
@@ -78,7 +77,7 @@ impl Session {
                     Some(seconds) => write!(script, "sleep {seconds} | {command}"),
                     None => write!(script, "{command}"),
                 };
-                // The status of this command is what the next one finds in `$?`.
+                // Restores the status for the next command, which may read `$?`.
                 script +=
                     "\nstatus_of_step=$?; printf '\\036%s\\036' $status_of_step; (exit $status_of_step)\n";
             }
@@ -97,20 +96,20 @@ impl Session {
         self.directory.path().join("metaplan")
     }
 
-    /// Returns everything that a script prints.
+    /// Output of a script.
     fn shell(&self, script: &str) -> String {
         let file = self.directory.path().join("script");
         std::fs::write(&file, script).expect("the script is written");
         let mut shell = Command::new("sh");
         shell.arg(file).current_dir(self.place()).env("PATH", &self.path).env_remove("CLICOLOR_FORCE");
-        // Independent of the language of the machine, and of a repository around the temporary directory.
+        // The output must not depend on the machine's language, or on a repository around the temporary directory.
         shell.env("LC_ALL", "C").env("GIT_CEILING_DIRECTORIES", std::env::temp_dir());
         let output = shell.stdin(Stdio::null()).output().expect("the shell runs");
         String::from_utf8(output.stdout).expect("UTF-8")
     }
 }
 
-/// Compares the results of a block's commands, which are the next ones, with what the block shows.
+/// Compares the results of a block's commands with the block. Takes one result per command from the iterator.
 fn compare<'a>(block: &Block, steps: &[Step], results: &mut impl Iterator<Item = (&'a str, i32)>) -> Outcome {
     let (mut text, mut faults) = (String::new(), Vec::new());
     if steps.is_empty() {
@@ -124,8 +123,8 @@ fn compare<'a>(block: &Block, steps: &[Step], results: &mut impl Iterator<Item =
         let output = without_progress(output);
         let shows_status = steps.get(number + 1).is_some_and(|next| next.command == "echo $?");
         if status != 0 && !shows_status {
-            let unshown = if block.kind == Kind::Script { &*output } else { "the page does not show that" };
-            faults.push(format!("`{}` ends with status {status}: {unshown}", step.command));
+            let detail = if block.kind == Kind::Script { &*output } else { "the page does not show that" };
+            faults.push(format!("`{}` ends with status {status}: {detail}", step.command));
         }
         if block.kind == Kind::Script {
             continue;
@@ -144,7 +143,7 @@ fn compare<'a>(block: &Block, steps: &[Step], results: &mut impl Iterator<Item =
     Outcome { text, faults }
 }
 
-/// Copies the files of the project that git would copy; without git, those that the commands of pages may use.
+/// Copies the project's files as git would. Without git, copies the folders that the commands of pages use.
 fn copy_project(directory: &TempDir) {
     let place = directory.path().join("metaplan");
     let mut git = Command::new("git");
@@ -159,7 +158,7 @@ fn copy_project(directory: &TempDir) {
     let names = String::from_utf8(files.stdout).expect("UTF-8");
     for name in names.split('\0').filter(|name| !name.is_empty()) {
         let (source, target) = (root().join(name), place.join(name));
-        // A file that was removed and not yet committed is still listed.
+        // Removed files are listed until the removal is committed.
         if source.is_file() {
             std::fs::create_dir_all(target.parent().expect("a parent")).expect("a folder");
             std::fs::copy(source, target).expect("a copy");

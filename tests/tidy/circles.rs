@@ -1,7 +1,7 @@
-//! Which file imports from which, and where that leads in a circle.
+//! Test that the modules of a crate do not import from each other in a cycle.
 //!
-//! A file imports from another where a path of it (`use` or in place) leads into the other's module. What is below `#[cfg(test)]` does not
-//! count: a test may look at everything.
+//! A file imports from another one if one of its paths (`use` or inline) refers to a module there. Code below `#[cfg(test)]` is ignored,
+//! because tests can import from any module.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -10,7 +10,7 @@ use petgraph::algo::tarjan_scc;
 use petgraph::graphmap::DiGraphMap;
 use syn::visit::{self, Visit};
 
-/// Crates without circles.
+/// Crates that must not have import cycles.
 const CRATES: [&str; 15] = [
     "crates/diagnostics/src",
     "crates/pddl/src",
@@ -29,10 +29,10 @@ const CRATES: [&str; 15] = [
     "src",
 ];
 
-/// A module as its path below the crate, without `crate`.
+/// Path of a module below the crate, without `crate`.
 pub type Module = Vec<String>;
 
-/// The module that a file holds.
+/// Module of a file.
 fn module(path: &str, folder: &str) -> Module {
     let inner = path.strip_prefix(folder).expect("below the folder").trim_start_matches('/');
     let mut parts: Module = inner.trim_end_matches(".rs").split('/').map(str::to_owned).collect();
@@ -42,61 +42,65 @@ fn module(path: &str, folder: &str) -> Module {
     parts
 }
 
-/// The modules that a file's paths lead to.
+/// Collects the modules to which the paths of a file refer.
 struct Paths<'m> {
-    own: &'m Module,
-    known: &'m BTreeSet<Module>,
-    /// Modules of other crates that the root of this one hands on.
+    /// Module of the file.
+    module: &'m Module,
+    /// All modules of the crate.
+    modules: &'m BTreeSet<Module>,
+    /// Names that the crate root re-exports from other crates.
     foreign: &'m BTreeSet<String>,
-    found: BTreeSet<Module>,
+    imports: BTreeSet<Module>,
 }
 
 impl Paths<'_> {
     fn add(&mut self, segments: &[String]) {
-        let mut rest = segments;
-        let mut path = match rest.first().map(String::as_str) {
-            // The command line calls the library by its name.
+        let mut remaining = segments;
+        let mut path = match remaining.first().map(String::as_str) {
+            // The command line refers to the library by its name.
             Some("crate" | "metaplan") => Vec::new(),
-            _ => self.own.clone(),
+            _ => self.module.clone(),
         };
-        while let Some(first @ ("crate" | "metaplan" | "self" | "super")) = rest.first().map(String::as_str) {
+        while let Some(first @ ("crate" | "metaplan" | "self" | "super")) =
+            remaining.first().map(String::as_str)
+        {
             if first == "super" {
                 path.pop();
             }
-            rest = &rest[1..];
+            remaining = &remaining[1..];
         }
-        if path.is_empty() && rest.first().is_some_and(|first| self.foreign.contains(first)) {
+        if path.is_empty() && remaining.first().is_some_and(|first| self.foreign.contains(first)) {
             return;
         }
-        path.extend(rest.iter().cloned());
-        // An item of a module is found in the module.
-        while !self.known.contains(&path) && !path.is_empty() {
+        path.extend(remaining.iter().cloned());
+        // Removes names of items, down to a module.
+        while !self.modules.contains(&path) && !path.is_empty() {
             path.pop();
         }
-        // What names no module of the crate is an item of the file, or of another crate.
-        let leads_away = path.len() > self.own.len() || !path.is_empty() || segments[0] == "crate";
-        if path != *self.own && leads_away {
-            self.found.insert(path);
+        // A path without a module of the crate refers to an item of the file or of another crate.
+        let is_import = path.len() > self.module.len() || !path.is_empty() || segments[0] == "crate";
+        if path != *self.module && is_import {
+            self.imports.insert(path);
         }
     }
 
-    fn tree(&mut self, tree: &syn::UseTree, before: &[String]) {
-        let with = |name: &syn::Ident| [before, &[name.to_string()]].concat();
+    fn tree(&mut self, tree: &syn::UseTree, prefix: &[String]) {
+        let path_to = |name: &syn::Ident| [prefix, &[name.to_string()]].concat();
         match tree {
-            syn::UseTree::Path(path) => self.tree(&path.tree, &with(&path.ident)),
-            syn::UseTree::Name(name) => self.add(&with(&name.ident)),
-            syn::UseTree::Rename(name) => self.add(&with(&name.ident)),
-            syn::UseTree::Glob(_) => self.add(before),
-            syn::UseTree::Group(group) => group.items.iter().for_each(|item| self.tree(item, before)),
+            syn::UseTree::Path(path) => self.tree(&path.tree, &path_to(&path.ident)),
+            syn::UseTree::Name(name) => self.add(&path_to(&name.ident)),
+            syn::UseTree::Rename(name) => self.add(&path_to(&name.ident)),
+            syn::UseTree::Glob(_) => self.add(prefix),
+            syn::UseTree::Group(group) => group.items.iter().for_each(|item| self.tree(item, prefix)),
         }
     }
 }
 
-/// What the root of a crate hands on of others: `pub use ::other::{name}`.
+/// Names that the root of a crate re-exports from other crates: `pub use ::other::{name}`.
 #[derive(Default)]
-struct HandedOn(BTreeSet<String>);
+struct Reexports(BTreeSet<String>);
 
-impl HandedOn {
+impl Reexports {
     fn tree(&mut self, tree: &syn::UseTree) {
         match tree {
             syn::UseTree::Path(path) => self.tree(&path.tree),
@@ -108,7 +112,7 @@ impl HandedOn {
     }
 }
 
-impl<'a> Visit<'a> for HandedOn {
+impl<'a> Visit<'a> for Reexports {
     fn visit_item_use(&mut self, item: &'a syn::ItemUse) {
         if item.leading_colon.is_some() && matches!(item.vis, syn::Visibility::Public(_)) {
             self.tree(&item.tree);
@@ -125,7 +129,7 @@ fn is_for_tests(attributes: &[syn::Attribute]) -> bool {
 
 impl<'a> Visit<'a> for Paths<'_> {
     fn visit_item_use(&mut self, item: &'a syn::ItemUse) {
-        // What begins with `::` is another crate, though a module of this one may have its name.
+        // A leading `::` refers to another crate, even if a module of this crate has the same name.
         if item.leading_colon.is_none() {
             self.tree(&item.tree, &[]);
         }
@@ -152,30 +156,35 @@ impl<'a> Visit<'a> for Paths<'_> {
     }
 }
 
-/// For each file of a crate the files from which it imports.
+/// For each module of a crate, the modules that it imports from.
 pub fn imports(files: &[(String, String)], folder: &str) -> BTreeMap<Module, BTreeSet<Module>> {
-    let own: Vec<_> = files.iter().filter(|(path, _)| Path::new(path).starts_with(folder)).collect();
-    let known: BTreeSet<Module> = own.iter().map(|(path, _)| module(path, folder)).collect();
+    let crate_files: Vec<_> = files.iter().filter(|(path, _)| Path::new(path).starts_with(folder)).collect();
+    let modules: BTreeSet<Module> = crate_files.iter().map(|(path, _)| module(path, folder)).collect();
     let is_tests = |path: &str| path.ends_with("/tests.rs") || path.contains("/tests/");
     let parsed =
         |path: &str, text: &str| syn::parse_file(text).unwrap_or_else(|error| panic!("{path}: {error}"));
-    let mut handed = HandedOn::default();
-    for (path, text) in own.iter().filter(|(path, _)| module(path, folder).is_empty()) {
-        handed.visit_file(&parsed(path, text));
+    let mut reexports = Reexports::default();
+    for (path, text) in crate_files.iter().filter(|(path, _)| module(path, folder).is_empty()) {
+        reexports.visit_file(&parsed(path, text));
     }
     let mut imports: BTreeMap<Module, BTreeSet<Module>> = BTreeMap::new();
-    for (path, text) in own.iter().filter(|(path, _)| !is_tests(path)) {
-        let own = module(path, folder);
-        let mut paths = Paths { own: &own, known: &known, foreign: &handed.0, found: BTreeSet::new() };
+    for (path, text) in crate_files.iter().filter(|(path, _)| !is_tests(path)) {
+        let module_of_file = module(path, folder);
+        let mut paths = Paths {
+            module: &module_of_file,
+            modules: &modules,
+            foreign: &reexports.0,
+            imports: BTreeSet::new(),
+        };
         paths.visit_file(&parsed(path, text));
-        let found = paths.found;
-        // A library and a program of one crate are one root.
-        imports.entry(own).or_default().extend(found);
+        let targets = paths.imports;
+        // The roots of a library and a program of the same crate are one module.
+        imports.entry(module_of_file).or_default().extend(targets);
     }
     imports
 }
 
-/// One circle through each group of files that import each other.
+/// One cycle for each group of modules that import from each other (strongly connected component).
 fn circles(imports: &BTreeMap<Module, BTreeSet<Module>>) -> Vec<String> {
     let graph: DiGraphMap<&Module, ()> =
         imports.iter().flat_map(|(from, to)| to.iter().map(move |to| (from, to))).collect();
@@ -183,22 +192,22 @@ fn circles(imports: &BTreeMap<Module, BTreeSet<Module>>) -> Vec<String> {
     groups.map(|group| shortest(&group.into_iter().collect(), imports)).collect()
 }
 
-/// The shortest circle through the first file of a group.
+/// Shortest cycle through the first module of a group, by breadth-first search.
 fn shortest(group: &BTreeSet<&Module>, imports: &BTreeMap<Module, BTreeSet<Module>>) -> String {
     let first = *group.first().expect("a group has files");
     let mut paths = vec![vec![first]];
-    let mut seen = BTreeSet::new();
+    let mut visited = BTreeSet::new();
     let mut next = 0;
     while let Some(path) = paths.get(next).cloned() {
         next += 1;
-        for to in imports.get(*path.last().expect("a path has a start")).into_iter().flatten() {
-            if to == first {
+        for target in imports.get(*path.last().expect("a path has a start")).into_iter().flatten() {
+            if target == first {
                 let names = path.iter().chain([&first]).map(|module| format!("crate::{}", module.join("::")));
                 let names: Vec<_> = names.collect();
                 return format!("{} (a group of {})", names.join(" -> "), group.len());
             }
-            if group.contains(to) && seen.insert(to) {
-                paths.push([path.clone(), vec![to]].concat());
+            if group.contains(target) && visited.insert(target) {
+                paths.push([path.clone(), vec![target]].concat());
             }
         }
     }
@@ -206,19 +215,19 @@ fn shortest(group: &BTreeSet<&Module>, imports: &BTreeMap<Module, BTreeSet<Modul
 }
 
 #[test]
-fn nothing_imports_in_a_circle() {
+fn crates_have_no_import_cycles() {
     let files = super::files();
-    let found: Vec<String> = CRATES
+    let cycles: Vec<String> = CRATES
         .iter()
         .flat_map(|folder| {
             circles(&imports(&files, folder)).into_iter().map(move |circle| format!("{folder}: {circle}"))
         })
         .collect();
-    assert!(found.is_empty(), "imports in a circle:\n{}", found.join("\n"));
+    assert!(cycles.is_empty(), "imports in a circle:\n{}", cycles.join("\n"));
 }
 
 #[test]
-fn a_circle_is_found() {
+fn import_cycles_are_detected() {
     let file = |path: &str, text: &str| (format!("x/src/{path}"), text.to_owned());
     let files = [
         file("lib.rs", "mod a; mod b; mod c;"),
@@ -228,7 +237,7 @@ fn a_circle_is_found() {
     ];
     assert_eq!(circles(&imports(&files, "x/src")), ["crate::a -> crate::c -> crate::a (a group of 2)"]);
     assert!(circles(&imports(&files[..3], "x/src")).is_empty());
-    // What the root has of another crate leads out of this one; what it has of its own does not.
+    // A re-export of another crate's item is not an import within this crate. A re-export of an own item is.
     for (root, expected) in [("pub use ::other::c; mod a;", 0), ("pub use a::c; mod a;", 1)] {
         let files = [file("lib.rs", root), file("a.rs", "use crate::c::Item;")];
         assert_eq!(circles(&imports(&files, "x/src")).len(), expected, "{root}");

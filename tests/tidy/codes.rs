@@ -1,24 +1,25 @@
-//! Every code that a crate's source gives is in a table, with what it means; and every code of a table is given.
+//! Test of the tables of error codes: every code in the source of a crate is listed, and every listed code is used.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use metaplan::codes::{self, Code};
 
-/// The crates that have a table, and the letters of codes.
+/// Crates with a table of codes.
 const TABLES: [&str; 10] =
     ["rules", "ontology", "pddl", "task", "probabilistic", "mission", "verify", "src", "ros", "fleet"];
+/// First letters of codes.
 const LETTERS: &str = "EMNOPQR";
 
-/// The codes that stand in a text as words, outside of comments and tests.
-fn given(text: &str) -> BTreeSet<String> {
-    let own = text.split("#[cfg(test)]").next().unwrap_or(text);
-    let lines = own.lines().filter(|line| !line.trim_start().starts_with("//"));
+/// Codes in a text, except for comments and tests.
+fn codes_in(text: &str) -> BTreeSet<String> {
+    let library_part = text.split("#[cfg(test)]").next().unwrap_or(text);
+    let lines = library_part.lines().filter(|line| !line.trim_start().starts_with("//"));
     let words = lines.flat_map(|line| line.split(|c: char| !(c.is_alphanumeric() || c == '_')));
     let is_code = |word: &&str| codes::is_code(word) && word.starts_with(|c| LETTERS.contains(c));
     words.filter(is_code).map(str::to_owned).collect()
 }
 
-/// The crate that a file belongs to, if it has a table.
+/// Crate of a file, if it has a table.
 fn owner(path: &str) -> Option<&'static str> {
     let folder = path
         .trim_start_matches("crates/")
@@ -35,45 +36,52 @@ fn is_table(path: &str) -> bool {
 
 type ByCrate = BTreeMap<&'static str, BTreeSet<String>>;
 
-/// By crate: the codes that its files give, and those of its table. What `metaplan-ros` and `metaplan-fleet` give is listed in the facade, their only neighbour.
-fn found() -> (ByCrate, ByCrate) {
+/// For each crate, the codes in its sources and in its table. The facade lists the codes of `metaplan-ros` and `metaplan-fleet`.
+fn codes_by_crate() -> (ByCrate, ByCrate) {
     let (mut used, mut listed) = (BTreeMap::new(), BTreeMap::new());
     for (path, text) in super::files() {
         let is_source = path.starts_with("src/") || path.contains("/src/");
-        let Some(own) = owner(&path).filter(|_| is_source && !path.contains("/tests")) else { continue };
-        let own = match path.as_str() {
+        let Some(crate_name) = owner(&path).filter(|_| is_source && !path.contains("/tests")) else {
+            continue;
+        };
+        let crate_name = match path.as_str() {
             "src/codes/ros.rs" => "ros",
             "src/codes/fleet.rs" => "fleet",
-            _ => own,
+            _ => crate_name,
         };
         let codes: &mut BTreeMap<_, BTreeSet<String>> = if is_table(&path) { &mut listed } else { &mut used };
         let quoted = |text: &str| -> BTreeSet<String> {
-            let quoted = text.split('"').skip(1).step_by(2).filter(|word| codes::is_code(word));
-            quoted.map(str::to_owned).collect()
+            let words = text.split('"').skip(1).step_by(2).filter(|word| codes::is_code(word));
+            words.map(str::to_owned).collect()
         };
-        codes.entry(own).or_default().extend(if is_table(&path) { quoted(&text) } else { given(&text) });
+        codes.entry(crate_name).or_default().extend(if is_table(&path) {
+            quoted(&text)
+        } else {
+            codes_in(&text)
+        });
     }
     (used, listed)
 }
 
 #[test]
-fn every_code_has_a_meaning_and_every_meaning_a_code() {
-    let (used, listed) = found();
-    let all: BTreeSet<&String> = listed.values().flatten().collect();
-    let mut wrong = Vec::new();
+fn used_codes_and_listed_codes_agree() {
+    let (used, listed) = codes_by_crate();
+    let all_listed: BTreeSet<&String> = listed.values().flatten().collect();
+    let mut differences = Vec::new();
     for table in TABLES {
         let (used, listed) = (&used[table], &listed[table]);
-        let unknown = used.iter().filter(|code| !all.contains(code));
-        wrong.extend(unknown.map(|code| format!("{table} gives {code}, which is in no table")));
+        let unknown = used.iter().filter(|code| !all_listed.contains(code));
+        differences.extend(unknown.map(|code| format!("{table} gives {code}, which is in no table")));
         let unused = listed.difference(used);
-        wrong.extend(unused.map(|code| format!("{code} is in the table of {table}, which never gives it")));
+        differences
+            .extend(unused.map(|code| format!("{code} is in the table of {table}, which never gives it")));
     }
-    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
-    let known: Vec<&str> = codes::all().iter().map(|code| code.code).collect();
-    assert_eq!(known, all.into_iter().collect::<Vec<_>>(), "each code once, in order");
+    assert!(differences.is_empty(), "{}", differences.join("\n"));
+    let exported_codes: Vec<&str> = codes::all_listed().iter().map(|code| code.code).collect();
+    assert_eq!(exported_codes, all_listed.into_iter().collect::<Vec<_>>(), "each code once, in order");
 }
 
-/// Each is a sentence, and says something of its own.
+/// Entries are sentences, and meaning, cause and remedy differ.
 #[test]
 fn entries_of_tables_are_sentences() {
     for Code { code, meaning, cause, remedy } in codes::all() {
@@ -87,8 +95,8 @@ fn entries_of_tables_are_sentences() {
 }
 
 #[test]
-fn codes_are_told_from_other_words() {
+fn codes_are_distinguished_from_other_words() {
     let text = "// M999\nlet a = \"M101\"; // no\nuse x::I256; error[O102]: R104 <{name}>\n#[cfg(test)]\nmod tests { \"P100\" }";
     let expected: BTreeSet<String> = ["M101", "O102", "R104"].map(str::to_owned).into();
-    assert_eq!(given(text), expected);
+    assert_eq!(codes_in(text), expected);
 }

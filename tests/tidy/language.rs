@@ -1,6 +1,6 @@
-//! Language of comments and documents: counts phrases and names that CONTRIBUTING.md advises against, and fails above a ceiling per folder.
+//! Test of the language of comments and documents: counts discouraged phrases and names (see CONTRIBUTING.md), with a ceiling per folder.
 //!
-//! A ceiling is the figure that was reached. Lower it when a folder improves; never raise it.
+//! A ceiling is the best figure reached so far. It may be lowered, but not raised.
 
 use std::path::Path;
 
@@ -105,7 +105,7 @@ impl Patterns {
         counts.phrases += self.phrases.iter().map(occurrences).sum::<u64>();
     }
 
-    /// Counts comments and variables of a Rust file. Only the first line of a doc comment has first words.
+    /// Counts comments and variables of a Rust file. Only the first line of a doc comment is checked for first words.
     fn count_rust(&self, text: &str, counts: &mut Counts) {
         let mut prose = String::new();
         let mut is_inside_doc = false;
@@ -143,13 +143,13 @@ fn comments_and_names_stay_below_the_ceilings() {
             patterns.count_rust(text, &mut counts);
         }
         assert!(counts.words > 0, "{folder} has no comments");
-        let reached = (
+        let rates = (
             rate(counts.phrases, counts.words, 10_000),
             rate(counts.first_words, counts.docs, 1_000),
             rate(counts.variables, counts.lets, 1_000),
         );
-        if reached.0 > phrases || reached.1 > first_words || reached.2 > variables {
-            excess.push(format!("ceiling(\"{folder}\", {}, {}, {}),", reached.0, reached.1, reached.2));
+        if rates.0 > phrases || rates.1 > first_words || rates.2 > variables {
+            excess.push(format!("ceiling(\"{folder}\", {}, {}, {}),", rates.0, rates.1, rates.2));
         }
     }
     assert!(excess.is_empty(), "above the ceiling (phrases, first words, variables):\n{}", excess.join("\n"));
@@ -164,10 +164,10 @@ fn markdown_stays_below_its_ceiling() {
         let text = std::fs::read_to_string(root.join(path)).expect("text");
         patterns.count_prose(&text, &mut counts);
     }
-    let reached = rate(counts.phrases, counts.words, 10_000);
+    let phrase_rate = rate(counts.phrases, counts.words, 10_000);
     assert!(
-        reached <= MARKDOWN_CEILING,
-        "{reached} phrases per 10,000 words; the ceiling is {MARKDOWN_CEILING}"
+        phrase_rate <= MARKDOWN_CEILING,
+        "{phrase_rate} phrases per 10,000 words; the ceiling is {MARKDOWN_CEILING}"
     );
 }
 

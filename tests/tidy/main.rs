@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 const FILE_LINES: usize = 800;
 const FUNCTION_LINES: usize = 100;
 
-/// Folder, and what its source must not mention.
+/// Folders, and the names that must not occur in their code.
 const FORBIDDEN: [(&str, &[&str]); 14] = [
     ("ontology/src", &["planner::", "pddl::", "std::time"]),
     ("rules/src", &["ontology::", "planner::", "std::fs", "std::time"]),
@@ -40,7 +40,7 @@ const FORBIDDEN: [(&str, &[&str]); 14] = [
     ("src/cli", &["horned", "oxrdf", "varisat", "crepe", "json!"]),
 ];
 
-/// Crates that only one file or folder may name.
+/// Crates that only one file or folder may use.
 const SINGLE_FILE: [(&str, &str); 6] = [
     ("horned_owl", "ontology/src/horned/"),
     ("varisat::", "encodings/src/sat/"),
@@ -50,41 +50,41 @@ const SINGLE_FILE: [(&str, &str); 6] = [
     ("mcap::", "src/recording/"),
 ];
 
-fn rust_files(directory: &Path, found: &mut Vec<PathBuf>) {
+fn rust_files(directory: &Path, files: &mut Vec<PathBuf>) {
     let Ok(entries) = std::fs::read_dir(directory) else { return };
     let mut paths: Vec<_> = entries.filter_map(|entry| entry.ok().map(|entry| entry.path())).collect();
     paths.sort();
     for path in paths {
         if path.is_dir() && !path.ends_with("target") {
-            rust_files(&path, found);
+            rust_files(&path, files);
         } else if path.extension().is_some_and(|extension| extension == "rs") {
-            found.push(path);
+            files.push(path);
         }
     }
 }
 
-/// All Rust files of the workspace, relative to its root, with their text.
+/// All Rust files of the workspace, with paths relative to its root, and their texts.
 fn files() -> Vec<(String, String)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let mut found = Vec::new();
+    let mut paths = Vec::new();
     for folder in ["src", "ontology", "rules", "encodings", "crates", "integrations", "tests", "benches"] {
-        rust_files(&root.join(folder), &mut found);
+        rust_files(&root.join(folder), &mut paths);
     }
     let relative =
         |path: PathBuf| path.strip_prefix(root).expect("below the root").to_string_lossy().replace('\\', "/");
-    found
+    paths
         .into_iter()
         .map(|path| (relative(path.clone()), std::fs::read_to_string(path).expect("text")))
         .collect()
 }
 
-/// Fails with all offenders at once.
+/// Fails with the list of all violations.
 fn check(rule: &str, offends: impl Fn(&str, &str) -> Vec<String>) {
     let offenders: Vec<String> = files().iter().flat_map(|(path, text)| offends(path, text)).collect();
     assert!(offenders.is_empty(), "{rule}:\n{}", offenders.join("\n"));
 }
 
-/// A library's own code, without tests.
+/// Library code of a file, without tests. `None` if the file is not part of a library.
 fn library_part<'a>(path: &str, text: &'a str) -> Option<&'a str> {
     let library = [
         "src/",
@@ -105,13 +105,13 @@ fn library_part<'a>(path: &str, text: &'a str) -> Option<&'a str> {
     ]
     .iter()
     .any(|folder| path.starts_with(folder));
-    let own = text.split("#[cfg(test)]").next().unwrap_or(text);
-    let exempt = path.ends_with("/tests.rs") || path.starts_with("src/cli") || path == "src/main.rs";
-    (library && !exempt).then_some(own)
+    let code = text.split("#[cfg(test)]").next().unwrap_or(text);
+    let is_exempt = path.ends_with("/tests.rs") || path.starts_with("src/cli") || path == "src/main.rs";
+    (library && !is_exempt).then_some(code)
 }
 
 #[test]
-fn every_file_says_what_it_is() {
+fn files_have_a_head_comment() {
     check("a file opens with `//!`", |path, text| {
         if text.starts_with("//!") { Vec::new() } else { vec![path.to_owned()] }
     });
@@ -145,29 +145,30 @@ fn files_and_functions_are_short() {
 #[test]
 fn libraries_do_not_print() {
     check("a library prints nothing", |path, text| {
-        let own = library_part(path, text).unwrap_or("");
+        let code = library_part(path, text).unwrap_or("");
         let prints = ["println!", "eprintln!", "print!(", "dbg!("];
         let is_code = |line: &&str| !line.trim_start().starts_with("//");
-        let has = |print: &&&str| own.lines().filter(is_code).any(|line| line.contains(**print));
-        prints.iter().filter(has).map(|print| format!("{path}: {print}")).collect()
+        let is_used = |print: &&&str| code.lines().filter(is_code).any(|line| line.contains(**print));
+        prints.iter().filter(is_used).map(|print| format!("{path}: {print}")).collect()
     });
 }
 
 #[test]
 fn panics_state_an_invariant() {
     check("`unwrap` is not used, `expect` states an invariant, in library code", |path, text| {
-        let own = library_part(path, text).unwrap_or("");
-        let bad = |line: &&str| {
-            let code = !line.trim_start().starts_with("//");
-            code && (line.contains(".unwrap()")
-                || line.contains(".expect(\"") && !line.contains(".expect(\"invariant: "))
+        let library_code = library_part(path, text).unwrap_or("");
+        let is_violation = |line: &&str| {
+            let is_code = !line.trim_start().starts_with("//");
+            is_code
+                && (line.contains(".unwrap()")
+                    || line.contains(".expect(\"") && !line.contains(".expect(\"invariant: "))
         };
-        own.lines().filter(bad).map(|line| format!("{path}: {}", line.trim())).collect()
+        library_code.lines().filter(is_violation).map(|line| format!("{path}: {}", line.trim())).collect()
     });
 }
 
 #[test]
-fn rooms_do_not_know_forbidden_neighbours() {
+fn folders_do_not_use_forbidden_names() {
     check("a room does not name what its invariant excludes", |path, text| {
         let mut offenders = Vec::new();
         for (folder, names) in FORBIDDEN.iter().filter(|(folder, _)| path.starts_with(folder)) {
@@ -180,9 +181,11 @@ fn rooms_do_not_know_forbidden_neighbours() {
                 offenders.push(format!("{path}: {name} in {folder}"));
             }
         }
-        for (name, only) in SINGLE_FILE.iter().filter(|(_, only)| !path.starts_with(only)) {
-            if library_part(path, text).is_some_and(|own| own.contains(name)) {
-                offenders.push(format!("{path}: only {only} names {name}"));
+        for (name, permitted_path) in
+            SINGLE_FILE.iter().filter(|(_, permitted_path)| !path.starts_with(permitted_path))
+        {
+            if library_part(path, text).is_some_and(|code| code.contains(name)) {
+                offenders.push(format!("{path}: only {permitted_path} names {name}"));
             }
         }
         offenders
@@ -190,7 +193,7 @@ fn rooms_do_not_know_forbidden_neighbours() {
 }
 
 #[test]
-fn nothing_is_left_for_later() {
+fn no_marks_of_unfinished_work() {
     check("nothing is left for later", |path, text| {
         let marks =
             [concat!("TO", "DO"), concat!("FIX", "ME"), concat!("unimplemented", "!"), concat!("to", "do!(")];

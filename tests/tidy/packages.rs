@@ -1,9 +1,9 @@
-//! What a package is linked with.
+//! Tests of the dependencies of packages, and of settings in the workspace's manifest.
 
 use std::collections::BTreeSet;
 use std::process::Command;
 
-/// Packages that plan, decide or search, which nothing that has to be believed is linked with.
+/// Packages that plan, decide or search. The trusted packages must not depend on them.
 const PLANNERS: [&str; 11] = [
     "metaplan",
     "metaplan-task",
@@ -18,11 +18,11 @@ const PLANNERS: [&str; 11] = [
     "varisat",
 ];
 
-/// What reasons, or reads knowledge. The checker of plans has nothing of it. Who checks derivations, too, is linked with the rule engine for
-/// its replay, and with OWL for its reading.
+/// Packages that reason or read knowledge bases. The checker of plans does not depend on them. The checker of derivations does: it replays
+/// derivations with the rule engine, and reads OWL.
 const KNOWLEDGE: [&str; 3] = ["metaplan-ontology", "metaplan-rules", "crepe"];
 
-/// The names of all packages that one is linked with, itself among them, whatever the platform and the features.
+/// Names of all packages in the dependency tree of a package, including itself, for all platforms and features.
 pub fn linked(package: &str) -> BTreeSet<String> {
     let output = Command::new(env!("CARGO"))
         .args(["tree", "--package", package, "--edges", "normal,build", "--all-features", "--target", "all"])
@@ -35,29 +35,29 @@ pub fn linked(package: &str) -> BTreeSet<String> {
     lines.lines().filter_map(|line| line.split_whitespace().next()).map(str::to_owned).collect()
 }
 
-/// Those of some packages that one is linked with.
-fn found(package: &str, others: &[&'static str]) -> Vec<&'static str> {
+/// Packages of a list that are in the dependency tree of `package`.
+fn linked_of(package: &str, candidates: &[&'static str]) -> Vec<&'static str> {
     let linked = linked(package);
-    others.iter().copied().filter(|name| linked.contains(*name)).collect()
+    candidates.iter().copied().filter(|name| linked.contains(*name)).collect()
 }
 
 #[test]
-fn who_must_be_believed_links_nothing_that_plans() {
-    let none: [&str; 0] = [];
+fn trusted_packages_do_not_depend_on_planners() {
+    let no_packages: [&str; 0] = [];
     for package in ["metaplan-pddl", "metaplan-certificate"] {
-        assert_eq!(found(package, &PLANNERS), none, "{package}");
-        assert_eq!(found(package, &KNOWLEDGE), none, "{package}");
+        assert_eq!(linked_of(package, &PLANNERS), no_packages, "{package}");
+        assert_eq!(linked_of(package, &KNOWLEDGE), no_packages, "{package}");
     }
     for package in ["metaplan-mission", "metaplan-verify"] {
-        assert_eq!(found(package, &PLANNERS), none, "{package}");
-        assert_eq!(found(package, &KNOWLEDGE), KNOWLEDGE, "{package}");
+        assert_eq!(linked_of(package, &PLANNERS), no_packages, "{package}");
+        assert_eq!(linked_of(package, &KNOWLEDGE), KNOWLEDGE, "{package}");
     }
-    assert_eq!(found("metaplan-verify", &["metaplan-pddl", "metaplan-certificate"]).len(), 2);
-    // Who plans is found where it is linked.
-    assert_eq!(found("metaplan", &PLANNERS), PLANNERS);
+    assert_eq!(linked_of("metaplan-verify", &["metaplan-pddl", "metaplan-certificate"]).len(), 2);
+    // The check is not vacuous: the facade depends on all of them.
+    assert_eq!(linked_of("metaplan", &PLANNERS), PLANNERS);
 }
 
-/// Narrowing is a matter of the planner: the facade has it, which no checker is linked with, and only grounding uses it.
+/// Narrowing belongs to the facade, on which no checker depends. Only grounding uses it.
 #[test]
 fn only_grounding_narrows_tasks() {
     let files = crate::files();
@@ -71,7 +71,7 @@ fn only_grounding_narrows_tasks() {
     }
 }
 
-/// Numbers are exact: what does not fit is a fault, also in a release build, and in packages that are still to come.
+/// Arithmetic must be exact, so overflows are errors in release builds, too, also for future packages.
 #[test]
 fn own_packages_check_for_overflows_in_releases() {
     let text =
