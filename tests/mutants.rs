@@ -1,8 +1,8 @@
-//! Whether the oracles notice when the planner is wrong, and the simulation of `tests/world` when the loop is.
+//! Mutation tests: the oracles must detect faults of the planner, and the simulation of `tests/world` faults of the loop.
 //!
-//! `tests/oracle/mutants.toml` and `tests/world/mutants.toml` name faults. They are put into a copy of the workspace, all into one program, which is asked once for each
-//! fault with that one switched on. A fault that no oracle notices is a hole in the oracles, or no fault at all. `MUTANTS` has the numbers of
-//! those that are tried, if not all are.
+//! `tests/oracle/mutants.toml` and `tests/world/mutants.toml` list the faults. All are compiled into one copy of the workspace, each
+//! behind a switch, and the tests run once per fault with only this fault switched on. A fault that no oracle detects is a gap in the
+//! oracles, or not a fault. `MUTANTS` selects faults by their numbers.
 
 #![expect(
     clippy::print_stdout,
@@ -16,8 +16,8 @@ use std::time::{Duration, Instant};
 
 use serde::Deserialize;
 
-/// What is copied of the workspace.
-const PARTS: [&str; 16] = [
+/// Files and folders that are copied from the workspace.
+const COPIED_PATHS: [&str; 16] = [
     "Cargo.toml",
     "Cargo.lock",
     "README.md",
@@ -36,35 +36,35 @@ const PARTS: [&str; 16] = [
     "GLOSSARY.md",
 ];
 
-/// The variable that switches a fault on; counted from 1.
+/// Environment variable with the number of the active fault, counted from 1.
 const SWITCH: &str = "METAPLAN_MUTANT";
 
-/// Where the switch is in a crate.
+/// File of a crate that gets the function for the switch.
 const LIBRARY: &str = "src/lib.rs";
 
-/// A program of tests.
+/// A test program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Tests {
     /// `tests/oracle`.
     Oracle,
     /// `tests/planta`.
     Planta,
-    /// What stands beside the code of the planner, for what only larger tasks come to.
+    /// Unit tests of the planner, for code that only large tasks reach.
     Unit,
     /// `tests/world`.
     World,
 }
 
-/// Tests that judge faults: the program, the name of the tests, and the number of tasks that they judge, or 0.
+/// Tests that must detect faults: program, filter for test names, and number of tasks (0 for the default).
 type Oracle = (Tests, &'static str, u32);
 
-/// Files of faults, each with the tests that have to notice them.
+/// Lists of faults, each with the tests that must detect them.
 const SUITES: [(&str, &[Oracle]); 2] = [
     ("tests/oracle/mutants.toml", &ORACLES),
     ("tests/world/mutants.toml", &[(Tests::World, "schedule", 1_000)]),
 ];
 
-/// What is asked of each fault, in order: tests, and how many tasks they judge.
+/// Tests that run for each fault of the planner, in this order, until one fails.
 const ORACLES: [Oracle; 10] = [
     (Tests::Oracle, "field::", 0),
     (Tests::Planta, "random::", 0),
@@ -78,8 +78,8 @@ const ORACLES: [Oracle; 10] = [
     (Tests::Oracle, "numbers::random_tasks_with_numbers", 1_500),
 ];
 
-/// A planner that does not come to an end is wrong, too.
-const PATIENCE: Duration = Duration::from_secs(900);
+/// Time limit of a test program. A planner that does not terminate counts as detected.
+const TIMEOUT: Duration = Duration::from_secs(900);
 
 #[derive(Deserialize)]
 struct Mutants {
@@ -92,12 +92,12 @@ struct Mutant {
     file: String,
     before: String,
     after: String,
-    /// The tests that have to notice it.
+    /// The tests that must detect the fault.
     #[serde(skip)]
     oracles: &'static [Oracle],
 }
 
-/// Writes a file; what is as it was is left alone, and not compiled again.
+/// Writes a file unless it is unchanged, so that cargo does not compile it again.
 fn write(path: &Path, bytes: &[u8]) {
     if std::fs::read(path).ok().as_deref() != Some(bytes) {
         std::fs::create_dir_all(path.parent().expect("a directory")).expect("a directory");
@@ -105,11 +105,11 @@ fn write(path: &Path, bytes: &[u8]) {
     }
 }
 
-/// Removes what the workspace does not have any more.
+/// Removes files that do not exist in the workspace any more.
 fn prune(from: &Path, to: &Path) {
     if !from.exists() {
-        let removed = if to.is_dir() { std::fs::remove_dir_all(to) } else { std::fs::remove_file(to) };
-        removed.expect("it can be removed");
+        let result = if to.is_dir() { std::fs::remove_dir_all(to) } else { std::fs::remove_file(to) };
+        result.expect("it can be removed");
     } else if to.is_dir() {
         for entry in std::fs::read_dir(to).expect("a directory") {
             let name = entry.expect("an entry").file_name();
@@ -118,16 +118,16 @@ fn prune(from: &Path, to: &Path) {
     }
 }
 
-/// Copies what has no faults.
-fn copy(from: &Path, to: &Path, faulty: &BTreeMap<PathBuf, String>) {
+/// Copies files and folders, except for the files with faults.
+fn copy(from: &Path, to: &Path, faulty_files: &BTreeMap<PathBuf, String>) {
     if from.is_dir() {
         for entry in std::fs::read_dir(from).expect("a directory") {
             let name = entry.expect("an entry").file_name();
             if name != "target" {
-                copy(&from.join(&name), &to.join(&name), faulty);
+                copy(&from.join(&name), &to.join(&name), faulty_files);
             }
         }
-    } else if !faulty.contains_key(to) {
+    } else if !faulty_files.contains_key(to) {
         write(to, &std::fs::read(from).expect("a file"));
     }
 }
@@ -140,8 +140,8 @@ fn mutants() -> Vec<Mutant> {
     SUITES.iter().flat_map(read).collect()
 }
 
-/// The files below the workspace that have faults, with all of them, each behind its switch.
-fn faulty(mutants: &[Mutant]) -> BTreeMap<String, String> {
+/// Texts of the files with faults, relative to the workspace. Each fault is behind its switch.
+fn faulty_texts(mutants: &[Mutant]) -> BTreeMap<String, String> {
     let mut files: BTreeMap<String, String> = BTreeMap::new();
     for (mutant, number) in mutants.iter().zip(1..) {
         let text = files.entry(mutant.file.clone()).or_insert_with(|| original(&mutant.file));
@@ -162,35 +162,36 @@ fn original(file: &str) -> String {
     std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(file)).expect("a file")
 }
 
-/// A copy of the workspace with all faults.
+/// Creates a copy of the workspace with all faults.
 fn mutated(mutants: &[Mutant]) -> PathBuf {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let home = Path::new(env!("CARGO_TARGET_TMPDIR")).join("mutants");
-    let files = faulty(mutants).into_iter().map(|(file, text)| (home.join(file), text));
-    let mut faulty: BTreeMap<PathBuf, String> = files.collect();
-    let question = format!(
+    let files = faulty_texts(mutants).into_iter().map(|(file, text)| (home.join(file), text));
+    let mut faulty_files: BTreeMap<PathBuf, String> = files.collect();
+    let switch_function = format!(
         "pub(crate) fn is_mutant(number: u32) -> bool {{ \
          static ON: std::sync::OnceLock<u32> = std::sync::OnceLock::new(); \
          let on = || std::env::var(\"{SWITCH}\").ok().and_then(|text| text.parse().ok()).unwrap_or(0); \
          *ON.get_or_init(on) == number }}"
     );
-    let crates: BTreeSet<&str> = mutants.iter().filter_map(|own| own.file.split("src/").next()).collect();
-    for own in crates {
-        let library = format!("{own}{LIBRARY}");
-        *faulty.entry(home.join(&library)).or_insert_with(|| original(&library)) += &question;
+    let crates: BTreeSet<&str> =
+        mutants.iter().filter_map(|mutant| mutant.file.split("src/").next()).collect();
+    for crate_folder in crates {
+        let library = format!("{crate_folder}{LIBRARY}");
+        *faulty_files.entry(home.join(&library)).or_insert_with(|| original(&library)) += &switch_function;
     }
-    for part in PARTS {
+    for part in COPIED_PATHS {
         prune(&root.join(part), &home.join(part));
-        copy(&root.join(part), &home.join(part), &faulty);
+        copy(&root.join(part), &home.join(part), &faulty_files);
     }
-    for (path, text) in faulty {
+    for (path, text) in faulty_files {
         write(&path, text.as_bytes());
     }
     home
 }
 
-/// Compiles tests of a workspace.
-fn compiled(home: &Path, tests: Tests) -> PathBuf {
+/// Compiles a test program and returns its path.
+fn compile_tests(home: &Path, tests: Tests) -> PathBuf {
     let (target, name): (&[&str], _) = match tests {
         Tests::Oracle => (&["--test", "oracle"], "oracle"),
         Tests::Planta => (&["--test", "planta"], "planta"),
@@ -208,21 +209,21 @@ fn compiled(home: &Path, tests: Tests) -> PathBuf {
         .expect("cargo");
     assert!(output.status.success(), "the faults do not compile");
     let text = String::from_utf8_lossy(&output.stdout);
-    let last = text.lines().filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok());
-    let programs = last.filter(|line| line["target"]["name"] == name);
+    let messages = text.lines().filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok());
+    let programs = messages.filter(|line| line["target"]["name"] == name);
     let mut programs = programs.filter_map(|line| line["executable"].as_str().map(PathBuf::from));
     let program = programs.next_back();
     program.expect("a program")
 }
 
-/// Whether an oracle is content with the planner when a fault is on.
-fn is_content(
+/// Returns `true` if the tests pass with a fault switched on.
+fn passes(
     programs: &[(Tests, PathBuf)],
     home: &Path,
     fault: usize,
     (tests, test, tasks): (Tests, &str, u32),
 ) -> bool {
-    let program = programs.iter().find(|(own, _)| *own == tests);
+    let program = programs.iter().find(|(program_tests, _)| *program_tests == tests);
     let mut command = Command::new(&program.expect("it is compiled").1);
     command.arg(test).current_dir(home).env(SWITCH, fault.to_string()).env("ORACLE_STOP", "1");
     if tasks > 0 {
@@ -234,7 +235,7 @@ fn is_content(
         if let Some(status) = child.try_wait().expect("a process") {
             return status.success();
         }
-        if started.elapsed() > PATIENCE {
+        if started.elapsed() > TIMEOUT {
             child.kill().expect("a process");
             child.wait().expect("a process");
             return false;
@@ -244,56 +245,57 @@ fn is_content(
 }
 
 #[test]
-fn every_fault_has_its_place() {
-    assert!(faulty(&mutants()).len() > 10);
+fn faults_apply_to_the_current_sources() {
+    assert!(faulty_texts(&mutants()).len() > 10);
 }
 
-/// Cargo reads no workspace that a member is missing from.
+/// Cargo rejects a workspace with missing members.
 #[test]
-fn every_member_is_copied() {
+fn all_members_are_copied() {
     let manifest: toml::Table = original("Cargo.toml").parse().expect("TOML");
     let members = manifest["workspace"]["members"].as_array().expect("members");
     for member in members {
         let name = member.as_str().expect("a name");
-        let is_copied = PARTS.iter().any(|part| Path::new(name).starts_with(part));
+        let is_copied = COPIED_PATHS.iter().any(|part| Path::new(name).starts_with(part));
         assert!(is_copied, "`{name}` is a member of the workspace, and not copied");
     }
 }
 
 #[test]
 #[ignore = "takes an hour: compiles the planner again, and judges thousands of tasks for each fault"]
-fn every_fault_is_noticed() {
+fn all_faults_are_detected() {
     let mutants = mutants();
     let home = mutated(&mutants);
     let chosen: Option<Vec<usize>> = std::env::var("MUTANTS")
         .ok()
         .map(|text| text.split(',').map(|number| number.parse().expect("a number")).collect());
     let is_chosen = |number: &usize| chosen.as_ref().is_none_or(|chosen| chosen.contains(number));
-    let tried: Vec<(&Mutant, usize)> =
+    let selected: Vec<(&Mutant, usize)> =
         mutants.iter().zip(1..).filter(|(_, number)| is_chosen(number)).collect();
     let mut oracles: Vec<Oracle> = Vec::new();
-    for oracle in tried.iter().flat_map(|(mutant, _)| mutant.oracles) {
+    for oracle in selected.iter().flat_map(|(mutant, _)| mutant.oracles) {
         if !oracles.contains(oracle) {
             oracles.push(*oracle);
         }
     }
-    // Programs that judge none of the chosen faults are not compiled.
+    // Programs without tests for the selected faults are not compiled.
     let mut programs: Vec<(Tests, PathBuf)> = Vec::new();
     for (tests, ..) in &oracles {
-        if programs.iter().all(|(own, _)| own != tests) {
-            programs.push((*tests, compiled(&home, *tests)));
+        if programs.iter().all(|(program_tests, _)| program_tests != tests) {
+            programs.push((*tests, compile_tests(&home, *tests)));
         }
     }
     for oracle in &oracles {
-        assert!(is_content(&programs, &home, 0, *oracle), "{} fails without a fault", oracle.1);
+        assert!(passes(&programs, &home, 0, *oracle), "{} fails without a fault", oracle.1);
     }
     let mut missed = Vec::new();
-    for (mutant, number) in &tried {
+    for (mutant, number) in &selected {
         let started = Instant::now();
-        let noticed = mutant.oracles.iter().find(|oracle| !is_content(&programs, &home, *number, **oracle));
-        let by = noticed.map_or("NOBODY", |(_, test, _)| test);
-        println!("{number:>3}. {}: noticed by {by} after {:.0?}", mutant.name, started.elapsed());
-        if noticed.is_none() {
+        let detecting_oracle =
+            mutant.oracles.iter().find(|oracle| !passes(&programs, &home, *number, **oracle));
+        let test_name = detecting_oracle.map_or("NOBODY", |(_, test, _)| test);
+        println!("{number:>3}. {}: noticed by {test_name} after {:.0?}", mutant.name, started.elapsed());
+        if detecting_oracle.is_none() {
             missed.push(mutant.name.as_str());
         }
     }
@@ -301,6 +303,6 @@ fn every_fault_is_noticed() {
         missed.is_empty(),
         "{} of {} faults are noticed by nobody: {missed:#?}",
         missed.len(),
-        tried.len()
+        selected.len()
     );
 }

@@ -1,4 +1,4 @@
-//! Plain domains whose actions get their designs from the knowledge base: the same optimum as in the explicit form.
+//! Tests of plain domains, whose actions get their designs from the knowledge base: same optimum as the explicit form.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -14,7 +14,7 @@ use planner::{Config, Limits, Status, lexicographic};
 use rules::Limits as StepLimits;
 use testing::random::Random;
 
-/// The status and cost of a mission's best plan, and its configurations by step.
+/// Status and cost of an optimal plan, and the configuration of each step.
 type Answer = (Status, Option<String>, Vec<Vec<(String, String)>>);
 
 fn answer(mission: &Mission) -> Answer {
@@ -36,7 +36,7 @@ fn shipped(name: &str, situation: &dyn Fn(&mut Mission)) -> Mission {
     mission
 }
 
-/// Both forms of a shipped mission have the same optimum, with the same designs at each step.
+/// Checks that both forms of a shipped mission have the same optimum with the same designs at each step.
 fn check(name: &str, situation: &dyn Fn(&mut Mission), expected: Option<&str>) {
     let explicit = answer(&shipped(name, situation));
     let native = answer(&shipped(&format!("{name}_plain"), situation));
@@ -62,7 +62,7 @@ fn shipped_missions_have_the_same_optimum_in_both_forms() {
 }
 
 #[test]
-fn a_plan_is_written_in_the_arguments_of_the_plain_domain() {
+fn plans_have_the_arguments_of_the_plain_domain() {
     let mission = shipped("ugv_plain", &|_| {});
     assert!(mission.adaptation().is_some());
     let (problem, _) = mission.filled().expect("a problem");
@@ -73,7 +73,7 @@ fn a_plan_is_written_in_the_arguments_of_the_plain_domain() {
     assert!(shipped("ugv", &|_| {}).adaptation().is_none());
 }
 
-/// A random mission: a map with contexts, functions with designs, bounds, a battery, and what a change of designs costs.
+/// A random mission: a map with contexts, functions with designs, bounds, a battery, and costs of design changes.
 struct Generated {
     knowledge: String,
     explicit: String,
@@ -113,11 +113,11 @@ impl Generated {
                     values.push(("safety", random.below(5)));
                 }
                 values.push(("change", random.below(4)));
-                let all: Vec<_> = values.iter().map(|(a, _)| format!(":{name}_{a}")).collect();
+                let estimations: Vec<_> = values.iter().map(|(a, _)| format!(":{name}_{a}")).collect();
                 let _ = writeln!(
                     knowledge,
                     ":{name} a t:FunctionDesign ; t:solvesF :f{function} ; {needs}t:hasQAestimation {} .",
-                    all.join(" , ")
+                    estimations.join(" , ")
                 );
                 for (attribute, value) in values {
                     let _ = writeln!(
@@ -164,11 +164,11 @@ impl Generated {
     }
 }
 
-/// The domain with function and design parameters; a change of designs is an action of its own.
+/// The domain with parameters for functions and designs. A change of designs is a separate action.
 fn explicit(functions: usize, bound: i64, reconfiguration: bool) -> String {
     let each = |text: &dyn Fn(usize) -> String| (0..functions).map(text).collect::<Vec<_>>().join(" ");
     let sum = |attribute: &str| format!("(+ 0 {})", each(&|f| format!("({attribute} ?d{f})")));
-    let (works, change) = if reconfiguration {
+    let (current_designs, change) = if reconfiguration {
         (
             each(&|f| format!("(at_work ?d{f} f{f})")),
             "(:action set :parameters (?f - function ?d - functiondesign)
@@ -184,7 +184,7 @@ fn explicit(functions: usize, bound: i64, reconfiguration: bool) -> String {
     let move_over = |name: &str, condition: &str| {
         format!(
             "(:action {name} :parameters (?a ?b - place {})
-               :precondition (and (at ?a) {condition} {} {works}
+               :precondition (and (at ?a) {condition} {} {current_designs}
                  (>= (battery) (* (length ?a ?b) {energy})))
                :effect (and (not (at ?a)) (at ?b) (decrease (battery) (* (length ?a ?b) {energy}))
                  (increase (total-cost) (+ (length ?a ?b) (* (length ?a ?b) {})))))",
@@ -210,7 +210,7 @@ fn explicit(functions: usize, bound: i64, reconfiguration: bool) -> String {
     )
 }
 
-/// The domain without a word of designs.
+/// The domain without designs.
 fn plain(reconfiguration: bool) -> String {
     let (function, effect) = if reconfiguration {
         ("(reconfiguration)", "(increase (total-cost) (reconfiguration))")
@@ -235,8 +235,8 @@ fn problem(random: &mut Random) -> String {
     for a in 0..4 {
         for b in 0..4 {
             if a != b && random.below(2) == 0 {
-                let way = if random.below(3) == 0 { "narrow" } else { "wide" };
-                let _ = write!(init, " ({way} p{a} p{b}) (= (length p{a} p{b}) {})", 1 + random.below(3));
+                let kind = if random.below(3) == 0 { "narrow" } else { "wide" };
+                let _ = write!(init, " ({kind} p{a} p{b}) (= (length p{a} p{b}) {})", 1 + random.below(3));
             }
         }
     }

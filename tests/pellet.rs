@@ -1,4 +1,4 @@
-//! Metaplan beside Pellet, the reasoner of today's TOMASys robots, in one run: a process a cycle, resident, and at scale.
+//! Comparison with Pellet, the reasoner of current TOMASys robots: one process per cycle, resident, and with large knowledge bases.
 //!
 //! ```sh
 //! apt-get install openjdk-17-jdk-headless
@@ -6,10 +6,10 @@
 //! METAPLAN_PYTHON=$PWD/pellet/bin/python cargo test --release --test pellet -- --ignored --nocapture
 //! ```
 //!
-//! Pellet is started with the command line of owlready2's `sync_reasoner_pellet`, so that what Python adds is left out.
-//! Processor time is that of the process and its children; wall time depends on what else the machine does.
+//! Pellet is started with the command line of owlready2's `sync_reasoner_pellet`, so that the overhead of Python is excluded.
+//! Processor time includes child processes. Wall time depends on the load of the machine.
 
-#![allow(clippy::print_stdout)] // measurements are printed
+#![allow(clippy::print_stdout)] // Measurements are printed.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -22,7 +22,7 @@ use rules::{Engine, Literal, Symbols};
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 const OURS: &str = env!("CARGO_BIN_EXE_metaplan");
 
-/// What a mission adds to SUAVE's knowledge base: an objective grounded in a design whose thruster has failed.
+/// Assertions of a mission for SUAVE's knowledge base: an objective grounded in a design whose thruster has failed.
 const MISSION: &str = "@prefix t: <http://metacontrol.org/tomasys#> .
 @prefix s: <http://www.metacontrol.org/suave#> .
 t:o a t:Objective ; t:typeF s:f_maintain_motion .
@@ -30,20 +30,21 @@ t:fg a t:FunctionGrounding ; t:solvesO t:o ; t:typeFD s:fd_all_thrusters .
 s:c_thruster_1 t:c_status \"FALSE\" .
 ";
 
-/// Wall and processor time, in milliseconds.
+/// Wall and processor time in milliseconds.
 #[derive(Clone, Copy, Debug)]
-struct Took {
+struct Times {
     wall: f64,
     processor: f64,
 }
 
-/// Where Pellet, SUAVE and the generator of large knowledge bases are; `None` with a message where one is not.
+/// Locations of Pellet, and of SUAVE and the generator of large knowledge bases.
 struct Peer {
     class_path: String,
     shared: PathBuf,
 }
 
 impl Peer {
+    /// Prints a message and returns `None` if one of them is missing.
     fn find() -> Option<Self> {
         let shared = Path::new(ROOT).join("../shared");
         let python = std::env::var("METAPLAN_PYTHON").unwrap_or_else(|_| "python3".to_owned());
@@ -58,7 +59,7 @@ impl Peer {
         Some(Self { class_path, shared })
     }
 
-    /// The command line by which owlready2 starts Pellet on an N-Triples document.
+    /// Command line with which owlready2 starts Pellet on an N-Triples document.
     fn command<'a>(&'a self, class: &'a [&'a str], document: &'a str) -> Vec<&'a str> {
         let mut command = vec!["java", "-Xmx2000M", "-cp", &self.class_path];
         command.extend(class);
@@ -72,8 +73,8 @@ impl Peer {
     }
 }
 
-/// Runs a command a few times; the median of each time.
-fn timed(command: &[&str], runs: usize) -> Took {
+/// Median times of several runs of a command.
+fn measure_command(command: &[&str], runs: usize) -> Times {
     let script = "TIMEFORMAT='%R %U %S'; time \"$@\" > /dev/null 2>&1 || echo failed >&2";
     let run = || {
         let mut bash = Command::new("bash");
@@ -84,7 +85,7 @@ fn timed(command: &[&str], runs: usize) -> Took {
         (times[0] * 1e3, (times[1] + times[2]) * 1e3)
     };
     let times: Vec<(f64, f64)> = (0..runs).map(|_| run()).collect();
-    Took {
+    Times {
         wall: median(times.iter().map(|time| time.0).collect()),
         processor: median(times.iter().map(|time| time.1).collect()),
     }
@@ -95,29 +96,29 @@ fn median(mut values: Vec<f64>) -> f64 {
     values[values.len() / 2]
 }
 
-/// Milliseconds of a call in this process: the median of the wall times of several, and the mean of their processor
-/// times, because the clock of a thread moves by ticks.
-fn within(runs: usize, mut call: impl FnMut()) -> Took {
-    let before = on_processor();
+/// Times of a call in this process: the median wall time, and the mean processor time. Thread clocks have a coarse resolution, so single
+/// processor times are not meaningful.
+fn measure_call(runs: usize, mut call: impl FnMut()) -> Times {
+    let start_time = thread_processor_time();
     let times = (0..runs).map(|_| {
         let start = Instant::now();
         call();
         start.elapsed().as_secs_f64() * 1e3
     });
     let wall = median(times.collect());
-    let mean = |(before, after): (f64, f64)| (after - before) / runs as f64;
-    Took { wall, processor: before.zip(on_processor()).map_or(wall, mean) }
+    let mean = |(start_time, end_time): (f64, f64)| (end_time - start_time) / runs as f64;
+    Times { wall, processor: start_time.zip(thread_processor_time()).map_or(wall, mean) }
 }
 
-/// Milliseconds that this thread has been on a processor, where the system says.
-fn on_processor() -> Option<f64> {
+/// Processor time of this thread in milliseconds, on systems that report it.
+fn thread_processor_time() -> Option<f64> {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
     Some(text.split_whitespace().next()?.parse::<f64>().ok()? / 1e6)
 }
 
-fn report(what: &str, ours: Took, pellet: Took) {
+fn report(label: &str, ours: Times, pellet: Times) {
     println!(
-        "{what}: Pellet {:.0} ms wall, {:.0} ms processor; ours {:.3} and {:.3}; ratios {:.0} and {:.0}",
+        "{label}: Pellet {:.0} ms wall, {:.0} ms processor; ours {:.3} and {:.3}; ratios {:.0} and {:.0}",
         pellet.wall,
         pellet.processor,
         ours.wall,
@@ -145,11 +146,11 @@ fn suave_deployed_and_resident() {
     let (suave, real) = (peer.owl("suave/suave.owl"), peer.owl(""));
     let convert =
         [OURS, "convert", &suave, &mission, "--directory", &real, "--to", "ntriples", "-o", &merged];
-    timed(&convert, 1);
+    measure_command(&convert, 1);
 
     let ours = [OURS, "reason", &suave, &mission, "--directory", &real, "--format", "ntriples", "-q"];
-    let deployed = timed(&peer.command(&["pellet.Pellet"], &merged), 5);
-    report("SUAVE, a process a cycle", timed(&ours, 5), deployed);
+    let deployed = measure_command(&peer.command(&["pellet.Pellet"], &merged), 5);
+    report("SUAVE, a process a cycle", measure_command(&ours, 5), deployed);
 
     let warm = format!("{ROOT}/tests/pellet/Warm.java");
     let class = [warm.as_str(), "30"];
@@ -158,10 +159,10 @@ fn suave_deployed_and_resident() {
     let text = String::from_utf8_lossy(&output.stdout);
     let times: Vec<f64> = text.split_whitespace().filter_map(|time| time.parse().ok()).collect();
     let [wall, processor] = times[..] else { panic!("the JDK's source launcher: {output:?}") };
-    let resident = Took { wall, processor };
+    let resident = Times { wall, processor };
 
     let options = ReadOptions { directories: vec![PathBuf::from(&real)], ..ReadOptions::default() };
-    let scratch = within(30, || drop(engine(&[&suave, &mission], &options)));
+    let scratch = measure_call(30, || drop(engine(&[&suave, &mission], &options)));
     report("SUAVE, resident, read and reasoned from scratch", scratch, resident);
 
     let mut runtime = Runtime::new(engine(&[&suave], &options), Mode::Retract);
@@ -171,7 +172,7 @@ fn suave_deployed_and_resident() {
     let best = &runtime.available_designs(Some(function)).expect("known")[0];
     runtime.ground(name, &best.name).expect("known");
     let mut turn = 0;
-    let change = within(2_001, || {
+    let change = measure_call(2_001, || {
         turn = 1 - turn;
         let value = Literal::parse(["0.5", "3.5"][turn], Some(vocab::xsd::DECIMAL), None);
         runtime.measure("water_visibility", value).expect("known");
@@ -194,13 +195,17 @@ fn knowledge_bases_at_scale() {
         let (n, m) = (functions.to_string(), designs.to_string());
         let generate = ["python3", &generator, "-n", &n, "-m", &m, "-c", "2", "-q", "2"];
         let options = ["--fail", "0.1", "--violate", "0.2", "-o", &scaled];
-        timed(&[&generate[..], &options].concat(), 1);
+        measure_command(&[&generate[..], &options].concat(), 1);
         let documents = [&tomasys[..], &mros, &scaled, "--directory", &real];
-        timed(&[&[OURS, "convert"], &documents[..], &["--to", "ntriples", "-o", &merged]].concat(), 1);
+        measure_command(
+            &[&[OURS, "convert"], &documents[..], &["--to", "ntriples", "-o", &merged]].concat(),
+            1,
+        );
         let ours = [&[OURS, "reason"], &documents[..], &["--format", "ntriples", "-q"]].concat();
-        // A single run of Pellet is long enough to be measured where there is much to do.
+        // For large knowledge bases, one run of Pellet is long enough for a measurement.
         let runs = if functions * designs < 1_000 { 3 } else { 1 };
-        let (ours, pellet) = (timed(&ours, 3), timed(&peer.command(&["pellet.Pellet"], &merged), runs));
+        let (ours, pellet) =
+            (measure_command(&ours, 3), measure_command(&peer.command(&["pellet.Pellet"], &merged), runs));
         report(&format!("{} designs, files to conclusions", functions * designs), ours, pellet);
     }
 }

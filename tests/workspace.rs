@@ -1,6 +1,6 @@
-//! Members of the workspace that `cargo test` in the root does not test, since they are not default members.
+//! Test of the workspace members that `cargo test` in the root does not test, because they are not default members.
 //!
-//! One line of its output names them and the commands that test them.
+//! The program prints one line with these members and their test commands.
 
 #![expect(clippy::print_stdout, reason = "the line is the purpose of this program")]
 
@@ -8,12 +8,12 @@ use std::process::ExitCode;
 
 use libtest_mimic::{Arguments, Failed, Trial};
 
-/// The command that tests each member that is not a default one.
+/// Members that are not default members, with the commands that test them.
 const COMMANDS: [(&str, &str); 4] = [
     ("integrations/ros", "cargo test -p metaplan-ros"),
     ("integrations/fleet", "cargo test -p metaplan-fleet"),
     ("integrations/python", ".ci/python"),
-    // Has no code.
+    // No code, so there is nothing to test.
     (".ci/features", ""),
 ];
 
@@ -38,10 +38,10 @@ fn check() -> Result<(), Failed> {
         list.iter().map(|member| member.as_str().expect("a path").to_owned()).collect()
     };
     let default = list("default-members");
-    let mut others: Vec<String> =
+    let mut nondefault: Vec<String> =
         list("members").into_iter().filter(|member| !default.contains(member)).collect();
-    others.sort();
+    nondefault.sort();
     let mut listed = COMMANDS.map(|(member, _)| member);
     listed.sort_unstable();
-    if others == listed { Ok(()) } else { Err(format!("{others:?} are not default members").into()) }
+    if nondefault == listed { Ok(()) } else { Err(format!("{nondefault:?} are not default members").into()) }
 }

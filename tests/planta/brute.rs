@@ -1,25 +1,24 @@
-//! All that can be reached, by plain enumeration: written from the definition of PDDL 2.2 (states, derived predicates as least
-//! fixpoints by strata, sequential actions), for tasks without numbers. It shares nothing with the planner, the validator and the
-//! room that completes domains but the syntax tree.
+//! Brute-force state space of tasks without numbers, from the definition of PDDL 2.2: states, derived predicates as least fixpoints
+//! by strata, sequential actions. It shares only the syntax tree with the planner, the validator and the completion of domains.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use pddl::ast::{ActionBody, Condition, Domain, Effect, InitialElement, Problem, Term, TypeExpression};
 
-/// A fact or a label: small letters, blanks in between.
+/// A fact or a ground action in lower case, with its words separated by spaces.
 pub type Text = String;
 type Words = Vec<String>;
 type Facts = BTreeMap<String, BTreeSet<Words>>;
 
-/// What can be reached.
+/// The reachable part of the state space.
 #[derive(Debug, Default)]
-pub struct Reached {
-    /// Every atom that holds in some state, derived ones among them.
+pub struct StateSpace {
+    /// All atoms that hold in some reachable state, including derived ones.
     pub atoms: BTreeSet<Text>,
-    /// From state to state by which action; states are what actions can change of them.
+    /// Transitions: state, action, next state. A state has only the atoms that actions can change.
     pub steps: BTreeSet<(Text, Text, Text)>,
-    /// The least number of actions to a goal.
-    pub least: Option<usize>,
+    /// Length of a shortest plan, if there is a plan.
+    pub least_steps: Option<usize>,
 }
 
 #[derive(Clone, Debug)]
@@ -28,15 +27,15 @@ enum Argument {
     Object(String),
 }
 
-/// A condition whose variables have names of their own.
+/// A condition in which all variables have unique names.
 #[derive(Clone, Debug)]
 enum Part {
     And(Vec<Part>),
     Or(Vec<Part>),
     Holds(String, Vec<Argument>),
     Equal(Argument, Argument),
-    /// The variable is an object of one of the types.
-    Is(String, Vec<String>),
+    /// The variable is an object of one of the types. All types if the list is empty.
+    HasType(String, Vec<String>),
     Exists(Box<Part>),
     Not(Box<Part>),
 }
@@ -45,7 +44,7 @@ type Binding = HashMap<String, String>;
 
 struct Rule {
     level: usize,
-    /// Whether it depends on something that actions change; what does not is the same in every state.
+    /// `true` if the body depends on predicates that actions change. Other rules have the same conclusions in every state.
     varies: bool,
     head: String,
     parameters: Vec<String>,
@@ -61,7 +60,7 @@ struct Schema {
 }
 
 pub struct Task {
-    /// Objects with all types that they are of.
+    /// Objects with all their types.
     objects: BTreeMap<String, BTreeSet<String>>,
     rules: Vec<Rule>,
     schemas: Vec<Schema>,
@@ -74,23 +73,23 @@ fn low(text: &impl ToString) -> String {
     text.to_string().to_ascii_lowercase()
 }
 
-fn types(of: &TypeExpression) -> Vec<String> {
-    of.alternatives.iter().map(|own| low(&own.name)).collect()
+fn types(expression: &TypeExpression) -> Vec<String> {
+    expression.alternatives.iter().map(|alternative| low(&alternative.name)).collect()
 }
 
 impl Task {
     pub fn new(domain: &Domain, problem: &Problem) -> Self {
         let mut parents: BTreeMap<String, Vec<String>> = BTreeMap::new();
-        for own in &domain.types {
-            parents.entry(low(&own.identifier.name)).or_default().extend(types(&own.r#type));
+        for declaration in &domain.types {
+            parents.entry(low(&declaration.identifier.name)).or_default().extend(types(&declaration.r#type));
         }
         let mut objects: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
-        for own in domain.constants.iter().chain(&problem.objects) {
-            let all = objects.entry(low(&own.identifier.name)).or_default();
-            let mut open = types(&own.r#type);
-            while let Some(one) = open.pop() {
-                open.extend(parents.get(&one).cloned().unwrap_or_default());
-                all.insert(one);
+        for declaration in domain.constants.iter().chain(&problem.objects) {
+            let all_types = objects.entry(low(&declaration.identifier.name)).or_default();
+            let mut pending = types(&declaration.r#type);
+            while let Some(type_name) = pending.pop() {
+                pending.extend(parents.get(&type_name).cloned().unwrap_or_default());
+                all_types.insert(type_name);
             }
         }
         let truth = Part::And(Vec::new());
@@ -101,11 +100,11 @@ impl Task {
                 panic!("no durations here")
             };
             let mut scope = Binding::new();
-            let (parameters, is) = task.declare(&action.parameters, &mut scope);
+            let (parameters, type_conditions) = task.declare(&action.parameters, &mut scope);
             let body = task.part(precondition, &scope);
             let (mut adds, mut deletes) = (Vec::new(), Vec::new());
             changes(effect, &scope, &mut adds, &mut deletes);
-            let body = Part::And(is.into_iter().chain([body]).collect());
+            let body = Part::And(type_conditions.into_iter().chain([body]).collect());
             task.schemas.push(Schema { name: low(&action.identifier.name), parameters, body, adds, deletes });
         }
         task.rules(domain);
@@ -116,7 +115,7 @@ impl Task {
                     task.initial.entry(low(&atom.predicate.name)).or_default().insert(words);
                 }
                 InitialElement::NegatedFact(_) => {}
-                other => panic!("no numbers or events here: {other:?}"),
+                unsupported => panic!("no numbers or events here: {unsupported:?}"),
             }
         }
         task.goal = task.part(&problem.goal, &Binding::new());
@@ -124,45 +123,45 @@ impl Task {
     }
 
     fn rules(&mut self, domain: &Domain) {
-        // A level above what is negated, at least the level of what is not.
+        // Strata by fixpoint: above negated predicates, and at least as high as the others.
         let mut levels: BTreeMap<String, usize> =
-            domain.derived.iter().map(|own| (low(&own.head.identifier.name), 0)).collect();
+            domain.derived.iter().map(|axiom| (low(&axiom.head.identifier.name), 0)).collect();
         loop {
-            let before = levels.clone();
+            let previous = levels.clone();
             for axiom in &domain.derived {
-                let mut found = Vec::new();
-                mentioned(&axiom.condition, false, &mut found);
-                let least = found.iter().filter_map(|(other, negated)| {
-                    before.get(other).map(|level| level + usize::from(*negated))
+                let mut predicates = Vec::new();
+                collect_predicates(&axiom.condition, false, &mut predicates);
+                let min_level = predicates.iter().filter_map(|(predicate, negated)| {
+                    previous.get(predicate).map(|level| level + usize::from(*negated))
                 });
-                let least = least.max().unwrap_or(0);
-                assert!(least <= domain.derived.len(), "negation in a circle");
-                let own = levels.entry(low(&axiom.head.identifier.name)).or_default();
-                *own = (*own).max(least);
+                let min_level = min_level.max().unwrap_or(0);
+                assert!(min_level <= domain.derived.len(), "negation in a circle");
+                let level_of_head = levels.entry(low(&axiom.head.identifier.name)).or_default();
+                *level_of_head = (*level_of_head).max(min_level);
             }
-            if levels == before {
+            if levels == previous {
                 break;
             }
         }
-        let mut varies = self.changed();
+        let mut varies = self.changed_predicates();
         loop {
-            let before = varies.len();
+            let previous_count = varies.len();
             for axiom in &domain.derived {
-                let mut found = Vec::new();
-                mentioned(&axiom.condition, false, &mut found);
-                if found.iter().any(|(other, _)| varies.contains(other)) {
+                let mut predicates = Vec::new();
+                collect_predicates(&axiom.condition, false, &mut predicates);
+                if predicates.iter().any(|(predicate, _)| varies.contains(predicate)) {
                     varies.insert(low(&axiom.head.identifier.name));
                 }
             }
-            if varies.len() == before {
+            if varies.len() == previous_count {
                 break;
             }
         }
         for axiom in &domain.derived {
             let mut scope = Binding::new();
-            let (parameters, is) = self.declare(&axiom.head.parameters, &mut scope);
+            let (parameters, type_conditions) = self.declare(&axiom.head.parameters, &mut scope);
             let body = self.part(&axiom.condition, &scope);
-            let body = Part::And(is.into_iter().chain([body]).collect());
+            let body = Part::And(type_conditions.into_iter().chain([body]).collect());
             let head = low(&axiom.head.identifier.name);
             self.rules.push(Rule {
                 level: levels[&head],
@@ -174,18 +173,18 @@ impl Task {
         }
     }
 
-    /// Variables with names that nothing else has.
+    /// Declares variables with unique names. Returns the names and the conditions on their types.
     fn declare(&mut self, list: &[pddl::ast::TypedName], scope: &mut Binding) -> (Vec<String>, Vec<Part>) {
-        let mut fresh = Vec::new();
-        let mut is = Vec::new();
-        for own in list {
+        let mut names = Vec::new();
+        let mut type_conditions = Vec::new();
+        for variable in list {
             self.counter += 1;
-            let unique = format!("{}#{}", low(&own.identifier.name), self.counter);
-            scope.insert(low(&own.identifier.name), unique.clone());
-            is.push(Part::Is(unique.clone(), types(&own.r#type)));
-            fresh.push(unique);
+            let unique = format!("{}#{}", low(&variable.identifier.name), self.counter);
+            scope.insert(low(&variable.identifier.name), unique.clone());
+            type_conditions.push(Part::HasType(unique.clone(), types(&variable.r#type)));
+            names.push(unique);
         }
-        (fresh, is)
+        (names, type_conditions)
     }
 
     fn part(&mut self, condition: &Condition, scope: &Binding) -> Part {
@@ -218,7 +217,7 @@ impl Task {
         }
     }
 
-    /// Calls `each` with every binding under which all parts hold; ends when it says so.
+    /// Calls `each` with every binding under which all parts hold. Stops when `each` returns `true`, and returns whether it did.
     fn solve(
         &self,
         mut open: Vec<&Part>,
@@ -233,7 +232,8 @@ impl Task {
                 _ => unreachable!("one of both"),
             }
         }
-        let none = BTreeSet::new();
+        let no_rows = BTreeSet::new();
+        // Join order: tests first, then the smallest relations. Negations must wait until their variables are bound.
         let price = |part: &Part| match part {
             part if is_bound(part, binding, &mut Vec::new()) => 0,
             Part::Equal(left, right) if value(left, binding).is_some() || value(right, binding).is_some() => {
@@ -241,7 +241,7 @@ impl Task {
             }
             Part::Holds(name, _) => 2 + facts.get(name).map_or(0, BTreeSet::len),
             Part::Or(_) => 1_000_000,
-            Part::Is(..) => 2_000_000,
+            Part::HasType(..) => 2_000_000,
             _ => usize::MAX,
         };
         let Some(at) = (0..open.len()).min_by_key(|at| price(open[*at])) else { return each(binding) };
@@ -251,9 +251,10 @@ impl Task {
         }
         match part {
             Part::Holds(name, arguments) => {
-                for row in facts.get(name).unwrap_or(&none) {
-                    let mut longer = binding.clone();
-                    if meet(arguments, row, &mut longer) && self.solve(open.clone(), &mut longer, facts, each)
+                for row in facts.get(name).unwrap_or(&no_rows) {
+                    let mut extended = binding.clone();
+                    if unify(arguments, row, &mut extended)
+                        && self.solve(open.clone(), &mut extended, facts, each)
                     {
                         return true;
                     }
@@ -261,70 +262,72 @@ impl Task {
                 false
             }
             Part::Equal(left, right) => {
-                let (known, other) = match value(left, binding) {
-                    Some(known) => (known, right),
+                let (object, free_side) = match value(left, binding) {
+                    Some(object) => (object, right),
                     None => (value(right, binding).expect("one side is known"), left),
                 };
-                let Argument::Variable(variable) = other else { unreachable!("the other is free") };
-                let mut longer = binding.clone();
-                longer.insert(variable.clone(), known);
-                self.solve(open, &mut longer, facts, each)
+                let Argument::Variable(variable) = free_side else { unreachable!("the other is free") };
+                let mut extended = binding.clone();
+                extended.insert(variable.clone(), object);
+                self.solve(open, &mut extended, facts, each)
             }
             Part::Or(parts) => parts.iter().any(|part| {
                 let open = open.iter().copied().chain([part]).collect();
                 self.solve(open, &mut binding.clone(), facts, each)
             }),
-            Part::Is(variable, wanted) => self.objects.keys().any(|object| {
-                let mut longer = binding.clone();
-                longer.insert(variable.clone(), object.clone());
-                self.is(object, wanted) && self.solve(open.clone(), &mut longer, facts, each)
+            Part::HasType(variable, types) => self.objects.keys().any(|object| {
+                let mut extended = binding.clone();
+                extended.insert(variable.clone(), object.clone());
+                self.has_type(object, types) && self.solve(open.clone(), &mut extended, facts, each)
             }),
-            other => unreachable!("every variable has a type: {other:?}"),
+            unsupported => unreachable!("every variable has a type: {unsupported:?}"),
         }
     }
 
-    fn is(&self, object: &str, wanted: &[String]) -> bool {
-        wanted.is_empty() || wanted.iter().any(|one| one == "object" || self.objects[object].contains(one))
+    fn has_type(&self, object: &str, types: &[String]) -> bool {
+        types.is_empty()
+            || types.iter().any(|type_name| type_name == "object" || self.objects[object].contains(type_name))
     }
 
     fn test(&self, part: &Part, binding: &mut Binding, facts: &Facts) -> bool {
-        let known = |own: &Argument| value(own, binding).expect("it is bound");
+        let object_of = |argument: &Argument| value(argument, binding).expect("it is bound");
         match part {
             Part::Holds(name, arguments) => {
-                let words: Words = arguments.iter().map(known).collect();
+                let words: Words = arguments.iter().map(object_of).collect();
                 facts.get(name).is_some_and(|rows| rows.contains(&words))
             }
-            Part::Equal(left, right) => known(left) == known(right),
-            Part::Is(variable, wanted) => self.is(&binding[variable], wanted),
+            Part::Equal(left, right) => object_of(left) == object_of(right),
+            Part::HasType(variable, types) => self.has_type(&binding[variable], types),
             Part::Not(inner) => !self.solve(vec![inner], &mut binding.clone(), facts, &mut |_| true),
-            other => self.solve(vec![other], &mut binding.clone(), facts, &mut |_| true),
+            connective => self.solve(vec![connective], &mut binding.clone(), facts, &mut |_| true),
         }
     }
 
-    /// The predicates that actions change.
-    fn changed(&self) -> BTreeSet<String> {
-        let all = self.schemas.iter().flat_map(|own| own.adds.iter().chain(&own.deletes));
-        all.map(|(name, _)| name.clone()).collect()
+    /// Names of the predicates that actions change.
+    fn changed_predicates(&self) -> BTreeSet<String> {
+        let changed_atoms = self.schemas.iter().flat_map(|schema| schema.adds.iter().chain(&schema.deletes));
+        changed_atoms.map(|(name, _)| name.clone()).collect()
     }
 
-    /// Facts with all that follows by the rules about what varies, or by the others.
-    fn closed(&self, mut facts: Facts, varies: bool) -> Facts {
+    /// Closure of facts under the rules with `varies` equal to the argument, stratum by stratum.
+    fn closure(&self, mut facts: Facts, varies: bool) -> Facts {
         let highest = self.rules.iter().map(|rule| rule.level).max().unwrap_or(0);
         for level in 0..=highest {
             loop {
-                let mut new = Vec::new();
+                let mut conclusions = Vec::conclusions();
                 for rule in self.rules.iter().filter(|rule| rule.level == level && rule.varies == varies) {
-                    self.solve(vec![&rule.body], &mut Binding::new(), &facts, &mut |found| {
-                        let words: Words = rule.parameters.iter().map(|own| found[own].clone()).collect();
-                        new.push((rule.head.clone(), words));
+                    self.solve(vec![&rule.body], &mut Binding::conclusions(), &facts, &mut |binding| {
+                        let words: Words =
+                            rule.parameters.iter().map(|parameter| binding[parameter].clone()).collect();
+                        conclusions.push((rule.head.clone(), words));
                         false
                     });
                 }
-                let mut grown = false;
-                for (head, words) in new {
-                    grown |= facts.entry(head).or_default().insert(words);
+                let mut has_grown = false;
+                for (head, words) in conclusions {
+                    has_grown |= facts.entry(head).or_default().insert(words);
                 }
-                if !grown {
+                if !has_grown {
                     break;
                 }
             }
@@ -332,49 +335,54 @@ impl Task {
         facts
     }
 
-    /// Everything, state by state; none if there are more states than that.
-    pub fn explore(&self, limit: usize) -> Option<Reached> {
-        let changed = self.changed();
+    /// Explores all reachable states breadth-first. Returns `None` if there are more than `limit` states.
+    pub fn explore(&self, limit: usize) -> Option<StateSpace> {
+        let changed_predicates = self.changed_predicates();
         let fixed = self.initial.iter().filter(|(name, _)| !changed.contains(*name));
-        let fixed = self.closed(fixed.map(|(name, rows)| (name.clone(), rows.clone())).collect(), false);
-        let shown = |state: &Facts| {
-            let own = state.iter().filter(|(name, _)| changed.contains(*name));
-            let all = own.flat_map(|(name, rows)| rows.iter().map(move |row| text(name, row)));
-            all.collect::<Vec<_>>().join(", ")
+        let fixed = self.closure(fixed.map(|(name, rows)| (name.clone(), rows.clone())).collect(), false);
+        let text_of_state = |state: &Facts| {
+            let changing_facts = state.iter().filter(|(name, _)| changed.contains(*name));
+            let atoms = changing_facts.flat_map(|(name, rows)| rows.iter().map(move |row| text(name, row)));
+            atoms.collect::<Vec<_>>().join(", ")
         };
-        let mut reached = Reached::default();
-        let mut seen: BTreeSet<Facts> = BTreeSet::from([self.initial.clone()]);
+        let mut space = StateSpace::default();
+        let mut visited: BTreeSet<Facts> = BTreeSet::from([self.initial.clone()]);
         let mut layer = vec![self.initial.clone()];
         for depth in 0.. {
             let mut next = Vec::new();
             for state in &layer {
-                let own = state.iter().filter(|(name, _)| changed.contains(*name));
+                let changing_facts = state.iter().filter(|(name, _)| changed.contains(*name));
                 let mut facts = fixed.clone();
-                facts.extend(own.map(|(name, rows)| (name.clone(), rows.clone())));
-                let facts = self.closed(facts, true);
-                let all = facts.iter().flat_map(|(name, rows)| rows.iter().map(move |row| text(name, row)));
-                reached.atoms.extend(all);
-                if reached.least.is_none() && self.test(&self.goal, &mut Binding::new(), &facts) {
-                    reached.least = Some(depth);
+                facts.extend(changing_facts.map(|(name, rows)| (name.clone(), rows.clone())));
+                let facts = self.closure(facts, true);
+                let atoms = facts.iter().flat_map(|(name, rows)| rows.iter().map(move |row| text(name, row)));
+                space.atoms.extend(atoms);
+                if space.least_steps.is_none() && self.test(&self.goal, &mut Binding::new(), &facts) {
+                    space.least_steps = Some(depth);
                 }
                 for schema in &self.schemas {
-                    let mut found = BTreeSet::new();
-                    self.solve(vec![&schema.body], &mut Binding::new(), &facts, &mut |own| {
-                        let words: Words = schema.parameters.iter().map(|name| own[name].clone()).collect();
-                        found.insert(words);
+                    let mut argument_lists = BTreeSet::new();
+                    self.solve(vec![&schema.body], &mut Binding::new(), &facts, &mut |binding| {
+                        let words: Words =
+                            schema.parameters.iter().map(|name| binding[name].clone()).collect();
+                        argument_lists.insert(words);
                         false
                     });
-                    for words in found {
-                        let own = schema.parameters.iter().cloned().zip(words.iter().cloned()).collect();
-                        let after = after(schema, &own, state);
-                        reached.steps.insert((shown(state), text(&schema.name, &words), shown(&after)));
-                        if seen.insert(after.clone()) {
+                    for words in argument_lists {
+                        let binding = schema.parameters.iter().cloned().zip(words.iter().cloned()).collect();
+                        let after = after(schema, &binding, state);
+                        space.steps.insert((
+                            text_of_state(state),
+                            text(&schema.name, &words),
+                            text_of_state(&after),
+                        ));
+                        if visited.insert(after.clone()) {
                             next.push(after);
                         }
                     }
                 }
             }
-            if seen.len() > limit {
+            if visited.len() > limit {
                 return None;
             }
             if next.is_empty() {
@@ -382,14 +390,14 @@ impl Task {
             }
             layer = next;
         }
-        Some(reached)
+        Some(space)
     }
 }
 
 fn after(schema: &Schema, binding: &Binding, state: &Facts) -> Facts {
     let mut after = state.clone();
     let words = |arguments: &[Argument]| -> Words {
-        arguments.iter().map(|own| value(own, binding).expect("a parameter")).collect()
+        arguments.iter().map(|argument| value(argument, binding).expect("a parameter")).collect()
     };
     for (name, arguments) in &schema.deletes {
         after.entry(name.clone()).or_default().remove(&words(arguments));
@@ -407,14 +415,14 @@ fn text(name: &str, words: &Words) -> Text {
 
 fn name(term: &Term) -> &pddl::ast::Name {
     match term {
-        Term::Variable(own) | Term::Constant(own) => &own.name,
+        Term::Variable(identifier) | Term::Constant(identifier) => &identifier.name,
     }
 }
 
 fn argument(term: &Term, scope: &Binding) -> Argument {
     match term {
-        Term::Variable(own) => Argument::Variable(scope[&low(&own.name)].clone()),
-        Term::Constant(own) => Argument::Object(low(&own.name)),
+        Term::Variable(identifier) => Argument::Variable(scope[&low(&identifier.name)].clone()),
+        Term::Constant(identifier) => Argument::Object(low(&identifier.name)),
     }
 }
 
@@ -425,10 +433,10 @@ fn value(argument: &Argument, binding: &Binding) -> Option<String> {
     }
 }
 
-fn meet(arguments: &[Argument], row: &Words, binding: &mut Binding) -> bool {
+fn unify(arguments: &[Argument], row: &Words, binding: &mut Binding) -> bool {
     arguments.len() == row.len()
-        && arguments.iter().zip(row).all(|(own, object)| match (value(own, binding), own) {
-            (Some(known), _) => known == *object,
+        && arguments.iter().zip(row).all(|(argument, object)| match (value(argument, binding), argument) {
+            (Some(value_of_argument), _) => value_of_argument == *object,
             (None, Argument::Variable(name)) => {
                 binding.insert(name.clone(), object.clone());
                 true
@@ -437,46 +445,49 @@ fn meet(arguments: &[Argument], row: &Words, binding: &mut Binding) -> bool {
         })
 }
 
-/// Whether all variables of a part are bound, but for those that a quantifier within it binds.
+/// Returns `true` if all variables of a part are bound by the binding or by an enclosing quantifier.
 fn is_bound(part: &Part, binding: &Binding, hidden: &mut Vec<String>) -> bool {
-    let own = |own: &Argument, hidden: &[String]| match own {
+    let is_argument_bound = |is_argument_bound: &Argument, hidden: &[String]| match is_argument_bound {
         Argument::Variable(name) => binding.contains_key(name) || hidden.contains(name),
         Argument::Object(_) => true,
     };
     match part {
         Part::And(parts) | Part::Or(parts) => parts.iter().all(|part| is_bound(part, binding, hidden)),
-        Part::Holds(_, arguments) => arguments.iter().all(|argument| own(argument, hidden)),
-        Part::Equal(left, right) => own(left, hidden) && own(right, hidden),
-        Part::Is(name, _) => binding.contains_key(name) || hidden.contains(name),
+        Part::Holds(_, arguments) => arguments.iter().all(|argument| is_argument_bound(argument, hidden)),
+        Part::Equal(left, right) => is_argument_bound(left, hidden) && is_argument_bound(right, hidden),
+        Part::HasType(name, _) => binding.contains_key(name) || hidden.contains(name),
         Part::Not(inner) => is_bound(inner, binding, hidden),
         Part::Exists(inner) => {
             let Part::And(parts) = &**inner else { unreachable!("made so") };
             let outer = hidden.len();
             hidden.extend(parts.iter().filter_map(|part| match part {
-                Part::Is(name, _) => Some(name.clone()),
+                Part::HasType(name, _) => Some(name.clone()),
                 _ => None,
             }));
-            let bound = is_bound(inner, binding, hidden);
+            let is_inner_bound = is_bound(inner, binding, hidden);
             hidden.truncate(outer);
-            bound
+            is_inner_bound
         }
     }
 }
 
-fn mentioned(condition: &Condition, negated: bool, found: &mut Vec<(String, bool)>) {
+/// Predicates in a condition, each with `true` if it is in the scope of an odd number of negations.
+fn collect_predicates(condition: &Condition, negated: bool, predicates: &mut Vec<(String, bool)>) {
     match condition {
         Condition::And(parts) | Condition::Or(parts) => {
             for part in parts {
-                mentioned(part, negated, found);
+                collect_predicates(part, negated, predicates);
             }
         }
-        Condition::Not(inner) => mentioned(inner, !negated, found),
-        Condition::Exists(_, inner) | Condition::ForAll(_, inner) => mentioned(inner, negated, found),
-        Condition::Imply(left, right) => {
-            mentioned(left, !negated, found);
-            mentioned(right, negated, found);
+        Condition::Not(inner) => collect_predicates(inner, !negated, predicates),
+        Condition::Exists(_, inner) | Condition::ForAll(_, inner) => {
+            collect_predicates(inner, negated, predicates)
         }
-        Condition::Atom(atom) => found.push((low(&atom.predicate.name), negated)),
+        Condition::Imply(left, right) => {
+            collect_predicates(left, !negated, predicates);
+            collect_predicates(right, negated, predicates);
+        }
+        Condition::Atom(atom) => predicates.push((low(&atom.predicate.name), negated)),
         Condition::Equal(..) | Condition::Compare(..) => {}
     }
 }
@@ -493,8 +504,8 @@ fn changes(
     };
     match effect {
         Effect::And(parts) => parts.iter().for_each(|part| changes(part, scope, adds, deletes)),
-        Effect::Add(own) => adds.push(atom(own)),
-        Effect::Delete(own) => deletes.push(atom(own)),
-        other => panic!("no such effects here: {other:?}"),
+        Effect::Add(effect_atom) => adds.push(atom(effect_atom)),
+        Effect::Delete(effect_atom) => deletes.push(atom(effect_atom)),
+        unsupported => panic!("no such effects here: {unsupported:?}"),
     }
 }

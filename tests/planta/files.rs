@@ -1,4 +1,4 @@
-//! The files of examples, and the program.
+//! Input files of the examples, and functions that run the program.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -10,23 +10,23 @@ use metaplan::mission::{Bindings, Mission};
 use ontology::ReadOptions;
 use pddl::ast::{Domain, Problem};
 
-/// An input of the converter.
+/// Input files of the converter.
 #[derive(Debug, Clone)]
 pub struct Input {
     pub domain: PathBuf,
     pub problem: PathBuf,
     pub knowledge: PathBuf,
-    /// Where imports lie.
+    /// Directory of imported documents.
     pub directory: PathBuf,
 }
 
-/// The directory with the real files, where it is there.
+/// Directory of the real files, if available.
 pub fn real() -> Option<PathBuf> {
     let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/real");
     if directory.is_dir() {
         return Some(directory);
     }
-    // The reason for the skip belongs into the test's own output.
+    // The reason for skipping should be part of the test's own output.
     #[allow(clippy::print_stderr)]
     {
         eprintln!("skipped: there is no ../shared beside the project");
@@ -34,7 +34,7 @@ pub fn real() -> Option<PathBuf> {
     None
 }
 
-/// What a run of the program answers: its status, and what it writes.
+/// Exit status, standard output and standard error of a run.
 pub fn metaplan(arguments: &[&str]) -> (i32, String, String) {
     let output = Command::new(env!("CARGO_BIN_EXE_metaplan")).args(arguments).output().expect("it runs");
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
@@ -42,7 +42,7 @@ pub fn metaplan(arguments: &[&str]) -> (i32, String, String) {
 }
 
 impl Input {
-    /// Files in a directory.
+    /// Names files in a directory.
     pub fn new(directory: &Path, domain: &str, problem: &str, knowledge: &str) -> Self {
         Self {
             domain: directory.join(domain),
@@ -52,16 +52,16 @@ impl Input {
         }
     }
 
-    /// The arguments of a command on these files, and further ones.
-    pub fn arguments<'a>(&'a self, command: &'a str, further: &[&'a str]) -> Vec<&'a str> {
+    /// Arguments of a command on these files, with further ones.
+    pub fn arguments<'a>(&'a self, command: &'a str, options: &[&'a str]) -> Vec<&'a str> {
         let path = |path: &'a Path| path.to_str().expect("UTF-8");
-        let mut all = vec![command, path(&self.domain), path(&self.problem), "--quiet"];
-        all.extend(["--kb", path(&self.knowledge), "--directory", path(&self.directory)]);
-        all.extend(further);
-        all
+        let mut command_line = vec![command, path(&self.domain), path(&self.problem), "--quiet"];
+        command_line.extend(["--kb", path(&self.knowledge), "--directory", path(&self.directory)]);
+        command_line.extend(options);
+        command_line
     }
 
-    /// As a mission.
+    /// Reads the files as a mission.
     pub fn mission(&self) -> Mission {
         let (domain, problem) = (source(&self.domain), source(&self.problem));
         let options = ReadOptions { directories: vec![self.directory.clone()], ..ReadOptions::default() };
@@ -70,19 +70,19 @@ impl Input {
         let text = domain.as_ref().map_or("", |domain| domain.text());
         let knowledge = Some(Knowledge::read_for(&sources, text));
         let mission = Mission::new("", knowledge, Bindings::default(), domain, problem);
-        mission.unwrap_or_else(|messages| panic!("{}", shown(&messages)))
+        mission.unwrap_or_else(|messages| panic!("{}", text_of(&messages)))
     }
 }
 
-/// Messages as text.
-pub fn shown(messages: &[Message]) -> String {
+/// Texts of messages.
+pub fn text_of(messages: &[Message]) -> String {
     messages.iter().map(Message::text).collect()
 }
 
-/// A domain and a problem as they stand in files, whether or not all of it is declared.
+/// Parses a domain and a problem without checking declarations.
 pub fn parsed(domain: &Path, problem: &Path) -> (Domain, Problem) {
     let read = |path: &Path| pddl::Source::new("file", std::fs::read_to_string(path).expect("a file"));
     let (domain, problem) = (read(domain), read(problem));
-    let both = (pddl::parse_domain(&domain).0, pddl::parse_problem(&problem).0);
-    (both.0.expect("a domain"), both.1.expect("a problem"))
+    let parsed_files = (pddl::parse_domain(&domain).0, pddl::parse_problem(&problem).0);
+    (parsed_files.0.expect("a domain"), parsed_files.1.expect("a problem"))
 }

@@ -1,5 +1,5 @@
-//! Missions in PLANTA's form, planned from the files that its users have: held against the files that its converter has made of them,
-//! by plain enumeration of all that can be reached.
+//! Tests of missions in PLANTA's form, planned from its input files. The oracle is the complete state space of the files that PLANTA's
+//! converter writes for them.
 
 mod brute;
 mod examples;

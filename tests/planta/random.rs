@@ -1,7 +1,7 @@
-//! Random tasks in PLANTA's form: narrowed and settled as the planner gets them, and as they are exported, they have the same states.
+//! Random tasks in PLANTA's form: the narrowed task, which the planner gets, and the exported one have the same state space.
 //!
-//! Both are explored by brute force, which shares nothing with the planner. The oracle of a change in the front end is the exported task: it
-//! has all axioms, nothing that is settled, and no bound.
+//! Both are explored by brute force, independently of the planner. The exported task is the oracle of narrowing: it has all axioms, and
+//! nothing in it is settled or bounded.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -10,16 +10,16 @@ use fastrand::Rng;
 use metaplan::mission::Planning;
 
 use crate::brute::Task;
-use crate::files::{Input, metaplan, real, shown};
+use crate::files::{Input, metaplan, real, text_of};
 use crate::situations::run;
 
 const CLASSES: [&str; 5] = ["Ca", "Cb", "Cc", "Cd", "Ce"];
 const PROPERTIES: [&str; 2] = ["pa", "pb"];
 const INDIVIDUALS: [&str; 2] = ["i1", "i2"];
-/// Larger tasks are skipped.
-const STATES: usize = 300;
+/// Maximum number of states. Larger tasks are skipped.
+const MAX_STATES: usize = 300;
 
-/// The texts of a task: knowledge base, domain and problem.
+/// Texts of a task: knowledge base, domain and problem.
 struct Texts {
     knowledge: String,
     domain: String,
@@ -58,10 +58,10 @@ fn pick<'n>(random: &mut Rng, names: &[&'n str]) -> &'n str {
     names[random.usize(..names.len())]
 }
 
-/// Axioms about classes and properties, and assertions.
+/// Random axioms about classes and properties, and assertions.
 fn axioms(random: &mut Rng) -> String {
     let mut text = String::new();
-    // An individual that is only declared is no object.
+    // An individual without an assertion does not become an object.
     for individual in INDIVIDUALS {
         let _ = writeln!(text, "ClassAssertion(:Ce :{individual})");
     }
@@ -71,9 +71,9 @@ fn axioms(random: &mut Rng) -> String {
                 let _ = writeln!(text, "ClassAssertion(:{class} :{individual})");
             }
         }
-        let other = pick(random, &CLASSES);
-        if random.u8(..10) < 3 && class != other {
-            let _ = writeln!(text, "SubClassOf(:{class} :{other})");
+        let superclass = pick(random, &CLASSES);
+        if random.u8(..10) < 3 && class != superclass {
+            let _ = writeln!(text, "SubClassOf(:{class} :{superclass})");
         }
     }
     for property in PROPERTIES {
@@ -94,12 +94,12 @@ fn axioms(random: &mut Rng) -> String {
     text
 }
 
-/// The name of what is stated of a class or property, or follows.
+/// Name of the predicate for inferred members of a class or property.
 fn inferred(name: &str) -> String {
     format!("inferred-{}{}", name[..1].to_uppercase(), &name[1..])
 }
 
-/// A condition on one or two variables.
+/// A random condition on one or two variables.
 fn condition(random: &mut Rng, has_axiom: bool) -> String {
     let variable = pick(random, &["?x", "?x", "?y"]);
     match random.u8(..if has_axiom { 8 } else { 7 }) {
@@ -128,12 +128,12 @@ fn texts(seed: u64) -> Texts {
         "(define (domain d) (:requirements :strips :derived-predicates)\n (:predicates (done ?x)".to_owned();
     let has_axiom = random.u8(..10) < 4;
     if has_axiom {
-        let [one, other] = [pick(&mut random, &CLASSES), pick(&mut random, &CLASSES)].map(inferred);
-        let _ = write!(domain, " (usable ?x))\n (:derived (usable ?x) (and ({one} ?x) ({other} ?x)))");
+        let [first, second] = [pick(&mut random, &CLASSES), pick(&mut random, &CLASSES)].map(inferred);
+        let _ = write!(domain, " (usable ?x))\n (:derived (usable ?x) (and ({first} ?x) ({second} ?x)))");
     } else {
         domain.push(')');
     }
-    // At least one action asks for a conclusion: that is what the form is recognised by.
+    // PLANTA's form is recognised by a conclusion in a condition, so the first action has one.
     for number in 0..random.usize(2..5) {
         let mut conditions = vec![condition(&mut random, has_axiom)];
         if number == 0 {
@@ -161,30 +161,30 @@ fn texts(seed: u64) -> Texts {
     Texts { knowledge, domain, problem }
 }
 
-/// A task that is small enough.
-struct Compared {
-    /// The least number of actions to a goal; none if there is no plan.
-    least: Option<usize>,
+/// Result for a task that is small enough to be compared.
+struct Comparison {
+    /// Length of a shortest plan; `None` if there is no plan.
+    least_steps: Option<usize>,
 }
 
-/// Compares the states of a task as it is narrowed and as it is exported; returns none if there are too many.
-fn compare(texts: &Texts, name: &str) -> Option<Compared> {
+/// Compares the state spaces of the narrowed and the exported task. Returns `None` if there are too many states.
+fn compare(texts: &Texts, name: &str) -> Option<Comparison> {
     let directory = tempfile::tempdir().expect("a directory");
     let mission = texts.write(directory.path()).mission();
-    let (filled, _) = mission.filled().unwrap_or_else(|messages| panic!("{}", shown(&messages)));
-    let exported = Task::new(mission.domain(), &filled).explore(STATES)?;
+    let (filled, _) = mission.filled().unwrap_or_else(|messages| panic!("{}", text_of(&messages)));
+    let exported = Task::new(mission.domain(), &filled).explore(MAX_STATES)?;
     let (domain, problem) = mission.narrowed(&filled);
-    let narrowed = Task::new(&domain, &problem).explore(2 * STATES).expect("as many states");
+    let narrowed = Task::new(&domain, &problem).explore(2 * MAX_STATES).expect("as many states");
     let text = format!("{name}\n{}\n{}\n{}", texts.knowledge, texts.domain, texts.problem);
-    assert_eq!(narrowed.least, exported.least, "{text}");
+    assert_eq!(narrowed.least_steps, exported.least_steps, "{text}");
     assert_eq!(narrowed.steps, exported.steps, "{text}");
-    Some(Compared { least: exported.least })
+    Some(Comparison { least_steps: exported.least_steps })
 }
 
-/// Compares tasks from a seed on, so many that are small enough.
+/// Compares the first `tasks` tasks from a seed on that are small enough.
 fn compare_many(seed: u64, tasks: usize) {
     let outcomes = (seed..).filter_map(|seed| compare(&texts(seed), &format!("seed {seed}")));
-    let solvable = outcomes.take(tasks).filter(|compared| compared.least.is_some()).count();
+    let solvable = outcomes.take(tasks).filter(|comparison| comparison.least_steps.is_some()).count();
     assert!(solvable * 10 > tasks, "only {solvable} of {tasks} tasks have a plan");
 }
 
@@ -199,9 +199,9 @@ fn many_random_tasks_have_the_states_of_their_export() {
     compare_many(1_000, 10_000);
 }
 
-/// Actions that ask for what follows add facts of everything that it follows of, not only of what is stated.
+/// Conditions on conclusions are satisfied by all facts that imply them, not only by stated ones. So later actions can add such facts.
 #[test]
-fn conditions_on_conclusions_do_not_bound_what_is_stated() {
+fn conditions_on_conclusions_do_not_bound_stated_facts() {
     let knowledge = knowledge("ClassAssertion(:Ca :i1)\n");
     let actions = "(:action b :parameters (?x) :precondition (inferred-Cb ?x) :effect (done ?x)))\n";
     let problem = "(define (problem p) (:domain d) (:init) (:goal (done i1)))\n".to_owned();
@@ -217,14 +217,14 @@ fn conditions_on_conclusions_do_not_bound_what_is_stated() {
     ];
     for domain in domains {
         let texts = Texts { knowledge: knowledge.clone(), domain, problem: problem.clone() };
-        let compared = compare(&texts, "conclusions").expect("few states");
-        assert_eq!(compared.least, Some(2));
+        let comparison = compare(&texts, "conclusions").expect("few states");
+        assert_eq!(comparison.least_steps, Some(2));
     }
 }
 
-/// A class that only one of two actions requires of an argument says nothing of the facts that the other one adds.
+/// A class that only one of two actions requires does not restrict the arguments of facts that the other action adds.
 #[test]
-fn a_class_that_one_action_requires_guards_nothing() {
+fn classes_required_by_one_action_do_not_guard_facts_of_others() {
     let knowledge = knowledge(
         "ClassAssertion(:Ca :i1) ClassAssertion(:Ce :i1) ClassAssertion(:Ce :i2) ObjectPropertyDomain(:pa :Ca)\n",
     );
@@ -234,13 +234,13 @@ fn a_class_that_one_action_requires_guards_nothing() {
  (:action b :parameters (?x) :precondition (inferred-Ca ?x) :effect (done ?x)))\n"
         .to_owned();
     let problem = "(define (problem p) (:domain d) (:init) (:goal (done i2)))\n".to_owned();
-    let compared = compare(&Texts { knowledge, domain, problem }, "two actions").expect("few states");
-    assert_eq!(compared.least, Some(2));
+    let comparison = compare(&Texts { knowledge, domain, problem }, "two actions").expect("few states");
+    assert_eq!(comparison.least_steps, Some(2));
 }
 
-/// An observation that no action could have brought about is planned with: `i2` is not stated to be a `Ca`, which the action requires.
+/// An observed fact is used although no action could have added it: the action requires `Ca`, which `i2` is not stated to be.
 #[test]
-fn an_observation_that_breaks_a_guard_is_planned_with() {
+fn observations_that_violate_a_guard_are_used() {
     let knowledge = knowledge(
         "ClassAssertion(:Ca :i1) ClassAssertion(:Ce :i1) ClassAssertion(:Ce :i2) ObjectPropertyDomain(:pa :Ca)\n",
     );
@@ -253,15 +253,15 @@ fn an_observation_that_breaks_a_guard_is_planned_with() {
     let input = Texts { knowledge, domain, problem }.write(directory.path());
     let line = "{\"event\":\"fact_changed\",\"name\":\"pa i2 i1\",\"value\":true}\n";
     let answers = run(&input.arguments("run", &[]), line);
-    let first = |kind: &str| answers.iter().find(|answer| answer["answer"] == kind);
-    assert!(first("plan_none").is_some() && first("error").is_none(), "{answers:#?}");
-    let plan = first("plan_found").unwrap_or_else(|| panic!("{answers:#?}"));
+    let first_answer = |kind: &str| answers.iter().find(|answer| answer["answer"] == kind);
+    assert!(first_answer("plan_none").is_some() && first_answer("error").is_none(), "{answers:#?}");
+    let plan = first_answer("plan_found").unwrap_or_else(|| panic!("{answers:#?}"));
     assert_eq!(plan["steps"].as_array().map(Vec::len), Some(1), "{plan}");
 }
 
-/// The public domain with a conclusion in place of a class in one of its conditions: the same best plan as its export, and a certificate of that.
+/// The public domain with a conclusion instead of a class in one condition has the same optimum as its export, and a valid certificate.
 #[test]
-fn a_public_domain_with_conclusions_in_conditions_is_planned_as_its_export() {
+fn public_domain_with_conclusions_has_the_optimum_of_its_export() {
     let Some(real) = real() else { return };
     let source = real.join("pddl/suave_planta");
     let domain = std::fs::read_to_string(source.join("suave_domain_extended.pddl")).expect("a domain");

@@ -1,4 +1,4 @@
-//! What fails, what is measured, and what is asked of a mission in PLANTA's form; and its maps.
+//! Tests of failures, measurements, commands and maps for missions in PLANTA's form.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::io::{Seek as _, Write as _};
@@ -32,28 +32,28 @@ fn grid(real: &Path, nodes: &str, with_designs: bool) -> Input {
     }
 }
 
-/// The best plan as JSON; it must be proved.
-fn plan(input: &Input, further: &[&str]) -> Value {
+/// Optimal plan as JSON. Fails unless optimality is proved.
+fn plan(input: &Input, options: &[&str]) -> Value {
     let (status, stdout, stderr) =
-        metaplan(&input.arguments("plan", &[&["--format", "json"], further].concat()));
+        metaplan(&input.arguments("plan", &[&["--format", "json"], options].concat()));
     assert_eq!(status, 0, "{stdout}{stderr}");
     let answer: Value = serde_json::from_str(&stdout).expect("JSON");
     assert_eq!(answer["status"], "optimal", "{answer}");
     answer
 }
 
-/// The arguments of all steps.
-fn mentioned(answer: &Value) -> BTreeSet<String> {
+/// Arguments of all steps.
+fn arguments_of_steps(answer: &Value) -> BTreeSet<String> {
     let steps = answer["steps"].as_array().expect("steps").iter();
     let arguments = steps.flat_map(|step| step["arguments"].as_array().expect("arguments"));
     arguments.filter_map(Value::as_str).map(ToOwned::to_owned).collect()
 }
 
 #[test]
-fn the_knowledge_base_decides_which_designs_are_grounded() {
+fn knowledge_base_determines_the_designs_of_plans() {
     let Some(real) = real() else { return };
     let input = extended(&real);
-    // The situation, the number of steps, what the plan uses and what not.
+    // Situation, number of steps, a design or action in the plan, and one that is not in the plan.
     let cases: [(&[&str], usize, &str, &str); 4] = [
         (&[], 7, "fd_all_thrusters", "fd_recover_thrusters"),
         (&["--fail", "c_thruster_1"], 7, "fd_recover_thrusters", "fd_all_thrusters"),
@@ -63,20 +63,20 @@ fn the_knowledge_base_decides_which_designs_are_grounded() {
     for (situation, steps, used, unused) in cases {
         let answer = plan(&input, situation);
         assert_eq!(answer["steps"].as_array().map(Vec::len), Some(steps), "{situation:?}");
-        let all = mentioned(&answer);
-        assert!(all.contains(used) && !all.contains(unused), "{situation:?}: {all:?}");
+        let arguments = arguments_of_steps(&answer);
+        assert!(arguments.contains(used) && !arguments.contains(unused), "{situation:?}: {arguments:?}");
     }
 }
 
 #[test]
-fn a_situation_is_that_of_the_merged_files() {
+fn situations_have_the_state_space_of_their_export() {
     let Some(real) = real() else { return };
     let input = extended(&real);
     let situations: [(Option<&str>, Option<&str>); 3] =
         [(Some("c_thruster_1"), None), (None, Some("1.5")), (Some("c_thruster_3"), Some("2.5"))];
-    for (failed, visibility) in situations {
+    for (failed_component, visibility) in situations {
         let mut mission = input.mission();
-        if let Some(component) = failed {
+        if let Some(component) = failed_component {
             mission.fail(component).expect("a component");
         }
         if let Some(value) = visibility {
@@ -86,13 +86,13 @@ fn a_situation_is_that_of_the_merged_files() {
         let exported = Task::new(mission.domain(), &filled).explore(20_000).expect("few states");
         let (domain, problem) = mission.narrowed(&filled);
         let narrowed = Task::new(&domain, &problem).explore(20_000).expect("few states");
-        assert_eq!(narrowed.steps, exported.steps, "{failed:?} {visibility:?}");
-        assert_eq!(narrowed.least, exported.least, "{failed:?} {visibility:?}");
+        assert_eq!(narrowed.steps, exported.steps, "{failed_component:?} {visibility:?}");
+        assert_eq!(narrowed.least_steps, exported.least_steps, "{failed_component:?} {visibility:?}");
     }
 }
 
 #[test]
-fn certificates_of_such_missions_are_verified() {
+fn certificates_are_verified() {
     let Some(real) = real() else { return };
     let directory = tempfile::tempdir().expect("a temporary directory");
     let cases: [(Input, &[&str]); 3] = [
@@ -113,7 +113,7 @@ fn certificates_of_such_missions_are_verified() {
 }
 
 #[test]
-fn a_manifest_serves_scenarios_explanations_and_the_loop() {
+fn manifests_support_scenarios_explanations_and_the_loop() {
     let Some(real) = real() else { return };
     let input = extended(&real);
     let directory = tempfile::tempdir().expect("a temporary directory");
@@ -134,26 +134,26 @@ fn a_manifest_serves_scenarios_explanations_and_the_loop() {
     assert!(murky.contains("fd_spiral_low"), "{murky}");
     let explained = run(&["explain", manifest, "fd_spiral_high", "--scenario", "murky", "--quiet"]);
     assert!(explained.contains("fd_spiral_high (f_generate_search_path) is not available"), "{explained}");
-    // With it, and no other one that searches, it is what the plan uses.
-    let (_, alone) = explained.split_once("if it were available").expect("what would be");
-    assert!(alone.contains("f_generate_search_path = fd_spiral_high"), "{explained}");
-    assert!(!alone.contains("fd_spiral_low"), "{explained}");
-    // A report of the robot changes what is decided before planning.
+    // The plan with this design is described, in which no other search design is used.
+    let (_, hypothetical) = explained.split_once("if it were available").expect("what would be");
+    assert!(hypothetical.contains("f_generate_search_path = fd_spiral_high"), "{explained}");
+    assert!(!hypothetical.contains("fd_spiral_low"), "{explained}");
+    // A reported failure changes the facts that are settled before planning.
     let answers =
         run_with(manifest, r#"{"event":"component_status","component":"c_thruster_1","status":"ERROR"}"#);
     let plans: Vec<&Value> = answers.iter().filter(|answer| answer["answer"] == "plan_found").collect();
     let [before, after] = plans[..] else { panic!("{answers:#?}") };
-    assert!(mentioned(before).contains("fd_all_thrusters"), "{before}");
-    let after = mentioned(after);
+    assert!(arguments_of_steps(before).contains("fd_all_thrusters"), "{before}");
+    let after = arguments_of_steps(after);
     assert!(after.contains("fd_recover_thrusters") && !after.contains("fd_all_thrusters"), "{after:?}");
 }
 
-/// What the loop answers to a line.
+/// Answers of the loop with a manifest to one input line.
 fn run_with(manifest: &str, line: &str) -> Vec<Value> {
     run(&["run", manifest, "--quiet"], line)
 }
 
-/// Answers of the loop to a line, with other arguments. The line comes from a file, so that the first plan comes before it.
+/// Answers of a command to one input line. The line comes from a file, so that the loop sends the first plan before it reads the line.
 pub fn run(arguments: &[&str], line: &str) -> Vec<Value> {
     let mut input = tempfile::tempfile().expect("a temporary file");
     input.write_all(line.as_bytes()).and_then(|()| input.rewind()).expect("a line");
@@ -167,7 +167,7 @@ pub fn run(arguments: &[&str], line: &str) -> Vec<Value> {
 }
 
 #[test]
-fn without_a_knowledge_base_it_is_said_what_to_give() {
+fn missing_knowledge_base_is_reported_with_a_remedy() {
     let Some(real) = real() else { return };
     let input = extended(&real);
     let path = |path: &Path| path.display().to_string();
@@ -175,62 +175,65 @@ fn without_a_knowledge_base_it_is_said_what_to_give() {
     let (status, _, stderr) = metaplan(&["plan", &domain, &problem]);
     assert_ne!(status, 0);
     assert!(stderr.contains("P134") && stderr.contains("`--kb FILE`"), "{stderr}");
-    // And with one that has other names, which they are.
-    let other = path(&real.join("owl/pddl_tomasys/pddl.owl"));
-    let (status, _, stderr) = metaplan(&["plan", &domain, &problem, "--kb", &other]);
+    // With a knowledge base that lacks the names, the names are listed.
+    let unrelated = path(&real.join("owl/pddl_tomasys/pddl.owl"));
+    let (status, _, stderr) = metaplan(&["plan", &domain, &problem, "--kb", &unrelated]);
     assert_ne!(status, 0);
     assert!(stderr.contains("M215") && stderr.contains("`inferred-SolvesF`"), "{stderr}");
 }
 
-/// The facts of a predicate in a problem.
+/// Facts of a predicate in the initial state.
 fn facts<'p>(problem: &'p Problem, predicate: &str) -> Vec<Vec<&'p str>> {
     let name = |term: &'p Term| match term {
-        Term::Variable(own) | Term::Constant(own) => own.name.as_str(),
+        Term::Variable(identifier) | Term::Constant(identifier) => identifier.name.as_str(),
     };
-    let own = problem.init.iter().filter_map(|element| match element {
+    let rows = problem.init.iter().filter_map(|element| match element {
         InitialElement::Fact(atom) if atom.predicate.name.as_str().eq_ignore_ascii_case(predicate) => {
             Some(atom.arguments.iter().map(name).collect())
         }
         _ => None,
     });
-    own.collect()
+    rows.collect()
 }
 
-/// The designs of PLANTA's navigation with accuracy and light, in hundredths, as its knowledge base has them.
+/// Accuracy and light of the designs in PLANTA's navigation mission, in hundredths, from its knowledge base.
 const DESIGNS: [(u32, u32); 6] = [(100, 0), (90, 0), (80, 0), (80, 100), (70, 0), (60, 0)];
 
-/// The least number of moves and reconfigurations, by breadth-first search over place and design: a corridor asks for accuracy and
-/// light, and of all designs that have both the most accurate has to be at work.
+/// Least number of moves and reconfigurations, by breadth-first search over place and current design. A corridor requires accuracy and
+/// light. Among the designs that satisfy both requirements, the most accurate one must be current.
 fn least_with_designs(problem: &Problem) -> usize {
     let amount =
         |name: &str| (name.trim_end_matches("_decimal").parse::<f64>().expect("a number") * 100.0) as u32;
-    let needs = |predicate: &str| -> BTreeMap<(String, String), u32> {
-        let own = facts(problem, predicate).into_iter();
-        own.map(|row| ((row[0].to_owned(), row[1].to_owned()), amount(row[2]))).collect()
+    let requirements = |predicate: &str| -> BTreeMap<(String, String), u32> {
+        let rows = facts(problem, predicate).into_iter();
+        rows.map(|row| ((row[0].to_owned(), row[1].to_owned()), amount(row[2]))).collect()
     };
-    let (safety, light) = (needs("safety_requirement"), needs("light_requirement"));
+    let (safety, light) = (requirements("safety_requirement"), requirements("light_requirement"));
     let corridors = facts(problem, "corridor");
     let start = facts(problem, "robot_at")[0][0].to_owned();
     let goal = format!("{:?}", problem.goal);
-    let mut seen: BTreeSet<(String, Option<usize>)> = BTreeSet::from([(start.clone(), None)]);
+    let mut visited: BTreeSet<(String, Option<usize>)> = BTreeSet::from([(start.clone(), None)]);
     let mut open = VecDeque::from([(start, None, 0)]);
     while let Some((place, design, steps)) = open.pop_front() {
         if goal.contains(&format!("\"{place}\"")) {
             return steps;
         }
-        let mut next: Vec<(String, Option<usize>)> =
-            (0..DESIGNS.len()).map(|other| (place.clone(), Some(other))).collect();
+        let mut successors: Vec<(String, Option<usize>)> =
+            (0..DESIGNS.len()).map(|new_design| (place.clone(), Some(new_design))).collect();
         for row in corridors.iter().filter(|row| row[0] == place) {
             let key = (row[0].to_owned(), row[1].to_owned());
             let (Some(safe), Some(bright)) = (safety.get(&key), light.get(&key)) else { continue };
-            let meets = |own: &(u32, u32)| own.0 >= *safe && own.1 >= *bright;
-            let best = DESIGNS.iter().filter(|own| meets(own)).map(|own| own.0).max();
-            if design.is_some_and(|own: usize| meets(&DESIGNS[own]) && Some(DESIGNS[own].0) == best) {
-                next.push((row[1].to_owned(), design));
+            let satisfies = |candidate: &(u32, u32)| candidate.0 >= *safe && candidate.1 >= *bright;
+            let best =
+                DESIGNS.iter().filter(|candidate| satisfies(candidate)).map(|candidate| candidate.0).max();
+            if design.is_some_and(|candidate: usize| {
+                satisfies(&DESIGNS[candidate]) && Some(DESIGNS[candidate].0) == best
+            }) {
+                successors.push((row[1].to_owned(), design));
             }
         }
-        for (place, design) in next {
-            if seen.insert((place.clone(), design)) {
+        for (place, design) in successors {
+            if visited.insert((place.clone(), design)) {
                 open.push_back((place, design, steps + 1));
             }
         }
@@ -238,8 +241,8 @@ fn least_with_designs(problem: &Problem) -> usize {
     panic!("the goal is not reached")
 }
 
-/// The least number of moves.
-fn least(problem: &Problem) -> usize {
+/// Least number of moves, by breadth-first search.
+fn least_moves(problem: &Problem) -> usize {
     let corridors = facts(problem, "corridor");
     let goal = format!("{:?}", problem.goal);
     let mut layer = BTreeSet::from([facts(problem, "robot_at")[0][0]]);
@@ -247,24 +250,24 @@ fn least(problem: &Problem) -> usize {
         if layer.iter().any(|place| goal.contains(&format!("\"{place}\""))) {
             return steps;
         }
-        let before = layer.clone();
-        layer.extend(corridors.iter().filter(|row| before.contains(row[0])).map(|row| row[1]));
-        assert_ne!(before, layer, "the goal is not reached");
+        let previous = layer.clone();
+        layer.extend(corridors.iter().filter(|row| previous.contains(row[0])).map(|row| row[1]));
+        assert_ne!(previous, layer, "the goal is not reached");
     }
     unreachable!("it ends above")
 }
 
 #[test]
-fn every_map_of_the_sweep_is_planned_with_proof() {
+fn all_maps_of_the_study_are_planned_optimally() {
     let Some(real) = real() else { return };
     for nodes in ["10", "50", "100", "200", "400", "1000"] {
         for with_designs in [true, false] {
             let input = grid(&real, nodes, with_designs);
             let answer = plan(&input, &[]);
             let (_, problem) = parsed(&input.domain, &input.problem);
-            let least = if with_designs { least_with_designs(&problem) } else { least(&problem) };
-            let found = answer["steps"].as_array().map(Vec::len);
-            assert_eq!(found, Some(least), "{nodes} nodes, with designs: {with_designs}");
+            let least_steps = if with_designs { least_with_designs(&problem) } else { least_moves(&problem) };
+            let plan_length = answer["steps"].as_array().map(Vec::len);
+            assert_eq!(plan_length, Some(least_steps), "{nodes} nodes, with designs: {with_designs}");
         }
     }
 }
