@@ -123,6 +123,7 @@ fn copy(from: &Path, to: &Path, faulty_files: &BTreeMap<PathBuf, String>) {
     if from.is_dir() {
         for entry in std::fs::read_dir(from).expect("a directory") {
             let name = entry.expect("an entry").file_name();
+            // Build results are large and not needed.
             if name != "target" {
                 copy(&from.join(&name), &to.join(&name), faulty_files);
             }
@@ -203,6 +204,7 @@ fn compile_tests(home: &Path, tests: Tests) -> PathBuf {
         .args(target)
         .current_dir(home)
         .env("CARGO_TARGET_DIR", home.with_file_name("mutants-target"))
+        // Faults cause warnings, such as unused variables, which must not stop the build.
         .env("RUSTFLAGS", "--cap-lints allow")
         .stderr(Stdio::inherit())
         .output()
@@ -285,6 +287,7 @@ fn all_faults_are_detected() {
             programs.push((*tests, compile_tests(&home, *tests)));
         }
     }
+    // The tests must pass without a fault, otherwise their failure proves nothing.
     for oracle in &oracles {
         assert!(passes(&programs, &home, 0, *oracle), "{} fails without a fault", oracle.1);
     }

@@ -152,6 +152,7 @@ impl Generated {
             options: ReadOptions::default(),
             limits: StepLimits::default(),
         };
+        // The explicit form counts design changes by actions, so it needs no binding.
         let bindings = if domain == self.plain { self.bindings.clone() } else { BTreeMap::new() };
         let mission: Result<Mission, Errors> = Mission::new(
             "generated",
@@ -258,5 +259,6 @@ fn generated_missions_have_the_same_optimum_in_both_forms() {
         assert!([Status::Optimal, Status::Unsolvable].contains(&native.0), "seed {seed}");
         solved[usize::from(!generated.bindings.is_empty())] += usize::from(native.1.is_some());
     }
+    // Guards against generated missions that are mostly unsolvable.
     assert!(solved[0] > 20 && solved[1] > 20, "{solved:?} missions have a plan");
 }

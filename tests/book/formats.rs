@@ -10,6 +10,7 @@ use serde_json::{Map, Value};
 pub fn answers() -> String {
     let mut text = String::new();
     for (name, about, _) in FORMATS {
+        // Inputs and the lines of the loop have pages of their own.
         if ["manifest", "study", "event", "answer"].contains(&name) {
             continue;
         }

@@ -81,6 +81,7 @@ fn codes() -> String {
     let mut text = String::new();
     let mut letter = "";
     for code in codes::all() {
+        // The codes are sorted, so each letter begins one table.
         if code.code[..1] != *letter {
             letter = &code.code[..1];
             let _ = write!(

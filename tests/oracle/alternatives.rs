@@ -173,6 +173,7 @@ fn check(seed: u64) -> Option<bool> {
     let limits = if seed.is_multiple_of(2) { limits.with_thresholds(Thresholds::NONE) } else { limits };
     let ground = mission.ground(&filled, &[], &limits).expect("a ground task");
     let config = Config::default().with_limits(limits);
+    // Every third task is solved by the SAT engine alone.
     let config = if seed.is_multiple_of(3) { config.with_engine(Engine::Sat) } else { config };
     let solution = planner::optimize(&ground, &config, &mut |_| {});
     if solution.status != Status::Optimal {
@@ -181,6 +182,7 @@ fn check(seed: u64) -> Option<bool> {
     let numbers = |plan: &planner::Plan| -> Vec<usize> {
         plan.steps.iter().map(|step| step.action[1..].parse().expect("a number")).collect()
     };
+    // If there are more than 30 alternatives, the report must not claim to be complete.
     let report = planner::alternatives(&ground, &solution, 30, &config)?;
     let plan = solution.plan.as_ref().expect("an optimal plan");
     let (first, cost) = (numbers(plan), plan.cost.to_string().parse().expect("a small number"));

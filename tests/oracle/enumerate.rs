@@ -97,7 +97,7 @@ impl Enumeration<'_> {
         let verdict = project_verdict(self.mission, self.problem, &steps, &self.mode);
         let validated = match &verdict.violation {
             None if self.problem.metric.is_some() => Outcome::Valid(verdict.metric),
-            // Without a metric the validator reports the total time, but the oracle counts the steps of sequential plans.
+            // Without a metric, the oracle may count the steps of sequential plans. The validator does not, so it cannot be compared.
             None if self.unit.is_some() => Outcome::Valid(Some(verdict.total_time)),
             None => match &executed {
                 Outcome::Valid(value) => Outcome::Valid(value.clone()),

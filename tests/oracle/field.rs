@@ -45,6 +45,7 @@ fn sequential() -> Mode {
 }
 
 fn overlapping() -> Mode {
+    // The default separation of the program.
     Mode::Concurrent(exact("0.001"))
 }
 

@@ -156,6 +156,7 @@ pub fn plan_text(steps: &[Step]) -> PlanText {
         action: Name::new(&step.action),
         arguments: step.arguments.iter().map(|argument| Name::new(argument)).collect(),
         start: Some(step.start.clone()),
+        // Instantaneous actions have no duration in plan files.
         duration: (!step.duration.is_zero()).then(|| step.duration.clone()),
         line: 0,
     };
@@ -321,6 +322,7 @@ pub fn judge(case: &Case, tally: &mut Tally) {
             unexpected => tally.fail(case, "the oracle refutes itself", &format!("{unexpected:?}")),
         }
     }
+    // A panic is a failure of this task only; the run continues.
     if let Err(panic) = catch_unwind(AssertUnwindSafe(|| judge_caught(case, tally))) {
         let reason = panic.downcast_ref::<String>().map(String::as_str);
         let reason = reason.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("?").to_owned();

@@ -3,12 +3,13 @@ import java.io.PrintStream;
 import java.lang.management.ManagementFactory;
 import java.util.Arrays;
 
-/** Realises one document again and again in one JVM and prints the median wall and CPU milliseconds once it is warm. */
+/** Realises one document repeatedly in one JVM. Prints the median wall and CPU time in ms of the second half of the rounds. */
 public class Warm {
     public static void main(String[] args) throws Exception {
         int rounds = Integer.parseInt(args[0]), warm = rounds / 2;
         String[] options = Arrays.copyOfRange(args, 1, args.length);
         PrintStream out = System.out;
+        // Pellet prints its results to standard output, which is for the measurement only.
         System.setOut(new PrintStream(OutputStream.nullOutputStream()));
         var system = (com.sun.management.OperatingSystemMXBean) ManagementFactory.getOperatingSystemMXBean();
         double[] wall = new double[warm], cpu = new double[warm];

@@ -1,4 +1,4 @@
-//! Tests of answers at a limit and of further plans: they contain the results known so far, and no false claims.
+//! Tests of answers at a limit and of further plans: they contain the results of the elapsed time, and no false claims.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -111,7 +111,7 @@ fn partial_explanations_are_printed_on_a_signal() {
     assert!(text.contains("limit was reached"), "{text}");
 }
 
-/// An incomplete front contains the points found so far and is not reported as optimal.
+/// An incomplete front contains the points found until the limit, and is not reported as optimal.
 #[test]
 fn fronts_at_a_limit_have_the_points_found_so_far() {
     let Some(directory) = ward(true) else { return };

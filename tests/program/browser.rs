@@ -20,7 +20,7 @@ const GREENHOUSE: &str = "tests/program/greenhouse/mission.toml";
 /// Script of the surrounding page. It collects the results for the pages in the frames.
 const QUESTIONS: &str = include_str!("browser.js");
 
-/// Path of the browser. Prints the reason for skipping if there is none.
+/// Path of the browser. Prints the reason for skipping if no browser is installed.
 pub fn browser() -> Option<PathBuf> {
     let path = std::env::var_os("PATH")?;
     let folders: Vec<PathBuf> = std::env::split_paths(&path).collect();

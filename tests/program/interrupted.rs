@@ -58,7 +58,7 @@ fn check(
     let answers = interruptions.iter().map(|interrupt| {
         let answer_with_results = SECONDS.iter().find_map(|&seconds| {
             let outcome = interrupt(seconds);
-            // Nothing is printed as JSON while the input files are read.
+            // While the input files are read, there is no result yet.
             let answer: Value = serde_json::from_str(&outcome.stdout).ok()?;
             let has_results = answer["format"] != "metaplan-error/1" && count_results(&answer) > 0;
             assert!(!has_results || outcome.status == status, "{outcome:#?}");

@@ -138,7 +138,7 @@ fn change_number(document: &mut Value, key: &str, random: &mut Random) {
                     .iter_mut()
                     .for_each(|(name, element)| numbers(element, key, inside || name == key, values));
             }
-            // Potentials can be null (infinite).
+            // A potential is null if no goal state is reachable.
             Value::Number(_) | Value::Null if inside => values.push(value),
             _ => {}
         }
@@ -253,7 +253,7 @@ fn check_mutants(
                 let manifest: Value = serde_json::from_str(&manifest).expect("JSON");
                 assert!(is_true(&manifest["claim"], &original.target), "{}", description());
             }
-            // Changes of these kinds are never accepted, because they break a file's syntax, hash or derivation.
+            // Every change of these kinds must be rejected, even if the claim remains true.
             let always_rejected = ["literal of the formula", "legend", "hash", "derivation step"];
             assert!(!accepted || !always_rejected.contains(&kind), "{}", description());
             let count = counts.entry(kind).or_default();

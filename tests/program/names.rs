@@ -321,7 +321,7 @@ fn components_have_object_and_individual_names() {
             outcome.json()["cost"].clone()
         },
     );
-    // Without a front thruster only the low speed remains. Without the sonar no pipeline can be followed.
+    // Without thruster 3 only the low speed remains. Without the sonar no pipeline can be followed.
     assert_eq!(costs, [json!(56), json!(56), json!(56), Value::Null]);
     let line = r#"{"event":"component_status","component":"front","status":"FALSE"}"#;
     let outcome = metaplan_in(copy.path(), &["run", MANIFEST], line);

@@ -25,8 +25,8 @@ struct Side {
 }
 
 /// Shortest route by bidirectional Dijkstra (I. Pohl: Bi-directional search, 1971), with alternating expansions of both sides. Ties are
-/// broken like in the common Python graph library, to reproduce published results: the first route found wins, and places at equal
-/// distance are expanded in the order of insertion.
+/// broken like in the common Python graph library: the first route found wins, and places at equal distance are expanded in the order
+/// of insertion.
 fn shortest(graph: &Graph, start: &str, goal: &str) -> Vec<String> {
     let mut sides = [start, goal].map(|place| {
         let mut side = Side::default();

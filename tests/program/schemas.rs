@@ -140,7 +140,7 @@ fn manifests_conform_and_unknown_keys_are_refused() {
     for path in paths.iter().filter(|path| path.extension().is_some_and(|extension| extension == "toml")) {
         let valid_manifest = manifest(path);
         assert_eq!(validate("manifest", &valid_manifest), Ok(()), "{}", path.display());
-        // Each table gets an unknown key in turn. Tables that map names accept any key and are left out.
+        // Each table gets an unknown key in turn. Tables that map names accept any key, so they are excluded.
         for pointer in [
             "",
             "/knowledge",

@@ -1,8 +1,8 @@
-"""MCAP files by the hands of others: PyPI `mcap` and `mcap-ros2-support`.
+"""Reads and writes MCAP files with independent libraries: PyPI `mcap` and `mcap-ros2-support`.
 
-`read FILE` prints every message, decoded by the schema that the file says, as a line of JSON. `salvage FILE` prints how many messages
-of each topic are in a file that may break off. `write FILE COMPRESSION` reads lines of JSON, [nanoseconds, array], and writes
-diagnostics as `ros2 bag record` does.
+`read FILE` prints every message, decoded by the schema in the file, as a line of JSON. `salvage FILE` prints the number of messages
+of each topic in a file that can be truncated. `write FILE COMPRESSION` reads lines of JSON, [nanoseconds, array], and writes
+diagnostics like `ros2 bag record`.
 """
 
 import json
@@ -52,9 +52,9 @@ uint32 nanosec
 
 
 def plain(value):
-    """A decoded message as JSON."""
+    """Converts a decoded message to JSON."""
     if isinstance(value, (list, tuple)):
-        return [plain(one) for one in value]
+        return [plain(element) for element in value]
     if isinstance(value, bytes):
         return list(value)
     if hasattr(value, "__slots__"):
@@ -66,6 +66,7 @@ def read(path):
     with open(path, "rb") as file:
         reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
         assert reader.get_header().profile == "ros2"
+        # File order, so that the test can compare it with the order of writing.
         messages = reader.iter_messages(log_time_order=False)
         decoder = DecoderFactory()
         for schema, channel, message in messages:
@@ -100,6 +101,7 @@ def write(path, compression):
         text = writer.register_msgdef("std_msgs/msg/String", "string data\n")
         for line in sys.stdin:
             time, array = json.loads(line)
+            # Messages of an unrelated topic, which a replay must skip.
             writer.write_message("/chatter", text, {"data": "of no concern"}, time)
             writer.write_message("/diagnostics", schema, array, time)
         writer.finish()

@@ -141,6 +141,7 @@ fn random_models() {
             let [exact, rounded] =
                 [Exactness::Always, Exactness::Never].map(|exactness| ours(&read, question, exactness));
             infinite += usize::from(exact.is_none());
+            // The JANI file must have the same values, which tests the export.
             for file in [&prism_file, &jani_file] {
                 queries.push(json!({ "file": file, "property": question, "exact": true }));
                 expected.push((format!("{question}\n{text}"), exact, rounded));

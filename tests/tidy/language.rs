@@ -1,6 +1,6 @@
 //! Test of the language of comments and documents: counts discouraged phrases and names (see CONTRIBUTING.md), with a ceiling per folder.
 //!
-//! A ceiling is the best figure reached so far. It may be lowered, but not raised.
+//! A ceiling is the best figure that a folder has reached. It may be lowered, but not raised.
 
 use std::path::Path;
 
@@ -99,6 +99,7 @@ impl Patterns {
     }
 
     fn count_prose(&self, prose: &str, counts: &mut Counts) {
+        // Code in backticks and fenced blocks is not prose.
         let prose = self.code.replace_all(prose, " ");
         counts.words += self.word.find_iter(&prose).count() as u64;
         let occurrences = |phrase: &Regex| phrase.find_iter(&prose).count() as u64;

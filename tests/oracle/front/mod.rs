@@ -172,6 +172,7 @@ fn check(sample: &Sample, about: &str, seed: u64, tally: &mut Tally) {
     tally.tasks += 1;
     let Sample { mission, mode, maximize, reference } = sample;
     let (export, texts) = exported(mission);
+    // The roles alternate, so that both mission and export are planned without thresholds.
     let [first, second] = if seed.is_multiple_of(2) {
         [Thresholds::default(), Thresholds::NONE]
     } else {
@@ -321,6 +322,7 @@ const FRONTS: [&str; 9] = [
 fn run(front: &str, default: u64, min_percent: usize) {
     let (from, tasks) = (setting("ORACLE_FROM", 0), setting("ORACLE_TASKS", default) as usize);
     let (mut samples, mut tally) = (samples(front), Tally::default());
+    // Some seeds have no sample, so tasks are counted instead of seeds.
     for seed in from.. {
         if tally.tasks == tasks {
             break;

@@ -26,7 +26,7 @@ pub enum Style {
     Wide,
     /// At most 1 away from 2^31, 2^46, 2^53, 2^62, 2^63 or 2^64.
     Powers,
-    /// Slightly above 10^30.
+    /// 10^30 to 10^30 + 2.
     Huge,
     Zero,
 }

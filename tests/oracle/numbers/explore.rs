@@ -76,6 +76,7 @@ impl<'g> Measures<'g> {
         let mut after = execute(instance, before)?;
         let new = self.of(&after, 1)?;
         let costs = new.into_iter().zip(old).map(|(new, old)| new - old).collect();
+        // Total time is part of the costs, not of the state.
         after.time = Number::zero();
         for (fluent, counter) in self.counters.iter().enumerate() {
             if *counter {

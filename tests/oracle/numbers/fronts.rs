@@ -11,6 +11,7 @@ const MAX_LABELS: usize = 4_000;
 /// Sorted values of all Pareto-optimal plans. The objectives are the measures after the first one, all minimised. Returns `None` if
 /// the space is incomplete, a step has a negative cost, or there are too many labels.
 pub fn front(space: &Space) -> Option<Vec<Vec<Number>>> {
+    // The first measure, the metric, is not part of the front.
     let has_negative = |costs: &[Number]| costs[1..].iter().any(Number::is_negative);
     if !space.complete || space.edges.iter().flatten().any(|edge| has_negative(&edge.costs)) {
         return None;

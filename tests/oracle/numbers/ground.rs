@@ -264,6 +264,7 @@ impl Grounder<'_> {
             Expr::Negative(inner) => Value::Negative(Box::new(self.value(inner, bound))),
             Expr::TotalTime => Value::Time,
         };
+        // Without fluents, the value is the same in every state and can be computed once.
         if mentions_state(&folded) {
             return folded;
         }

@@ -51,6 +51,7 @@ fn candidates(task: &Task) -> Vec<Task> {
         let shortened = shortened.map_or(whole(1), |(whole_digits, fraction_digits)| {
             decimal(&format!("{whole_digits}.{fraction_digits}"))
         });
+        // Simpler numbers make the printed task easier to understand.
         for simple in [whole(0), whole(1), shortened] {
             if text_of(&simple).is_some_and(|simple| simple.len() < text.len()) {
                 let mut smaller_task = task.clone();

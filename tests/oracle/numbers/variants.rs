@@ -228,6 +228,7 @@ pub fn check_validator(puzzle: &Puzzle, case: &Case, rng: &mut Rng, tally: &mut 
     };
     let instances = puzzle.ground.instances.len();
     for _ in 0..4 {
+        // Small changes of a valid plan fail late and for many reasons; random plans would fail at the first step.
         let mut plan = base_plan.clone();
         plan.truncate(6);
         for _ in 0..rng.usize(1..4) {

@@ -93,6 +93,7 @@ impl Maker {
             return None;
         }
         maker.fill();
+        // A separate random sequence, so that the other parts of the task do not depend on this feature.
         maker.random = fastrand::Rng::with_seed(!seed);
         maker.durations_in_effects();
         Some(maker.task)

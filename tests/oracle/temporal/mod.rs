@@ -147,6 +147,7 @@ fn batteries_that_are_charged() {
 
 /// Kinds and texts of the failures of a task.
 fn kinds(task: &Task, unit: Option<Q>) -> (Vec<&'static str>, String) {
+    // The oracle panics if its own plan is invalid, which is a failure to be shrunk as well.
     let case = std::panic::catch_unwind(|| case_of("smaller".into(), task.clone(), unit));
     let Ok(case) = case else { return (vec!["the oracle"], String::new()) };
     let mut tally = Tally::default();

@@ -69,7 +69,7 @@ pub fn execute(world: &World, plan: &[(usize, Q, Q)], separation: Q) -> Result<Q
         for (_, event) in world.events.iter().filter(|(time, _)| *time == clock) {
             state = event.apply(&state)?;
         }
-        // All happenings of one time are evaluated in the state before them.
+        // All happenings of one time are evaluated in the state after the events of that time.
         let before = state.clone();
         for (time, number, end) in times.iter().filter(|(time, ..)| *time == clock) {
             let (instance, _, length) = plan[*number];

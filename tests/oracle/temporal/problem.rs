@@ -117,6 +117,7 @@ impl Maker {
             return;
         }
         let world = World::new(self.task.clone());
+        // The search is limited to 40 nodes, so the goal is reachable by few actions.
         let search = Search::new(&world, 40);
         // A state from the second half of the search needs several actions.
         let (state, ..) = search.nodes[self.random.usize(search.nodes.len() / 2..search.nodes.len())].clone();

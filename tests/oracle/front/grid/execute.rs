@@ -149,7 +149,7 @@ impl Task {
             }
             happenings.iter().for_each(|happening| happening.apply(&mut state));
             trajectory.push((time, state));
-            // Over-all conditions must hold in every state strictly between start and end.
+            // Over-all conditions must hold in every state from the start until before the end.
             for (start, action, duration) in plan {
                 if *start <= time && time < start + duration && !self.holds(*action, Moment::OverAll, &state)
                 {

@@ -196,6 +196,7 @@ impl Task {
         let (domain, problem) = (self.domain(), self.problem());
         let (mission, _): (Mission, _) =
             read(&domain, &problem).unwrap_or_else(|messages| panic!("{messages:#?}\n{domain}\n{problem}"));
+        // The separation is the unit of the grid, so interfering happenings of a grid plan are far enough apart.
         let separation = BigRational::from_integer(1.into());
         Sample {
             mission,

@@ -82,7 +82,7 @@ impl Robot {
             }
             let _ = writeln!(
                 text,
-                ":{name} a t:FunctionDesign ; t:solvesF :{own}f{}{needs} ; t:hasQAestimation {} .",
+                ":{name} a t:FunctionDesign ; t:solvesF :{prefix}f{}{needs} ; t:hasQAestimation {} .",
                 design.function,
                 estimations.join(" , ")
             );

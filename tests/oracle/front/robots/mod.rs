@@ -100,6 +100,7 @@ impl Robot {
         let mut designs = Vec::new();
         for function in 0..functions {
             for number in 0..rng.usize(2..5) {
+                // The first design of a function needs no component, so failures do not affect it.
                 let is_first = number == 0;
                 designs.push(Design {
                     function,
