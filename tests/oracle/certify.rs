@@ -65,8 +65,8 @@ pub fn check(
         (Truth::NoPlan, None) | (Truth::Open(None), _) => false,
         (Truth::NoPlan, Some(_)) | (Truth::NoBest(..), _) | (Truth::Best(..) | Truth::Open(_), None) => true,
     };
-    let wrong = report.parts.iter().find_map(|part| Some((part.part, part.result.as_ref().err()?)));
-    match (wrong, refuted) {
+    let failing_part = report.parts.iter().find_map(|part| Some((part.part, part.result.as_ref().err()?)));
+    match (failing_part, refuted) {
         (None, true) => tally.fail(case, "A FALSE CLAIM IS VERIFIED", &format!("{:?}", report.claim)),
         (None, false) => {
             let is_timed = problem.init.iter().any(|element| matches!(element, InitialElement::Timed(..)));

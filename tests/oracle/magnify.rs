@@ -11,7 +11,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Significant digits.
+/// Number of significant digits of the decimals.
 const DIGITS: usize = 16;
 /// Number of generated missions.
 const MISSIONS: usize = 50;

@@ -314,9 +314,9 @@ impl Task {
         let highest = self.rules.iter().map(|rule| rule.level).max().unwrap_or(0);
         for level in 0..=highest {
             loop {
-                let mut conclusions = Vec::conclusions();
+                let mut conclusions = Vec::new();
                 for rule in self.rules.iter().filter(|rule| rule.level == level && rule.varies == varies) {
-                    self.solve(vec![&rule.body], &mut Binding::conclusions(), &facts, &mut |binding| {
+                    self.solve(vec![&rule.body], &mut Binding::new(), &facts, &mut |binding| {
                         let words: Words =
                             rule.parameters.iter().map(|parameter| binding[parameter].clone()).collect();
                         conclusions.push((rule.head.clone(), words));
@@ -337,7 +337,7 @@ impl Task {
 
     /// Explores all reachable states breadth-first. Returns `None` if there are more than `limit` states.
     pub fn explore(&self, limit: usize) -> Option<StateSpace> {
-        let changed_predicates = self.changed_predicates();
+        let changed = self.changed_predicates();
         let fixed = self.initial.iter().filter(|(name, _)| !changed.contains(*name));
         let fixed = self.closure(fixed.map(|(name, rows)| (name.clone(), rows.clone())).collect(), false);
         let text_of_state = |state: &Facts| {

@@ -9,7 +9,7 @@ use pddl::{portable, print_domain, print_problem};
 use serde_json::Value;
 
 use crate::brute::{StateSpace, Task};
-use crate::files::{Input, metaplan, parsed, real, shown};
+use crate::files::{Input, metaplan, parsed, real, text_of};
 
 /// An example, and the converter's output for it.
 struct Example {

@@ -46,7 +46,7 @@ fn plans_found_in_fractions_have_certificates() {
             let mut numbers = text.split(|character: char| !character.is_ascii_digit());
             let long_number = numbers.find(|digits| digits.len() > 39).expect("a long number");
             let last_digit = if long_number.ends_with('5') { "6" } else { "5" };
-            text.replacen(long_number, &format!("{}{last_digit}", &long_number[..long.len() - 1]), 1)
+            text.replacen(long_number, &format!("{}{last_digit}", &long_number[..long_number.len() - 1]), 1)
         });
         assert_eq!(verify_in(directory.path(), &[name]).status, 30);
     }

@@ -147,7 +147,7 @@ fn comparisons_at_a_limit_show_finished_results() {
         assert!(answer["messages"][0]["code"] == "M130" && text.contains("before"), "{answer:#}");
         assert!(answer["format"] == "metaplan-error/1" || answer["complete"] == false, "{answer:#}");
         let Some(comparisons) = answer["comparisons"].as_array() else { continue };
-        for comparison in &comparisons[..all.len().saturating_sub(1)] {
+        for comparison in &comparisons[..comparisons.len().saturating_sub(1)] {
             assert_eq!(comparison["complete"], true);
         }
         rows = comparisons

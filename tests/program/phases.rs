@@ -85,7 +85,6 @@ fn files(domain: &str, problem: &str) -> tempfile::TempDir {
 
 const PLAN: [&str; 3] = ["plan", "domain.pddl", "problem.pddl"];
 
-/// A problem with many facts.
 fn many_facts(count: usize) -> tempfile::TempDir {
     let objects = repeated(count, |number| format!(" o{number}"));
     let facts = repeated(count, |number| format!("(p o{number} o{})", (number * 7) % count));

@@ -89,7 +89,7 @@ fn known_results(map: &str, speeds: bool, configurations: usize) {
         (&lit, no_risk, "R{\"time\"}min=? [ F \"goal\" ]", "15277/200"),
         (
             &lit,
-            Risk { collisions: true, failures: true, ..nothing },
+            Risk { collisions: true, failures: true, ..no_risk },
             "R{\"time\"}min=? [ F \"goal\" ]",
             "15277/200",
         ),
@@ -106,7 +106,7 @@ fn known_results(map: &str, speeds: bool, configurations: usize) {
     let (_directory, mut without_kinect) = mission(map, &places("l25", "l7"));
     without_kinect.mission.fail("c_kinect").expect("a component");
     let question = "multi(R{\"time\"}min=? [ F \"goal\" ], Pmax=? [ F \"safe_goal\" ])";
-    let risk = Risk { collisions: true, ..nothing };
+    let risk = Risk { collisions: true, ..no_risk };
     let Outcome::Front(front) = answer(&coadaptation(&without_kinect), risk, question) else {
         panic!("no front")
     };

@@ -66,8 +66,11 @@ fn shortest(graph: &Graph, start: &str, goal: &str) -> Vec<String> {
             {
                 let total = from_start + from_goal;
                 if best.as_ref().is_none_or(|(best_length, _)| *best_length > total) {
-                    let return_route = sides[1].routes[next].iter().rev().skip(1);
-                    best = Some((total, sides[0].routes[next].iter().chain(return_route).cloned().collect()));
+                    let return_route = sides[1].routes[neighbour].iter().rev().skip(1);
+                    best = Some((
+                        total,
+                        sides[0].routes[neighbour].iter().chain(return_route).cloned().collect(),
+                    ));
                 }
             }
         }

@@ -54,7 +54,7 @@ fn line_counts_of_the_trusted_code_base_are_up_to_date() {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("crates/verify/README.md");
     let rows = rows(&std::fs::read_to_string(page).expect("text"));
     let (total_row, part_rows) = rows.split_last().expect("rows");
-    let listed = part_rows
+    let row_by_path = part_rows
         .iter()
         .zip(0..)
         .flat_map(|((paths, _), row)| paths.iter().map(move |path| (path.as_str(), row)));

@@ -93,7 +93,7 @@ pub fn once_in(rng: &mut Rng, times: u32) -> bool {
 
 /// A random element of the slice.
 pub fn one_of<T: Clone>(rng: &mut Rng, choices: &[T]) -> T {
-    choices[rng.usize(0..of.len())].clone()
+    choices[rng.usize(0..choices.len())].clone()
 }
 
 /// A random comparison; equality is rare.

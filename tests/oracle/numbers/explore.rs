@@ -271,11 +271,11 @@ pub fn explore(ground: &Ground, measures: &Measures<'_>, budget: Budget) -> Opti
         let old = measures.of(&state, 0)?;
         for (position, instance) in ground.instances.iter().enumerate() {
             if let Some((after, costs)) = measures.step(instance, (&state, &old)) {
-                let (target, is_new) = states.number(after);
+                let (to, is_new) = states.number(after);
                 if is_new {
                     space.depths.push(space.depths[current] + 1);
                 }
-                edges.push(Edge { target, instance: position, costs });
+                edges.push(Edge { to, instance: position, costs });
             }
         }
         space.edges.push(edges);

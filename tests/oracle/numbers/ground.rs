@@ -342,7 +342,8 @@ fn key(applied: &Applied, bound: &[usize]) -> (usize, Vec<usize>) {
 
 /// Position of the last parameter that a condition mentions.
 fn greatest(condition: &Condition) -> Option<usize> {
-    let applied = |applied: &Applied| applied.arguments.iter().filter_map(|term| parameter(*term)).max();
+    let last_parameter =
+        |applied: &Applied| applied.arguments.iter().filter_map(|term| parameter(*term)).max();
     match condition {
         Condition::Holds(atom) => last_parameter(atom),
         Condition::Not(inner) => greatest(inner),

@@ -45,9 +45,9 @@ fn candidates(task: &Task) -> Vec<Task> {
     candidate_tasks.extend(without_unused(task));
     for (position, (_, _, value)) in task.values.iter().enumerate() {
         let text = text_of(value).expect("an initial value is a decimal");
-        let shortened = text
-            .split_once('.')
-            .map(|(whole_digits, fraction_digits)| (whole_digits, &fraction_digits[..after.len().min(1)]));
+        let shortened = text.split_once('.').map(|(whole_digits, fraction_digits)| {
+            (whole_digits, &fraction_digits[..fraction_digits.len().min(1)])
+        });
         let shortened = shortened.map_or(whole(1), |(whole_digits, fraction_digits)| {
             decimal(&format!("{whole_digits}.{fraction_digits}"))
         });
@@ -70,7 +70,7 @@ fn without_one<T: Clone>(items: &[T]) -> Vec<Vec<T>> {
         remaining.remove(position);
         remaining
     };
-    (0..of.len()).map(without).collect()
+    (0..items.len()).map(without).collect()
 }
 
 fn smaller_actions(action: &Action) -> Vec<Action> {

@@ -209,7 +209,7 @@ pub fn make(seed: u64, unit: Q) -> (Task, usize) {
             _ if random.bool() => vec![atom(random)],
             _ => Vec::new(),
         },
-        values: vec![(level(), q(random.i64(0..fullest)))],
+        values: vec![(level(), q(random.i64(0..level_limit)))],
         events,
         goal: Condition::All(goal),
         measure: Measure::Time,

@@ -88,7 +88,7 @@ impl Graph {
     }
 
     fn has_cycle(&self, distances: &Distances) -> bool {
-        (0..found.len()).any(|start| {
+        (0..distances.len()).any(|start| {
             let mut node = start;
             for _ in 0..=distances.len() {
                 match distances[node] {

@@ -59,7 +59,7 @@ impl Maker {
     /// Tries derived seeds until a task is small enough.
     fn build(seed: u64, unit: Option<Q>, designs: bool) -> Task {
         let seeds = (0..u64::MAX).map(|attempt| seed ^ (attempt << 40));
-        let mut small_tasks = seeds.filter_map(|seed| Self::small_tasks(seed, unit, designs));
+        let mut small_tasks = seeds.filter_map(|seed| Self::small(seed, unit, designs));
         small_tasks.next().expect("a small task")
     }
 

@@ -150,7 +150,7 @@ pub fn best(world: &World, unit: Q, cap: usize) -> Truth {
         after_events = event.apply(&after_events).expect("events change atoms");
     }
     let goal_holds = world.holds(&world.task.goal, &after_events, &[]) == Ok(true);
-    let empty = search.reduction.rest(&after_events).ok().filter(|_| goal_holds);
+    let empty = search.reduction.remaining_metric(&after_events).ok().filter(|_| goal_holds);
     search.node((state, Vec::new(), 0));
     let mut next = 0;
     while next < search.nodes.len() {
@@ -298,7 +298,7 @@ impl Search<'_> {
         }
         let (after, cost) = self.reduction.reduce(after)?;
         if tick.ended && tick.running.is_empty() && self.world.holds(&self.world.task.goal, &after, &[])? {
-            let final_cost = fit(cost + self.reduction.rest(&after)?)?;
+            let final_cost = fit(cost + self.reduction.remaining_metric(&after)?)?;
             self.graph.goals.push((from, final_cost));
             self.last_starts.push(tick.starts.clone());
         }

@@ -155,7 +155,7 @@ impl Reduction {
     }
 
     /// Contribution of the state and of the initial values to the metric, in addition to action costs.
-    pub fn rest(&self, state: &State) -> Result<Q, Obstacle> {
+    pub fn remaining_metric(&self, state: &State) -> Result<Q, Obstacle> {
         let mut sum = self.offset;
         for (weight, at) in &self.remaining {
             let value = state.values[*at].ok_or(Obstacle::Blocked("the metric is undefined"))?;

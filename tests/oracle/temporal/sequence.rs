@@ -53,7 +53,6 @@ pub struct Search<'w> {
     pub nodes: Vec<Node>,
     numbers: HashMap<Node, usize>,
     pub edges: Vec<Edge>,
-    /// Edges to goals, with the value there to be minimised.
     /// Edges that reach a goal, with the final cost there.
     pub goals: Vec<(usize, Q)>,
     /// Final cost of the empty plan, if it reaches the goal.
@@ -84,7 +83,8 @@ impl<'w> Search<'w> {
         }
         let (state, _) = search.reduction.reduce(state).expect("the generator's numbers are small");
         if world.holds(&world.task.goal, &state, &[]) == Ok(true) {
-            search.empty = search.reduction.rest(&state).ok().map(|final_cost| search.sign() * final_cost);
+            search.empty =
+                search.reduction.remaining_metric(&state).ok().map(|final_cost| search.sign() * final_cost);
         }
         search.node((state, applied, (q(0), false)));
         let mut next = 0;
@@ -123,8 +123,8 @@ impl<'w> Search<'w> {
         if let Some((time, event)) = self.world.events.get(applied) {
             match event.apply(&state) {
                 Ok(after) => {
-                    let target = self.node((after, applied + 1, (*time, false)));
-                    self.edges.push(Edge { from, target, cost: q(0), step: None });
+                    let to = self.node((after, applied + 1, (*time, false)));
+                    self.edges.push(Edge { from, to, cost: q(0), step: None });
                 }
                 Err(_) => self.open = true,
             }
@@ -230,7 +230,7 @@ impl<'w> Search<'w> {
     ) {
         let reduced = self.reduction.reduce(state).and_then(|(state, cost)| {
             let cost = fit(cost + self.reduction.time * duration + self.reduction.step)?;
-            let final_cost = self.reduction.rest(&state)?;
+            let final_cost = self.reduction.remaining_metric(&state)?;
             let goal_holds = self.world.holds(&self.world.task.goal, &state, &[]);
             Ok((state, cost * self.sign(), final_cost * self.sign(), goal_holds?))
         });
@@ -240,11 +240,11 @@ impl<'w> Search<'w> {
         };
         let slack = start.0 - self.nodes[from].2.0;
         let gap = [gap, Some(slack)].into_iter().flatten().filter(|gap| *gap > q(0)).min();
-        let target = self.node((state, applied, (start.0 + duration, start.1)));
+        let to = self.node((state, applied, (start.0 + duration, start.1)));
         if goal_holds {
             self.goals.push((self.edges.len(), final_cost));
         }
-        self.edges.push(Edge { from, target, cost, step: Some((instance, duration, start, gap)) });
+        self.edges.push(Edge { from, to, cost, step: Some((instance, duration, start, gap)) });
     }
 }
 
