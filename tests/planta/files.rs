@@ -42,7 +42,7 @@ pub fn metaplan(arguments: &[&str]) -> (i32, String, String) {
 }
 
 impl Input {
-    /// Names files in a directory.
+    /// Input files in a directory, with the directory of PLANTA's imports.
     pub fn new(directory: &Path, domain: &str, problem: &str, knowledge: &str) -> Self {
         Self {
             domain: directory.join(domain),

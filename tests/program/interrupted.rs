@@ -38,7 +38,8 @@ fn interrupted(directory: &Path, arguments: &[&str], seconds: u32) -> Outcome {
     }
 }
 
-/// Ends a command early, by limit and by signal, with growing times until there is a result. `done` counts the results of an answer.
+/// Ends a command early, by limit and by signal, with growing times until there is a result. `count_results`
+/// counts the results of an answer.
 fn check(
     directory: &Path,
     arguments: &[&str],

@@ -41,11 +41,11 @@ pub struct Sample {
 /// Result of brute force: the enumerated plans, and the best value among them (`None` if there is no plan).
 #[derive(Debug, Clone)]
 pub enum Reference {
-    /// All plans.
+    /// All plans were enumerated.
     All(Option<BigRational>),
-    /// All plans up to this value; less is better.
+    /// All plans up to this value were enumerated; less is better.
     UpTo(i64, Option<BigRational>),
-    /// Some plans.
+    /// Some plans were enumerated.
     Some(Option<BigRational>),
 }
 
