@@ -318,7 +318,7 @@ const FRONTS: [&str; 9] = [
     "undefined fluents",
 ];
 
-/// Checks `default` samples (or `ORACLE_TASKS`), of which at least `least` percent must be decided.
+/// Checks `default` samples (or `ORACLE_TASKS`), of which at least `min_percent` percent must be decided.
 fn run(front: &str, default: u64, min_percent: usize) {
     let (from, tasks) = (setting("ORACLE_FROM", 0), setting("ORACLE_TASKS", default) as usize);
     let (mut samples, mut tally) = (samples(front), Tally::default());
