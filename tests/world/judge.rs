@@ -332,7 +332,8 @@ impl Judge {
                 self.ended.contains(&effect.action) && !matches!(effect.command, Command::Reconfigure { .. });
             let is_closed = robot.seen.contains(number)
                 || self.superseded.contains(number)
-                || self.given_up.contains(number);
+                || self.given_up.contains(number)
+                || self.belief.implied.contains(number);
             // Of a robot that has never acknowledged anything, as far as the loop was told, nothing is expected.
             !is_closed && !is_moot && self.belief.has_receipts
         };
@@ -382,6 +383,8 @@ struct Belief {
     greatest: u64,
     /// Reconfigurations up to this one may have been carried out before or after an observation.
     crossed: u64,
+    /// Reconfigurations that count as carried out since nothing had been acknowledged by its number.
+    implied: BTreeSet<u64>,
     /// Reconfigurations that have failed, as the loop was told.
     failed: BTreeSet<u64>,
     /// Superseded reconfigurations up to this one have no effect on the design that was observed after them.
@@ -431,6 +434,7 @@ impl Belief {
         let implied: Vec<u64> = self.pending.range(..request).map(|(number, _)| *number).collect();
         for effect in implied {
             if !self.has_receipts {
+                self.implied.insert(effect);
                 self.confirm(effect);
             }
         }
