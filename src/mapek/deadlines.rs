@@ -36,7 +36,9 @@ pub(super) fn due(beliefs: &Beliefs, settings: &Settings) -> Option<Duration> {
     };
     let waits = beliefs.waits.iter().filter(|(number, _)| beliefs.receipts.are_sent() && is_effect(number));
     let effects = waits.map(|(_, wait)| wait.since.saturating_add(settings.deadline));
-    let is_action = |own: &&Running| !own.suspended && !own.cancelling || own.cancelling && open_cancel(beliefs).is_some();
+    let is_action = |own: &&Running| {
+        !own.suspended && !own.cancelling || own.cancelling && open_cancel(beliefs).is_some()
+    };
     let running = beliefs.running.as_ref().filter(is_action);
     let action = running.map(|own| own.heard.saturating_add(patience(own, settings)));
     effects.chain(action).min()

@@ -93,11 +93,10 @@ impl Receipts {
     /// For a snapshot.
     pub(super) fn to_record(&self) -> Value {
         let function = |(name, own): (&String, &Received)| {
-            let last =
-                own.last.as_ref().map(|last| {
-                    let before = last.before.as_ref().map(|before| json!([before.design, before.effect]));
-                    json!([last.effect, last.design, before, last.failed])
-                });
+            let last = own.last.as_ref().map(|last| {
+                let before = last.before.as_ref().map(|before| json!([before.design, before.effect]));
+                json!([last.effect, last.design, before, last.failed])
+            });
             json!([name, last, own.superseded.iter().collect::<Vec<_>>(), own.doubted])
         };
         json!([self.by_number, self.functions.iter().map(function).collect::<Vec<_>>()])
@@ -107,7 +106,8 @@ impl Receipts {
     pub(super) fn from_record(record: &Value) -> Option<Self> {
         let text = |value: &Value| value.as_str().map(ToOwned::to_owned);
         let superseded = |pair: &Value| Some((pair.get(0)?.as_u64()?, text(pair.get(1)?)?));
-        let before = |pair: &Value| Some(Before { design: text(pair.get(0)?)?, effect: pair.get(1)?.as_u64() });
+        let before =
+            |pair: &Value| Some(Before { design: text(pair.get(0)?)?, effect: pair.get(1)?.as_u64() });
         let function = |record: &Value| {
             let last = match record.get(1)? {
                 Value::Null => None,

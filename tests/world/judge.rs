@@ -74,7 +74,8 @@ impl Judge {
                 }
             }
             "reconfiguration_failed" => {
-                self.is_misled |= self.was_misled && self.belief.last.as_ref().map(|last| last.effect) == effect;
+                self.is_misled |=
+                    self.was_misled && self.belief.last.as_ref().map(|last| last.effect) == effect;
                 self.refused.extend(self.belief.fail(effect.unwrap_or_default()));
             }
             "design_status" => {
