@@ -1,5 +1,6 @@
 //! Reading, printing and validating PDDL.
 
+mod advance;
 mod course;
 mod definition;
 mod derived;

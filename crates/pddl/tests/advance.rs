@@ -1,0 +1,114 @@
+//! One step is executed in a smaller problem, without facts and values that it cannot read. The result is that of the whole problem.
+//!
+//! A domain with a derived predicate is never reduced, so that the same domain with one more predicate is the oracle.
+
+use std::path::{Path, PathBuf};
+
+use metaplan_pddl::ast::{Domain, Problem};
+use metaplan_pddl::validate::{PlanStep, PlanText, advance, advance_each};
+use metaplan_pddl::{Source, read};
+
+/// Number of ground steps that are compared for each action.
+const STEPS: u64 = 150;
+
+/// Steps of the walk from the initial state, so that other states are compared as well.
+const WALK: usize = 6;
+
+/// A pseudo-random sequence (Knuth's MMIX generator).
+struct Sequence(u64);
+
+impl Sequence {
+    fn below(&mut self, limit: usize) -> usize {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((self.0 >> 33) % limit as u64) as usize
+    }
+}
+
+/// Pairs of `domain.pddl` and `problem.pddl` in the repository, in the order of their paths.
+fn tasks() -> Vec<PathBuf> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let mut folders: Vec<PathBuf> = [
+        "encodings",
+        "missions/templates",
+        "integrations/ros/examples",
+        "docs/how-to/examples",
+        "tests/program",
+    ]
+    .iter()
+    .flat_map(|folder| std::fs::read_dir(root.join(folder)).expect("a folder"))
+    .map(|entry| entry.expect("an entry").path())
+    .filter(|folder| folder.join("domain.pddl").exists() && folder.join("problem.pddl").exists())
+    .collect();
+    folders.sort();
+    folders
+}
+
+/// Returns the domain and the problem of a folder, with a derived predicate that nothing reads if `is_whole` is set.
+fn task(folder: &Path, is_whole: bool) -> (Domain, Problem) {
+    let text = |name: &str| std::fs::read_to_string(folder.join(name)).expect("a file");
+    let mut domain = text("domain.pddl");
+    if is_whole {
+        let end = domain.rfind(')').expect("a definition");
+        domain.insert_str(end, "\n(:derived (oracle_only) (and))\n");
+        domain = domain.replacen("(:predicates", "(:predicates (oracle_only)", 1);
+    }
+    let sources = (Source::new("domain.pddl", domain), Source::new("problem.pddl", text("problem.pddl")));
+    let (domain, problem, _) = read(&sources.0, &sources.1).expect("the files are correct");
+    (domain, problem)
+}
+
+#[test]
+fn a_step_changes_the_reduced_problem_as_it_changes_the_whole_one() {
+    let folders = tasks();
+    assert!(folders.len() >= 8, "{folders:?}");
+    let (mut possible, mut impossible) = (0, 0);
+    for folder in folders {
+        let (domain, mut problem) = task(&folder, false);
+        let (whole_domain, mut whole_problem) = task(&folder, true);
+        let objects: Vec<String> = domain
+            .constants
+            .iter()
+            .chain(&problem.objects)
+            .map(|object| object.identifier.name.to_string())
+            .collect();
+        let mut sequence = Sequence(7);
+        for _ in 0..WALK {
+            let mut next = None;
+            for action in &domain.actions {
+                let steps: Vec<PlanStep> = (0..STEPS)
+                    .map(|_| {
+                        let arguments = (0..action.parameters.len())
+                            .map(|_| objects[sequence.below(objects.len())].clone())
+                            .collect::<Vec<_>>()
+                            .join(" ");
+                        let text = format!("({} {arguments})", action.identifier.name);
+                        PlanText::parse(&Source::new("plan", text)).expect("a step").steps.remove(0)
+                    })
+                    .collect();
+                let each = advance_each(&domain, &problem, &steps);
+                for (step, of_each) in steps.iter().zip(each) {
+                    for is_forced in [false, true] {
+                        let reduced = advance(&domain, &problem, step, is_forced);
+                        let whole = advance(&whole_domain, &whole_problem, step, is_forced);
+                        let text = |result: &Result<_, Box<_>>| format!("{result:?}");
+                        let is_same = match (&reduced, &whole) {
+                            (Ok(reduced), Ok(whole)) => format!("{reduced:?}") == format!("{whole:?}"),
+                            (Err(reduced), Err(whole)) => reduced.message == whole.message,
+                            _ => false,
+                        };
+                        assert!(is_same, "{folder:?} {step:?}\n{}\n{}", text(&reduced), text(&whole));
+                        if !is_forced {
+                            assert_eq!(of_each.is_ok(), reduced.is_ok(), "{folder:?} {step:?}");
+                            *(if reduced.is_ok() { &mut possible } else { &mut impossible }) += 1;
+                            next = reduced.ok().or(next);
+                        }
+                    }
+                }
+            }
+            let Some(change) = next else { break };
+            change.apply(&mut problem.init);
+            change.apply(&mut whole_problem.init);
+        }
+    }
+    assert!(possible > 200 && impossible > 200, "{possible} steps are possible, {impossible} are not");
+}
