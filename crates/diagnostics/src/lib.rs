@@ -2,9 +2,13 @@
 //!
 #![doc = include_str!("../README.md")]
 
+mod spelling;
+
 use std::error::Error;
 use std::fmt::{self, Debug, Display, Formatter};
 use std::ops::Deref;
+
+pub use spelling::nearest;
 
 /// Everything that is wrong with an input: one error or more, in the order in which they are to be read.
 ///

@@ -3,6 +3,7 @@
 
 use std::collections::BTreeSet;
 
+use diagnostics::nearest;
 use ontology::tomasys::FunctionDesign;
 use ontology::vocab::local_name;
 use pddl::ast::{ActionBody, Assignment, Effect, InitialElement, Name};
@@ -11,7 +12,7 @@ use rules::{Engine, Fact};
 
 use crate::joined::Mission;
 use crate::knowledge::Knowledge;
-use crate::message::{Message, did_you_mean, nearest};
+use crate::message::{Message, did_you_mean};
 
 impl Mission {
     /// Returns lint warnings about names of the knowledge base without counterpart in PDDL, and

@@ -266,17 +266,5 @@ fn one_line(text: &str) -> String {
 /// Returns `; did you mean ...?` with the known name that is most similar to `written`, or an empty
 /// text.
 pub fn did_you_mean<'n>(written: &str, known: impl IntoIterator<Item = &'n str>) -> String {
-    nearest(written, known).map_or_else(String::new, |name| format!("; did you mean `{name}`?"))
-}
-
-/// Returns the known name with the smallest edit distance to `written`. At most a third of its
-/// letters and at most three may differ.
-pub(crate) fn nearest<'n>(written: &str, known: impl IntoIterator<Item = &'n str>) -> Option<&'n str> {
-    let written = written.to_lowercase();
-    let length = written.chars().count();
-    let distance = |name: &str| strsim::osa_distance(&written, &name.to_lowercase());
-    let near = known.into_iter().map(|name| (distance(name), name));
-    // A single letter is within distance 1 of every other letter, so it has no suggestion.
-    let near = near.filter(|(distance, _)| length > 1 && *distance <= (length / 3).clamp(1, 3));
-    near.min_by_key(|(distance, _)| *distance).map(|(_, name)| name)
+    diagnostics::nearest(written, known).map_or_else(String::new, |name| format!("; did you mean `{name}`?"))
 }

@@ -19,7 +19,6 @@ mod codes;
 pub mod diagnostic;
 mod excerpt;
 mod mentioned;
-mod names;
 mod number;
 pub mod parse;
 mod portable;

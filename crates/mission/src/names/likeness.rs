@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::message::nearest;
+use diagnostics::nearest;
 
 /// Threshold of similarity: half of the words are equal.
 const ALIKE: f64 = 0.5;

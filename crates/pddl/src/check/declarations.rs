@@ -47,7 +47,7 @@ impl<'a> Checker<'a> {
         for flag in flags {
             let known = REQUIREMENTS.iter().any(|known| known.eq_ignore_ascii_case(flag.name.as_str()));
             if !known {
-                let proposal = crate::names::nearest(flag.name.as_str(), REQUIREMENTS);
+                let proposal = diagnostics::nearest(flag.name.as_str(), REQUIREMENTS);
                 let help = proposal.map(|known| format!("did you mean `:{known}`?"));
                 let message = format!("unknown requirement `:{}`", flag.name);
                 self.sink.warning("P132", flag.span, message).help = help;

@@ -142,5 +142,5 @@ const PROPOSALS_LIMIT: usize = 5_000;
 fn did_you_mean<'n>(written: &str, known: impl IntoIterator<Item = &'n Name>) -> Option<String> {
     let mut known: Vec<&str> = known.into_iter().take(PROPOSALS_LIMIT).map(Name::as_str).collect();
     known.sort_unstable();
-    super::names::nearest(written, known).map(|name| format!("did you mean `{name}`?"))
+    diagnostics::nearest(written, known).map(|name| format!("did you mean `{name}`?"))
 }

@@ -1,7 +1,8 @@
 //! Domains and their actions.
 
+use diagnostics::nearest;
+
 use crate::ast::{Action, ActionBody, Condition, Derived, Domain, Effect, Identifier};
-use crate::names::nearest;
 use crate::sexp::{Item, SECTIONS};
 
 use super::object::with_needs;

@@ -1,9 +1,9 @@
 //! Steps of a plan to instances of action schemas.
 
+use diagnostics::nearest;
 use num_rational::BigRational;
 
 use crate::ast::{Action, Name};
-use crate::names::nearest;
 
 use super::evaluate::{Binding, Bindings};
 use super::plan::PlanStep;

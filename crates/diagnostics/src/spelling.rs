@@ -1,15 +1,18 @@
-//! Which of the known names somebody may have meant.
+//! Spelling suggestions: the known name that is most similar to an unknown one.
 
-/// The known name that is most like `written`, if one is like it at all; of equally near ones the first.
-pub(crate) fn nearest<'n>(written: &str, known: impl IntoIterator<Item = &'n str>) -> Option<&'n str> {
-    let written = written.to_ascii_lowercase();
+/// Returns the known name with the smallest edit distance to `written`, the first one of equally similar names.
+///
+/// Case does not matter, and the same words in another order are one edit. At most a third of the letters and at most three
+/// may differ; in a name of two letters one may. A single letter has no suggestion, because it is near every other letter.
+pub fn nearest<'n>(written: &str, known: impl IntoIterator<Item = &'n str>) -> Option<&'n str> {
+    let written = written.to_lowercase();
     let limit = match written.chars().count() {
         0 | 1 => 0,
         length => (length / 3).clamp(1, 3),
     };
     let mut best: Option<(usize, &str)> = None;
     for name in known {
-        let distance = distance(&written, &name.to_ascii_lowercase());
+        let distance = distance(&written, &name.to_lowercase());
         if distance <= limit && best.is_none_or(|(least, _)| distance < least) {
             best = Some((distance, name));
         }
@@ -17,8 +20,9 @@ pub(crate) fn nearest<'n>(written: &str, known: impl IntoIterator<Item = &'n str
     best.map(|(_, name)| name)
 }
 
-/// How many edits lie between two names; the same words in another order count as one.
+/// Optimal string alignment distance, in which transposed neighbours are one edit.
 fn distance(left: &str, right: &str) -> usize {
+    // No suggestion differs in length by more than three letters of at most four bytes each.
     if left.len().abs_diff(right.len()) > 12 {
         return usize::MAX;
     }
@@ -39,7 +43,7 @@ mod tests {
     use super::nearest;
 
     #[test]
-    fn near_names_are_found() {
+    fn similar_names_are_suggested() {
         let known = ["fd_available", "robot_at", "at", "fd_solves_f"];
         let cases = [
             ("fd_availabel", Some("fd_available")),
