@@ -201,8 +201,9 @@ fn mistakes<S: DeserializeOwned>(text: &str, first: toml::de::Error, name: &str)
         let counts = is_new && (messages.is_empty() || !description.starts_with("missing field"));
         if counts {
             let place = error.span().map(|span| line_and_column(text, span.start));
-            let message = Message::at("M104", name, place, description.to_owned() + &meant(description))
-                .with_source(text);
+            let message =
+                Message::at("M104", name, place, description.to_owned() + &key_suggestion(description))
+                    .with_source(text);
             messages.push((place, message));
         }
         let is_toml = remaining.parse::<toml::Table>().is_ok();
@@ -238,7 +239,7 @@ fn without(text: &str, place: std::ops::Range<usize>) -> Option<String> {
 }
 
 /// Suggestion for a misspelt key, if the parser's message lists the valid keys.
-fn meant(message: &str) -> String {
+fn key_suggestion(message: &str) -> String {
     let mut quoted = message.split('`').skip(1).step_by(2);
     match (["unknown field", "unknown variant"].iter().any(|start| message.starts_with(start)), quoted.next())
     {

@@ -68,8 +68,8 @@ fn either(mut schemas: Vec<Value>) -> Value {
     let mut definitions = Map::new();
     for schema in schemas.iter_mut().filter_map(Value::as_object_mut) {
         schema.remove("$schema");
-        if let Some(Value::Object(own)) = schema.remove("$defs") {
-            definitions.extend(own);
+        if let Some(Value::Object(embedded)) = schema.remove("$defs") {
+            definitions.extend(embedded);
         }
     }
     json!({ "$schema": "https://json-schema.org/draft/2020-12/schema", "anyOf": schemas, "$defs": definitions })

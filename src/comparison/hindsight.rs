@@ -105,9 +105,9 @@ fn anticipated(referee: &Referee<'_>, policy: &[u32], start: Valuation, moves: u
 }
 
 /// Returns `true` if the remaining plan does not need the component.
-fn carries_on(mission: &Coadaptation, configuration: usize, rest: &[Action]) -> bool {
+fn carries_on(mission: &Coadaptation, configuration: usize, remaining_plan: &[Action]) -> bool {
     let mut configuration = configuration;
-    rest.iter().all(|action| match action {
+    remaining_plan.iter().all(|action| match action {
         Action::Change(new) => {
             configuration = *new;
             !mission.lost(*new)

@@ -108,8 +108,8 @@ impl PlanTable<'_, '_> {
     /// Returns the plan from a situation.
     pub(super) fn plan(&mut self, situation: &Valuation) -> Result<Option<Vec<Action>>, Errors> {
         let key = Valuation { hit: false, ..*situation };
-        if let Some(known) = self.plans.get(&key) {
-            return Ok(known.clone());
+        if let Some(plan) = self.plans.get(&key) {
+            return Ok(plan.clone());
         }
         let planned = (self.planner)(&key)?;
         if self.costs.plans == 0 {

@@ -141,7 +141,7 @@ impl ProcessWriter<'_> {
         (Some(enough), vec![assign("b", Expr::name("b").op(BinaryOp::Minus, Expr::int(levels)))])
     }
 
-    fn kept(&self, configuration: usize) -> Option<Expr> {
+    fn not_lost(&self, configuration: usize) -> Option<Expr> {
         (self.risk.loss && self.mission.lost(configuration)).then(|| not(Expr::name("lost")))
     }
 
@@ -161,8 +161,10 @@ impl ProcessWriter<'_> {
             for old in 0..self.mission.configurations.len() {
                 let Some(switch) = &self.mission.switches[old][new] else { continue };
                 let (enough, spent) = self.spend(&switch.energy);
-                let guard =
-                    all([self.running(), equals("c", old)].into_iter().chain(self.kept(new)).chain(enough));
+                let guard = all([self.running(), equals("c", old)]
+                    .into_iter()
+                    .chain(self.not_lost(new))
+                    .chain(enough));
                 let mut changed = spent.clone();
                 changed.push(assign("c", Expr::int(new as i64)));
                 // A failed change takes energy and keeps the configuration.
@@ -176,7 +178,7 @@ impl ProcessWriter<'_> {
                 let Some(traversal) = traversal else { continue };
                 let (enough, spent) = self.spend(&traversal.energy);
                 let place = [self.running(), equals("l", arc.from), equals("c", design)];
-                let guard = all(place.into_iter().chain(self.kept(design)).chain(enough));
+                let guard = all(place.into_iter().chain(self.not_lost(design)).chain(enough));
                 let updates = updates(self.ends(traversal, arc.to, &spent));
                 commands.push(command(self.go(index), guard, updates));
             }

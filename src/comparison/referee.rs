@@ -64,9 +64,9 @@ impl Referee<'_> {
             ("best policy by P(goal), then time", &goal, reachable.clone()),
             ("best policy by P(goal, no collision), then time", &safe, None),
         ];
-        for (name, target, known) in probabilities {
+        for (name, target, precomputed) in probabilities {
             let problem = self.problem(Direction::Max, None, target);
-            let solution = known.or_else(|| solve(problem, None));
+            let solution = precomputed.or_else(|| solve(problem, None));
             let better = solution.and_then(|s| with_secondary(&problem, &s, &self.explored.rewards[0]));
             policies.extend(better.map(|s| (name.to_owned(), s.policy)));
         }

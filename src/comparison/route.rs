@@ -26,8 +26,8 @@ fn best_by(
         let mut next = vec![None; designs];
         for design in (0..designs).filter(|design| mission.configurations[*design].available) {
             let Some(traversal) = &mission.arcs[*arc].by[design] else { continue };
-            for (old, known) in best.iter().enumerate() {
-                let Some((so_far, plan)) = known else { continue };
+            for (old, incumbent) in best.iter().enumerate() {
+                let Some((so_far, plan)) = incumbent else { continue };
                 let mut cost = so_far + traversal_cost(traversal);
                 let mut plan = plan.clone();
                 if old != design {
@@ -36,7 +36,7 @@ fn best_by(
                     plan.push(Action::Change(design));
                 }
                 plan.push(Action::Move(*arc));
-                if next[design].as_ref().is_none_or(|(known, _)| cost < *known) {
+                if next[design].as_ref().is_none_or(|(incumbent, _)| cost < *incumbent) {
                     next[design] = Some((cost, plan));
                 }
             }

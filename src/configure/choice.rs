@@ -233,7 +233,7 @@ impl<'a> Offers<'a> {
                 components: used.map(|(number, _)| number).collect(),
             };
             let (design, components) = (candidate.design.name, components.clone());
-            let missed = candidate.missed.iter().map(said).collect();
+            let missed = candidate.missed.iter().map(requirement_text).collect();
             Offer { design, utility, rejections: candidate.rejections, missed, choice, components }
         };
         let mut candidates: Vec<Offer> = candidates_of_objective.into_iter().map(offer).collect();
@@ -348,7 +348,7 @@ impl Whole<'_> {
 }
 
 /// Formats a missed requirement.
-fn said(missed: &Missed) -> String {
+fn requirement_text(missed: &Missed) -> String {
     let Missed { attribute, estimation, bound, status } = missed;
     format!("{attribute}: estimated {}, required {}: {status}", decimal(estimation), decimal(bound))
 }

@@ -183,7 +183,7 @@ impl Configurator {
     /// objective stays in need.
     ///
     /// # Errors
-    /// As [`Configurator::adopt`].
+    /// Errors of [`Configurator::adopt`].
     pub fn revert(&mut self, objective: &str, before: Option<&str>) -> Result<(), Message> {
         match before {
             Some(design) => self.change(|runtime| runtime.ground(objective, design)),

@@ -83,7 +83,7 @@ pub struct Keeper {
     /// Sequence numbers of the received lines.
     numbers: Numbers,
     effects: u64,
-    asked: BTreeMap<u64, PendingChange>,
+    pending_changes: BTreeMap<u64, PendingChange>,
     available: BTreeSet<String>,
     statuses: BTreeMap<String, Vec<String>>,
     violated: BTreeSet<String>,
@@ -106,7 +106,7 @@ impl Keeper {
             limit,
             numbers: Numbers::default(),
             effects: 0,
-            asked: BTreeMap::new(),
+            pending_changes: BTreeMap::new(),
             available,
             statuses: BTreeMap::new(),
             violated: BTreeSet::new(),
@@ -245,10 +245,12 @@ impl Keeper {
     /// Undoes a change of design: the design counts as not realisable, so that the next best is
     /// chosen. Does nothing if the change is unknown or was undone before.
     fn undo(&mut self, effect: u64) -> Result<(), Message> {
-        let Some(PendingChange { objective, from, to }) = self.asked.remove(&effect) else { return Ok(()) };
+        let Some(PendingChange { objective, from, to }) = self.pending_changes.remove(&effect) else {
+            return Ok(());
+        };
         self.configurator.knowledge_mut().take(&to, RobotReport::Design(false))?;
         // A later change of the same objective has replaced it.
-        if self.asked.range(effect..).any(|(_, later)| later.objective == objective) {
+        if self.pending_changes.range(effect..).any(|(_, later)| later.objective == objective) {
             return Ok(());
         }
         self.configurator.revert(&objective, from.as_deref())
@@ -289,7 +291,7 @@ impl Keeper {
             }));
         }
         // A failed change of a removed objective needs no undo.
-        self.asked.retain(|_, asked| asked.objective != name);
+        self.pending_changes.retain(|_, pending_changes| pending_changes.objective != name);
         self.unserved.remove(name);
         Ok(())
     }
@@ -325,7 +327,7 @@ impl Keeper {
             return;
         }
         let Some(design) = &choice.design else {
-            let because = said(choice);
+            let because = reasons_of(choice);
             // The same reasons are reported only once.
             if self.unserved.get(&objective) != Some(&because) {
                 self.unserved.insert(objective.clone(), because.clone());
@@ -341,13 +343,13 @@ impl Keeper {
                 from: choice.before.clone(),
                 to: design.clone(),
             };
-            self.asked.insert(self.effects, change);
+            self.pending_changes.insert(self.effects, change);
             // The oldest change is the least likely to fail.
-            if self.asked.len() > MAX_CHANGES {
-                self.asked.pop_first();
+            if self.pending_changes.len() > MAX_CHANGES {
+                self.pending_changes.pop_first();
             }
             let (from, to) = (choice.before.clone(), choice.design.clone());
-            let (because, effect) = (said(choice), self.effects);
+            let (because, effect) = (reasons_of(choice), self.effects);
             answers.push(KeeperAnswer::Service(Service::Reconfigure {
                 objective,
                 function,
@@ -373,7 +375,7 @@ fn wrong(message: &Message) -> KeeperAnswer {
 }
 
 /// Reasons why an objective is in need, and why better designs than the chosen one are not used.
-fn said(choice: &Choice) -> Vec<String> {
+fn reasons_of(choice: &Choice) -> Vec<String> {
     let mut because: Vec<String> =
         choice.need.iter().map(|need| format!("{} is {need}", choice.objective)).collect();
     for considered in &choice.considered {

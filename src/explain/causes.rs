@@ -224,11 +224,11 @@ fn altered<'a>(
     alterations: impl IntoIterator<Item = &'a Alteration>,
 ) -> Option<Knowledge> {
     let mut knowledge = knowledge.clone();
-    for own in alterations {
-        let outcome = match own.to {
-            Target::Recovered => knowledge.report(&own.name, Component::Recovered),
-            Target::Failed => knowledge.report(&own.name, Component::Failed),
-            _ => knowledge.observe(&own.name, &own.to.example()),
+    for alteration in alterations {
+        let outcome = match alteration.to {
+            Target::Recovered => knowledge.report(&alteration.name, Component::Recovered),
+            Target::Failed => knowledge.report(&alteration.name, Component::Failed),
+            _ => knowledge.observe(&alteration.name, &alteration.to.example()),
         };
         outcome.ok()?;
     }
@@ -261,16 +261,21 @@ pub(super) fn in_situation(
 /// Returns each alteration of the repairs, with the best plan after this alteration alone.
 pub(super) fn singly(mission: &Mission, repairs: &[Repair], limits: &Limits) -> Result<Vec<Change>, Errors> {
     let mut changes: Vec<Change> = Vec::new();
-    for own in repairs.iter().flat_map(|repair| &repair.alterations) {
-        if changes.iter().any(|change| change.alteration == *own) {
+    for alteration in repairs.iter().flat_map(|repair| &repair.alterations) {
+        if changes.iter().any(|change| change.alteration == *alteration) {
             continue;
         }
-        let alone = repairs.iter().find(|repair| repair.alterations == [own.clone()]);
+        let alone = repairs.iter().find(|repair| repair.alterations == [alteration.clone()]);
         let then = match alone {
             Some(repair) => repair.then.clone(),
-            None => in_situation(mission, std::slice::from_ref(own), limits)?,
+            None => in_situation(mission, std::slice::from_ref(alteration), limits)?,
         };
-        changes.push(Change { alteration: own.clone(), within: None, suffices: alone.is_some(), then });
+        changes.push(Change {
+            alteration: alteration.clone(),
+            within: None,
+            suffices: alone.is_some(),
+            then,
+        });
     }
     Ok(changes)
 }
@@ -298,15 +303,15 @@ fn candidates(knowledge: &Knowledge, design: &FunctionDesign) -> Vec<Alteration>
 
 /// Adds alterations of all failed components, and of the measurements that any design depends on,
 /// to the candidates.
-fn all_candidates(knowledge: &Knowledge, mut all: Vec<Alteration>) -> Vec<Alteration> {
+fn all_candidates(knowledge: &Knowledge, mut candidates_found: Vec<Alteration>) -> Vec<Alteration> {
     let designs = knowledge.view().function_designs();
     let additional = designs.iter().flat_map(|design| candidates(knowledge, design));
-    for own in components(knowledge, false, &|_| true).into_iter().chain(additional) {
-        if own.to != Target::Failed && !all.contains(&own) {
-            all.push(own);
+    for alteration in components(knowledge, false, &|_| true).into_iter().chain(additional) {
+        if alteration.to != Target::Failed && !candidates_found.contains(&alteration) {
+            candidates_found.push(alteration);
         }
     }
-    all
+    candidates_found
 }
 
 /// Returns alterations of components: failed ones are repaired, or working ones fail.

@@ -91,8 +91,8 @@ pub fn availability(mission: &Mission, name: &str) -> Result<Availability, Error
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let mut mission = Setup::read(Path::new("missions/ugv.toml"))?.mission;
 /// mission.fail("c_kinect")?;
-/// let found = explain::design(&mission, "fd_amcl_kinect", &Limits::none())?;
-/// assert!(!found.availability.available && !found.availability.because.is_empty());
+/// let explanation = explain::design(&mission, "fd_amcl_kinect", &Limits::none())?;
+/// assert!(!explanation.availability.available && !explanation.availability.because.is_empty());
 /// # Ok(())
 /// # }
 /// ```

@@ -198,8 +198,8 @@ fn snapshot(bytes: &[u8], number: u64) -> Result<SnapshotFile, String> {
 
 fn check_opening(record: &Record, number: u64) -> Result<(), String> {
     match (record.text(0), record.count(2)) {
-        (Some(FORMAT), Some(own)) if own == number => Ok(()),
-        (Some(FORMAT), own) => Err(format!("has the number {} in it", own.unwrap_or_default())),
+        (Some(FORMAT), Some(stated)) if stated == number => Ok(()),
+        (Some(FORMAT), stated) => Err(format!("has the number {} in it", stated.unwrap_or_default())),
         (Some("metaplan-journal/2"), _) => Err(OLD_FORMAT.to_owned()),
         (format, _) => Err(format!("has the format `{}`, not `{FORMAT}`", format.unwrap_or_default())),
     }

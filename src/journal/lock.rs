@@ -56,7 +56,7 @@ impl Lock {
         match answer {
             Ok(()) => {
                 let mut lock = Self { file, records: records.parse().unwrap_or(0) };
-                lock.note(lock.records).map_err(|error| failed(&error))?;
+                lock.store_count(lock.records).map_err(|error| failed(&error))?;
                 Ok(lock)
             }
             Err(TryLockError::WouldBlock) => {
@@ -73,7 +73,7 @@ impl Lock {
     }
 
     /// Stores the number of records.
-    pub(super) fn note(&mut self, records: u64) -> io::Result<()> {
+    pub(super) fn store_count(&mut self, records: u64) -> io::Result<()> {
         let owner = std::process::id();
         self.file.seek(SeekFrom::Start(0))?;
         self.file.write_all(format!("{owner:>OWNER_CHARACTERS$}\n{records:>COUNT_CHARACTERS$}\n").as_bytes())

@@ -122,10 +122,10 @@ impl Journal {
             return Ok((journal, recovery));
         }
         let failed = |error: io::Error| broken(&directory, &error.to_string());
-        let Resumed { from, segments, observations, unfinished, anew } =
+        let Resumed { from, segments, observations, unfinished, missing_snapshots } =
             resume(&directory, &contents, control, &mut recovery)?;
         let (file, link) = settle(&directory, &segments, &mut recovery).map_err(failed)?;
-        for (number, line) in anew {
+        for (number, line) in missing_snapshots {
             write_snapshot(&directory, number, &line).map_err(failed)?;
         }
         // A machine that lost power may have lost records that were not flushed.
@@ -194,7 +194,7 @@ impl Journal {
     /// Returns answers and effects that were not acknowledged, for repeated output.
     fn again(&mut self, control: &Loop, mut answers: Vec<Answer>) -> io::Result<Vec<Answer>> {
         self.file.sync_data()?;
-        self.lock.note(self.link.next)?;
+        self.lock.store_count(self.link.next)?;
         // Effects of the new answers must not be repeated.
         let fresh: Vec<u64> = answers.iter().filter_map(Answer::effect).map(|effect| effect.number).collect();
         let again = control.repeat().into_iter();
@@ -264,7 +264,7 @@ impl Journal {
         if must {
             self.file.sync_data()?;
         }
-        self.lock.note(self.link.next)
+        self.lock.store_count(self.link.next)
     }
 
     fn decide(&mut self, decision: &Decision) -> io::Result<()> {
@@ -287,7 +287,7 @@ impl Journal {
         self.file.write_all(end.as_bytes())?;
         self.file.sync_data()?;
         (self.file, self.link, self.segment, self.observations) = (file, link, next, 0);
-        self.lock.note(self.link.next)?;
+        self.lock.store_count(self.link.next)?;
         let line = snapshot_line(&at, &self.digest, next, control);
         write_snapshot(&self.directory, next, &line)?;
         for entry in std::fs::read_dir(&self.directory)? {
@@ -313,7 +313,7 @@ struct Resumed<'c> {
     observations: u64,
     unfinished: Option<Unfinished>,
     /// Missing snapshots, by number, which are written again.
-    anew: Vec<(u64, String)>,
+    missing_snapshots: Vec<(u64, String)>,
 }
 
 /// Restores a loop from the newest sound snapshot and the later observations.
@@ -337,17 +337,17 @@ fn resume<'c>(
     }
     recovery.replayed = Some(0);
     let mut replay = Replay { directory, control, recovery, observations: 0, unfinished: None };
-    let mut anew = Vec::new();
+    let mut missing_snapshots = Vec::new();
     for segment in &segments {
         // A crash between the creation of a segment and its snapshot leaves the snapshot missing.
         if segment.number > from && contents.start(segment.number).is_err() {
             let line = snapshot_line(&segment.before, &digest, segment.number, replay.control);
-            anew.push((segment.number, line));
+            missing_snapshots.push((segment.number, line));
         }
         replay.segment(segment)?;
     }
     let Replay { observations, unfinished, .. } = replay;
-    Ok(Resumed { from, segments, observations, unfinished, anew })
+    Ok(Resumed { from, segments, observations, unfinished, missing_snapshots })
 }
 
 /// Creates a segment with only its header, atomically.

@@ -12,14 +12,14 @@ use crate::live::keep::{design_key, keys};
 use crate::mapek::DesignChange;
 
 /// Maximum number of lines in the queue; further lines are dropped and counted.
-const WAITING: usize = 4096;
-const WAITING_BYTES: usize = 16 << 20;
+const MAX_QUEUED_LINES: usize = 4096;
+const MAX_QUEUED_BYTES: usize = 16 << 20;
 
 /// Maximum number of retained lines.
 const MAX_LINES: usize = 2000;
 
 /// Maximum number of bytes of retained lines, unless a single line has more.
-const BYTES: usize = 4 << 20;
+const MAX_RETAINED_BYTES: usize = 4 << 20;
 
 /// Maximum number of keys with a retained state; the oldest are dropped first.
 const MAX_KEYS: usize = 10_000;
@@ -30,7 +30,7 @@ const MAX_BATCH: usize = 100;
 /// The retained lines, and the condition variable for new ones.
 #[derive(Debug, Default)]
 pub(super) struct Hub {
-    known: Mutex<RetainedLines>,
+    retained: Mutex<RetainedLines>,
     more: Condvar,
 }
 
@@ -102,7 +102,7 @@ impl Hub {
         state.bytes += line.len();
         state.lines.push_back(line);
         // The newest line is always retained, even if it exceeds the limit alone.
-        while state.lines.len() > 1 && (state.lines.len() > MAX_LINES || state.bytes > BYTES) {
+        while state.lines.len() > 1 && (state.lines.len() > MAX_LINES || state.bytes > MAX_RETAINED_BYTES) {
             let removed = state.lines.pop_front();
             state.bytes -= removed.map_or(0, |line| line.len());
             state.first += 1;
@@ -117,7 +117,7 @@ impl Hub {
     }
 
     fn lock(&self) -> MutexGuard<'_, RetainedLines> {
-        self.known.lock().unwrap_or_else(PoisonError::into_inner)
+        self.retained.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -130,22 +130,22 @@ impl RetainedLines {
 
 /// Sender of the loop's messages to a hub. Sending never blocks. Copies share the hub.
 #[derive(Debug, Clone)]
-pub(super) struct Mouth {
-    said: SyncSender<Option<(f64, Entry)>>,
-    behind: Arc<Backlog>,
-    begun: Instant,
+pub(super) struct HubSender {
+    queue: SyncSender<Option<(f64, Entry)>>,
+    backlog: Arc<Backlog>,
+    start: Instant,
 }
 
 /// Size of the queue, and number of dropped lines.
 #[derive(Debug, Default)]
 struct Backlog {
-    left_out: AtomicU64,
+    dropped: AtomicU64,
     bytes: AtomicUsize,
 }
 
 #[derive(Debug)]
 enum Entry {
-    Heard(u64, String),
+    Event(u64, String),
     Answer(String),
     Designs(Vec<DesignChange>),
     Planned { exists: bool, under_way: Option<u64> },
@@ -155,73 +155,73 @@ impl Entry {
     /// Number of bytes of text.
     fn bytes(&self) -> usize {
         match self {
-            Self::Heard(_, text) | Self::Answer(text) => text.len(),
+            Self::Event(_, text) | Self::Answer(text) => text.len(),
             Self::Designs(_) | Self::Planned { .. } => 0,
         }
     }
 }
 
-impl Mouth {
+impl HubSender {
     /// Starts a receiving thread for a hub, and returns the sender.
     pub(super) fn of(hub: Arc<Hub>) -> Self {
-        let (said, received) = sync_channel(WAITING);
-        let behind = Arc::new(Backlog::default());
-        let counted = Arc::clone(&behind);
-        std::thread::spawn(move || listen(&hub, &received, &counted));
-        Self { said, behind, begun: Instant::now() }
+        let (queue, receiver) = sync_channel(MAX_QUEUED_LINES);
+        let backlog = Arc::new(Backlog::default());
+        let receiver_backlog = Arc::clone(&backlog);
+        std::thread::spawn(move || listen(&hub, &receiver, &receiver_backlog));
+        Self { queue, backlog, start: Instant::now() }
     }
 
     /// Sends a line of events, with its number.
-    pub(super) fn heard(&self, number: u64, text: &str) {
-        self.say(Entry::Heard(number, text.to_owned()));
+    pub(super) fn send_event(&self, number: u64, text: &str) {
+        self.enqueue(Entry::Event(number, text.to_owned()));
     }
 
     /// Sends an answer, a JSON object of the format.
-    pub(super) fn answer(&self, answer: &str) {
-        self.say(Entry::Answer(answer.to_owned()));
+    pub(super) fn send_answer(&self, answer: &str) {
+        self.enqueue(Entry::Answer(answer.to_owned()));
     }
 
     /// Sends the state of designs.
-    pub(super) fn known(&self, designs: Vec<DesignChange>) {
-        self.say(Entry::Designs(designs));
+    pub(super) fn send_designs(&self, designs: Vec<DesignChange>) {
+        self.enqueue(Entry::Designs(designs));
     }
 
     /// Sends the existence of a plan, and the number of the running action.
-    pub(super) fn planned(&self, exists: bool, under_way: Option<u64>) {
-        self.say(Entry::Planned { exists, under_way });
+    pub(super) fn send_plan(&self, exists: bool, under_way: Option<u64>) {
+        self.enqueue(Entry::Planned { exists, under_way });
     }
 
     /// Sends the end of the run, and waits until all earlier messages are processed.
     pub(super) fn end(&self) {
-        let _ = self.said.send(None);
+        let _ = self.queue.send(None);
     }
 
-    fn say(&self, said: Entry) {
-        let at = self.begun.elapsed().as_secs_f64();
-        let bytes = said.bytes();
-        let waiting = self.behind.bytes.fetch_add(bytes, Ordering::Relaxed);
+    fn enqueue(&self, entry: Entry) {
+        let at = self.start.elapsed().as_secs_f64();
+        let bytes = entry.bytes();
+        let waiting = self.backlog.bytes.fetch_add(bytes, Ordering::Relaxed);
         // The loop must not wait for slow clients, so lines beyond the limit are dropped.
-        let is_taken = waiting.saturating_add(bytes) <= WAITING_BYTES
-            && !matches!(self.said.try_send(Some((at, said))), Err(TrySendError::Full(_)));
+        let is_taken = waiting.saturating_add(bytes) <= MAX_QUEUED_BYTES
+            && !matches!(self.queue.try_send(Some((at, entry))), Err(TrySendError::Full(_)));
         if !is_taken {
-            self.behind.bytes.fetch_sub(bytes, Ordering::Relaxed);
-            self.behind.left_out.fetch_add(1, Ordering::Relaxed);
+            self.backlog.bytes.fetch_sub(bytes, Ordering::Relaxed);
+            self.backlog.dropped.fetch_add(1, Ordering::Relaxed);
         }
     }
 }
 
-fn listen(hub: &Hub, received: &Receiver<Option<(f64, Entry)>>, behind: &Backlog) {
-    while let Ok(Some((at, said))) = received.recv() {
-        behind.bytes.fetch_sub(said.bytes(), Ordering::Relaxed);
+fn listen(hub: &Hub, receiver: &Receiver<Option<(f64, Entry)>>, backlog: &Backlog) {
+    while let Ok(Some((at, entry))) = receiver.recv() {
+        backlog.bytes.fetch_sub(entry.bytes(), Ordering::Relaxed);
         // Milliseconds are precise enough for a page.
         let at = (at * 1000.0).round() / 1000.0;
         // The page shows the number of dropped lines.
-        let missing = behind.left_out.swap(0, Ordering::Relaxed);
+        let missing = backlog.dropped.swap(0, Ordering::Relaxed);
         if missing > 0 {
             hub.take(json!({"at": at, "left_out": missing}).to_string().into(), Vec::new());
         }
-        match said {
-            Entry::Heard(number, text) => {
+        match entry {
+            Entry::Event(number, text) => {
                 let line = json!({"at": at, "line": number, "heard": text});
                 hub.take(line.to_string().into(), Vec::new());
             }
@@ -249,38 +249,38 @@ mod tests {
     use std::sync::atomic::Ordering;
     use std::time::Duration;
 
-    use super::{Hub, Mouth, News, WAITING_BYTES};
+    use super::{Hub, HubSender, MAX_QUEUED_BYTES, News};
 
     #[test]
     fn the_queue_is_bounded_by_its_bytes() {
         let hub = Arc::new(Hub::default());
-        let mouth = Mouth::of(Arc::clone(&hub));
+        let sender = HubSender::of(Arc::clone(&hub));
         let long = "x".repeat(1 << 20);
         // The lock blocks the receiving thread.
         let guard = hub.lock();
         for number in 0..100 {
-            mouth.heard(number, &long);
+            sender.send_event(number, &long);
         }
-        assert!(mouth.behind.bytes.load(Ordering::Relaxed) <= WAITING_BYTES);
-        assert!(mouth.behind.left_out.load(Ordering::Relaxed) >= 83);
+        assert!(sender.backlog.bytes.load(Ordering::Relaxed) <= MAX_QUEUED_BYTES);
+        assert!(sender.backlog.dropped.load(Ordering::Relaxed) >= 83);
         drop(guard);
-        while mouth.behind.bytes.load(Ordering::Relaxed) > 0 {
+        while sender.backlog.bytes.load(Ordering::Relaxed) > 0 {
             std::thread::sleep(Duration::from_millis(1));
         }
-        mouth.heard(100, "short");
-        mouth.end();
-        let (mut next, mut seen) = (0, 0);
+        sender.send_event(100, "short");
+        sender.end();
+        let (mut next, mut short_lines) = (0, 0);
         loop {
             match hub.news(next, Duration::from_secs(1)) {
                 News::Lines(lines) => {
                     next += lines.len() as u64;
-                    seen += lines.iter().filter(|line| line.contains("short")).count();
+                    short_lines += lines.iter().filter(|line| line.contains("short")).count();
                 }
                 News::Missed => next = hub.state().1,
                 News::Nothing => {}
                 News::Ended => break,
             }
         }
-        assert_eq!(seen, 1, "lines after an overflow are delivered");
+        assert_eq!(short_lines, 1, "lines after an overflow are delivered");
     }
 }

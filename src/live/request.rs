@@ -5,10 +5,10 @@ use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
 /// Maximum number of bytes of a request's head.
-const LONGEST: usize = 16 << 10;
+const MAX_HEAD_BYTES: usize = 16 << 10;
 
 /// Maximum number of headers.
-const HEADERS: usize = 64;
+const MAX_HEADERS: usize = 64;
 
 /// A parsed request.
 #[derive(Debug, PartialEq, Eq)]
@@ -38,7 +38,7 @@ impl Request {
                 return Err(io::ErrorKind::UnexpectedEof.into());
             }
             bytes.extend_from_slice(&part[..count]);
-            if bytes.len() > LONGEST {
+            if bytes.len() > MAX_HEAD_BYTES {
                 return Ok(Err((431, "Request Header Fields Too Large")));
             }
             if let Some(request) = Self::parse(&bytes) {
@@ -49,7 +49,7 @@ impl Request {
 
     /// Parses a request. `None` while it is incomplete.
     fn parse(bytes: &[u8]) -> Option<Result<Self, Refused>> {
-        let mut headers = [httparse::EMPTY_HEADER; HEADERS];
+        let mut headers = [httparse::EMPTY_HEADER; MAX_HEADERS];
         let mut parsed = httparse::Request::new(&mut headers);
         match parsed.parse(bytes) {
             Ok(httparse::Status::Partial) => return None,

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use crate::live::address::{Address, is_local_host};
 use crate::live::canvas::Canvas;
-use crate::live::hub::{Hub, Mouth, News};
+use crate::live::hub::{Hub, HubSender, News};
 use crate::live::request::{Refused, Request};
 use crate::live::token::Token;
 use crate::mapek::{DesignChange, Outlook};
@@ -35,9 +35,9 @@ const SCRIPT: &str = include_str!("page/live.js");
 /// Server of a run's page; copies share the run.
 #[derive(Debug, Clone)]
 pub struct Live {
-    mouth: Mouth,
+    sender: HubSender,
     address: SocketAddr,
-    house: Arc<SharedState>,
+    shared: Arc<SharedState>,
 }
 
 /// State shared by all connections.
@@ -46,7 +46,7 @@ struct SharedState {
     hub: Arc<Hub>,
     canvas: Canvas,
     token: Option<Token>,
-    visitors: AtomicUsize,
+    open_connections: AtomicUsize,
 }
 
 impl Live {
@@ -67,10 +67,10 @@ impl Live {
         let listener = TcpListener::bind(address.0).map_err(failed)?;
         let address = listener.local_addr().map_err(failed)?;
         let hub = Arc::new(Hub::default());
-        let mouth = Mouth::of(Arc::clone(&hub));
+        let sender = HubSender::of(Arc::clone(&hub));
         let canvas = Canvas::new(painter);
-        let house = Arc::new(SharedState { hub, canvas, token, visitors: AtomicUsize::new(0) });
-        let accepting = Arc::clone(&house);
+        let shared = Arc::new(SharedState { hub, canvas, token, open_connections: AtomicUsize::new(0) });
+        let accepting = Arc::clone(&shared);
         std::thread::spawn(move || {
             for stream in listener.incoming() {
                 match stream {
@@ -81,7 +81,7 @@ impl Live {
                 }
             }
         });
-        Ok(Self { mouth, address, house })
+        Ok(Self { sender, address, shared })
     }
 
     /// Returns the address of the server.
@@ -91,32 +91,32 @@ impl Live {
 
     /// Publishes a line of events, with its number. Never blocks.
     pub fn heard(&self, number: u64, text: &str) {
-        self.mouth.heard(number, text);
+        self.sender.send_event(number, text);
     }
 
     /// Publishes an answer, a JSON object of the format. Never blocks.
     pub fn said(&self, answer: &str) {
-        self.mouth.answer(answer);
+        self.sender.send_answer(answer);
     }
 
     /// Publishes the initial state of the designs, before the first answer. Never blocks.
     pub fn known(&self, designs: Vec<DesignChange>) {
-        self.mouth.known(designs);
+        self.sender.send_designs(designs);
     }
 
     /// Replaces the plan, or removes it. Never blocks; the plan is drawn on the next request.
     pub fn planned(&self, outlook: Option<Outlook>) {
         let under_way = outlook.as_ref().filter(|plan| plan.is_under_way).map(|plan| plan.first);
         let exists = outlook.is_some();
-        self.house.canvas.take(outlook);
-        self.mouth.planned(exists, under_way);
+        self.shared.canvas.take(outlook);
+        self.sender.send_plan(exists, under_way);
     }
 
     /// Ends the run for all clients, and waits a moment until they have received the end.
     pub fn end(&self) {
-        self.mouth.end();
+        self.sender.end();
         let begun = Instant::now();
-        while self.house.visitors.load(Ordering::Acquire) > 0 && begun.elapsed() < SHUTDOWN_GRACE {
+        while self.shared.open_connections.load(Ordering::Acquire) > 0 && begun.elapsed() < SHUTDOWN_GRACE {
             std::thread::sleep(Duration::from_millis(5));
         }
     }
@@ -127,52 +127,52 @@ struct ConnectionGuard(Arc<SharedState>);
 
 impl Drop for ConnectionGuard {
     fn drop(&mut self) {
-        self.0.visitors.fetch_sub(1, Ordering::AcqRel);
+        self.0.open_connections.fetch_sub(1, Ordering::AcqRel);
     }
 }
 
 /// Starts a thread for a connection, unless there are too many.
-fn receive(house: &Arc<SharedState>, mut stream: TcpStream) {
-    let connections = house.visitors.fetch_add(1, Ordering::AcqRel);
-    let visit = ConnectionGuard(Arc::clone(house));
+fn receive(shared: &Arc<SharedState>, mut stream: TcpStream) {
+    let connections = shared.open_connections.fetch_add(1, Ordering::AcqRel);
+    let guard = ConnectionGuard(Arc::clone(shared));
     let is_full = connections >= MAX_CONNECTIONS;
     let answered = std::thread::Builder::new().spawn(move || {
         // A write error means that the client has disconnected.
         let _ = if is_full {
             refuse(&mut stream, (503, "Service Unavailable"))
         } else {
-            answer(&visit.0, &mut stream)
+            answer(&guard.0, &mut stream)
         };
         let _ = stream.shutdown(Shutdown::Both);
-        drop(visit);
+        drop(guard);
     });
     // If no thread could be started, the connection is closed and its guard is dropped.
     drop(answered);
 }
 
 /// Answers one request.
-fn answer(house: &SharedState, stream: &mut TcpStream) -> io::Result<()> {
+fn answer(shared: &SharedState, stream: &mut TcpStream) -> io::Result<()> {
     stream.set_nodelay(true)?;
     let request = match Request::read(stream, CLIENT_TIMEOUT)? {
         Ok(request) => request,
         Err(refused) => return refuse(stream, refused),
     };
-    if let Err(refused) = may_look(house, &request) {
+    if let Err(refused) = authorize(shared, &request) {
         return refuse(stream, refused);
     }
     match request.path.as_str() {
         "/" => document(stream, "text/html", PAGE),
         "/live.css" => document(stream, "text/css", &[picture::STYLE, STYLE].concat()),
-        "/plan" => document(stream, "text/html", &house.canvas.picture()),
+        "/plan" => document(stream, "text/html", &shared.canvas.picture()),
         "/live.js" => document(stream, "text/javascript", SCRIPT),
-        "/events" => events(house, stream),
+        "/events" => events(shared, stream),
         _ => refuse(stream, (404, "Not Found")),
     }
 }
 
 /// Checks that a request is authorised.
-fn may_look(house: &SharedState, request: &Request) -> Result<(), Refused> {
-    if let Some(token) = &house.token {
+fn authorize(shared: &SharedState, request: &Request) -> Result<(), Refused> {
+    if let Some(token) = &shared.token {
         let fits = request.authorization.as_deref().is_some_and(|given| token.fits(given));
         return if fits { Ok(()) } else { Err((401, "Unauthorized")) };
     }
@@ -210,19 +210,19 @@ fn refuse(stream: &mut TcpStream, (status, words): Refused) -> io::Result<()> {
 }
 
 /// Sends the current state and then the new lines, until the run ends or the client is too slow.
-fn events(house: &SharedState, stream: &mut TcpStream) -> io::Result<()> {
+fn events(shared: &SharedState, stream: &mut TcpStream) -> io::Result<()> {
     send(
         stream,
         &format!(
             "HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\n{COMMON}\r\nevent: begin\ndata: {{}}\n\n"
         ),
     )?;
-    let (state, mut next) = house.hub.state();
+    let (state, mut next) = shared.hub.state();
     for batch in state.chunks(100) {
         send(stream, &stanzas(batch))?;
     }
     loop {
-        match house.hub.news(next, KEEPALIVE_INTERVAL) {
+        match shared.hub.news(next, KEEPALIVE_INTERVAL) {
             News::Lines(lines) => {
                 send(stream, &stanzas(&lines))?;
                 next += lines.len() as u64;

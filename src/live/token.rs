@@ -10,10 +10,10 @@ use subtle::ConstantTimeEq as _;
 use crate::message::Message;
 
 /// Minimum length; shorter tokens can be guessed.
-const SHORTEST: usize = 16;
+const MIN_LENGTH: usize = 16;
 
 /// Maximum length; a longer text is probably another file.
-const LONGEST: usize = 1024;
+const MAX_LENGTH: usize = 1024;
 
 /// A token, stored as its digest only.
 #[derive(Clone)]
@@ -34,14 +34,15 @@ impl Token {
         let name = path.display().to_string();
         let wrong = |text: String| Message::at("M332", &name, None, text);
         let size = std::fs::metadata(path).map_or(0, |data| data.len());
-        if size > 2 * LONGEST as u64 {
+        if size > 2 * MAX_LENGTH as u64 {
             return Err(wrong("this is too long for a token".to_owned()));
         }
         let text = std::fs::read(path).map_err(|error| wrong(format!("the file cannot be read: {error}")))?;
         let word = text.trim_ascii();
-        let fits = (SHORTEST..=LONGEST).contains(&word.len()) && word.iter().all(u8::is_ascii_graphic);
+        let fits = (MIN_LENGTH..=MAX_LENGTH).contains(&word.len()) && word.iter().all(u8::is_ascii_graphic);
         if !fits {
-            let text = format!("a token is one word of {SHORTEST} to {LONGEST} visible characters of ASCII");
+            let text =
+                format!("a token is one word of {MIN_LENGTH} to {MAX_LENGTH} visible characters of ASCII");
             return Err(wrong(text));
         }
         Ok(Self::of(word))

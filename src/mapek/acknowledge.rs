@@ -1,43 +1,43 @@
-//! Acknowledgements: messages about reconfigurations to the design that a function is believed to have.
+//! Acknowledgements: determines the believed design of each function from acknowledgements of reconfigurations.
 //!
-//! A function has the design that was acknowledged last. A reconfiguration is acknowledged by an event that names its number, and
-//! messages may cross, be doubled or come out of order: of two acknowledged reconfigurations of a function the later one counts.
-//! A reconfiguration that was superseded before it was answered may still be acknowledged; until then it is not believed, and the
-//! function's design is not certain.
+//! The believed design is the one that was acknowledged last. An event with the number of a reconfiguration
+//! acknowledges it. Messages can cross, be duplicated or arrive out of order: of two acknowledged reconfigurations of
+//! one function, the later one counts. A superseded reconfiguration without an answer can still be acknowledged. Until
+//! then its design is not believed, and the design of the function is uncertain.
 //!
-//! A report that an action has started, progressed or succeeded implies that its request has arrived, and that is all. Robots
-//! that acknowledge nothing would never have any design then. So, as long as no reconfiguration was ever acknowledged by its
-//! number, such a report also implies the reconfigurations that preceded the request: an action begins with the configuration of
-//! its request.
+//! A report that an action has started, progressed or succeeded implies the arrival of its request, and nothing else.
+//! Under this rule alone, robots without acknowledgements would never have a believed design. Therefore, until a
+//! reconfiguration is acknowledged by its number, such a report also implies the reconfigurations before the request:
+//! an action starts with the configuration of its request.
 
 use crate::mapek::answer::Command;
 use crate::mapek::beliefs::Beliefs;
 use crate::mapek::receipts::{Acknowledged, Before};
 
-/// The consequence of an acknowledgement.
+/// Outcome of an acknowledgement.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Receipt {
-    /// There was no such effect.
+    /// No effect has this number.
     Unknown,
     /// The effect is acknowledged.
-    Taken,
-    /// It is not certain any more which design this function has.
+    Recorded,
+    /// The design of this function is uncertain.
     Doubtful(String),
 }
 
-/// The consequence of a reconfiguration's failure.
+/// Outcome of a report that a reconfiguration has failed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Failure {
     /// The design cannot be realised.
     Design(String),
-    /// None: it is old or a duplicate.
+    /// No consequence: the report is old or a duplicate.
     Stale,
-    /// The effect is not a reconfiguration, or there was none.
+    /// The number does not belong to a reconfiguration.
     NotReconfiguration,
 }
 
 impl Beliefs {
-    /// Takes an acknowledgement of an effect.
+    /// Records an acknowledgement. The effect is then no longer outstanding.
     pub(super) fn acknowledge(&mut self, effect: u64) -> Receipt {
         if effect == 0 || effect > self.effects {
             return Receipt::Unknown;
@@ -53,11 +53,11 @@ impl Beliefs {
             let (function, design) = (function.clone(), design.clone());
             return self.configured(effect, function, design);
         }
-        Receipt::Taken
+        Receipt::Recorded
     }
 
-    /// Takes a report of an action that has started: its request has arrived, and with a robot that never acknowledges also what
-    /// was asked for before that.
+    /// Records the arrival of a request, implied by a report of its action. If the robot has never acknowledged a
+    /// reconfiguration by its number, the report also implies the reconfigurations that precede the request.
     pub(super) fn confirm_request(&mut self, request: u64) {
         self.outstanding.remove(&request);
         self.waits.remove(&request);
@@ -78,12 +78,13 @@ impl Beliefs {
         }
     }
 
-    /// Takes the failure of a reconfiguration.
+    /// Records the failure of a reconfiguration, before or after its acknowledgement.
     pub(super) fn reconfiguration_failed(&mut self, effect: u64) -> Failure {
         if effect == 0 || effect > self.effects {
             return Failure::NotReconfiguration;
         }
-        match self.outstanding.get(&effect).map(|own| &own.command) {
+        // A reconfiguration is outstanding, superseded, or acknowledged; the three cases follow in this order.
+        match self.outstanding.get(&effect).map(|outstanding_effect| &outstanding_effect.command) {
             Some(Command::Reconfigure { function, to, .. }) => {
                 let (function, design) = (function.clone(), to.clone());
                 self.outstanding.remove(&effect);
@@ -93,13 +94,13 @@ impl Beliefs {
             Some(_) => return Failure::NotReconfiguration,
             None => {}
         }
-        for (function, own) in &mut self.receipts.functions {
-            if let Some(design) = own.superseded.remove(&effect) {
+        for (function, history) in &mut self.receipts.functions {
+            if let Some(design) = history.superseded.remove(&effect) {
                 let function = function.clone();
                 return self.unanswered_failed(&function, design);
             }
-            let Some(last) = own.last.as_mut() else { continue };
-            // Without the reconfiguration before the last one nobody knows what a failure of the last one leads to, or has led to.
+            let Some(last) = history.last.as_mut() else { continue };
+            // If the previous reconfiguration failed too, the design after a failure of the last one is unknown.
             if let Some(before) = last.before.take_if(|before| before.effect == Some(effect))
                 && last.failed
                 && self.configuration.get(function) == Some(&before.design)
@@ -113,7 +114,7 @@ impl Beliefs {
             last.failed = true;
             let design = last.design.clone();
             match last.before.clone() {
-                // Somebody else may have changed it since.
+                // The design may have changed since, for example by an observation.
                 _ if self.configuration.get(function) != Some(&design) => {}
                 Some(before) => drop(self.configuration.insert(function.clone(), before.design)),
                 None => drop(self.configuration.remove(function)),
@@ -123,8 +124,9 @@ impl Beliefs {
         Failure::Stale
     }
 
-    /// Takes the failure of a reconfiguration without an answer so far. The function keeps the design before. But if it was seen with
-    /// the design meanwhile, the reconfiguration was carried out and has failed later: nobody knows the design before.
+    /// Records the failure of an unanswered reconfiguration. The function keeps its previous design. If the function
+    /// was observed with the new design meanwhile, the reconfiguration has failed after it was carried out, and the
+    /// design becomes unknown.
     fn unanswered_failed(&mut self, function: &str, design: String) -> Failure {
         if self.configuration.get(function) == Some(&design) {
             self.configuration.remove(function);
@@ -132,28 +134,31 @@ impl Beliefs {
         Failure::Design(design)
     }
 
-    /// Believes that a function has got a design by a reconfiguration, unless a later one was acknowledged. The function was seen
-    /// with another design while the reconfiguration was pending: then nobody knows which came first.
+    /// Records that a reconfiguration has arrived, unless a later one is acknowledged. If the function was observed
+    /// with another design while the reconfiguration was pending, the order of the two is unknown, and so is the
+    /// design.
     fn configured(&mut self, effect: u64, function: String, design: String) -> Receipt {
-        let own = self.receipts.functions.entry(function.clone()).or_default();
-        // One that was superseded without an answer may have been carried out in between.
-        let is_before_known = own.superseded.range(..effect).next().is_none();
-        own.superseded.retain(|number, _| *number > effect);
-        if own.last.as_ref().is_some_and(|last| last.effect >= effect) {
-            return Receipt::Taken;
+        let history = self.receipts.functions.entry(function.clone()).or_default();
+        // A superseded reconfiguration without an answer may have been carried out in between.
+        let is_before_known = history.superseded.range(..effect).next().is_none();
+        history.superseded.retain(|number, _| *number > effect);
+        if history.last.as_ref().is_some_and(|last| last.effect >= effect) {
+            return Receipt::Recorded;
         }
-        let is_doubtful = own.doubted >= effect;
+        let is_doubtful = history.doubted >= effect;
         let before = if is_doubtful {
             self.configuration.remove(&function)
         } else {
             self.configuration.insert(function.clone(), design.clone())
         };
-        // The function was seen with the design before its acknowledgement came: nobody knows the one that it had before.
+        // If the function was observed with this design before the acknowledgement arrived, its previous design is
+        // unknown.
         let before = before.filter(|before| is_before_known && !is_doubtful && *before != design);
-        let source = own.last.as_ref().filter(|last| !last.failed && Some(&last.design) == before.as_ref());
+        let source =
+            history.last.as_ref().filter(|last| !last.failed && Some(&last.design) == before.as_ref());
         let source = source.map(|last| last.effect);
         let before = before.map(|design| Before { design, effect: source });
-        own.last = Some(Acknowledged { effect, design, before, failed: false });
-        if is_doubtful { Receipt::Doubtful(function) } else { Receipt::Taken }
+        history.last = Some(Acknowledged { effect, design, before, failed: false });
+        if is_doubtful { Receipt::Doubtful(function) } else { Receipt::Recorded }
     }
 }

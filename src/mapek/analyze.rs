@@ -1,4 +1,5 @@
-//! Analyze: from what is known to which designs are available, which objectives are in error, and what has changed.
+//! Analyze: computes available designs and objectives in error from the knowledge base, and compares them with the
+//! previous ones.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,14 +10,14 @@ use crate::mapek::answer::{Answer, DesignChange, ObjectiveChange};
 use crate::mapek::beliefs::Beliefs;
 use crate::mapek::monitor::Base;
 
-/// What the analysis has found.
+/// Changes found by the analysis.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Findings {
-    /// Designs that are available no more.
+    /// Designs that are no longer available.
     pub(super) lost: BTreeSet<String>,
-    /// Designs that are available again.
+    /// Designs that have become available.
     pub(super) gained: BTreeSet<String>,
-    /// Objectives that have come into error, with their statuses.
+    /// Objectives that are newly in error, with their statuses, as sentences.
     pub(super) errors: Vec<String>,
 }
 
@@ -26,7 +27,7 @@ impl Findings {
         self.lost.is_empty() && self.gained.is_empty() && self.errors.is_empty()
     }
 
-    /// Adds what was found later: a design that was lost and has come back is neither.
+    /// Adds later findings. A design that was lost and is available again is in neither set.
     pub(super) fn extend(&mut self, later: Self) {
         for design in later.lost {
             if !self.gained.remove(&design) {
@@ -42,7 +43,7 @@ impl Findings {
     }
 }
 
-/// The designs that are available, by local name; none where it is not known what follows.
+/// Returns the local names of available designs. Without conclusions, no design counts as available.
 pub(crate) fn available(knowledge: &Knowledge) -> BTreeSet<String> {
     if knowledge.fault().is_some() {
         return BTreeSet::new();
@@ -51,13 +52,13 @@ pub(crate) fn available(knowledge: &Knowledge) -> BTreeSet<String> {
     designs.map(|design| design.individual.name.clone()).collect()
 }
 
-/// Reports what contradicts itself, and that it is not known what follows, where that has changed; what was observed stays.
-pub(super) fn contradict(beliefs: &mut Beliefs, answers: &mut Vec<Answer>) {
+/// Reports changes of contradictions and of the availability of conclusions. Observed statements are kept.
+pub(super) fn report_contradictions(beliefs: &mut Beliefs, answers: &mut Vec<Answer>) {
     let Some(knowledge) = beliefs.mission.knowledge() else { return };
     answers.extend(doubts(knowledge, &mut beliefs.fault, &mut beliefs.violated));
 }
 
-/// That it is not known what follows, and what contradicts itself, where that is something else than before.
+/// Returns answers for a changed fault and for changed contradictions, and updates `fault` and `violated`.
 pub(crate) fn doubts(
     knowledge: &Knowledge,
     fault: &mut Option<Fault>,
@@ -69,10 +70,11 @@ pub(crate) fn doubts(
         answers.push(Answer::Unconcluded { fault: fault.clone() });
     }
     let mut contradictions = knowledge.contradictions();
-    for fact in contradictions.iter_mut().flat_map(|own| own.facts.iter_mut()) {
-        *fact = local(fact);
+    for fact in contradictions.iter_mut().flat_map(|contradiction| contradiction.facts.iter_mut()) {
+        *fact = with_local_names(fact);
     }
-    let now: BTreeSet<String> = contradictions.iter().map(|own| own.violated.clone()).collect();
+    let now: BTreeSet<String> =
+        contradictions.iter().map(|contradiction| contradiction.violated.clone()).collect();
     if now != *violated {
         *violated = now;
         answers.push(Answer::Contradicted { contradictions });
@@ -80,16 +82,15 @@ pub(crate) fn doubts(
     answers
 }
 
-/// What a change of the knowledge base has led to: contradictions are reported, and where what is watched has changed, what
-/// follows is compared with what followed before.
-pub(super) fn follow(beliefs: &mut Beliefs, base: Base, answers: &mut Vec<Answer>) -> Findings {
+/// Handles a change of the knowledge base: reports contradictions, and analyzes availability if it may have changed.
+pub(super) fn analyze_change(beliefs: &mut Beliefs, base: Base, answers: &mut Vec<Answer>) -> Findings {
     if base > Base::Nothing {
-        contradict(beliefs, answers);
+        report_contradictions(beliefs, answers);
     }
     if base == Base::Watched { analyze(beliefs, answers) } else { Findings::default() }
 }
 
-/// Compares what follows now with what followed before, and reports the difference.
+/// Compares the current availability and statuses with the previous ones, and reports the differences.
 pub(super) fn analyze(beliefs: &mut Beliefs, answers: &mut Vec<Answer>) -> Findings {
     let mut findings = Findings::default();
     let Some(knowledge) = beliefs.mission.knowledge() else { return findings };
@@ -105,64 +106,65 @@ pub(super) fn analyze(beliefs: &mut Beliefs, answers: &mut Vec<Answer>) -> Findi
     findings
 }
 
-/// What has changed, as an answer; none if nothing has.
+/// Returns an answer with the changes, or `None` without changes.
 pub(crate) fn inferred(designs: Vec<DesignChange>, objectives: Vec<ObjectiveChange>) -> Option<Answer> {
     let is_something = !designs.is_empty() || !objectives.is_empty();
     is_something.then_some(Answer::Inferred { designs, objectives })
 }
 
-/// The designs that are available now and were not, or the other way round, and the objectives that have another status, with the
-/// reasons; what was before is brought up to date.
+/// Returns the designs whose availability has changed and the objectives whose statuses have changed, with reasons.
+/// Updates both arguments.
 pub(crate) fn changes(
     knowledge: &Knowledge,
     designs: &mut BTreeSet<String>,
     objectives: &mut BTreeMap<String, Vec<String>>,
 ) -> (Vec<DesignChange>, Vec<ObjectiveChange>) {
     let now = available(knowledge);
-    let changed = designs.symmetric_difference(&now);
-    let changed = changed.map(|design| judged(knowledge, design, now.contains(design))).collect();
+    let changed_designs = designs.symmetric_difference(&now);
+    let changed_designs =
+        changed_designs.map(|design| availability(knowledge, design, now.contains(design))).collect();
     *designs = now;
     let now = statuses(knowledge);
     let names: BTreeSet<&String> = now.keys().chain(objectives.keys()).collect();
-    let other = names.into_iter().filter(|name| now.get(*name) != objectives.get(*name));
+    let changed_names = names.into_iter().filter(|name| now.get(*name) != objectives.get(*name));
     let objective = |name: &String| ObjectiveChange {
         objective: name.clone(),
         statuses: now.get(name).cloned().unwrap_or_default(),
         because: why_objective(knowledge, name),
     };
-    let others = other.map(objective).collect();
+    let changed_objectives = changed_names.map(objective).collect();
     *objectives = now;
-    (changed, others)
+    (changed_designs, changed_objectives)
 }
 
-/// A design with why it is not available, if it is not.
-pub(super) fn judged(knowledge: &Knowledge, design: &str, available: bool) -> DesignChange {
+/// Availability of a design, with the reasons if it is unavailable.
+pub(super) fn availability(knowledge: &Knowledge, design: &str, available: bool) -> DesignChange {
     let because = match knowledge.fault() {
         _ if available => Vec::new(),
-        Some(fault) => vec![unknown(fault)],
+        Some(fault) => vec![missing_conclusions(fault)],
         None => ruled_out(knowledge, design),
     };
     DesignChange { design: design.to_owned(), available, because }
 }
 
-/// Why nothing counts as available, and no plan is looked for.
-pub(super) fn unknown(fault: &Fault) -> String {
+/// Explains that conclusions are missing, so that no design counts as available and planning is impossible.
+pub(super) fn missing_conclusions(fault: &Fault) -> String {
     format!("it is not known what follows: {}", fault.message)
 }
 
-/// Objectives that have a status which calls for another design.
+/// Returns the objectives in error, with their statuses.
 fn statuses(knowledge: &Knowledge) -> BTreeMap<String, Vec<String>> {
     let objectives = knowledge.runtime().objectives().into_iter();
     let in_error = objectives.filter(ontology::runtime::Objective::is_in_error);
     in_error.map(|objective| (objective.individual.name, objective.statuses)).collect()
 }
 
-/// The rules and stated facts by which a design is ruled out.
+/// Returns the rules and stated facts that make a design unavailable.
 pub(crate) fn ruled_out(knowledge: &Knowledge, design: &str) -> Vec<String> {
     unavailable(knowledge, design).iter().flat_map(|derivation| reasons(knowledge, derivation)).collect()
 }
 
-/// How it follows that a design cannot be used; empty where nothing says so.
+/// Returns derivations of the statements that a design is unavailable; empty if none can be derived.
 pub(crate) fn unavailable(knowledge: &Knowledge, design: &str) -> Vec<Derivation> {
     let engine = knowledge.engine();
     let symbols = engine.symbols();
@@ -188,7 +190,7 @@ fn why_objective(knowledge: &Knowledge, objective: &str) -> Vec<String> {
     derivations.iter().flat_map(|derivation| reasons(knowledge, derivation)).collect()
 }
 
-/// A derivation as lines: the labels of its rules, then the stated facts that it rests on.
+/// Formats a derivation as lines: the labels of its rules, then the stated facts that support it.
 fn reasons(knowledge: &Knowledge, derivation: &Derivation) -> Vec<String> {
     let symbols = knowledge.engine().symbols();
     let mut lines = Vec::new();
@@ -200,34 +202,34 @@ fn reasons(knowledge: &Knowledge, derivation: &Derivation) -> Vec<String> {
     }
     for step in &derivation.steps {
         if matches!(step.reason, Reason::Asserted) {
-            lines.push(said(&step.fact, symbols));
+            lines.push(fact_text(&step.fact, symbols));
         }
     }
     lines
 }
 
-/// A fact as text with local names in place of IRIs.
-pub(crate) fn said(fact: &Fact, symbols: &Symbols) -> String {
+/// Formats a fact with local names in place of IRIs.
+pub(crate) fn fact_text(fact: &Fact, symbols: &Symbols) -> String {
     let mut text = String::with_capacity(64);
     for (position, &symbol) in std::iter::once(&fact.predicate).chain(&fact.arguments).enumerate() {
         text += ["", "(", ", "][position.min(2)];
         match symbols.value(symbol) {
             Value::Name(name) => text += ontology::vocab::local_name(name),
-            Value::Literal(literal) => text += &local(&literal.to_string()),
+            Value::Literal(literal) => text += &with_local_names(&literal.to_string()),
         }
     }
     text += if fact.arguments.is_empty() { "()" } else { ")" };
     text
 }
 
-/// A fact with local names in place of IRIs.
-pub(crate) fn local(text: &str) -> String {
+/// Replaces each `<IRI>` in a text by its local name.
+pub(crate) fn with_local_names(text: &str) -> String {
     let mut parts = text.split('<');
     let mut short = parts.next().unwrap_or_default().to_owned();
     for part in parts {
-        if let Some((iri, rest)) = part.split_once('>') {
+        if let Some((iri, suffix)) = part.split_once('>') {
             short += ontology::vocab::local_name(iri);
-            short += rest;
+            short += suffix;
         } else {
             short.push('<');
             short += part;
@@ -240,23 +242,23 @@ pub(crate) fn local(text: &str) -> String {
 mod tests {
     use std::path::Path;
 
-    use super::{available, follow};
+    use super::{analyze_change, available};
     use crate::mapek::answer::Answer;
     use crate::mapek::beliefs::Beliefs;
     use crate::mapek::monitor::Base;
     use crate::setup::Setup;
 
     #[test]
-    fn what_follows_is_compared_with_what_followed_before() {
+    fn changes_of_availability_are_reported_once() {
         let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("missions/ugv.toml");
         let mut beliefs = Beliefs::new(Setup::read(&manifest).expect("the mission is read").mission);
         beliefs.available = available(beliefs.mission.knowledge().expect("a knowledge base"));
         let before = beliefs.available.clone();
         beliefs.mission.fail("c_kinect").expect("a component");
         let mut answers = Vec::new();
-        let stated = follow(&mut beliefs, Base::Stated, &mut answers);
+        let stated = analyze_change(&mut beliefs, Base::Stated, &mut answers);
         assert!(stated.lost.is_empty() && answers.is_empty(), "nothing that is watched has changed");
-        let findings = follow(&mut beliefs, Base::Watched, &mut answers);
+        let findings = analyze_change(&mut beliefs, Base::Watched, &mut answers);
         assert!(findings.lost.contains("fd_amcl_kinect") && findings.gained.is_empty(), "{findings:?}");
         assert!(beliefs.available.is_disjoint(&findings.lost));
         assert_eq!(beliefs.available.union(&findings.lost).cloned().collect::<super::BTreeSet<_>>(), before);
@@ -264,7 +266,7 @@ mod tests {
         assert_eq!(designs.len(), findings.lost.len());
         assert!(designs.iter().all(|change| !change.available && !change.because.is_empty()), "{designs:?}");
         answers.clear();
-        let again = follow(&mut beliefs, Base::Watched, &mut answers);
+        let again = analyze_change(&mut beliefs, Base::Watched, &mut answers);
         assert!(again.lost.is_empty() && answers.is_empty(), "it is said once");
     }
 }

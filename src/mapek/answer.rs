@@ -1,4 +1,4 @@
-//! What the loop answers: conclusions, plans and effects, one JSON object each, in the format `metaplan-events/1`.
+//! Answers of the loop: conclusions, plans and effects, one JSON object each, in the format `metaplan-events/1`.
 
 use std::time::Duration;
 
@@ -14,79 +14,81 @@ use crate::number;
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Answer {
-    /// What follows has changed.
+    /// The conclusions about designs and objectives have changed.
     Inferred {
         /// Designs whose availability has changed.
         designs: Vec<DesignChange>,
         /// Objectives whose status has changed.
         objectives: Vec<ObjectiveChange>,
     },
-    /// What is known contradicts itself, or does so no more. What was observed stays, and so does what follows from it.
+    /// The knowledge has become inconsistent, or consistent again. Observed statements and their conclusions are kept.
     Contradicted {
-        /// All contradictions from now on; none where what is known is consistent again.
+        /// All current contradictions; empty if the knowledge is consistent again.
         contradictions: Vec<Contradiction>,
     },
-    /// It is not known what follows from what was observed, or it is again. What was observed stays. No design counts as
-    /// available meanwhile, and nothing is begun.
+    /// A rule has exceeded its budget, so that the conclusions are incomplete; or they are complete again. Observed
+    /// statements are kept. Without conclusions, no design counts as available, and no action is requested.
     Unconcluded {
-        /// Why; none where it is known again.
+        /// Fault that stopped the reasoning; `None` once the conclusions are complete.
         fault: Option<Fault>,
     },
-    /// A plan is looked for.
+    /// Planning starts.
     PlanRequested {
-        /// Why, in sentences.
+        /// Reasons for planning, as sentences.
         because: Vec<String>,
     },
     /// A plan is adopted.
     PlanFound {
-        /// What its steps add to the metric, in the metric's unit.
+        /// Sum of the costs of its steps, in the metric's unit.
         cost: BigRational,
-        /// Whether it is proved that no plan has a better metric.
+        /// Whether the plan is proved optimal.
         optimal: bool,
-        /// What is to be done; the first step is the action that is under way if there is one.
+        /// Steps of the plan. The first one is the action under way, if any.
         steps: Vec<PlannedStep>,
     },
-    /// The plan stays as it is.
+    /// The current plan is kept.
     PlanKept {
-        /// Why, in a sentence.
+        /// Reason, as a sentence.
         because: String,
     },
-    /// There is no plan.
+    /// Planning has found no plan.
     PlanNone {
         /// `unsolvable`, `unknown` or `failed`.
         status: &'static str,
-        /// Why, in a sentence.
+        /// Reason, as a sentence.
         because: String,
-        /// Designs that are not available, by which alone there is none, if it is known: with any one of them there would be a
-        /// plan, were all others available, too.
+        /// Minimal set of unavailable designs that blocks every plan, if computed. A plan would exist with any one of them
+        /// and with all designs outside the set.
         blocking: Vec<String>,
     },
-    /// Something is to be done.
+    /// A request to the managed system.
     Effect(Effect),
-    /// An effect was not acknowledged, or nothing was heard of an action, for longer than the deadline.
+    /// An effect was not acknowledged, or no report of an action has arrived, before the deadline.
     Overdue {
-        /// The effect, where it is about one.
+        /// Number of the overdue effect; `None` if an action is overdue.
         effect: Option<u64>,
-        /// The action.
+        /// Number of the action.
         action: u64,
-        /// Seconds since it was asked for, or since the last report.
+        /// Seconds since the request, or since the last report.
         seconds: u64,
-        /// What follows from it.
+        /// Reaction of the loop.
         outcome: OverdueOutcome,
     },
-    /// The goal holds; nothing is to be done.
+    /// The goal holds, and no further action is required.
     GoalReached,
-    /// A report is held back by a filter: the first, tenth, hundredth … one since the value or status last changed.
+    /// A filter holds a report back. Reported for the first, tenth, hundredth … held report since the last change of
+    /// value or status.
     Filtered {
         /// The attribute or component, by local name.
         name: String,
-        /// The value or status that was reported.
+        /// Reported value or status.
         value: Value,
         /// `range`, `jump`, `hysteresis`, `debounce`, `confirm` or `heal`.
         because: &'static str,
-        /// Number of reports that were held back since the last change.
+        /// Number of held reports since the last change.
         held: u64,
-        /// Time at which the report will be believed if nothing else is reported, if there is one.
+        /// Time at which the report will be believed unless another one arrives; `None` if time alone does not confirm
+        /// it.
         due: Option<Duration>,
     },
     /// A sensor has been silent for longer than its period.
@@ -95,22 +97,22 @@ pub enum Answer {
         name: String,
         /// `keep`, `unknown` or `worst`.
         outcome: &'static str,
-        /// The value that is believed from now on, with `worst`.
+        /// Believed value from now on; only with `worst`.
         value: Option<Value>,
     },
-    /// The line was seen before and has changed nothing.
+    /// The line is a duplicate and was ignored.
     Duplicate {
-        /// Its number.
+        /// Sequence number of the line.
         sequence: u64,
     },
-    /// The line has changed nothing: its number is so old that nobody knows whether it was seen.
+    /// The line was ignored: its number is too old to decide whether it is a duplicate.
     Stale {
-        /// Its number.
+        /// Sequence number of the line.
         sequence: u64,
-        /// Numbers up to this one are too old.
+        /// Greatest number that is too old.
         mark: u64,
     },
-    /// The line, or a part of it, has changed nothing.
+    /// The line, or a part of it, was refused and has changed nothing.
     Error {
         /// A stable code.
         code: String,
@@ -119,95 +121,95 @@ pub enum Answer {
     },
 }
 
-/// What follows from a deadline that has passed.
+/// Reaction to a missed deadline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum OverdueOutcome {
-    /// The effect is asked for again.
+    /// The effect is requested again.
     Repeated,
     /// The reconfiguration counts as failed.
     Failed,
-    /// The action is to be brought to a safe end.
+    /// The action is cancelled.
     Cancelled,
-    /// Nothing: the robot may be one that does not report this.
+    /// No reaction: the robot may never send this report.
     Waiting,
 }
 
-/// A design that has become available, or is available no more.
+/// A design whose availability has changed.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct DesignChange {
-    /// Its local name.
+    /// Local name of the design.
     pub design: String,
     /// Whether it is available from now on.
     pub available: bool,
-    /// The rules and facts that rule it out.
+    /// Rules and facts that make it unavailable.
     pub because: Vec<String>,
 }
 
 /// An objective whose status has changed.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct ObjectiveChange {
-    /// Its local name.
+    /// Local name of the objective.
     pub objective: String,
-    /// Its statuses from now on; none while all is well.
+    /// Current statuses; empty if the objective is not in error.
     pub statuses: Vec<String>,
-    /// The rules and facts that say so.
+    /// Rules and facts from which the statuses follow.
     pub because: Vec<String>,
 }
 
-/// Something that the managed system is to do.
+/// A request to the managed system.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Effect {
-    /// Its number, from 1; the same again if it has to be repeated.
+    /// Number of the effect, from 1. A repetition has the number of the original.
     pub number: u64,
-    /// The number of the action that it is about.
+    /// Number of the action that the effect belongs to.
     pub action: u64,
-    /// What is to be done.
+    /// Requested operation.
     pub command: Command,
-    /// Whether it may have been asked for before the program was started again.
+    /// Whether the effect is a repetition, so that the robot may have received it before.
     pub repeated: bool,
-    /// Effects that were not acknowledged and need not be carried out any more, since this one replaces them.
+    /// Numbers of unacknowledged effects that this one replaces. They need not be carried out.
     pub supersedes: Vec<u64>,
 }
 
-/// What the managed system is to do.
+/// Operation requested from the managed system.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Command {
-    /// A function gets another design.
+    /// Changes the design of a function.
     Reconfigure {
         /// The function.
         function: String,
-        /// The design before, if there was one.
+        /// Previous design, if known.
         from: Option<String>,
-        /// The design from now on.
+        /// New design.
         to: String,
     },
-    /// An action begins.
+    /// Starts an action.
     Request {
         /// The action with its configuration.
         step: PlannedStep,
     },
-    /// An action is brought to a safe end.
+    /// Ends an action safely.
     Cancel {
-        /// Why, in a sentence.
+        /// Reason, as a sentence.
         because: String,
     },
-    /// An action stands still and keeps what it has done.
+    /// Suspends an action. Its progress is kept.
     Suspend {
-        /// Why, in a sentence.
+        /// Reason, as a sentence.
         because: String,
     },
-    /// A suspended action goes on as soon as its functions have these designs.
+    /// Resumes a suspended action once its functions have these designs.
     Resume {
-        /// Functions with their designs, in the order of the step.
+        /// Functions with their designs, in the order of the step's parameters.
         configuration: Vec<(String, String)>,
     },
 }
 
 impl Command {
-    /// The word for it among the answers.
+    /// Value of the field `answer`.
     fn kind(&self) -> &'static str {
         match self {
             Self::Reconfigure { .. } => "reconfigure",
@@ -218,24 +220,26 @@ impl Command {
         }
     }
 
-    /// Whether this command makes another one, about the same action, pointless.
-    pub(super) fn replaces(&self, other: &Self, same_action: bool) -> bool {
-        match (self, other) {
-            (Self::Reconfigure { function: own, .. }, Self::Reconfigure { function: other, .. }) => {
-                own == other
-            }
-            _ => same_action && self.is_about_going_on() && other.is_about_going_on(),
+    /// Returns `true` if this command makes an earlier one pointless. `same_action` says whether both belong to one
+    /// action.
+    pub(super) fn replaces(&self, earlier: &Self, same_action: bool) -> bool {
+        match (self, earlier) {
+            (
+                Self::Reconfigure { function: new_function, .. },
+                Self::Reconfigure { function: earlier_function, .. },
+            ) => new_function == earlier_function,
+            _ => same_action && self.controls_execution() && earlier.controls_execution(),
         }
     }
 
-    /// Whether it says if an action goes on. A report of that action may have been on its way before the command, so that
-    /// it does not show that the command has arrived.
-    pub(super) fn is_about_going_on(&self) -> bool {
+    /// Returns `true` for commands that end, suspend or resume an action. A report of that action may have been sent
+    /// before the command arrived, so that it does not acknowledge the command.
+    pub(super) fn controls_execution(&self) -> bool {
         matches!(self, Self::Cancel { .. } | Self::Suspend { .. } | Self::Resume { .. })
     }
 }
 
-/// The answer as an object of the format.
+/// JSON object of the format.
 impl Serialize for Answer {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut object = serializer.serialize_map(None)?;
@@ -250,13 +254,13 @@ impl Serialize for Answer {
 }
 
 impl Answer {
-    /// The answer as an object of the format.
+    /// Converts the answer to a JSON object of the format.
     pub fn to_json(&self) -> Value {
-        // Texts, numbers and lists of them are always data.
+        // The serialization cannot fail: all map keys are strings.
         serde_json::to_value(self).unwrap_or_default()
     }
 
-    /// The word for what it is.
+    /// Value of the field `answer`.
     fn kind(&self) -> &'static str {
         match self {
             Self::Inferred { .. } => "inferred",
@@ -277,7 +281,7 @@ impl Answer {
         }
     }
 
-    /// Writes what stands behind the kind of an answer that is not an effect.
+    /// Writes the fields after `answer`, for answers other than effects.
     fn fields<M: SerializeMap>(&self, object: &mut M) -> Result<(), M::Error> {
         match self {
             Self::Inferred { designs, objectives } => {
@@ -337,7 +341,7 @@ impl Answer {
         }
     }
 
-    /// The effect, if it is one.
+    /// Returns the effect, if the answer is one.
     pub fn effect(&self) -> Option<&Effect> {
         match self {
             Self::Effect(effect) => Some(effect),
@@ -351,7 +355,7 @@ impl Effect {
     fn fields<M: SerializeMap>(&self, object: &mut M) -> Result<(), M::Error> {
         object.serialize_entry("answer", self.command.kind())?;
         if let Command::Request { step } = &self.command {
-            // The number of the action stands where its name stands in a step.
+            // In a request, `action` is the number; the name of the schema follows as `name`.
             object.serialize_entry("action", &self.action)?;
             step.fields(object)?;
             object.serialize_entry("name", &step.action)?;

@@ -1,4 +1,4 @@
-//! What the planner is asked, and what planning has come to.
+//! Question to the planner, and outcome of planning.
 
 use num_rational::BigRational;
 use pddl::ast::Problem;
@@ -8,37 +8,37 @@ use crate::mapek::beliefs::Running;
 use crate::mapek::step::PlannedStep;
 use crate::mission::Mission;
 
-/// What planning has come to.
+/// Outcome of planning.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Outcome {
-    /// The plan.
+    /// Steps of the plan, if there is one.
     pub steps: Option<Vec<PlannedStep>>,
-    /// Its metric.
+    /// Metric of the plan.
     pub cost: BigRational,
-    /// Whether the status is proved.
+    /// Whether the plan is proved optimal, or its absence is proved.
     pub proved: bool,
-    /// Why there is no plan.
+    /// Reason for the absence of a plan.
     pub because: String,
-    /// Designs that are not available, by which alone there is none, if that is known; see [`planner::Replanner::blocking`].
+    /// Unavailable designs that block every plan, if computed; see [`planner::Replanner::blocking`].
     pub blocking: Vec<String>,
 }
 
-/// What is to be planned for.
+/// Planning problem: the believed situation and the first step, if one is fixed.
 #[derive(Debug)]
-pub(crate) struct Ask<'a> {
+pub(crate) struct Question<'a> {
     pub mission: &'a Mission,
-    /// The problem as it is believed, with what the knowledge base contributes.
+    /// The believed problem, filled from the knowledge base.
     pub problem: &'a Problem,
-    /// The action that comes first, if one is under way.
+    /// The action under way. Its remainder is the first step of every plan.
     pub running: Option<&'a Running>,
-    /// The plan at hand, if what is planned for goes on from where it is.
+    /// The current plan, if the question continues from its first step.
     pub old: Option<&'a [PlannedStep]>,
-    /// Whether to stay close to it among plans that are as good.
+    /// Whether to prefer, among optimal plans of equal length, one that shares most steps with `old`.
     pub stay_close: bool,
 }
 
-impl Ask<'_> {
-    /// The metric of the mission if it ended now; without a metric, 0.
+impl Question<'_> {
+    /// Metric of the current state, as if the plan were empty; 0 without a metric.
     pub(super) fn metric(&self) -> Option<BigRational> {
         let zero = BigRational::default();
         if self.problem.metric.is_none() {
@@ -49,19 +49,19 @@ impl Ask<'_> {
 }
 
 impl Outcome {
-    /// No plan.
-    pub(super) fn none(proved: bool, because: String) -> Self {
+    /// An outcome without a plan.
+    pub(super) fn no_plan(proved: bool, because: String) -> Self {
         Self { steps: None, cost: BigRational::default(), proved, because, blocking: Vec::new() }
     }
 
-    /// For the journal.
+    /// Serializes the outcome for the journal.
     pub fn to_record(&self) -> Value {
         let steps: Option<Vec<Value>> =
             self.steps.as_ref().map(|steps| steps.iter().map(PlannedStep::to_record).collect());
         json!([steps, self.cost.to_string(), self.proved, self.because, self.blocking])
     }
 
-    /// The inverse of [`Outcome::to_record`].
+    /// Inverse of [`Outcome::to_record`].
     pub fn from_record(record: &Value) -> Option<Self> {
         let [steps, cost, proved, because, blocking] = record.as_array()?.as_slice() else { return None };
         let text = |value: &Value| value.as_str().map(ToOwned::to_owned);

@@ -1,8 +1,8 @@
-//! The loop's knowledge of the situation: what it believes and what it has asked for. All of it, and nothing else, makes two loops
-//! equal. All stations of the loop share it.
+//! Shared state of the loop: the believed situation and outstanding effects. Loops of one mission with equal beliefs
+//! behave equally.
 //!
-//! While an action is under way, values that it increases or decreases change with its progress; its other effects
-//! take place when it has succeeded.
+//! While an action is under way, values that it increases or decreases change with its progress. Its other effects take
+//! place when it succeeds.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -21,61 +21,61 @@ use crate::mapek::sequence::Numbers;
 use crate::mapek::step::{PlannedStep, plan_text};
 use crate::mission::Mission;
 
-/// Everything that the loop knows.
+/// State of the loop.
 #[derive(Debug, Clone)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own")]
 pub struct Beliefs {
-    /// Knowledge base and problem, as they are believed to be.
+    /// Knowledge base and problem in their believed state.
     pub(super) mission: Mission,
-    /// The text of the goal, if it is not the problem's.
+    /// Text of the goal; `None` for the goal of the problem file.
     pub(super) goal: Option<String>,
-    /// The designs that are available, by local name.
+    /// Local names of available designs.
     pub(super) available: BTreeSet<String>,
-    /// Objectives that have a status, with it.
+    /// Objectives in error, with their statuses.
     pub(super) statuses: BTreeMap<String, Vec<String>>,
-    /// The axioms and rules that what is known violates.
+    /// Violated axioms and rules.
     pub(super) violated: BTreeSet<String>,
-    /// Why it is not known what follows, as was said last.
+    /// Fault that stopped the reasoning, as last reported. The conclusions are then incomplete.
     pub(super) fault: Option<Fault>,
-    /// Function to the design that it has: the one that was acknowledged last.
+    /// Believed design of each function: the one that was acknowledged last.
     pub(super) configuration: BTreeMap<String, String>,
-    /// What is still to be requested, if there is a plan.
+    /// Remaining steps of the plan, without the action under way.
     pub(super) plan: Option<VecDeque<PlannedStep>>,
-    /// The action that was requested and has not ended.
+    /// The action under way: requested and not ended.
     pub(super) running: Option<Running>,
-    /// Whether the goal was seen to hold.
+    /// Whether the goal held when it was last checked.
     pub(super) reached: bool,
-    /// Why no plan is looked for until something changes.
+    /// Whether planning has failed and pauses until something changes.
     pub(super) stuck: bool,
-    /// Whether the plan at hand may not be the best, since time was up.
+    /// Whether the plan is not proved optimal, because its search hit a limit.
     pub(super) unproved: bool,
-    /// The next search for a plan after one that was cut short, if nothing else happens.
+    /// The next search after one that hit its time limit.
     pub(super) retry: Option<Retry>,
-    /// The last step that failed, and how often in a row.
+    /// The step that failed last, with its number of consecutive failures.
     pub(super) failures: Option<(PlannedStep, u32)>,
-    /// Designs that have come back, or a word for facts that have changed, without another plan being looked for.
-    pub(super) hopes: BTreeSet<String>,
-    /// When the last of them came.
-    pub(super) hoped: Duration,
-    /// How many actions were requested.
+    /// Causes for which a better plan may exist: designs that are available again, and an entry for changed facts.
+    pub(super) improvement_causes: BTreeSet<String>,
+    /// Time at which the last cause was added, since the start of the mission.
+    pub(super) improvement_since: Duration,
+    /// Number of requested actions.
     pub(super) actions: u64,
-    /// How many effects there were.
+    /// Number of effects.
     pub(super) effects: u64,
-    /// Effects that are not acknowledged.
+    /// Unacknowledged effects by number.
     pub(super) outstanding: BTreeMap<u64, Effect>,
-    /// Acknowledgements so far, by function.
+    /// History of acknowledgements by function.
     pub(super) receipts: Receipts,
-    /// For each outstanding effect, when it was asked for last and how often.
+    /// Time of the last request and number of repetitions, by outstanding effect.
     pub(super) waits: BTreeMap<u64, Wait>,
-    /// Whether the robot has ever reported that an action has started or progressed.
+    /// Whether the robot has ever reported the start or the progress of an action.
     pub(super) reports_actions: bool,
-    /// How many lines were handled.
+    /// Number of handled lines.
     pub(super) lines: u64,
-    /// The numbers of the lines that had one and were taken over.
+    /// Sequence numbers of accepted lines.
     pub(super) numbers: Numbers,
-    /// The time of the last line, since the start of the mission.
+    /// Time of the last line, since the start of the mission.
     pub(super) now: Duration,
-    /// Memory of the filters of what is measured and of what components report.
+    /// Memory of the filters for measurements and component reports.
     pub(super) filters: FilterStates,
 }
 
@@ -83,23 +83,23 @@ pub struct Beliefs {
 #[derive(Debug, Clone, PartialEq)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own")]
 pub(super) struct Running {
-    /// The number of the request.
+    /// Number of the action.
     pub(super) action: u64,
-    /// The action as it runs now.
+    /// The action with its current designs.
     pub(super) step: PlannedStep,
-    /// How much is done, from 0 to 1.
+    /// Completed share of the action, from 0 to 1.
     pub(super) progress: BigRational,
-    /// Whether it was asked to end.
+    /// Whether the loop has requested its end.
     pub(super) cancelling: bool,
-    /// Whether it was asked to stand still.
+    /// Whether the loop has suspended it.
     pub(super) suspended: bool,
-    /// Whether it stands still only until planning has decided what becomes of it.
+    /// Whether it is suspended only until planning has finished.
     pub(super) provisional: bool,
-    /// The number of the effect that requested it.
+    /// Number of the effect that requested it.
     pub(super) request: u64,
-    /// When it was requested or last reported.
-    pub(super) heard: Duration,
-    /// Number of deadlines that have passed since then.
+    /// Time of the request or of the last report, since the start of the mission.
+    pub(super) last_report: Duration,
+    /// Backoff since the last report: 0, then doubled from 1 by each missed deadline.
     pub(super) overdue: u32,
     /// Whether its start or progress was reported.
     pub(super) started: bool,
@@ -107,40 +107,40 @@ pub(super) struct Running {
     pub(super) progressed: bool,
     /// Whether it was suspended and resumed.
     pub(super) resumed: bool,
-    /// Functions with the designs that the action was told to use last.
-    pub(super) instructed: Vec<(String, String)>,
+    /// Functions with the designs that were last sent to the action.
+    pub(super) sent_configuration: Vec<(String, String)>,
 }
 
-/// A search for a plan that is to be repeated.
+/// A scheduled repetition of a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Retry {
-    /// Time since the start of the mission at which it is repeated.
+    /// Time at which the search is due, since the start of the mission.
     pub(super) at: Duration,
-    /// Number of searches in a row that were cut short.
+    /// Number of consecutive searches that hit their time limit.
     pub(super) attempt: u32,
 }
 
-/// How long an effect has been outstanding.
+/// Time and repetitions of an outstanding effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Wait {
-    /// When it was asked for last, since the start of the mission.
+    /// Time of the last request, since the start of the mission.
     pub(super) since: Duration,
-    /// How often it was repeated.
+    /// Number of repetitions.
     pub(super) repeats: u32,
 }
 
-/// What is about to be done, as a task and its plan.
+/// The remaining mission as a planning task with its plan.
 #[derive(Debug, Clone)]
 pub struct Outlook {
-    /// The domain; what is left of the action under way comes first in it.
+    /// The domain. If an action is under way, its remainder must come first.
     pub domain: Domain,
-    /// The situation as it is believed, with what the knowledge base contributes, and the goal.
+    /// The believed problem, filled from the knowledge base, with the goal.
     pub problem: Problem,
-    /// The action under way, if there is one, and what is still to be requested.
+    /// The action under way, if any, followed by the remaining steps of the plan.
     pub steps: Vec<PlannedStep>,
-    /// The number that the request of the first of these steps has, or will have.
+    /// Number of the first of these steps as an action.
     pub first: u64,
-    /// Whether it was requested.
+    /// Whether the first step is under way.
     pub is_under_way: bool,
 }
 
@@ -161,8 +161,8 @@ impl Beliefs {
             unproved: false,
             retry: None,
             failures: None,
-            hopes: BTreeSet::new(),
-            hoped: Duration::ZERO,
+            improvement_causes: BTreeSet::new(),
+            improvement_since: Duration::ZERO,
             actions: 0,
             effects: 0,
             outstanding: BTreeMap::new(),
@@ -176,33 +176,33 @@ impl Beliefs {
         }
     }
 
-    /// The mission as it is believed to be.
+    /// The mission in its believed state.
     pub fn mission(&self) -> &Mission {
         &self.mission
     }
 
-    /// The goal, if it is another one than the problem's.
+    /// Text of the current goal; `None` for the goal of the problem file.
     pub fn goal(&self) -> Option<&str> {
         self.goal.as_deref()
     }
 
-    /// The designs that are available, by local name.
+    /// Local names of available designs.
     pub fn available(&self) -> &BTreeSet<String> {
         &self.available
     }
 
-    /// Objectives in error, by local name, with their statuses.
+    /// Objectives in error by local name, with their statuses.
     pub fn statuses(&self) -> &BTreeMap<String, Vec<String>> {
         &self.statuses
     }
 
-    /// Function to the design that it has: the one that was acknowledged last. What was asked for since then is
+    /// Believed design of each function: the one that was acknowledged last. Later requests are
     /// [pending](Self::pending).
     pub fn configuration(&self) -> &BTreeMap<String, String> {
         &self.configuration
     }
 
-    /// Functions with the design that was asked for and is not acknowledged.
+    /// Functions with requested designs that are not acknowledged.
     pub fn pending(&self) -> impl Iterator<Item = (&str, &str)> {
         self.outstanding.values().filter_map(|effect| match &effect.command {
             Command::Reconfigure { function, to, .. } => Some((function.as_str(), to.as_str())),
@@ -210,107 +210,107 @@ impl Beliefs {
         })
     }
 
-    /// Returns `true` if a reconfiguration of the function was asked for and never answered, be it outstanding or superseded:
-    /// the function may then have another design than the one that was acknowledged last.
+    /// Returns `true` if a reconfiguration of the function is outstanding, or was superseded without an answer. The
+    /// function may then have another design than the one that was acknowledged last.
     pub fn is_unsettled(&self, function: &str) -> bool {
-        self.pending().any(|(own, _)| own == function) || self.receipts.has_superseded(function)
+        self.pending().any(|(name, _)| name == function) || self.receipts.has_superseded(function)
     }
 
-    /// The design that a function has or is about to get; none where it is not certain.
+    /// Design that a function has or is about to get; `None` if uncertain.
     pub(super) fn expected(&self, function: &str) -> Option<&str> {
-        if let Some((_, design)) = self.pending().find(|(own, _)| *own == function) {
+        if let Some((_, design)) = self.pending().find(|(name, _)| *name == function) {
             return Some(design);
         }
         let design = self.configuration.get(function).map(String::as_str);
         design.filter(|_| !self.receipts.has_superseded(function))
     }
 
-    /// The number of the action that is under way, and the action as it runs now.
+    /// Number and current designs of the action under way.
     pub fn running(&self) -> Option<(u64, &PlannedStep)> {
         self.running.as_ref().map(|running| (running.action, &running.step))
     }
 
-    /// Share of the action under way that is done, from 0 to 1.
+    /// Completed share of the action under way, from 0 to 1.
     pub(crate) fn progress(&self) -> Option<&BigRational> {
         self.running.as_ref().map(|running| &running.progress)
     }
 
-    /// Whether the action that is under way was asked to end.
+    /// Returns `true` if the action under way is being cancelled.
     pub fn cancelling(&self) -> bool {
         self.running.as_ref().is_some_and(|running| running.cancelling)
     }
 
-    /// Whether the action that is under way was asked to stand still.
+    /// Returns `true` if the action under way is suspended.
     pub fn suspended(&self) -> bool {
         self.running.as_ref().is_some_and(|running| running.suspended)
     }
 
-    /// What is still to be requested, if there is a plan.
+    /// Remaining steps of the plan, without the action under way.
     pub fn plan(&self) -> Option<impl Iterator<Item = &PlannedStep>> {
         self.plan.as_ref().map(VecDeque::iter)
     }
 
-    /// What is about to be done, if there is a plan.
+    /// The remaining mission with its plan, if there is one.
     pub fn outlook(&self) -> Option<Outlook> {
         let plan = self.plan.as_ref()?;
-        let (domain, problem) = self.left();
+        let (domain, problem) = self.remaining_mission();
         let (domain, running) = (domain.into_owned(), self.running.as_ref());
         let first = running.map_or(self.actions + 1, |running| running.action);
         let steps = running.map(|running| &running.step).into_iter().chain(plan).cloned().collect();
         Some(Outlook { domain, problem, steps, first, is_under_way: running.is_some() })
     }
 
-    /// Effects that were asked for and are not acknowledged, in their order.
+    /// Unacknowledged effects in the order of their numbers.
     pub fn outstanding(&self) -> impl Iterator<Item = &Effect> {
         self.outstanding.values()
     }
 
-    /// How many lines were handled.
+    /// Number of handled lines.
     pub fn lines(&self) -> u64 {
         self.lines
     }
 
-    /// The greatest number of a line that was taken over.
+    /// Greatest sequence number of an accepted line.
     pub fn sequence(&self) -> Option<u64> {
         self.numbers.greatest()
     }
 
-    /// The numbers of lines that are missing below the greatest one, as ranges with both ends: these lines were on their way, or were
-    /// refused.
+    /// Gaps among the sequence numbers of accepted lines, as inclusive ranges. These lines have not arrived yet, or
+    /// were refused.
     pub fn missing(&self) -> Vec<[u64; 2]> {
         self.numbers.missing()
     }
 
-    /// The time of the last line, since the start of the mission.
+    /// Time of the last line, since the start of the mission.
     pub fn now(&self) -> Duration {
         self.now
     }
 
-    /// Whether the goal was seen to hold and nothing has changed since.
+    /// Returns `true` if the goal was reached and nothing has changed since.
     pub fn reached(&self) -> bool {
         self.reached
     }
 
-    /// Whether a design can be used, as far as is known; all can without a knowledge base.
+    /// Returns `true` if a design is believed to be available. Without a knowledge base, all designs are.
     pub(super) fn is_available(&self, design: &str) -> bool {
         self.mission.knowledge().is_none() || self.available.contains(design) || self.mission.provides(design)
     }
 
-    /// The designs of the steps that are still to be requested.
-    pub(super) fn planned(&self) -> impl Iterator<Item = &String> {
+    /// Designs of the remaining steps of the plan.
+    pub(super) fn planned_designs(&self) -> impl Iterator<Item = &String> {
         let steps = self.plan.iter().flatten();
         steps.flat_map(|step| step.configuration.iter().map(|(_, design)| design))
     }
 
-    /// The problem as it is believed now, with what the knowledge base contributes.
+    /// The believed problem, filled from the knowledge base.
     pub(super) fn filled(&self) -> Problem {
         let mut problem = self.mission.problem().clone();
         self.mission.fill(&mut problem);
         problem
     }
 
-    /// What is left to be done: the domain, in which the action under way comes first, and the filled problem.
-    fn left(&self) -> (Cow<'_, Domain>, Problem) {
+    /// Domain and filled problem of the remaining mission. The remainder of the action under way must come first.
+    fn remaining_mission(&self) -> (Cow<'_, Domain>, Problem) {
         let (domain, mut problem) = (self.mission.domain(), self.filled());
         match &self.running {
             Some(running) => {
@@ -321,28 +321,28 @@ impl Beliefs {
         }
     }
 
-    /// What the validator says of the plan, the action under way included.
+    /// Validates the action under way and the remaining plan against the believed situation.
     pub(super) fn verdict(&self) -> Verdict {
         let running = self.running.iter().map(|running| &running.step);
         let steps = running.chain(self.plan.iter().flatten());
-        let (domain, problem) = self.left();
+        let (domain, problem) = self.remaining_mission();
         validate(&domain, &problem, &plan_text(steps), &Options::default())
     }
 
-    /// Why what is left of the action under way cannot be done.
+    /// Reason why the remainder of the action under way cannot be executed, if it cannot.
     pub(super) fn obstacle(&self, running: &Running) -> Option<String> {
-        let (domain, problem) = self.left();
+        let (domain, problem) = self.remaining_mission();
         let violation = advance(&domain, &problem, &running.step.to_plan_step(), false).err()?;
         Some(violation.message.clone())
     }
 
-    /// Why the plan, with what is left of the action under way, does not fit the situation as it is believed.
+    /// Reason why the action under way and the remaining plan do not fit the believed situation, if they do not.
     pub fn violation(&self) -> Option<String> {
         self.verdict().violation.map(|violation| self.mission.spoken(&sentence(&violation)))
     }
 }
 
-/// What is wrong with a plan.
+/// Formats a violation as a message.
 fn sentence(violation: &Violation) -> String {
     let unmet = violation.unmet.first().map(|unmet| format!(": {}", unmet.condition)).unwrap_or_default();
     format!("the plan does not fit the situation: {}{unmet}", violation.message)

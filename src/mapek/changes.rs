@@ -1,58 +1,59 @@
-//! What observations have changed: from the monitor to the analysis and the planning.
+//! Changes by observations, passed from the monitor to analysis and planning.
 
 use crate::mapek::answer::Answer;
 
-/// What a line has changed, for the analysis.
+/// Changes by the observations since the last deliberation.
 #[derive(Debug, Clone, Default)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own")]
 pub(super) struct Changes {
-    /// What the knowledge base says.
+    /// Change of the knowledge base.
     pub(super) base: Base,
-    /// Facts or values of the problem.
+    /// Whether facts or values of the problem have changed.
     pub(super) facts: bool,
-    /// Facts of the problem, and not only values.
+    /// Whether facts of the problem have changed, and not only values.
     pub(super) predicates: bool,
-    /// What is to be reached: plans for another goal are of no use any more.
+    /// Whether the goal has changed, which invalidates all remembered plans.
     pub(super) goal: bool,
-    /// Values of the problem that were reported and differ from the expected ones.
+    /// Whether reported values of the problem differ from the expected ones.
     pub(super) values: bool,
-    /// An action has ended.
+    /// Whether an action has ended.
     pub(super) ended: bool,
-    /// The action under way has got another design that nobody here has asked for.
+    /// Whether the action under way was observed with a design that the loop has not requested.
     pub(super) observed: bool,
-    /// Why the action under way cannot go on as it was; a safe effect was asked for.
-    pub(super) upset: Vec<String>,
-    /// Reasons to plan whatever the plan is like: sentences.
-    pub(super) must: Vec<String>,
-    /// Reports that filters have held back, and sensors that are silent.
+    /// Reasons why the action under way could not go on unchanged. A safe effect was requested for each.
+    pub(super) interruptions: Vec<String>,
+    /// Reasons to plan, as sentences, that apply even if the current plan is valid.
+    pub(super) reasons: Vec<String>,
+    /// Answers about reports held by filters and about silent sensors.
     pub(super) filtered: Vec<Answer>,
 }
 
-/// What has changed in the knowledge base.
+/// Extent of a change of the knowledge base.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Base {
     #[default]
     Nothing,
-    /// What is stated, or follows.
+    /// Statements or conclusions have changed, but none that determine availability or statuses.
     Stated,
-    /// That from which availability and statuses are read.
+    /// Statements that determine availability or statuses may have changed.
     Watched,
 }
 
 impl Changes {
-    /// Whether anything has changed, though the line was not taken over as a whole.
+    /// Returns `true` if anything has changed, for lines of which only a part was accepted.
     pub(super) fn any(&self) -> bool {
-        self.base > Base::Nothing || self.facts || self.predicates || !self.must.is_empty()
+        self.base > Base::Nothing || self.facts || self.predicates || !self.reasons.is_empty()
     }
 
-    /// Returns `true` if another question is to be planned for than before.
+    /// Returns `true` if the planning problem may differ from the previous one.
     pub(super) fn is_news(&self) -> bool {
-        self.facts || self.goal || self.ended || !self.upset.is_empty() || !self.must.is_empty()
+        self.facts || self.goal || self.ended || !self.interruptions.is_empty() || !self.reasons.is_empty()
     }
 
-    /// Adds what has changed since.
+    /// Adds later changes.
     pub(super) fn extend(&mut self, later: Self) {
-        let Self { base, facts, predicates, goal, values, ended, observed, upset, must, filtered } = later;
+        let Self { base, facts, predicates, goal, values, ended, observed, interruptions, reasons, filtered } =
+            later;
         self.base = self.base.max(base);
         self.facts |= facts;
         self.predicates |= predicates;
@@ -60,8 +61,8 @@ impl Changes {
         self.values |= values;
         self.ended |= ended;
         self.observed |= observed;
-        self.upset.extend(upset);
-        self.must.extend(must);
+        self.interruptions.extend(interruptions);
+        self.reasons.extend(reasons);
         self.filtered.extend(filtered);
     }
 }

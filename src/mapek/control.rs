@@ -1,4 +1,4 @@
-//! The loop itself: an observation goes through the stations, one after the other, and answers come out.
+//! The loop: passes each observation through its stages and returns answers.
 
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
@@ -8,12 +8,12 @@ use serde_json::Value;
 use tracing::info_span;
 
 use crate::knowledge::Knowledge;
-use crate::mapek::adapt::Adapting;
-use crate::mapek::analyze::{Findings, analyze, available, follow, judged};
+use crate::mapek::adapt::Adaptation;
+use crate::mapek::analyze::{Findings, analyze, analyze_change, availability, available};
 use crate::mapek::answer::{Answer, Command, DesignChange, Effect};
 use crate::mapek::ask::Outcome;
 use crate::mapek::beliefs::{Beliefs, Retry};
-use crate::mapek::deadlines::{self, overdue};
+use crate::mapek::deadlines::{self, handle_overdue};
 use crate::mapek::digest::digest;
 use crate::mapek::effects::{objectives, reconfigure, request};
 use crate::mapek::event::{Event, Observation};
@@ -29,29 +29,30 @@ use crate::mapek::watch::Watch;
 use crate::message::{Errors, Message};
 use crate::mission::Mission;
 
-/// What follows from an observation is to be found in so many steps; see [`rules::Limits`]. A robot waits meanwhile.
-const STEPS: u64 = 100_000_000;
+/// Limit on reasoning steps per observation; see [`rules::Limits`]. The robot waits during reasoning.
+const MAX_REASONING_STEPS: u64 = 100_000_000;
 
-/// So many names and values may be interned before the knowledge is made anew without what is not used any more.
-const GROWTH: usize = 1024;
+/// Number of unused interned names and values above which the knowledge base is rebuilt without them.
+const MAX_GROWTH: usize = 1024;
 
-/// Upper limit on the step from the time of one line to that of the next. Sequence numbers skip no more than a million either.
+/// Upper limit on the time between two lines; a larger step is an error. It matches the limit on gaps of sequence
+/// numbers.
 const MAX_TIME_STEP: Duration = Duration::from_secs(1_000_000);
 
-/// What there is to deliberate on.
+/// Input of the next deliberation.
 #[derive(Debug, Clone, Default)]
 struct Agenda {
     changes: Changes,
     findings: Findings,
-    /// Whether the loop has not begun: nothing has changed that could be adapted to.
+    /// Whether the loop has just started, so that nothing has changed.
     is_start: bool,
 }
 
-/// What deliberation changes before the first plan is asked for.
+/// State that deliberation changes before it plans.
 #[derive(Debug)]
 pub(super) struct Checkpoint {
     agenda: Option<Agenda>,
-    hopes: (BTreeSet<String>, Duration),
+    improvement_causes: (BTreeSet<String>, Duration),
     failures: Option<(PlannedStep, u32)>,
     plan: Option<VecDeque<PlannedStep>>,
     retry: Option<Retry>,
@@ -65,19 +66,18 @@ pub struct Loop {
     pub(super) beliefs: Beliefs,
     monitor: Monitor,
     pub(super) planner: Planner,
-    /// What has changed since the last deliberation, if anything has.
+    /// Changes since the last deliberation, if any.
     agenda: Option<Agenda>,
-    /// Number of times that the question for the planner has changed.
+    /// Number of changes of the planning problem.
     pub(super) question: u64,
     digest: String,
 }
 
 impl Loop {
-    /// Takes charge of a mission.
+    /// Creates the loop of a mission.
     ///
     /// # Errors
-    /// The mission cannot be planned for: what the knowledge base contributes does not fit the domain, or the knowledge
-    /// contradicts itself.
+    /// The filled problem does not fit the domain, or the knowledge is inconsistent.
     pub fn new(mission: Mission, settings: Settings) -> Result<Self, Errors> {
         mission.filled()?;
         let contradictions = mission.knowledge().map(Knowledge::contradictions).unwrap_or_default();
@@ -91,7 +91,7 @@ impl Loop {
         let planner = Planner { time_limit: settings.time_limit, ..Planner::default() };
         let mut beliefs = Beliefs::new(mission);
         if let Some(base) = beliefs.mission.knowledge_mut() {
-            base.limit(STEPS);
+            base.limit(MAX_REASONING_STEPS);
         }
         beliefs.filters = monitor.filters().states(beliefs.mission.knowledge());
         if let Some(base) = beliefs.mission.knowledge() {
@@ -101,19 +101,21 @@ impl Loop {
         Ok(Self { settings, beliefs, monitor, planner, agenda, question: 0, digest })
     }
 
-    /// What the loop believes and has asked for.
+    /// State of the loop.
     pub fn beliefs(&self) -> &Beliefs {
         &self.beliefs
     }
 
-    /// All designs of the knowledge base, each with why it is not available, if it is not.
+    /// Availability of all designs of the knowledge base, with the reasons for unavailability.
     pub fn designs(&self) -> Vec<DesignChange> {
         let Some(knowledge) = self.beliefs.mission.knowledge() else { return Vec::new() };
-        let designs = knowledge.catalogue().designs().iter().map(|own| own.individual.name.as_str());
-        designs.map(|design| judged(knowledge, design, self.beliefs.available.contains(design))).collect()
+        let designs = knowledge.catalogue().designs().iter().map(|design| design.individual.name.as_str());
+        designs
+            .map(|design| availability(knowledge, design, self.beliefs.available.contains(design)))
+            .collect()
     }
 
-    /// To look at how planning goes, from another thread.
+    /// Handle to observe the progress of planning from another thread.
     pub fn watch(&self) -> Watch {
         self.planner.watch.clone()
     }
@@ -147,15 +149,16 @@ impl Loop {
         answers
     }
 
-    /// Takes an observation over, and asks for a safe effect if the action under way cannot go on as it is: other designs with which
-    /// what is left of it can be done, or a standstill. Nothing is planned, whatever the time limit of plans.
+    /// Applies an observation to the beliefs. If the action under way cannot go on unchanged, requests a safe effect:
+    /// other designs for its remainder, or suspension. Does not plan, so that the time limit of plans does not delay
+    /// it.
     ///
-    /// Several observations may be reacted to before [`deliberate`](Self::deliberate) is called.
+    /// Call [`deliberate`](Self::deliberate) after one or several observations.
     pub fn react(&mut self, observation: &Observation, now: Duration) -> Vec<Answer> {
         let _span = info_span!("react", line = self.beliefs.lines + 1).entered();
         let mut answers = Vec::new();
-        // Plans that nobody has asked for are of no use to anybody.
-        self.planner.made.clear();
+        // Plans that no decision has taken are obsolete.
+        self.planner.computed.clear();
         self.beliefs.lines += u64::from(!observation.is_timer);
         let latest = self.beliefs.now.max(now).saturating_add(MAX_TIME_STEP);
         self.beliefs.now =
@@ -176,32 +179,35 @@ impl Loop {
         }
         let mut changes = Changes::default();
         let mut understood = false;
+        // Held reports that are due precede the events of this line.
         let due = self.monitor.elapse(&mut self.beliefs, &mut changes);
         answers.extend(due.into_iter().map(refused));
         for event in &observation.events {
             let outcome =
-                event.clone().and_then(|event| self.monitor.take(&mut self.beliefs, &event, &mut changes));
+                event.clone().and_then(|event| self.monitor.apply(&mut self.beliefs, &event, &mut changes));
             match outcome {
                 Ok(()) => understood = true,
                 Err(refusal) => answers.push(refused(refusal)),
             }
         }
-        for effect in overdue(&mut self.beliefs, &self.settings, &mut answers) {
-            self.give_up(effect, &mut changes);
+        for effect in handle_overdue(&mut self.beliefs, &self.settings, &mut answers) {
+            self.abandon(effect, &mut changes);
         }
         answers.append(&mut changes.filtered);
         if changes.goal {
-            self.planner.memo.forget();
+            self.planner.memo.clear();
         }
+        // A refused line does not use up its number, so that a corrected line can have it.
         if understood || changes.any() {
             if let Some(sequence) = observation.sequence {
                 self.beliefs.numbers.insert(sequence);
             }
+            // The observed design becomes a grounding before the analysis.
             if let Some(running) = self.beliefs.running.as_ref().filter(|_| changes.observed) {
                 let step = running.step.clone();
                 objectives(&mut self.beliefs, Some(&step), &mut answers);
             }
-            let findings = follow(&mut self.beliefs, changes.base, &mut answers);
+            let findings = analyze_change(&mut self.beliefs, changes.base, &mut answers);
             react(&mut self.beliefs, &self.settings, &findings, &mut changes, &mut answers);
             self.question += u64::from(changes.is_news() || !findings.is_empty());
             let agenda = self.agenda.get_or_insert_default();
@@ -211,40 +217,41 @@ impl Loop {
         answers
     }
 
-    /// Plans if what was reacted to calls for it, adopts the plan, and requests the next action. This may take as long as the time
-    /// limit of plans allows, several times. Without anything to deliberate on it does nothing.
+    /// Plans if the changes since the last call require it, adopts the plan, and requests the next action. Can take
+    /// several times the time limit of plans. Without changes, this does nothing.
     pub fn deliberate(&mut self) -> Vec<Answer> {
         let _span = info_span!("deliberate", line = self.beliefs.lines).entered();
         let mut answers = Vec::new();
-        self.planner.made.clear();
+        self.planner.computed.clear();
         let Some(Agenda { changes, findings, is_start }) = self.agenda.take() else { return answers };
-        let mut adapting = self.adapting();
+        let mut adaptation = self.adaptation();
         if !is_start || changes.is_news() || !findings.is_empty() {
-            adapting.adapt(changes, findings, &mut answers);
+            adaptation.adapt(changes, findings, &mut answers);
         }
-        execute(&mut adapting, &mut answers);
-        if !adapting.planner.is_missing {
-            adapting.release(&mut answers);
+        execute(&mut adaptation, &mut answers);
+        if !adaptation.planner.is_missing {
+            adaptation.release(&mut answers);
         }
-        self.forget();
+        self.compact_knowledge();
         answers
     }
 
-    /// Returns `true` if something was reacted to and not deliberated on.
+    /// Returns `true` if observations were applied since the last deliberation.
     pub fn has_agenda(&self) -> bool {
         self.agenda.is_some()
     }
 
-    /// A reconfiguration that was not acknowledged in time counts as failed, and it is not known which design the function has.
-    fn give_up(&mut self, effect: u64, changes: &mut Changes) {
+    /// Handles a reconfiguration that was not acknowledged in time: it counts as failed, and the design of the function
+    /// becomes unknown.
+    fn abandon(&mut self, effect: u64, changes: &mut Changes) {
         let Some(Command::Reconfigure { function, to, .. }) =
             self.beliefs.outstanding.get(&effect).map(|effect| effect.command.clone())
         else {
             return;
         };
         let failed = Event::ReconfigurationFailed { effect };
-        // Without a knowledge base there is nothing to be noted of the design.
-        let _ = self.monitor.take(&mut self.beliefs, &failed, changes);
+        // Without a knowledge base, the design cannot be marked as unrealisable.
+        let _ = self.monitor.apply(&mut self.beliefs, &failed, changes);
         self.beliefs.outstanding.remove(&effect);
         self.beliefs.waits.remove(&effect);
         self.beliefs.configuration.remove(&function);
@@ -252,86 +259,88 @@ impl Loop {
         self.beliefs.receipts.supersede(effect, function, to);
     }
 
-    /// What deliberation changes before the first plan is asked for.
+    /// Copies the state that deliberation changes before it plans.
     pub(super) fn checkpoint(&self) -> Checkpoint {
-        let known = &self.beliefs;
+        let beliefs = &self.beliefs;
         Checkpoint {
             agenda: self.agenda.clone(),
-            hopes: (known.hopes.clone(), known.hoped),
-            failures: known.failures.clone(),
-            plan: known.plan.clone(),
-            retry: known.retry,
-            flags: [known.stuck, known.reached],
+            improvement_causes: (beliefs.improvement_causes.clone(), beliefs.improvement_since),
+            failures: beliefs.failures.clone(),
+            plan: beliefs.plan.clone(),
+            retry: beliefs.retry,
+            flags: [beliefs.stuck, beliefs.reached],
         }
     }
 
-    /// Goes back to where no plan had been asked for.
+    /// Restores the state before deliberation.
     pub(super) fn roll_back(&mut self, to: Checkpoint) {
-        let known = &mut self.beliefs;
+        let beliefs = &mut self.beliefs;
         self.agenda = to.agenda;
-        (known.hopes, known.hoped) = to.hopes;
-        known.failures = to.failures;
-        (known.plan, known.retry) = (to.plan, to.retry);
-        [known.stuck, known.reached] = to.flags;
-        self.planner.made.clear();
+        (beliefs.improvement_causes, beliefs.improvement_since) = to.improvement_causes;
+        beliefs.failures = to.failures;
+        (beliefs.plan, beliefs.retry) = (to.plan, to.retry);
+        [beliefs.stuck, beliefs.reached] = to.flags;
+        self.planner.computed.clear();
     }
 
-    /// The station that decides.
-    fn adapting(&mut self) -> Adapting<'_> {
-        Adapting { beliefs: &mut self.beliefs, planner: &mut self.planner, settings: &self.settings }
+    /// The deciding stage.
+    fn adaptation(&mut self) -> Adaptation<'_> {
+        Adaptation { beliefs: &mut self.beliefs, planner: &mut self.planner, settings: &self.settings }
     }
 
-    /// Time since the start of the mission at which something becomes due without an event: a report that a filter holds
-    /// back, a sensor that counts as silent, a better plan, another search after one that was cut short, or a deadline. A tick or a [timer](Observation::timer) at that
-    /// time takes it.
+    /// Time since the start of the mission at which something becomes due without an event: a report held by a filter,
+    /// a silent sensor, a search for a better plan, a repeated search, or a deadline. Handle a tick or a
+    /// [timer](Observation::timer) at that time.
     pub fn due(&self) -> Option<Duration> {
-        let hope = self.beliefs.hoped.saturating_add(self.settings.settle);
-        let hope = (!self.beliefs.hopes.is_empty() && hope > self.beliefs.now).then_some(hope);
-        let retry = self.beliefs.retry.map(|own| own.at).filter(|at| *at > self.beliefs.now);
+        let improvement = self.beliefs.improvement_since.saturating_add(self.settings.settle);
+        let improvement = (!self.beliefs.improvement_causes.is_empty() && improvement > self.beliefs.now)
+            .then_some(improvement);
+        let retry = self.beliefs.retry.map(|retry| retry.at).filter(|at| *at > self.beliefs.now);
         let filters = self.monitor.filters().due(&self.beliefs.filters);
         let deadline = deadlines::due(&self.beliefs, &self.settings);
-        filters.into_iter().chain(hope).chain(retry).chain(deadline).min()
+        filters.into_iter().chain(improvement).chain(retry).chain(deadline).min()
     }
 
-    /// Effects that were asked for and not acknowledged, to be asked for again after a restart.
+    /// Unacknowledged effects as answers, to be requested again after a restart.
     pub fn repeat(&self) -> Vec<Answer> {
         let again = |effect: &Effect| Answer::Effect(Effect { repeated: true, ..effect.clone() });
         self.beliefs.outstanding().map(again).collect()
     }
 
-    /// A checksum of the mission before anything has happened, to tell missions apart.
+    /// Checksum of the initial mission and settings, which identifies them in a journal.
     pub fn digest(&self) -> String {
         self.digest.clone()
     }
 
-    /// Makes the knowledge anew where its history takes up memory.
-    fn forget(&mut self) {
-        let Some(base) = self.beliefs.mission.knowledge_mut().filter(|base| base.growth() > GROWTH) else {
+    /// Rebuilds the knowledge base if unused names take up memory.
+    fn compact_knowledge(&mut self) {
+        let Some(base) = self.beliefs.mission.knowledge_mut().filter(|base| base.growth() > MAX_GROWTH)
+        else {
             return;
         };
         let statements = base.statements();
-        // What was consistent and came to an end does so again.
+        // The statements were consistent and within the budget before, so that restoring them succeeds.
         let _ = base.restore(&statements);
     }
 }
 
-/// A refusal as an answer.
+/// Converts a refusal to an answer.
 fn refused(Refusal { code, message }: Refusal) -> Answer {
     Answer::Error { code: code.to_owned(), message }
 }
 
-/// What the journal keeps, and what is made of it again.
+/// Recording and replay of decisions, for the journal.
 impl Loop {
-    /// The decision of which these are the answers, to be called once after each step.
+    /// Returns the decision with these answers and the plans computed for them. Call once after each step.
     pub fn decision(&mut self, answers: &[Answer]) -> Decision {
-        let made = std::mem::take(&mut self.planner.made);
+        let plans = std::mem::take(&mut self.planner.computed);
         Decision {
             answers: answers.iter().map(Answer::to_json).collect(),
-            plans: made.iter().map(Outcome::to_record).collect(),
+            plans: plans.iter().map(Outcome::to_record).collect(),
         }
     }
 
-    /// As [`Loop::handle`], with the plans that were made then.
+    /// Repeats [`Loop::handle`] with recorded plans.
     pub fn handle_again(&mut self, observation: &Observation, now: Duration, plans: &[Value]) -> Vec<Answer> {
         self.planner.recorded = plans.iter().filter_map(Outcome::from_record).collect();
         let answers = self.handle(observation, now);
@@ -347,25 +356,25 @@ impl Loop {
         answers
     }
 
-    /// All that the loop knows, once it has deliberated on all that it has reacted to.
+    /// Copies the state of the loop. Call only after deliberation.
     pub fn snapshot(&self) -> Snapshot {
         record::snapshot(&self.beliefs)
     }
 
-    /// Takes over what a loop of the same mission knew.
+    /// Restores the state from a snapshot of a loop of the same mission.
     ///
     /// # Errors
     /// The snapshot is damaged, or belongs to another mission.
     pub fn restore(&mut self, snapshot: &Snapshot) -> Result<(), Message> {
-        self.planner.memo.forget();
+        self.planner.memo.clear();
         self.agenda = None;
         record::restore(&mut self.beliefs, snapshot)
     }
 }
 
-/// The stations one by one, for those who decide otherwise: they observe, plan and request by themselves.
+/// Single stages, for strategies of a simulation that decide otherwise: they observe, plan and request separately.
 impl Loop {
-    /// Takes an observation over without reacting to it.
+    /// Applies an observation to the beliefs without a reaction.
     pub(crate) fn observe(&mut self, observation: &Observation, now: Duration) {
         self.beliefs.lines += 1;
         self.beliefs.now = self.beliefs.now.max(now);
@@ -373,36 +382,35 @@ impl Loop {
         let mut changes = Changes::default();
         let _ = self.monitor.elapse(&mut self.beliefs, &mut changes);
         for event in observation.events.iter().flatten() {
-            // What the loop would answer with an error changes nothing.
-            let _ = self.monitor.take(&mut self.beliefs, event, &mut changes);
+            // Refused events change nothing.
+            let _ = self.monitor.apply(&mut self.beliefs, event, &mut changes);
         }
         if changes.goal {
-            self.planner.memo.forget();
+            self.planner.memo.clear();
         }
         if changes.base == Base::Watched {
             analyze(&mut self.beliefs, &mut Vec::new());
         }
     }
 
-    /// Sets limits at which planning ends, in addition to its own time limit. A plan that these limits cut short must
-    /// not be used.
+    /// Sets limits in addition to the time limit of plans. A plan cut short by these limits must not be used.
     pub(crate) fn limit(&mut self, limits: Limits) {
         self.planner.limits = limits;
     }
 
-    /// The best plan for the situation as it is believed.
+    /// Plans from the believed situation.
     pub(crate) fn plan_anew(&mut self) -> Option<Vec<PlannedStep>> {
-        let outcome = self.adapting().plan(true);
-        self.planner.made.clear();
+        let outcome = self.adaptation().plan(true);
+        self.planner.computed.clear();
         outcome.steps
     }
 
-    /// Requests an action without asking whether it can be done.
+    /// Requests an action without a check of its conditions.
     pub(crate) fn request_now(&mut self, step: PlannedStep, answers: &mut Vec<Answer>) {
         request(&mut self.beliefs, step, answers);
     }
 
-    /// Gives the action under way other designs.
+    /// Changes the designs of the action under way.
     pub(crate) fn reconfigure_now(&mut self, step: PlannedStep, answers: &mut Vec<Answer>) {
         if let Some(mut running) = self.beliefs.running.take() {
             running.step = step;
@@ -411,12 +419,12 @@ impl Loop {
         }
     }
 
-    /// Whether the goal holds as far as is believed.
+    /// Returns `true` if no action is under way, no plan remains, and the goal is believed to hold.
     pub(crate) fn is_goal(&self) -> bool {
         self.beliefs.plan.is_none() && self.beliefs.running.is_none() && self.beliefs.violation().is_none()
     }
 
-    /// The available designs of a function, in the order of the knowledge base.
+    /// Available designs of a function, in the order of the knowledge base.
     pub(crate) fn designs_for(&self, function: &str) -> Vec<String> {
         let mut designs = self.beliefs.mission.designs_of(function);
         designs.retain(|design| self.beliefs.is_available(design));

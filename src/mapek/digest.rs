@@ -1,4 +1,4 @@
-//! A mission and how it is adapted to a checksum, to tell journals of different missions apart.
+//! Checksum of a mission and its adaptation settings, to distinguish journals of different missions.
 
 use sha2::{Digest as _, Sha256};
 
@@ -6,8 +6,8 @@ use crate::mapek::event::FORMAT;
 use crate::mapek::settings::Settings;
 use crate::mission::Mission;
 
-/// Everything that decisions rest on before anything has happened: what is said and follows, the rules, the domain and the
-/// problem with its settings, the bindings, how eager the loop is, and the versions of the formats.
+/// Hashes everything that initial decisions depend on: facts, rules, domain, filled problem, bindings, settings, and
+/// the versions of program and format.
 pub(super) fn digest(mission: &Mission, settings: &Settings) -> String {
     let mut problem = mission.problem().clone();
     mission.fill(&mut problem);

@@ -1,4 +1,4 @@
-//! A loop joined with the world: who reports, who acts, and what time it is.
+//! Interfaces between a loop and its environment: observer, effector and clock.
 
 use std::io;
 use std::time::{Duration, Instant};
@@ -7,31 +7,31 @@ use crate::mapek::answer::Answer;
 use crate::mapek::control::Loop;
 use crate::mapek::event::Observation;
 
-/// What reports to the loop.
+/// Source of observations.
 pub trait Observer {
-    /// Waits for the next observation; none where there will be no more.
+    /// Waits for the next observation. `None` ends the loop.
     ///
     /// # Errors
-    /// Nothing can be read any more.
+    /// The source cannot be read.
     fn observe(&mut self) -> io::Result<Option<Observation>>;
 }
 
-/// What does as the loop says.
+/// Recipient of answers, which executes the effects among them.
 pub trait Effector {
-    /// Takes the answers to one observation, in their order. Effects among them are to be carried out.
+    /// Receives the answers to one observation, in order. Executes the effects among them.
     ///
     /// # Errors
-    /// Nothing can be done any more.
+    /// The effects cannot be executed.
     fn effect(&mut self, answers: &[Answer]) -> io::Result<()>;
 }
 
-/// What time it is.
+/// Source of time.
 pub trait Clock {
-    /// The time since the start of the mission; it never goes back.
+    /// Time since the start of the mission; monotonic.
     fn now(&mut self) -> Duration;
 }
 
-/// The time since it was made.
+/// Time since creation of the value, from the monotonic system clock.
 #[derive(Debug, Clone, Copy)]
 pub struct SystemClock(Instant);
 
@@ -47,10 +47,10 @@ impl Clock for SystemClock {
     }
 }
 
-/// Runs a loop until the observer has no more to say.
+/// Runs a loop until the observer returns no observation.
 ///
 /// # Errors
-/// Those of the observer and of the effector.
+/// Errors of the observer and of the effector.
 pub fn drive(
     control: &mut Loop,
     observer: &mut dyn Observer,

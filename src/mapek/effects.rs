@@ -1,17 +1,16 @@
-//! What is asked of the managed system, and what the knowledge base hears of it: which functions are objectives now, and which
-//! designs are grounded for them.
+//! Creates effects for the managed system, and updates the objectives and groundings of the knowledge base.
 
 use std::collections::BTreeSet;
 
-use crate::mapek::analyze::{analyze, contradict};
+use crate::mapek::analyze::{analyze, report_contradictions};
 use crate::mapek::answer::{Answer, Command, Effect};
 use crate::mapek::beliefs::{Beliefs, Running, Wait};
 use crate::mapek::step::PlannedStep;
 
-/// Upper limit on the effects that one effect names as superseded.
+/// Upper limit on the superseded effects that one effect lists.
 const MAX_SUPERSEDED: usize = 64;
 
-/// The goal holds: nothing is to be done any more.
+/// Finishes the mission: the goal holds, and no objective remains.
 pub(super) fn finish(beliefs: &mut Beliefs, answers: &mut Vec<Answer>) {
     beliefs.reached = true;
     beliefs.plan = None;
@@ -19,20 +18,20 @@ pub(super) fn finish(beliefs: &mut Beliefs, answers: &mut Vec<Answer>) {
     answers.push(Answer::GoalReached);
 }
 
-/// Requests an action, with its configuration.
+/// Requests an action, after reconfigurations for its designs.
 pub(super) fn request(beliefs: &mut Beliefs, step: PlannedStep, answers: &mut Vec<Answer>) {
     beliefs.actions += 1;
     let action = beliefs.actions;
     let mut running = Running {
         action,
-        instructed: step.configuration.clone(),
+        sent_configuration: step.configuration.clone(),
         step,
         progress: num_rational::BigRational::from_integer(0.into()),
         cancelling: false,
         suspended: false,
         provisional: false,
         request: 0,
-        heard: beliefs.now,
+        last_report: beliefs.now,
         overdue: 0,
         started: false,
         progressed: false,
@@ -44,25 +43,27 @@ pub(super) fn request(beliefs: &mut Beliefs, step: PlannedStep, answers: &mut Ve
     beliefs.running = Some(running);
 }
 
-/// Gives functions the designs of an action, and the knowledge base its objectives.
+/// Requests the designs of an action where functions have others, and updates the objectives of the knowledge base.
 ///
-/// An action may still wait for designs that it was told to use. If it gets others it is told so, also where its functions have
-/// them already.
+/// A requested action can still be waiting for designs that were sent before. Therefore, changed designs of the action
+/// are sent even if the functions already have them.
 pub(super) fn reconfigure(beliefs: &mut Beliefs, running: &mut Running, answers: &mut Vec<Answer>) {
     let may_wait = !running.suspended && (!running.started || running.resumed);
     for pair in &running.step.configuration {
         let (function, design) = pair;
-        if beliefs.expected(function) != Some(design) || may_wait && !running.instructed.contains(pair) {
+        if beliefs.expected(function) != Some(design)
+            || may_wait && !running.sent_configuration.contains(pair)
+        {
             let from = beliefs.configuration.get(function).cloned();
             let command = Command::Reconfigure { function: function.clone(), from, to: design.clone() };
             effect(beliefs, running.action, command, answers);
         }
     }
-    running.instructed.clone_from(&running.step.configuration);
+    running.sent_configuration.clone_from(&running.step.configuration);
     objectives(beliefs, Some(&running.step), answers);
 }
 
-/// Asks the managed system for something.
+/// Creates an effect, and removes the effects that it supersedes.
 pub(super) fn effect(beliefs: &mut Beliefs, action: u64, command: Command, answers: &mut Vec<Answer>) {
     beliefs.effects += 1;
     let number = beliefs.effects;
@@ -70,13 +71,16 @@ pub(super) fn effect(beliefs: &mut Beliefs, action: u64, command: Command, answe
     let is_replaced = |old: &Effect| command.replaces(&old.command, old.action == action);
     let replaced: Vec<u64> =
         outstanding.values().filter(|old| is_replaced(old)).map(|old| old.number).collect();
-    // An effect may arrive after the one that has superseded it has been superseded in turn: all of them are named.
+    // The new effect may arrive before the effects that the replaced ones have superseded. Therefore, all of them are
+    // listed.
     let mut supersedes: BTreeSet<u64> = replaced.iter().copied().collect();
     supersedes
         .extend(replaced.iter().filter_map(|number| outstanding.get(number)).flat_map(|old| &old.supersedes));
+    // Superseded reconfigurations without an answer may still arrive, too.
     if let Command::Reconfigure { function, .. } = &command {
         supersedes.extend(beliefs.receipts.unanswered(function));
     }
+    // The list is bounded. The oldest effects have most likely arrived or been lost.
     while supersedes.len() > MAX_SUPERSEDED {
         supersedes.pop_first();
     }
@@ -95,27 +99,27 @@ pub(super) fn effect(beliefs: &mut Beliefs, action: u64, command: Command, answe
     answers.push(Answer::Effect(effect));
 }
 
-/// Makes the functions of a step, and no others, the objectives of the knowledge base, grounded as the step says.
+/// Makes the functions of a step, and no others, the objectives of the knowledge base, grounded by the step's designs.
 pub(super) fn objectives(beliefs: &mut Beliefs, step: Option<&PlannedStep>, answers: &mut Vec<Answer>) {
     let mission = &beliefs.mission;
-    let mut wanted = step.map_or_else(Vec::new, |step| step.configuration.clone());
-    wanted.retain(|(_, design)| !mission.decides_on(design));
+    let mut objectives_with_designs = step.map_or_else(Vec::new, |step| step.configuration.clone());
+    objectives_with_designs.retain(|(_, design)| !mission.decides_on(design));
     let Some(knowledge) = beliefs.mission.knowledge_mut() else { return };
-    if let Err(error) = knowledge.pursue_in_time(&wanted) {
+    if let Err(error) = knowledge.pursue_in_time(&objectives_with_designs) {
         answers.push(Answer::Error { code: error.code.clone(), message: error.message.clone() });
     }
-    contradict(beliefs, answers);
+    report_contradictions(beliefs, answers);
     analyze(beliefs, answers);
 }
 
-/// Asks for a safe end of the action under way.
+/// Cancels the action under way and drops the plan.
 pub(super) fn cancel(beliefs: &mut Beliefs, running: Running, because: String, answers: &mut Vec<Answer>) {
     beliefs.plan = None;
     effect(beliefs, running.action, Command::Cancel { because }, answers);
     beliefs.running = Some(Running { cancelling: true, ..running });
 }
 
-/// Asks the action under way to stand still.
+/// Suspends the action under way and drops the plan.
 pub(super) fn suspend(beliefs: &mut Beliefs, running: Running, reason: &str, answers: &mut Vec<Answer>) {
     beliefs.plan = None;
     beliefs.stuck = true;
@@ -126,11 +130,11 @@ pub(super) fn suspend(beliefs: &mut Beliefs, running: Running, reason: &str, ans
     beliefs.running = Some(Running { suspended: true, provisional: false, ..running });
 }
 
-/// Lets a suspended action go on.
+/// Resumes an action if it is suspended.
 pub(super) fn resume_suspended(beliefs: &mut Beliefs, running: &mut Running, answers: &mut Vec<Answer>) {
     running.provisional = false;
     if std::mem::take(&mut running.suspended) {
-        (running.heard, running.overdue) = (beliefs.now, 0);
+        (running.last_report, running.overdue) = (beliefs.now, 0);
         running.resumed = true;
         let configuration = running.step.configuration.clone();
         effect(beliefs, running.action, Command::Resume { configuration }, answers);
@@ -149,7 +153,7 @@ mod tests {
     use crate::mapek::step::PlannedStep;
     use crate::setup::Setup;
 
-    /// The commands among the answers, each in a word.
+    /// Short text of each effect.
     fn words(answers: &[Answer]) -> Vec<String> {
         let word = |command: &Command| match command {
             Command::Reconfigure { function, from, to } => format!("{function} {from:?} {to}"),
@@ -161,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn designs_come_before_the_action_that_needs_them() {
+    fn designs_are_requested_before_their_action() {
         let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("missions/ugv.toml");
         let mut beliefs = Beliefs::new(Setup::read(&manifest).expect("the mission is read").mission);
         let step = |design: &str| PlannedStep {

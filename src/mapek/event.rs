@@ -1,7 +1,7 @@
-//! Text to events: what the managed system reports, one JSON object each, in the format `metaplan-events/1`.
+//! Events: reports of the managed system, one JSON object per line, in the format `metaplan-events/1`.
 //!
-//! Objects of the shape of `diagnostic_msgs/DiagnosticArray`, as the MROS observers publish them, are taken as they are
-//! \[1\]. What is not understood is a [`Refusal`], which changes nothing.
+//! Objects in the form of `diagnostic_msgs/DiagnosticArray`, as published by the MROS observers \[1\], are accepted,
+//! too. Other input is a [`Refusal`], which changes nothing.
 //!
 //! \[1\] Bozhinoski et al., MROS: Runtime Adaptation For Robot Control Architectures, Advanced Robotics 36, 2022.
 
@@ -18,10 +18,10 @@ use crate::mapek::fields::{Refusal, doubled_key, fraction, need, numbers, second
 use crate::message::did_you_mean;
 use crate::number;
 
-/// The version of events and answers.
+/// Version of the format of events and answers.
 pub const FORMAT: &str = "metaplan-events/1";
 
-/// Lines of more bytes are not read as events.
+/// Maximum length of a line in bytes. Longer lines are refused.
 pub const LONGEST_LINE: usize = 1 << 20;
 
 /// Something that has happened.
@@ -164,7 +164,7 @@ pub enum Event {
     },
 }
 
-/// What [`status`] reads, as a JSON Schema.
+/// JSON Schema of the values that [`status`] accepts.
 fn status_schema(_: &mut SchemaGenerator) -> Schema {
     json_schema!({
         "anyOf": [
@@ -174,17 +174,17 @@ fn status_schema(_: &mut SchemaGenerator) -> Schema {
     })
 }
 
-/// A name, or null; in either case it is there.
+/// JSON Schema of a field that must be present but may be null.
 fn name_or_null_schema(_: &mut SchemaGenerator) -> Schema {
     json_schema!({ "type": ["string", "null"] })
 }
 
-/// What [`word`] reads, as a JSON Schema.
+/// JSON Schema of the values that [`word`] accepts.
 fn word_schema(_: &mut SchemaGenerator) -> Schema {
     json_schema!({ "type": ["string", "number", "boolean"] })
 }
 
-/// The JSON Schema of a line that is an event. Diagnostic arrays are described by ROS.
+/// JSON Schema of an event with the fields common to all lines. Diagnostic arrays are specified by ROS.
 pub fn event_schema() -> Schema {
     let mut schema = schema_for!(Event);
     let kinds = schema.get_mut("oneOf").and_then(Value::as_array_mut);
@@ -197,16 +197,16 @@ pub fn event_schema() -> Schema {
     schema
 }
 
-/// One line of input.
+/// Content of one line of input.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Observation {
-    /// A number that grows from line to line, if the sender counts; a line with a number that was seen is left out.
+    /// Sequence number, if the sender numbers its lines. Lines with a repeated number are ignored.
     pub sequence: Option<u64>,
-    /// When it was made, since the start of the mission, if the sender says so.
+    /// Time of the observation since the start of the mission, if the line has one.
     pub time: Option<Duration>,
-    /// What it says; a diagnostic array says several things.
+    /// Events of the line. A diagnostic array can contain several.
     pub events: Vec<Result<Event, Refusal>>,
-    /// Whether it is no line of input but the passing of time: it counts as no line.
+    /// Whether this is not a line but the passing of time. It is not counted as a line.
     pub is_timer: bool,
 }
 
@@ -220,7 +220,7 @@ impl Observation {
     /// Text of a [timer](Self::timer) in a journal. Blank lines of input are skipped, so that no line has this text.
     pub const TIMER: &str = "";
 
-    /// The passing of time, which [`Loop::due`](crate::mapek::Loop::due) calls for.
+    /// The passing of time, as requested by [`Loop::due`](crate::mapek::Loop::due).
     pub fn timer() -> Self {
         Self { is_timer: true, ..Self::from(Event::Tick) }
     }
@@ -255,7 +255,7 @@ impl Observation {
         if fields.contains_key("status") && !fields.contains_key("event") {
             return diagnostics(&fields);
         }
-        // The number and the time count even if the rest is wrong.
+        // Sequence number and time are used even if the other fields are wrong.
         self.sequence = take(&mut fields, "seq", "a whole number", Value::as_u64)?;
         self.time = take(&mut fields, "time", "a number of seconds, not negative", seconds)?;
         event(&mut fields).map(|event| vec![Ok(event)])
@@ -335,9 +335,10 @@ fn event(fields: &mut Map<String, Value>) -> Result<Event, Refusal> {
             objective: need(fields, "objective", "the name of an objective", text)?,
         },
         "tick" => Event::Tick,
-        other => {
-            let meant = did_you_mean(other, KINDS);
-            let text = format!("there is no event `{other}`; there are: {}{meant}", KINDS.join(", "));
+        unknown_kind => {
+            let suggestion = did_you_mean(unknown_kind, KINDS);
+            let text =
+                format!("there is no event `{unknown_kind}`; there are: {}{suggestion}", KINDS.join(", "));
             return Err(Refusal::new("M303", text));
         }
     };
@@ -369,7 +370,7 @@ const KINDS: [&str; 17] = [
 
 const STATUSES: &str = "`FALSE` or `ERROR`, `RECOVERED`, `TRUE` or `OK`, or a truth value";
 
-/// A status in the spelling of MROS, of PLANTA, or as a truth value.
+/// Parses a status in the spelling of MROS or PLANTA, or a truth value.
 fn status(text: &str) -> Option<Status> {
     match text.to_ascii_uppercase().as_str() {
         "FALSE" | "ERROR" => Some(Status::Failed),
@@ -379,7 +380,7 @@ fn status(text: &str) -> Option<Status> {
     }
 }
 
-/// The statuses of a diagnostic array that are about attributes and components; others are of no concern here.
+/// Returns the measurements and component statuses of a diagnostic array. Other statuses are ignored.
 fn diagnostics(fields: &Map<String, Value>) -> Result<Vec<Result<Event, Refusal>>, Refusal> {
     let Some(statuses) = fields.get("status").and_then(Value::as_array) else {
         return Err(Refusal::new("M304", "`status` of a diagnostic array is a list"));
@@ -388,9 +389,9 @@ fn diagnostics(fields: &Map<String, Value>) -> Result<Vec<Result<Event, Refusal>
     for entry in statuses {
         let message = entry.get("message").and_then(Value::as_str).unwrap_or_default();
         let values = entry.get("values").and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
-        // SUAVE's thruster monitor says one thing twice, once in the words of MROS and once in those of PLANTA: of
-        // several values for one key, the first counts.
-        let mut seen: Vec<&str> = Vec::new();
+        // SUAVE's thruster monitor reports each status twice, in the vocabularies of MROS and of PLANTA: the first
+        // value of each key counts.
+        let mut keys: Vec<&str> = Vec::new();
         for pair in values {
             let part = |name: &str| pair.get(name).and_then(Value::as_str).map(str::trim);
             let (Some(key), Some(value)) = (part("key"), part("value")) else {
@@ -400,10 +401,10 @@ fn diagnostics(fields: &Map<String, Value>) -> Result<Vec<Result<Event, Refusal>
                 )));
                 continue;
             };
-            if seen.contains(&key) {
+            if keys.contains(&key) {
                 continue;
             }
-            seen.push(key);
+            keys.push(key);
             match message {
                 "QA status" => events.push(measured(key, value)),
                 "Component status" => events.push(component(key, value)),
@@ -446,19 +447,19 @@ fn as_word<S: Serializer>(status: &Status, serializer: S) -> Result<S::Ok, S::Er
 }
 
 impl Event {
-    /// The event as an object of the format.
+    /// Converts the event to a JSON object of the format.
     pub fn to_json(&self) -> Value {
-        // Texts and numbers are always data.
+        // The serialization cannot fail: all map keys are strings.
         serde_json::to_value(self).unwrap_or_default()
     }
 
-    /// Its kind, as the format names it.
+    /// Name of the event in the format.
     pub(crate) fn kind(&self) -> String {
         self.to_json().get("event").and_then(Value::as_str).unwrap_or_default().to_owned()
     }
 }
 
-/// An event with what its line says besides.
+/// An event with the common fields of its line.
 #[derive(Serialize)]
 struct Line<'a> {
     #[serde(flatten)]
@@ -470,7 +471,8 @@ struct Line<'a> {
 }
 
 impl Observation {
-    /// The observation as an object of the format, if it is one event; an empty object otherwise.
+    /// Converts the observation to a JSON object of the format if it consists of one event, and to an empty object
+    /// otherwise.
     pub fn to_json(&self) -> Value {
         let [Ok(event)] = self.events.as_slice() else { return Map::new().into() };
         let line = Line { event, seq: self.sequence, time: self.time.map(|time| time.as_secs_f64()) };

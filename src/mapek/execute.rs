@@ -1,19 +1,21 @@
-//! Execute: actions are requested one by one, each with its configuration: Algorithm 2 of the paper.
+//! Execute: requests the actions of a plan one by one, each with its configuration: Algorithm 2 of the paper (see
+//! [`crate::mapek`]).
 //!
-//! Before each request the rest of the plan is validated against the state as it is believed.
+//! Before each request, the remaining plan is validated against the believed situation.
 
 use std::collections::VecDeque;
 
-use crate::mapek::adapt::{Adapting, Need};
+use crate::mapek::adapt::{Adaptation, Need};
 use crate::mapek::answer::Answer;
 use crate::mapek::effects::{finish, request};
 
-/// Requests the next action if none is under way. A plan that does not fit is replaced once; one that still does not fit is none.
-pub(super) fn execute(adapting: &mut Adapting<'_>, answers: &mut Vec<Answer>) {
+/// Requests the next action if none is under way. A plan that does not fit is replaced once. If the second plan does
+/// not fit either, planning pauses until something changes.
+pub(super) fn execute(adaptation: &mut Adaptation<'_>, answers: &mut Vec<Answer>) {
     for attempt in 0..2 {
-        let beliefs = &mut *adapting.beliefs;
+        let beliefs = &mut *adaptation.beliefs;
         let is_known = beliefs.fault.is_none();
-        if adapting.planner.is_missing
+        if adaptation.planner.is_missing
             || beliefs.running.is_some()
             || beliefs.stuck
             || beliefs.reached
@@ -35,7 +37,7 @@ pub(super) fn execute(adapting: &mut Adapting<'_>, answers: &mut Vec<Answer>) {
             }
             Some(because) if attempt == 0 => {
                 let because = if is_planned { because } else { "there is no plan".to_owned() };
-                adapting.replan(vec![because], Need::Must, answers);
+                adaptation.replan(vec![because], Need::Must, answers);
             }
             Some(because) => {
                 answers.push(Answer::PlanNone { status: "unknown", because, blocking: Vec::new() });

@@ -1,4 +1,4 @@
-//! The fields of a line: what is missing, what is wrong, and what is there twice.
+//! Readers for the fields of a line, with messages for missing, wrong and repeated fields.
 
 use std::time::Duration;
 
@@ -7,12 +7,12 @@ use serde_json::{Map, Value};
 
 use crate::number;
 
-/// Why a line, or a part of it, is not an event.
+/// Reason why a line, or a part of it, is not an event.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Refusal {
-    /// A stable code.
+    /// Stable code of the message.
     pub code: &'static str,
-    /// One sentence.
+    /// Message, one sentence.
     pub message: String,
 }
 
@@ -22,14 +22,14 @@ impl Refusal {
     }
 }
 
-/// A field that an object has twice; of objects within it nothing is said.
+/// Returns the first repeated key of an object. Nested objects are not checked.
 pub(super) fn doubled_key(text: &str) -> Option<String> {
     let Keys(keys) = serde_json::from_str(text).ok()?;
     let doubled = keys.iter().enumerate().find(|(index, key)| keys[..*index].contains(key));
     doubled.map(|(_, key)| key.clone())
 }
 
-/// The keys of an object, in their order.
+/// Keys of an object in the order of the text, including repetitions.
 struct Keys(Vec<String>);
 
 impl<'de> serde::Deserialize<'de> for Keys {
@@ -58,7 +58,7 @@ pub(super) fn seconds(value: &Value) -> Option<Duration> {
     number::from_json(value).and_then(|value| Duration::try_from_secs_f64(number::to_f64(&value)).ok())
 }
 
-/// Takes an optional field away.
+/// Removes an optional field and parses it.
 pub(super) fn take<T>(
     fields: &mut Map<String, Value>,
     name: &str,
@@ -95,13 +95,13 @@ pub(super) fn fraction(value: &Value) -> Option<BigRational> {
     Some((fraction * &percent).round() / percent)
 }
 
-/// Names with exact numbers.
+/// Parses an object of names and numbers, without rounding.
 pub(super) fn numbers(value: &Value) -> Option<Vec<(String, BigRational)>> {
     let fields = value.as_object()?.iter();
     fields.map(|(name, value)| Some((name.clone(), number::from_json(value)?))).collect()
 }
 
-/// The value of a fact: a word, a number or a truth value.
+/// Parses the value of a fact: a word, a number or a truth value.
 pub(super) fn word(value: &Value) -> Option<String> {
     match value {
         Value::Bool(truth) => Some(truth.to_string()),

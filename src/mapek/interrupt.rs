@@ -1,41 +1,40 @@
-//! Whether the action under way goes on, is suspended, or is cancelled, when it cannot stay as it is.
+//! Decides whether the action under way continues, is suspended, or is cancelled, when it cannot go on unchanged.
 //!
-//! To cancel an action is to lose what it has done so far, so that it is weighed against going on. The rest of the mission is
-//! planned twice: with what is left of the action as its first step, and as though the action had been cancelled. The
-//! action is cancelled where nothing goes on with it, or where the mission is better without it by more than the
-//! minimum benefit. Where there is neither plan, cancelling would gain nothing and lose what was done: the action is
-//! suspended, and goes on when its designs, or others, are back. Robots that cannot suspend an action say that it was
-//! cancelled.
+//! Cancelling an action loses its progress. Therefore, the remaining mission is planned twice: with the remainder of
+//! the action as the first step, and as if the action were cancelled. The action is cancelled if only the second plan
+//! exists, or if it is better by more than the minimum benefit. If neither plan exists, cancelling would lose the
+//! progress without any benefit: the action is suspended until suitable designs are available again. Robots that cannot
+//! suspend an action report that it was cancelled.
 
 use num_rational::BigRational;
 
 use crate::mapek::ask::Outcome;
 use crate::number;
 
-/// What becomes of the action under way.
+/// Decision about the action under way.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Interruption {
-    /// It goes on.
+    /// The action continues.
     None,
-    /// It is brought to a safe end.
+    /// The action is ended safely.
     Cancel {
-        /// Why, in a sentence.
+        /// Reason, as a sentence.
         because: String,
     },
-    /// It stands still, and there is no plan.
+    /// The action is suspended, because no plan exists.
     Suspend {
         /// `unsolvable` or `unknown`.
         status: &'static str,
-        /// Why there is no plan.
+        /// Reason for the absence of a plan.
         because: String,
-        /// Designs by which alone there is none.
+        /// Minimal set of unavailable designs that blocks every plan.
         blocking: Vec<String>,
     },
 }
 
-/// Weighs the plan that begins with what is left of the action under way against the plan as though it had been cancelled, which
-/// is better by `gained` if that is enough. `reason` is why the action cannot stay as it is; `can_go_on` says whether its designs
-/// are available, and what is left of it can be done with them.
+/// Compares the plan that continues with the action (`going_on`) and the plan after its cancellation (`without`).
+/// `reason` says why the action cannot go on unchanged. `can_go_on` says whether its current designs are available and
+/// its remainder is executable. `gained` is the benefit of cancelling, if it is sufficient.
 pub(super) fn weigh(
     reason: &str,
     can_go_on: bool,
@@ -71,7 +70,7 @@ mod tests {
     use super::{Interruption, weigh};
     use crate::mapek::ask::Outcome;
 
-    /// A plan without steps, or none.
+    /// An outcome with an empty plan, or without a plan.
     fn outcome(is_plan: bool) -> Outcome {
         Outcome {
             steps: is_plan.then(Vec::new),
@@ -84,12 +83,12 @@ mod tests {
 
     fn check(can_go_on: bool, goes_on: bool, without: bool, gained: Option<i64>, expected: &Interruption) {
         let gained = gained.map(|gained| BigRational::from_integer(gained.into()));
-        let found = weigh("it is lost", can_go_on, &outcome(goes_on), outcome(without), gained);
-        assert_eq!(&found, expected, "{can_go_on} {goes_on} {without}");
+        let decision = weigh("it is lost", can_go_on, &outcome(goes_on), outcome(without), gained);
+        assert_eq!(&decision, expected, "{can_go_on} {goes_on} {without}");
     }
 
     #[test]
-    fn an_action_is_interrupted_only_for_something() {
+    fn an_action_is_interrupted_only_with_a_benefit() {
         let cancel = |because: &str| Interruption::Cancel { because: format!("it is lost; {because}") };
         let suspend = Interruption::Suspend {
             status: "unsolvable",

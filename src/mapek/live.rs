@@ -1,74 +1,82 @@
-//! The situation to a question for the live planner, and its answer to a plan of the loop.
+//! Translates the believed situation to a query of the incremental planner, and its answer to a plan.
 //!
-//! The live planner knows the mission's own domain only. What is left of an action under way is a step that comes first: its
-//! configurations are tried one by one on the domain in which that action is shortened, see [`super::resume`].
+//! The incremental planner is built for the domain of the mission. The remainder of an action under way is passed as a
+//! fixed first step: each of its configurations is simulated in the domain in which the action is shortened, see
+//! [`super::resume`].
 
 use num_rational::BigRational;
 use pddl::validate::advance_each;
 use planner::{FirstStep, Limits, Progress, Query, ReplanOutcome, Replanner};
 
-use crate::mapek::ask::{Ask, Outcome};
+use crate::mapek::ask::{Outcome, Question};
 use crate::mapek::resume::{GATE, resume};
 use crate::mapek::step::PlannedStep;
 use crate::mapek::watch::Watch;
 use crate::mission::replanner;
 
-/// So many configurations of the action under way are tried at most.
-const CONFIGURATIONS: usize = 256;
+/// Upper limit on the simulated configurations of the action under way.
+const MAX_CONFIGURATIONS: usize = 256;
 
-/// A planner that is kept from one plan to the next.
+/// Incremental planner, kept between queries.
 #[derive(Debug, Clone, Default)]
 pub(super) enum Live {
-    /// There is none yet.
+    /// Before the first query.
     #[default]
     Untried,
-    /// The mission is not suited.
+    /// The incremental planner does not support the mission.
     Unsuited,
-    /// For the problem that it was made for, and for those that are like it.
+    /// Built for one problem. It also accepts problems that differ only in initial values and available designs.
     Ready(Replanner),
 }
 
 impl Live {
-    /// A proved answer, or the best plan that was known when time was up; none if it has to be found without a live planner.
-    pub(super) fn plan(&mut self, ask: &Ask<'_>, limits: &Limits, watch: &Watch) -> Option<Outcome> {
-        let metric = ask.metric()?;
-        let first = match ask.running {
-            Some(_) => first_steps(ask)?,
+    /// Returns a proved answer, or the incumbent at the time limit. `None` if planning from scratch is necessary.
+    pub(super) fn plan(
+        &mut self,
+        question: &Question<'_>,
+        limits: &Limits,
+        watch: &Watch,
+    ) -> Option<Outcome> {
+        let metric = question.metric()?;
+        let first = match question.running {
+            Some(_) => first_steps(question)?,
             None => Vec::new(),
         };
-        if ask.running.is_some() && first.is_empty() {
+        // No configuration can execute the remainder of the action.
+        if question.running.is_some() && first.is_empty() {
             return Some(none(Vec::new()));
         }
         let (steps, first): (Vec<PlannedStep>, Vec<FirstStep>) = first.into_iter().unzip();
-        let old: Option<Vec<(String, Vec<String>)>> = ask
+        let old: Option<Vec<(String, Vec<String>)>> = question
             .old
             .map(|plan| plan.iter().map(|step| (step.action.clone(), step.arguments.clone())).collect());
         let query = Query {
-            problem: ask.problem,
+            problem: question.problem,
             first: &first,
             metric: metric.clone(),
             old: old.as_deref(),
-            stay_close: ask.stay_close,
+            stay_close: question.stay_close,
             limits,
         };
         let mut report = |progress: Progress| {
-            let cost = progress.metric.map(|own| own - &metric);
+            let cost = progress.metric.map(|total| total - &metric);
             watch.improve(cost, progress.bound - &metric);
         };
-        let mut answer = self.ask(ask, &query, false, &mut report)?;
+        let mut answer = self.query_planner(question, &query, false, &mut report)?;
+        // The planner does not fit the problem, for example after a change of the goal. It is rebuilt once.
         if answer == ReplanOutcome::Misfit {
-            answer = self.ask(ask, &query, true, &mut report)?;
+            answer = self.query_planner(question, &query, true, &mut report)?;
         }
         let proved = matches!(answer, ReplanOutcome::Optimal { .. });
         match answer {
-            ReplanOutcome::Optimal { first: begins, steps: rest, metric }
-            | ReplanOutcome::Feasible { first: begins, steps: rest, metric } => {
-                let begins = begins.and_then(|index| steps.into_iter().nth(index));
-                let rest = rest.iter().map(|step| PlannedStep::new(ask.mission, step));
-                let steps = begins.into_iter().chain(rest).collect();
+            ReplanOutcome::Optimal { first: first_step, steps: remaining, metric }
+            | ReplanOutcome::Feasible { first: first_step, steps: remaining, metric } => {
+                let first_step = first_step.and_then(|index| steps.into_iter().nth(index));
+                let remaining = remaining.iter().map(|step| PlannedStep::new(question.mission, step));
+                let steps = first_step.into_iter().chain(remaining).collect();
                 Some(Outcome { steps: Some(steps), cost: metric, proved, ..none(Vec::new()) })
             }
-            ReplanOutcome::Unsolvable if ask.running.is_none() => {
+            ReplanOutcome::Unsolvable if question.running.is_none() => {
                 let Self::Ready(replanner) = self else { return None };
                 Some(none(replanner.blocking(&query).unwrap_or_default()))
             }
@@ -77,16 +85,16 @@ impl Live {
         }
     }
 
-    fn ask(
+    fn query_planner(
         &mut self,
-        ask: &Ask<'_>,
+        question: &Question<'_>,
         query: &Query<'_>,
-        anew: bool,
+        rebuild: bool,
         report: &mut dyn FnMut(Progress),
     ) -> Option<ReplanOutcome> {
-        if anew || matches!(self, Self::Untried) {
-            let made = replanner(ask.mission, ask.problem, query.limits);
-            *self = made.map_or(Self::Unsuited, Self::Ready);
+        if rebuild || matches!(self, Self::Untried) {
+            let new_replanner = replanner(question.mission, question.problem, query.limits);
+            *self = new_replanner.map_or(Self::Unsuited, Self::Ready);
         }
         match self {
             Self::Ready(replanner) => Some(replanner.plan_aloud(query, report)),
@@ -95,7 +103,7 @@ impl Live {
     }
 }
 
-/// That there is no plan.
+/// Proved absence of a plan.
 fn none(blocking: Vec<String>) -> Outcome {
     Outcome {
         steps: None,
@@ -106,29 +114,32 @@ fn none(blocking: Vec<String>) -> Outcome {
     }
 }
 
-/// What is left of the action under way, with each configuration that it can go on with; none if those are too many, or unknown.
-pub(super) fn first_steps(ask: &Ask<'_>) -> Option<Vec<(PlannedStep, FirstStep)>> {
-    let running = ask.running?;
+/// Remainders of the action under way, one per executable configuration. `None` if the configurations are too many or
+/// unknown.
+pub(super) fn first_steps(question: &Question<'_>) -> Option<Vec<(PlannedStep, FirstStep)>> {
+    let running = question.running?;
     let mut steps = vec![running.step.clone()];
     for (function, _) in &running.step.configuration {
-        let designs = ask.mission.designs_of(function);
-        if designs.is_empty() || steps.len() * designs.len() > CONFIGURATIONS {
+        let designs = question.mission.designs_of(function);
+        if designs.is_empty() || steps.len() * designs.len() > MAX_CONFIGURATIONS {
             return None;
         }
         let with =
             |step: &PlannedStep| designs.iter().map(|design| step.with_design(function, design)).collect();
         steps = steps.iter().flat_map(|step| -> Vec<PlannedStep> { with(step) }).collect();
     }
-    let domain = resume(ask.mission.domain(), &running.step, &running.progress);
+    let domain = resume(question.mission.domain(), &running.step, &running.progress);
     let plan_steps: Vec<_> = steps.iter().map(PlannedStep::to_plan_step).collect();
-    let before = ask.metric()?;
-    let advances = advance_each(&domain, ask.problem, &plan_steps);
+    let before = question.metric()?;
+    let advances = advance_each(&domain, question.problem, &plan_steps);
     let mut first = Vec::new();
     for (mut step, change) in steps.into_iter().zip(advances) {
         let Ok(mut change) = change else { continue };
+        // The gate exists only in the shortened domain, not in the one of the planner.
         change.added.retain(|atom| atom.predicate.name.as_str() != GATE);
-        let one = BigRational::from_integer(1.into());
-        let metric = if ask.problem.metric.is_some() { change.metric.clone()? } else { one };
+        // Without a metric, plans are measured by their number of steps.
+        let one_step = BigRational::from_integer(1.into());
+        let metric = if question.problem.metric.is_some() { change.metric.clone()? } else { one_step };
         step.duration.clone_from(&change.duration);
         step.cost = &metric - &before;
         let (configuration, arguments) = (step.configuration.clone(), step.arguments.clone());

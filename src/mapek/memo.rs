@@ -1,104 +1,105 @@
-//! Plans that were proved the best for situations, to be used again when the same situation comes back: components flap,
-//! and measurements go to and fro across a bound.
+//! Cache of optimal plans for recurring situations: components that fail and recover, and measurements that oscillate
+//! around a bound.
 //!
-//! A proved plan depends on the situation and on nothing else, so that what is remembered is what would be found again.
+//! A proved plan depends only on the situation, so that a cached plan equals the plan of a new search.
 
 use std::collections::VecDeque;
 
 use pddl::ast::{Atom, InitialElement, Problem, Term};
 
-use crate::mapek::ask::{Ask, Outcome};
+use crate::mapek::ask::{Outcome, Question};
 use crate::mapek::beliefs::Running;
 use crate::mapek::step::PlannedStep;
 
-/// So many situations are remembered.
-const SITUATIONS: usize = 16;
+/// Capacity of the cache.
+const CAPACITY: usize = 16;
 
-/// Situations with their plans, the one that was last asked for first.
+/// Situations with their plans, most recently used first.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Memo(VecDeque<(Asked, Outcome)>);
+pub(crate) struct Memo(VecDeque<(StoredQuestion, Outcome)>);
 
-/// What a plan depends on. The domain and the metric stay; for another goal there is another memo.
+/// Everything that a plan depends on, apart from the domain and the metric, which are constant. A new goal clears the
+/// cache.
 #[derive(Debug, Clone)]
-pub(crate) struct Asked {
+pub(crate) struct StoredQuestion {
     problem: Problem,
     running: Option<Running>,
-    /// The plan at hand, where the choice depends on it.
+    /// The current plan, if the choice between optimal plans depends on it.
     old: Option<Vec<PlannedStep>>,
 }
 
 impl Memo {
-    /// The plan of a situation that was there before.
-    pub(super) fn recall(&mut self, ask: &Ask<'_>) -> Option<Outcome> {
-        let place = self.0.iter().position(|(situation, _)| situation.is(ask))?;
-        let found = self.0.remove(place)?;
-        let outcome = found.1.clone();
-        self.0.push_front(found);
+    /// Returns the plan of a cached situation.
+    pub(super) fn recall(&mut self, question: &Question<'_>) -> Option<Outcome> {
+        let position = self.0.iter().position(|(situation, _)| situation.equals(question))?;
+        let entry = self.0.remove(position)?;
+        let outcome = entry.1.clone();
+        self.0.push_front(entry);
         Some(outcome)
     }
 
-    /// Remembers a plan; one that may not be the best is looked for again.
-    pub(super) fn note(&mut self, ask: &Ask<'_>, outcome: &Outcome) {
+    /// Caches an outcome if it is proved.
+    pub(super) fn store(&mut self, question: &Question<'_>, outcome: &Outcome) {
         if outcome.proved {
-            self.0.push_front((Asked::new(ask), outcome.clone()));
-            self.0.truncate(SITUATIONS);
+            self.0.push_front((StoredQuestion::new(question), outcome.clone()));
+            self.0.truncate(CAPACITY);
         }
     }
 
-    /// Another goal makes another question of each situation.
-    pub(super) fn forget(&mut self) {
+    /// Clears the cache, for a new goal.
+    pub(super) fn clear(&mut self) {
         self.0.clear();
     }
 }
 
-impl Asked {
-    /// Keeps what a plan depends on.
-    pub(super) fn new(ask: &Ask<'_>) -> Self {
-        let old = ask.old.filter(|_| ask.stay_close).map(<[_]>::to_vec);
-        Self { problem: ask.problem.clone(), running: ask.running.cloned(), old }
+impl StoredQuestion {
+    /// Copies the situation of a question.
+    pub(super) fn new(question: &Question<'_>) -> Self {
+        let old = question.old.filter(|_| question.stay_close).map(<[_]>::to_vec);
+        Self { problem: question.problem.clone(), running: question.running.cloned(), old }
     }
 
-    /// Returns `true` if the same action comes first, or none.
-    pub(super) fn is_about(&self, ask: &Ask<'_>) -> bool {
-        self.running.as_ref().map(|own| own.action) == ask.running.map(|own| own.action)
+    /// Returns `true` if both questions have the same action under way, or none.
+    pub(super) fn has_same_action(&self, question: &Question<'_>) -> bool {
+        self.running.as_ref().map(|running| running.action) == question.running.map(|running| running.action)
     }
 
-    /// Returns `true` if it is the same question.
-    pub(super) fn is(&self, ask: &Ask<'_>) -> bool {
-        let (own, other) = (&self.problem, ask.problem);
+    /// Returns `true` if the questions are equal.
+    pub(super) fn equals(&self, question: &Question<'_>) -> bool {
+        let (left, right) = (&self.problem, question.problem);
         let objects = |problem: &Problem| problem.objects.len();
-        own.init.len() == other.init.len()
-            && objects(own) == objects(other)
-            && self.running.as_ref().map(key) == ask.running.map(key)
-            && self.old.as_deref() == ask.old.filter(|_| ask.stay_close)
-            && own.init.iter().zip(&other.init).all(|(own, other)| same(own, other))
-            && own.objects.iter().zip(&other.objects).all(|(own, other)| {
-                let types = own.r#type.alternatives.iter().map(|name| &name.name);
-                own.identifier.name == other.identifier.name
-                    && types.eq(other.r#type.alternatives.iter().map(|name| &name.name))
+        left.init.len() == right.init.len()
+            && objects(left) == objects(right)
+            && self.running.as_ref().map(relevant_part) == question.running.map(relevant_part)
+            && self.old.as_deref() == question.old.filter(|_| question.stay_close)
+            && left.init.iter().zip(&right.init).all(|(left, right)| are_equal(left, right))
+            && left.objects.iter().zip(&right.objects).all(|(left, right)| {
+                let types = left.r#type.alternatives.iter().map(|name| &name.name);
+                left.identifier.name == right.identifier.name
+                    && types.eq(right.r#type.alternatives.iter().map(|name| &name.name))
             })
     }
 }
 
-/// What of the action under way a plan depends on: not the number that it was requested with.
-fn key(running: &Running) -> (&PlannedStep, &num_rational::BigRational) {
+/// Part of the action under way that plans depend on. The numbers of action and request are irrelevant.
+fn relevant_part(running: &Running) -> (&PlannedStep, &num_rational::BigRational) {
     (&running.step, &running.progress)
 }
 
-fn same(own: &InitialElement, other: &InitialElement) -> bool {
+fn are_equal(left: &InitialElement, right: &InitialElement) -> bool {
     use InitialElement::{Fact, NegatedFact, Timed, Value};
-    match (own, other) {
-        (Fact(own), Fact(other)) | (NegatedFact(own), NegatedFact(other)) => same_atom(own, other),
-        (Value(own, a, _), Value(other, b, _)) => a == b && same_atom(own, other),
-        (Timed(s, own, a, _), Timed(t, other, b, _)) => s == t && a == b && same_atom(own, other),
+    match (left, right) {
+        (Fact(left), Fact(right)) | (NegatedFact(left), NegatedFact(right)) => are_equal_atoms(left, right),
+        (Value(left, a, _), Value(right, b, _)) => a == b && are_equal_atoms(left, right),
+        (Timed(s, left, a, _), Timed(t, right, b, _)) => s == t && a == b && are_equal_atoms(left, right),
         _ => false,
     }
 }
 
-fn same_atom(own: &Atom, other: &Atom) -> bool {
+fn are_equal_atoms(left: &Atom, right: &Atom) -> bool {
     let name = |term: &Term| match term {
         Term::Constant(identifier) | Term::Variable(identifier) => identifier.name.clone(),
     };
-    own.predicate.name == other.predicate.name
-        && own.arguments.iter().map(name).eq(other.arguments.iter().map(name))
+    left.predicate.name == right.predicate.name
+        && left.arguments.iter().map(name).eq(right.arguments.iter().map(name))
 }

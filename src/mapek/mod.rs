@@ -1,14 +1,14 @@
-//! The adaptation loop: events in, adaptations out. Monitor, Analyze, Plan, Execute, over shared Knowledge \[1, 2\].
+//! The adaptation loop: Monitor, Analyze, Plan, Execute over shared Knowledge (MAPE-K) \[1, 2\].
 //!
-//! A [`Loop`] is fed with [`Observation`]s and answers each with [`Answer`]s, some of which are [`Effect`]s: things that
-//! the managed system is to do. It has no clock, no thread, no file and no global state; the same observations at
-//! the same times give the same answers. [`drive`] joins it with an [`Observer`], an [`Effector`] and a [`Clock`].
+//! A [`Loop`] receives [`Observation`]s and returns [`Answer`]s. Some of them are [`Effect`]s: requests to the managed
+//! system. The loop has no clock, thread, file or global state: the same observations at the same times produce the
+//! same answers. [`drive`] connects it to an [`Observer`], an [`Effector`] and a [`Clock`].
 //!
-//! A plan is looked for when the plan at hand cannot be kept: it uses a design that is not available any more, an
-//! objective is in error, an action has failed, the goal has changed, or the validator rejects the plan for the state as it
-//! is (Algorithm 1 of the paper). It is also looked for when a design comes back, and adopted then if it is better by
-//! the mission's minimum benefit. A design that is lost and that the plan does not use is not a reason: of fewer choices none is
-//! better.
+//! The loop replans if the current plan cannot be kept: the plan uses an unavailable design, an objective is in error,
+//! an action has failed, the goal has changed, or the validator rejects the plan in the current state (Algorithm 1 of
+//! \[2\]). It also plans if a design becomes available again, and adopts that plan if its benefit is at least the
+//! minimum benefit of the mission. The loss of a design that the plan does not use is not a reason, because losing
+//! alternatives cannot improve the optimum.
 //!
 //! - \[1\] J. Kephart, D. Chess: The vision of autonomic computing, Computer 36, 2003.
 //! - \[2\] Bozhinoski et al., MROS: Runtime Adaptation For Robot Control Architectures, Advanced Robotics 36, 2022.
@@ -45,7 +45,7 @@ mod step;
 mod think;
 mod watch;
 
-pub(crate) use analyze::{available, changes, doubts, inferred, ruled_out, said, unavailable};
+pub(crate) use analyze::{available, changes, doubts, fact_text, inferred, ruled_out, unavailable};
 pub use answer::{Answer, Command, DesignChange, Effect, ObjectiveChange, OverdueOutcome};
 pub use beliefs::{Beliefs, Outlook};
 pub use control::Loop;

@@ -1,4 +1,4 @@
-//! Monitor: events to changes of what is believed.
+//! Monitor: applies events to the beliefs.
 
 use std::collections::{BTreeSet, HashMap, HashSet};
 
@@ -22,10 +22,10 @@ use crate::message::{Message, did_you_mean};
 use crate::mission::Mission;
 use crate::number;
 
-/// The properties from which availability and statuses are read, by local name.
+/// Local names of properties that determine availability and statuses.
 const WATCHED: [&str; 5] = ["fd_realisability", "fd_available", "o_status", "o_updatable", "fg_status"];
 
-/// What else of the knowledge base plans rest on, by local name.
+/// Local names of other properties and classes that plans depend on.
 const PLANNED: [&str; 9] = [
     "solvesF",
     "requiresF",
@@ -38,23 +38,23 @@ const PLANNED: [&str; 9] = [
     "FunctionDesign",
 ];
 
-/// Values, by local name: those that were not reported are estimations.
+/// Local names of properties with values. Derived values are estimations; reported values are stated.
 const VALUES: [&str; 2] = ["hasValue", "qa_has_value"];
 
-/// What events are held against.
+/// Constant data for the interpretation of events, with caches.
 #[derive(Debug, Clone)]
 pub(super) struct Monitor {
     /// Attributes of the knowledge base, by local name and by IRI.
     pub(super) attributes: BTreeSet<String>,
-    /// Facts and functions that were found to fit the domain, as text.
+    /// Facts and functions that are known to fit the domain, as text.
     checked: HashSet<String>,
     pub(super) filters: Filters,
-    /// Names under which components have reported, with their local names.
+    /// Cache of local names of components, by the reported name.
     pub(super) components: HashMap<String, String>,
 }
 
 impl Monitor {
-    /// For the reports of a robot with this mission.
+    /// Creates the monitor of a mission.
     pub(super) fn new(mission: &Mission, settings: &Settings) -> Self {
         let kinds =
             mission.knowledge().map(|knowledge| knowledge.view().attribute_types()).unwrap_or_default();
@@ -63,41 +63,41 @@ impl Monitor {
         Self { attributes, checked: HashSet::new(), filters, components: HashMap::new() }
     }
 
-    /// Filters of what is measured and of what components report.
+    /// Filters for measurements and component reports.
     pub(super) fn filters(&self) -> &Filters {
         &self.filters
     }
 
-    /// Takes over what filters have held back and what is due at the time of the beliefs.
+    /// Applies reports that were held by filters and have become due.
     pub(super) fn elapse(&mut self, beliefs: &mut Beliefs, changes: &mut Changes) -> Vec<Refusal> {
         let due = self.filters.elapse(&mut beliefs.filters, beliefs.now, &mut changes.filtered);
-        let mut taking = Taking { monitor: self, beliefs, changes };
-        due.into_iter().filter_map(|accepted| taking.accept(accepted).err()).collect()
+        let mut update = BeliefUpdate { monitor: self, beliefs, changes };
+        due.into_iter().filter_map(|accepted| update.accept(accepted).err()).collect()
     }
 
-    /// Takes an event over into what is believed, and notes what that changes.
+    /// Applies an event to the beliefs, and records the changes.
     ///
     /// # Errors
-    /// Why it changes nothing.
-    pub(super) fn take(
+    /// The event does not fit the mission or the state of the loop. Nothing has changed.
+    pub(super) fn apply(
         &mut self,
         beliefs: &mut Beliefs,
         event: &Event,
         changes: &mut Changes,
     ) -> Result<(), Refusal> {
-        Taking { monitor: self, beliefs, changes }.take(event)
+        BeliefUpdate { monitor: self, beliefs, changes }.apply(event)
     }
 }
 
-/// One event being taken over.
-pub(super) struct Taking<'a> {
+/// Application of one event to the beliefs.
+pub(super) struct BeliefUpdate<'a> {
     pub(super) monitor: &'a mut Monitor,
     pub(super) beliefs: &'a mut Beliefs,
     pub(super) changes: &'a mut Changes,
 }
 
-impl Taking<'_> {
-    fn take(&mut self, event: &Event) -> Result<(), Refusal> {
+impl BeliefUpdate<'_> {
+    fn apply(&mut self, event: &Event) -> Result<(), Refusal> {
         match event {
             Event::Measured { attribute, value } => self.sampled(attribute, value),
             Event::Component { component, status } => self.component(component, *status),
@@ -105,22 +105,22 @@ impl Taking<'_> {
                 self.report("design", design, RobotReport::Design(*realisable))
             }
             Event::Observed { function, design } => self.observed(function, design.as_deref()),
-            Event::ReconfigurationFailed { effect } => self.not_configured(*effect),
-            Event::Started { action } => self.begun(*action).map(|_| ()),
+            Event::ReconfigurationFailed { effect } => self.failed_reconfiguration(*effect),
+            Event::Started { action } => self.confirm_started(*action).map(|_| ()),
             Event::Progress { action, fraction } => {
-                self.begun(*action)?.progressed = true;
+                self.confirm_started(*action)?.progressed = true;
                 self.progress(fraction)
             }
             Event::Succeeded { action } => self.succeeded(*action),
             Event::Failed { action, reason } => {
                 let reason = if reason.is_empty() { String::new() } else { format!(": {reason}") };
                 self.failed(*action)?;
-                self.changes.must.push(format!("action {action} has failed{reason}"));
+                self.changes.reasons.push(format!("action {action} has failed{reason}"));
                 Ok(())
             }
             Event::Cancelled { action } => {
                 self.ended_early(*action)?;
-                self.changes.must.push(format!("action {action} was cancelled"));
+                self.changes.reasons.push(format!("action {action} was cancelled"));
                 Ok(())
             }
             Event::Goal { goal } => {
@@ -128,7 +128,7 @@ impl Taking<'_> {
                 self.beliefs.mission.set_goal(condition);
                 self.beliefs.goal = Some(goal.clone());
                 self.changes.goal = true;
-                self.changes.must.push("the goal has changed".to_owned());
+                self.changes.reasons.push("the goal has changed".to_owned());
                 Ok(())
             }
             Event::Fact { name, value } => self.fact(name, value),
@@ -142,7 +142,7 @@ impl Taking<'_> {
         }
     }
 
-    /// Tells the knowledge base something about one of its individuals.
+    /// Updates the knowledge base with a report about one of its individuals.
     pub(super) fn report(&mut self, kind: &str, name: &str, report: RobotReport) -> Result<(), Refusal> {
         let Some(knowledge) = self.beliefs.mission.knowledge_mut() else {
             let text = format!("there is no knowledge base that has a {kind} `{name}`");
@@ -150,28 +150,28 @@ impl Taking<'_> {
         };
         let was_known = knowledge.fault().is_none();
         let delta = knowledge.take(name, report).map_err(|message| fault(&message))?;
-        self.note(&delta, was_known);
+        self.record_delta(&delta, was_known);
         Ok(())
     }
 
-    /// An effect has arrived.
+    /// Records the acknowledgement of an effect.
     fn acknowledged(&mut self, effect: u64) -> Result<(), Refusal> {
         match self.beliefs.acknowledge(effect) {
             Receipt::Unknown => Err(Refusal::new("M305", format!("there was no effect {effect}"))),
-            Receipt::Taken => Ok(()),
+            Receipt::Recorded => Ok(()),
             Receipt::Doubtful(function) => {
                 let running = self.beliefs.running.as_ref();
-                if running.is_some_and(|own| own.step.design(&function).is_some()) {
-                    self.changes.must.push(format!("it is not certain which design {function} has"));
+                if running.is_some_and(|running_action| running_action.step.design(&function).is_some()) {
+                    self.changes.reasons.push(format!("it is not certain which design {function} has"));
                 }
                 Ok(())
             }
         }
     }
 
-    /// A function could not take the design that was asked for: it has the one that was acknowledged before, and nobody asks for the
-    /// other again until the function says that it can take it.
-    fn not_configured(&mut self, effect: u64) -> Result<(), Refusal> {
+    /// Records that a reconfiguration has failed: the function has the previously acknowledged design, and the
+    /// requested one is marked as unrealisable until a report says otherwise.
+    fn failed_reconfiguration(&mut self, effect: u64) -> Result<(), Refusal> {
         if self.beliefs.mission.knowledge().is_none() {
             return Err(Refusal::new("M306", "there is no knowledge base that has designs"));
         }
@@ -190,7 +190,7 @@ impl Taking<'_> {
             let was_known = knowledge.fault().is_none();
             let delta =
                 knowledge.take(attribute, RobotReport::measured(value)).map_err(|message| fault(&message))?;
-            self.note(&delta, was_known);
+            self.record_delta(&delta, was_known);
             if let Some(function) = self.beliefs.mission.fed_by(local_name(attribute)) {
                 self.changes.facts = true;
                 if self.beliefs.mission.value(&function).is_some() {
@@ -202,7 +202,7 @@ impl Taking<'_> {
         if self.beliefs.mission.is_function(attribute) {
             return self.fact(attribute, &number::decimal(value));
         }
-        let known: Vec<&str> =
+        let attributes: Vec<&str> =
             self.monitor.attributes.iter().map(String::as_str).filter(|name| !name.contains(':')).collect();
         let functions: Vec<&str> = self
             .beliefs
@@ -210,21 +210,23 @@ impl Taking<'_> {
             .domain()
             .functions
             .iter()
-            .filter(|own| own.parameters.is_empty())
-            .map(|own| own.identifier.name.as_str())
+            .filter(|declaration| declaration.parameters.is_empty())
+            .map(|declaration| declaration.identifier.name.as_str())
             .collect();
-        let meant = did_you_mean(attribute, known.iter().chain(&functions).copied());
+        let suggestion = did_you_mean(attribute, attributes.iter().chain(&functions).copied());
         let text = format!(
-            "there is no attribute or function `{attribute}`; attributes are: {}{meant}",
-            known.join(", ")
+            "there is no attribute or function `{attribute}`; attributes are: {}{suggestion}",
+            attributes.join(", ")
         );
         Err(Refusal::new("M306", text))
     }
 
-    /// What a change of the knowledge base matters for; and whether it was known before what follows.
-    fn note(&mut self, delta: &Delta, was_known: bool) {
+    /// Records the consequences of a change of the knowledge base. `was_known` says whether the conclusions were
+    /// complete before.
+    fn record_delta(&mut self, delta: &Delta, was_known: bool) {
         let Some(knowledge) = self.beliefs.mission.knowledge() else { return };
         let is_known = knowledge.fault().is_none();
+        // If the conclusions were or are incomplete, the delta does not contain all changes.
         self.changes.base =
             self.changes.base.max(if was_known && is_known { Base::Stated } else { Base::Watched });
         let engine = knowledge.engine();
@@ -236,33 +238,35 @@ impl Taking<'_> {
             }
             self.changes.facts |= PLANNED.contains(&name);
         }
+        // A derived value is an estimation, which plans depend on. A reported value is a measurement.
         let is_concluded = |fact: &Fact| VALUES.contains(&name(fact)) && !engine.is_asserted(fact);
         let is_replaced = |gone: &Fact| {
-            let same = |new: &Fact| new.predicate == gone.predicate && new.arguments[0] == gone.arguments[0];
-            delta.insert.iter().any(same)
+            let is_successor =
+                |new: &Fact| new.predicate == gone.predicate && new.arguments[0] == gone.arguments[0];
+            delta.insert.iter().any(is_successor)
         };
         let is_lost = |fact: &Fact| VALUES.contains(&name(fact)) && !is_replaced(fact);
         self.changes.facts |= delta.insert.iter().any(is_concluded) || delta.delete.iter().any(is_lost);
     }
 
-    /// The action with that number, which must be under way.
+    /// Returns the action under way, which must have this number.
     fn running(&mut self, action: u64) -> Result<&mut Running, Refusal> {
         let running = self.beliefs.running.as_mut().filter(|running| running.action == action);
         running.ok_or_else(|| Refusal::new("M305", format!("no action {action} is under way")))
     }
 
-    /// The action with that number, which has started: its request has arrived.
-    fn begun(&mut self, action: u64) -> Result<&mut Running, Refusal> {
+    /// Returns the action under way after a report that it has started, which also confirms its request.
+    fn confirm_started(&mut self, action: u64) -> Result<&mut Running, Refusal> {
         let request = self.running(action)?.request;
         self.beliefs.confirm_request(request);
         self.beliefs.reports_actions = true;
         let now = self.beliefs.now;
         let running = self.running(action)?;
-        (running.heard, running.overdue, running.started) = (now, 0, true);
+        (running.last_report, running.overdue, running.started) = (now, 0, true);
         Ok(running)
     }
 
-    /// Ends the action with that number; nothing about it is outstanding any more but reconfigurations, which belong to functions.
+    /// Ends an action. Its effects are no longer outstanding, except reconfigurations, which belong to functions.
     fn end(&mut self, action: u64) -> Result<Running, Refusal> {
         self.running(action)?;
         let is_moot = |effect: &Effect| {
@@ -272,17 +276,19 @@ impl Taking<'_> {
         let outstanding = &self.beliefs.outstanding;
         self.beliefs.waits.retain(|number, _| outstanding.contains_key(number));
         self.changes.ended = true;
-        let none = || Refusal::new("M305", format!("no action {action} is under way"));
-        self.beliefs.running.take().ok_or_else(none)
+        let refusal = || Refusal::new("M305", format!("no action {action} is under way"));
+        self.beliefs.running.take().ok_or_else(refusal)
     }
 
     fn succeeded(&mut self, action: u64) -> Result<(), Refusal> {
         let request = self.running(action)?.request;
         self.beliefs.confirm_request(request);
-        // What it has not used up yet is used up now; the robot knows better than our conditions whether it has succeeded.
+        // Completes the remaining increases and decreases. The report of success counts even if conditions are
+        // violated.
         self.progress(&BigRational::from_integer(1.into()))?;
         let running = self.end(action)?;
         if let Some(mut advance) = self.advance(&running.step) {
+            // Increases and decreases were applied with the progress.
             advance.values.retain(|change| change.assigned);
             let mut init = self.beliefs.mission.problem().init.clone();
             advance.apply(&mut init);
@@ -290,51 +296,52 @@ impl Taking<'_> {
         }
         self.beliefs.failures = None;
         if running.cancelling || running.suspended {
-            let what = if running.cancelling { "cancelled" } else { "suspended" };
-            self.changes.must.push(format!("action {action} was to be {what}, but has succeeded"));
+            let expected_end = if running.cancelling { "cancelled" } else { "suspended" };
+            self.changes.reasons.push(format!("action {action} was to be {expected_end}, but has succeeded"));
         }
         Ok(())
     }
 
     fn failed(&mut self, action: u64) -> Result<(), Refusal> {
         let step = self.ended_early(action)?.step;
+        // Only consecutive failures of one step count.
         let before = self.beliefs.failures.take().filter(|(failed, _)| *failed == step);
         let count = before.map_or(1, |(_, count)| count + 1);
         self.beliefs.failures = Some((step, count));
         Ok(())
     }
 
-    /// An action has ended before its end: what it has used up is gone, and its other effects have not taken place.
+    /// Ends an action without success: its progress has consumed resources, and its other effects do not take place.
     fn ended_early(&mut self, action: u64) -> Result<Running, Refusal> {
         let running = self.end(action)?;
         self.changes.facts = true;
         Ok(running)
     }
 
-    /// So much of the action under way is done, and what that uses up is used up.
+    /// Sets the progress of the action under way, and changes numeric values in proportion.
     fn progress(&mut self, fraction: &BigRational) -> Result<(), Refusal> {
         let Some(running) = &mut self.beliefs.running else { return Ok(()) };
-        let more = fraction - &running.progress;
+        let increment = fraction - &running.progress;
         running.progress.clone_from(fraction);
         let step = running.step.clone();
         let Some(advance) = self.advance(&step) else { return Ok(()) };
         for change in advance.values.into_iter().filter(|change| !change.assigned) {
             let name = change.text.trim_matches(['(', ')']).to_owned();
             if let (Some(now), Some(before)) = (self.beliefs.mission.value(&name), change.before) {
-                let value = number::rounded(&(now + (change.after - before) * &more));
+                let value = number::rounded(&(now + (change.after - before) * &increment));
                 self.set(&name, &number::decimal(&value))?;
             }
         }
         Ok(())
     }
 
-    /// What a whole action changes, whether or not its conditions hold.
+    /// Effects of a whole action, regardless of its conditions.
     fn advance(&self, step: &PlannedStep) -> Option<Advance> {
         let mission = &self.beliefs.mission;
         advance(mission.domain(), &self.beliefs.filled(), &step.to_plan_step(), true).ok()
     }
 
-    /// A fact or a value of the problem is reported.
+    /// Applies a report of a fact or a value of the problem.
     fn fact(&mut self, name: &str, value: &str) -> Result<(), Refusal> {
         let mut words = name.split_whitespace();
         let name = words.by_ref().collect::<Vec<_>>().join(" ");
@@ -342,7 +349,7 @@ impl Taking<'_> {
             let predicate = name.split(' ').next().unwrap_or(&name).to_owned();
             let before = self.facts(&predicate);
             self.set(&name, value)?;
-            // A report of what is known is no change.
+            // A report of a known fact is not a change.
             if self.facts(&predicate) != before {
                 self.changes.predicates = true;
                 self.changes.facts = true;
@@ -359,7 +366,7 @@ impl Taking<'_> {
         Ok(())
     }
 
-    /// The facts of a predicate that hold, as words in alphabetical order.
+    /// Facts of a predicate, as sequences of words.
     fn facts(&self, predicate: &str) -> BTreeSet<Vec<String>> {
         let predicate = Name::new(predicate);
         let word = |term: &Term| match term {
@@ -374,7 +381,7 @@ impl Taking<'_> {
         self.beliefs.mission.problem().init.iter().filter_map(words).collect()
     }
 
-    /// Sets a fact or value of the problem, if the problem is still right then.
+    /// Sets a fact or a value of the problem. The previous state is restored if the result does not fit the domain.
     fn set(&mut self, name: &str, value: &str) -> Result<(), Refusal> {
         let mission = &mut self.beliefs.mission;
         let before = mission.problem().init.clone();
@@ -410,7 +417,7 @@ mod tests {
     use crate::mapek::settings::Settings;
     use crate::setup::Setup;
 
-    /// What an event changes in the mission `ugv`; or the code of its refusal.
+    /// Applies an event to the mission `ugv`, and compares the changes or the code of the refusal.
     fn check(line: &str, expected: Result<(Base, [bool; 3], &[&str]), &str>) {
         let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("missions/ugv.toml");
         let mission = Setup::read(&manifest).expect("the mission is read").mission;
@@ -418,21 +425,21 @@ mod tests {
             (Monitor::new(&mission, &Settings::default()), Beliefs::new(mission));
         let mut changes = Changes::default();
         let event = Observation::parse(line).events.remove(0).expect("an event");
-        let taken = monitor.take(&mut beliefs, &event, &mut changes);
-        let found = taken.map_err(|refusal| refusal.code);
-        let Changes { base, facts, predicates, goal, must, .. } = &changes;
-        assert_eq!(found.is_err() || line.contains("tick"), !changes.any(), "{line}");
-        let must: Vec<&str> = must.iter().map(String::as_str).collect();
-        let found = found.map(|()| (*base, [*facts, *predicates, *goal], &must[..]));
-        assert_eq!(found, expected, "{line}");
+        let outcome = monitor.apply(&mut beliefs, &event, &mut changes);
+        let result = outcome.map_err(|refusal| refusal.code);
+        let Changes { base, facts, predicates, goal, reasons, .. } = &changes;
+        assert_eq!(result.is_err() || line.contains("tick"), !changes.any(), "{line}");
+        let reasons: Vec<&str> = reasons.iter().map(String::as_str).collect();
+        let result = result.map(|()| (*base, [*facts, *predicates, *goal], &reasons[..]));
+        assert_eq!(result, expected, "{line}");
     }
 
     #[test]
-    fn events_change_what_is_believed() {
-        let none = [false, false, false];
+    fn events_change_the_beliefs() {
+        let unchanged = [false, false, false];
         check(
             r#"{"event":"component_status","component":"c_kinect","status":"FALSE"}"#,
-            Ok((Base::Watched, none, &[])),
+            Ok((Base::Watched, unchanged, &[])),
         );
         check(r#"{"event":"component_status","component":"c_nothing","status":"FALSE"}"#, Err("M306"));
         check(
@@ -445,6 +452,6 @@ mod tests {
         );
         check(r#"{"event":"action_failed","action":1}"#, Err("M305"));
         check(r#"{"event":"acknowledged","effect":1}"#, Err("M305"));
-        check(r#"{"event":"tick"}"#, Ok((Base::Nothing, none, &[])));
+        check(r#"{"event":"tick"}"#, Ok((Base::Nothing, unchanged, &[])));
     }
 }

@@ -1,7 +1,6 @@
-//! Plan: the situation to a jointly optimal plan, proved, or to the reason why there is none.
+//! Plan: computes a jointly optimal plan with a proof of its status, or the reason for its absence.
 //!
-//! Plans that the journal has recorded are taken from there and not made again: a plan that was cut short by a time
-//! limit would not come out twice.
+//! Plans recorded in the journal are replayed: a plan cut short by a time limit is not reproducible.
 
 use std::borrow::Cow;
 use std::collections::VecDeque;
@@ -9,108 +8,110 @@ use std::time::Duration;
 
 use planner::{Config, Limits, Status, optimize};
 
-use crate::mapek::ask::{Ask, Outcome};
+use crate::mapek::ask::{Outcome, Question};
 use crate::mapek::live::Live;
-use crate::mapek::memo::{Asked, Memo};
+use crate::mapek::memo::{Memo, StoredQuestion};
 use crate::mapek::resume::{resume, resumed_goal};
 use crate::mapek::step::PlannedStep;
 use crate::mapek::watch::Watch;
 use crate::mission::ground_with;
 use crate::number;
 
-/// Upper limit on how often the time limit of a search is doubled.
+/// Upper limit on the number of doublings of the time limit.
 const MAX_DOUBLINGS: u32 = 3;
 
-/// Makes plans.
+/// Planner of the loop, with its caches.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Planner {
-    /// How long one plan may take.
+    /// Time limit of one plan.
     pub time_limit: Option<Duration>,
-    /// Number of searches in a row that were cut short: the time limit doubles with each.
+    /// Number of consecutive searches that hit their time limit. Each doubles the next time limit.
     pub attempt: u32,
-    /// Limits at which all planning ends.
+    /// Limits in addition to the time limit of one plan.
     pub limits: Limits,
-    /// Plans that were made before, to be used again in this order.
+    /// Recorded plans for replay, in order.
     pub recorded: VecDeque<Outcome>,
-    /// Plans made since the last look.
-    pub made: Vec<Outcome>,
-    /// Whether plans are made only where no search is needed for them.
-    pub is_idle: bool,
-    /// Whether a plan was needed that would have taken a search.
+    /// Plans computed for the current decision, for the journal.
+    pub computed: Vec<Outcome>,
+    /// Whether searches are forbidden: only recorded, prepared and cached plans are used.
+    pub forbids_search: bool,
+    /// Whether a plan was missing because searches are forbidden.
     pub is_missing: bool,
-    /// The questions that were asked since the last look, if they are kept, with the answers.
-    pub asked: Option<Vec<(Asked, Outcome)>>,
-    /// Questions that were answered elsewhere, in the order in which they come up.
-    pub prepared: VecDeque<(Asked, Outcome)>,
-    /// What is kept from one plan to the next.
+    /// Questions of the current deliberation with their answers, recorded if present.
+    pub question_log: Option<Vec<(StoredQuestion, Outcome)>>,
+    /// Questions with answers that another thread has computed, in order.
+    pub prepared: VecDeque<(StoredQuestion, Outcome)>,
+    /// Incremental planner, kept between plans.
     pub live: Live,
-    /// Plans of situations that may come back.
+    /// Cache of plans for recurring situations.
     pub memo: Memo,
-    /// Who looks on.
+    /// Handle for observers of the progress.
     pub watch: Watch,
 }
 
 impl Planner {
-    /// The best plan for a situation.
-    pub fn plan(&mut self, ask: &Ask<'_>) -> Outcome {
-        let recorded = self.recorded.pop_front().or_else(|| self.prepared(ask));
-        let known = recorded.or_else(|| self.memo.recall(ask));
-        if known.is_none() && self.is_idle {
+    /// Returns a recorded, prepared or cached plan, or computes one.
+    pub fn plan(&mut self, question: &Question<'_>) -> Outcome {
+        // Recorded and prepared outcomes have an order, so that they are consumed even if the memo has the answer.
+        let recorded = self.recorded.pop_front().or_else(|| self.prepared(question));
+        let stored_outcome = recorded.or_else(|| self.memo.recall(question));
+        if stored_outcome.is_none() && self.forbids_search {
             self.is_missing = true;
-            return Outcome::none(false, "no plan was looked for".to_owned());
+            return Outcome::no_plan(false, "no plan was looked for".to_owned());
         }
-        let outcome = known.unwrap_or_else(|| self.solve(ask));
-        if let Some(asked) = &mut self.asked {
-            asked.push((Asked::new(ask), outcome.clone()));
+        let outcome = stored_outcome.unwrap_or_else(|| self.solve(question));
+        if let Some(question_log) = &mut self.question_log {
+            question_log.push((StoredQuestion::new(question), outcome.clone()));
         }
-        self.made.push(outcome.clone());
+        self.computed.push(outcome.clone());
         outcome
     }
 
-    /// The answer that was found elsewhere. Time has passed since, and the action under way has gone on: then the plan serves, but is
-    /// not proved to be the best.
-    fn prepared(&mut self, ask: &Ask<'_>) -> Option<Outcome> {
-        let (asked, mut outcome) = self.prepared.pop_front()?;
-        if !asked.is_about(ask) {
+    /// Returns the next answer of another thread, if it is about the same action under way. If the situation has
+    /// changed since, for example by progress of the action, the plan is not proved optimal.
+    fn prepared(&mut self, question: &Question<'_>) -> Option<Outcome> {
+        let (answered, mut outcome) = self.prepared.pop_front()?;
+        if !answered.has_same_action(question) {
             return None;
         }
-        if asked.is(ask) {
-            self.memo.note(ask, &outcome);
+        if answered.equals(question) {
+            self.memo.store(question, &outcome);
         } else {
             outcome.proved = false;
         }
         Some(outcome)
     }
 
-    fn solve(&mut self, ask: &Ask<'_>) -> Outcome {
+    fn solve(&mut self, question: &Question<'_>) -> Outcome {
         let time_limit =
             self.time_limit.map(|time| time.saturating_mul(1 << self.attempt.min(MAX_DOUBLINGS)));
         let limits = time_limit.map_or_else(|| self.limits.clone(), |time| self.limits.within(time));
         self.watch.begin();
         let outcome = self
             .live
-            .plan(ask, &limits, &self.watch)
-            .unwrap_or_else(|| from_scratch(ask, limits, &self.watch));
+            .plan(question, &limits, &self.watch)
+            .unwrap_or_else(|| from_scratch(question, limits, &self.watch));
         self.watch.end();
-        self.memo.note(ask, &outcome);
+        self.memo.store(question, &outcome);
         outcome
     }
 }
 
-/// The best plan of a task that is ground for it alone.
-pub(super) fn from_scratch(ask: &Ask<'_>, limits: Limits, watch: &Watch) -> Outcome {
-    let none = Outcome::none;
-    let (mut domain, mut problem) = (Cow::Borrowed(ask.mission.domain()), Cow::Borrowed(ask.problem));
-    if let Some(running) = ask.running {
+/// Plans in a task that is ground for this question.
+pub(super) fn from_scratch(question: &Question<'_>, limits: Limits, watch: &Watch) -> Outcome {
+    let no_plan = Outcome::no_plan;
+    let (mut domain, mut problem) =
+        (Cow::Borrowed(question.mission.domain()), Cow::Borrowed(question.problem));
+    if let Some(running) = question.running {
         domain = Cow::Owned(resume(&domain, &running.step, &running.progress));
         let goal = resumed_goal(&problem.goal);
         problem.to_mut().goal = goal;
     }
-    let task = match ground_with(ask.mission, &domain, &problem, &[], &limits) {
+    let task = match ground_with(question.mission, &domain, &problem, &[], &limits) {
         Ok(task) => task,
         Err(messages) => {
             let texts: Vec<&str> = messages.iter().map(|message| message.message.as_str()).collect();
-            return none(false, texts.join("; "));
+            return no_plan(false, texts.join("; "));
         }
     };
     let config = Config::default().with_limits(limits);
@@ -121,12 +122,12 @@ pub(super) fn from_scratch(ask: &Ask<'_>, limits: Limits, watch: &Watch) -> Outc
     match (solution.status, solution.plan) {
         (status, Some(plan)) => Outcome {
             cost: number::of_plan(&plan.cost),
-            steps: Some(plan.steps.iter().map(|step| PlannedStep::new(ask.mission, step)).collect()),
+            steps: Some(plan.steps.iter().map(|step| PlannedStep::new(question.mission, step)).collect()),
             proved: status == Status::Optimal,
             because: String::new(),
             blocking: Vec::new(),
         },
-        (Status::Unsolvable, None) => none(true, "no plan reaches the goal".to_owned()),
-        _ => none(false, "the time limit came before any plan".to_owned()),
+        (Status::Unsolvable, None) => no_plan(true, "no plan reaches the goal".to_owned()),
+        _ => no_plan(false, "the time limit came before any plan".to_owned()),
     }
 }

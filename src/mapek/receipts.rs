@@ -1,48 +1,49 @@
-//! What was heard of reconfigurations: which was acknowledged last for each function, and which were superseded without an answer.
-//! [`super::acknowledge`] says what is believed of them.
+//! History of reconfigurations per function: the last acknowledged one, and the superseded ones without an answer.
+//! [`super::acknowledge`] derives the believed design from it.
 
 use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 
-/// Upper limit on the superseded reconfigurations that are kept for each function.
+/// Upper limit on the recorded superseded reconfigurations per function.
 const MAX_SUPERSEDED: usize = 16;
 
-/// Acknowledgements so far.
+/// History of acknowledgements.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(super) struct Receipts {
-    /// Whether a reconfiguration was ever acknowledged by its number.
+    /// Whether any reconfiguration was acknowledged by its number.
     pub(super) by_number: bool,
     pub(super) functions: BTreeMap<String, Received>,
 }
 
-/// Acknowledgements of one function's reconfigurations.
+/// History of the reconfigurations of one function.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(super) struct Received {
     pub(super) last: Option<Acknowledged>,
-    /// Reconfigurations that were superseded and never answered, by number, with their design.
+    /// Designs of superseded reconfigurations without an answer, by number.
     pub(super) superseded: BTreeMap<u64, String>,
-    /// The greatest number of an effect when the function was seen with a design that was neither the believed nor the pending one;
-    /// 0 if it never was. Such a reconfiguration may have been carried out before or after.
+    /// Greatest number of an effect at the time when the function was observed with a design that was neither believed
+    /// nor pending; 0 if it never was. It is unknown whether reconfigurations up to this number were carried out before
+    /// or after the observation.
     pub(super) doubted: u64,
 }
 
-/// The greatest reconfiguration that was acknowledged.
+/// The acknowledged reconfiguration with the greatest number.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Acknowledged {
     pub(super) effect: u64,
     pub(super) design: String,
-    /// The design before, where it is known.
+    /// Previous design, if known.
     pub(super) before: Option<Before>,
-    /// Whether it has failed after it was acknowledged.
+    /// Whether it was reported as failed after its acknowledgement.
     pub(super) failed: bool,
 }
 
-/// The design that a function had before a reconfiguration.
+/// Design of a function before a reconfiguration.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Before {
     pub(super) design: String,
-    /// Number of the reconfiguration by which the function had got it; `None` if it was observed.
+    /// Number of the reconfiguration that had set this design; `None` if it was observed.
     pub(super) effect: Option<u64>,
 }
 
@@ -52,13 +53,13 @@ impl Receipts {
         self.by_number
     }
 
-    /// Returns `true` if a reconfiguration of the function was superseded and never answered. It may still be on its way, also when the function
-    /// was observed since.
+    /// Returns `true` if a reconfiguration of the function was superseded without an answer. It may still arrive, even if
+    /// the function was observed since.
     pub(super) fn has_superseded(&self, function: &str) -> bool {
-        self.functions.get(function).is_some_and(|own| !own.superseded.is_empty())
+        self.functions.get(function).is_some_and(|history| !history.superseded.is_empty())
     }
 
-    /// Notes that a reconfiguration was superseded before it was answered.
+    /// Records a reconfiguration that was superseded before it was answered.
     pub(super) fn supersede(&mut self, effect: u64, function: String, design: String) {
         let superseded = &mut self.functions.entry(function).or_default().superseded;
         superseded.insert(effect, design);
@@ -67,42 +68,42 @@ impl Receipts {
         }
     }
 
-    /// Notes that a function was seen. If no reconfiguration is pending it is certain which design it has; otherwise acknowledgements
-    /// of those up to `doubted` are not.
+    /// Records an observation of a function, which may cross messages: acknowledgements up to number `doubted` are then
+    /// uncertain, and so are those of superseded reconfigurations if none is pending.
     pub(super) fn observe(&mut self, function: &str, doubted: Option<u64>, is_pending: bool) {
-        if !is_pending && let Some(own) = self.functions.get_mut(function) {
-            let last = own.superseded.last_key_value().map_or(0, |(number, _)| *number);
-            own.doubted = own.doubted.max(last);
+        if !is_pending && let Some(history) = self.functions.get_mut(function) {
+            let last = history.superseded.last_key_value().map_or(0, |(number, _)| *number);
+            history.doubted = history.doubted.max(last);
         }
         if let Some(doubted) = doubted {
             self.functions.entry(function.to_owned()).or_default().doubted = doubted;
         }
     }
 
-    /// Numbers of the reconfigurations of a function that were superseded and never answered.
+    /// Numbers of superseded reconfigurations of a function without an answer.
     pub(super) fn unanswered(&self, function: &str) -> impl Iterator<Item = &u64> {
-        self.functions.get(function).into_iter().flat_map(|own| own.superseded.keys())
+        self.functions.get(function).into_iter().flat_map(|history| history.superseded.keys())
     }
 
-    /// Returns the superseded reconfiguration with that number.
+    /// Returns function and design of a superseded reconfiguration.
     pub(super) fn superseded(&self, effect: u64) -> Option<(&String, &String)> {
-        let design = |(function, own)| Some((function, Received::superseded(own, effect)?));
+        let design = |(function, history)| Some((function, Received::superseded(history, effect)?));
         self.functions.iter().find_map(design)
     }
 
-    /// For a snapshot.
+    /// Serializes the history for a snapshot.
     pub(super) fn to_record(&self) -> Value {
-        let function = |(name, own): (&String, &Received)| {
-            let last = own.last.as_ref().map(|last| {
+        let function = |(name, history): (&String, &Received)| {
+            let last = history.last.as_ref().map(|last| {
                 let before = last.before.as_ref().map(|before| json!([before.design, before.effect]));
                 json!([last.effect, last.design, before, last.failed])
             });
-            json!([name, last, own.superseded.iter().collect::<Vec<_>>(), own.doubted])
+            json!([name, last, history.superseded.iter().collect::<Vec<_>>(), history.doubted])
         };
         json!([self.by_number, self.functions.iter().map(function).collect::<Vec<_>>()])
     }
 
-    /// The inverse of [`Receipts::to_record`].
+    /// Inverse of [`Receipts::to_record`].
     pub(super) fn from_record(record: &Value) -> Option<Self> {
         let text = |value: &Value| value.as_str().map(ToOwned::to_owned);
         let superseded = |pair: &Value| Some((pair.get(0)?.as_u64()?, text(pair.get(1)?)?));

@@ -1,4 +1,4 @@
-//! A loop to data and back: decisions as the journal keeps them, and snapshots of all that a loop knows.
+//! Serialization of the loop: decisions for the journal, and snapshots of the beliefs.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
@@ -16,25 +16,25 @@ use crate::mapek::sequence::Numbers;
 use crate::mapek::step::{PlannedStep, configuration_from_record};
 use crate::message::Message;
 
-/// What one observation has led to.
+/// Result of one observation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Decision {
-    /// The answers, as objects of the format.
+    /// Answers, as JSON objects of the format.
     pub answers: Vec<Value>,
-    /// The plans that were made.
+    /// Plans computed for the answers.
     pub plans: Vec<Value>,
 }
 
 impl Decision {
-    /// Whether answers to the same observation that were written once are these, explanations apart: of several that are right,
-    /// which one is given depends on what came before the snapshot.
+    /// Returns `true` if the answers equal earlier answers to the same observation, apart from explanations. Of several
+    /// correct explanations, the chosen one depends on events before the snapshot.
     pub fn agrees(&self, written: &[Value]) -> bool {
         let essence = |answers: &[Value]| answers.iter().cloned().map(essence).collect::<Vec<_>>();
         essence(&self.answers) == essence(written)
     }
 }
 
-/// An answer without explanations.
+/// Removes the explanations from an answer.
 fn essence(mut answer: Value) -> Value {
     let kind = answer["answer"].as_str().unwrap_or_default().to_owned();
     let mut strip = |list: &str, field: &str| {
@@ -54,15 +54,15 @@ fn essence(mut answer: Value) -> Value {
     answer
 }
 
-/// All that a loop knows, as data.
+/// Beliefs of a loop as JSON.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Snapshot(pub Value);
 
-/// All that a loop knows, as data.
-pub(super) fn snapshot(known: &Beliefs) -> Snapshot {
-    let statements = known.mission.knowledge().map(Knowledge::statements).unwrap_or_default();
+/// Serializes the beliefs.
+pub(super) fn snapshot(beliefs: &Beliefs) -> Snapshot {
+    let statements = beliefs.mission.knowledge().map(Knowledge::statements).unwrap_or_default();
     let steps = |steps: &VecDeque<PlannedStep>| steps.iter().map(PlannedStep::to_record).collect::<Vec<_>>();
-    let running = known.running.as_ref().map(|running| {
+    let running = beliefs.running.as_ref().map(|running| {
         json!([
             running.action,
             running.step.to_record(),
@@ -71,140 +71,141 @@ pub(super) fn snapshot(known: &Beliefs) -> Snapshot {
             running.suspended,
             running.provisional,
             running.request,
-            micros(running.heard),
+            microseconds(running.last_report),
             running.overdue,
             running.progressed,
             running.started,
             running.resumed,
-            running.instructed,
+            running.sent_configuration,
         ])
     });
     Snapshot(json!({
-        "goal": known.goal,
-        "init": known.mission.problem().init.iter().filter_map(element_to_record).collect::<Vec<_>>(),
+        "goal": beliefs.goal,
+        "init": beliefs.mission.problem().init.iter().filter_map(element_to_record).collect::<Vec<_>>(),
         "added": statements.added.iter().map(statement_to_record).collect::<Vec<_>>(),
         "removed": statements.removed.iter().map(statement_to_record).collect::<Vec<_>>(),
-        "available": known.available,
-        "statuses": known.statuses,
-        "violated": known.violated,
-        "waiting": known.mission.knowledge().map(|base| base.waiting().to_record()),
-        "configuration": known.configuration,
-        "plan": known.plan.as_ref().map(steps),
+        "available": beliefs.available,
+        "statuses": beliefs.statuses,
+        "violated": beliefs.violated,
+        "waiting": beliefs.mission.knowledge().map(|base| base.waiting().to_record()),
+        "configuration": beliefs.configuration,
+        "plan": beliefs.plan.as_ref().map(steps),
         "running": running,
-        "reached": known.reached,
-        "stuck": known.stuck,
-        "unproved": known.unproved,
-        "retry": known.retry.map(|own| json!([micros(own.at), own.attempt])),
-        "failures": known.failures.as_ref().map(|(step, count)| json!([step.to_record(), count])),
-        "hopes": known.hopes,
-        "hoped": micros(known.hoped),
-        "actions": known.actions,
-        "effects": known.effects,
-        "outstanding": known.outstanding.values().map(effect_to_record).collect::<Vec<_>>(),
-        "receipts": known.receipts.to_record(),
-        "waits": known.waits.iter().map(|(number, own)| json!([number, micros(own.since), own.repeats])).collect::<Vec<_>>(),
-        "reports_actions": known.reports_actions,
-        "lines": known.lines,
-        "numbers": known.numbers.to_record(),
-        "now": micros(known.now),
-        "filters": known.filters.to_record(),
+        "reached": beliefs.reached,
+        "stuck": beliefs.stuck,
+        "unproved": beliefs.unproved,
+        "retry": beliefs.retry.map(|entry| json!([microseconds(entry.at), entry.attempt])),
+        "failures": beliefs.failures.as_ref().map(|(step, count)| json!([step.to_record(), count])),
+        "hopes": beliefs.improvement_causes,
+        "hoped": microseconds(beliefs.improvement_since),
+        "actions": beliefs.actions,
+        "effects": beliefs.effects,
+        "outstanding": beliefs.outstanding.values().map(effect_to_record).collect::<Vec<_>>(),
+        "receipts": beliefs.receipts.to_record(),
+        "waits": beliefs.waits.iter().map(|(number, entry)| json!([number, microseconds(entry.since), entry.repeats])).collect::<Vec<_>>(),
+        "reports_actions": beliefs.reports_actions,
+        "lines": beliefs.lines,
+        "numbers": beliefs.numbers.to_record(),
+        "now": microseconds(beliefs.now),
+        "filters": beliefs.filters.to_record(),
     }))
 }
 
-/// Takes over what a loop of the same mission knew.
+/// Restores the beliefs from a snapshot of a loop of the same mission.
 ///
 /// # Errors
 /// The snapshot is damaged, or belongs to another mission.
-pub(super) fn restore(known: &mut Beliefs, snapshot: &Snapshot) -> Result<(), Message> {
+pub(super) fn restore(beliefs: &mut Beliefs, snapshot: &Snapshot) -> Result<(), Message> {
     let wrong = |what: &str| Message::error("M320", format!("the snapshot does not fit the mission: {what}"));
-    restore_mission(known, &snapshot.0).ok_or_else(|| wrong("facts or statements"))?;
-    restore_work(known, &snapshot.0).ok_or_else(|| wrong("plan or effects"))?;
-    if let Some(base) = known.mission.knowledge()
-        && available(base) != known.available
+    restore_mission(beliefs, &snapshot.0).ok_or_else(|| wrong("facts or statements"))?;
+    restore_work(beliefs, &snapshot.0).ok_or_else(|| wrong("plan or effects"))?;
+    if let Some(base) = beliefs.mission.knowledge()
+        && available(base) != beliefs.available
     {
         return Err(wrong("other designs are available"));
     }
     Ok(())
 }
 
-/// What is known of the mission: statements, facts and goal.
-fn restore_mission(known: &mut Beliefs, data: &Value) -> Option<()> {
+/// Restores the mission: statements, facts and goal.
+fn restore_mission(beliefs: &mut Beliefs, data: &Value) -> Option<()> {
     let records = |name: &str| data.get(name).and_then(Value::as_array);
     let statements =
         |name: &str| records(name)?.iter().map(statement_from_record).collect::<Option<Vec<_>>>();
     let statements = Statements { added: statements("added")?, removed: statements("removed")? };
-    if let Some(base) = known.mission.knowledge_mut() {
+    if let Some(base) = beliefs.mission.knowledge_mut() {
         base.restore(&statements).ok()?;
         base.set_waiting(Waiting::from_record(data.get("waiting").unwrap_or(&Value::Null))?);
-        known.fault = base.fault().cloned();
+        beliefs.fault = base.fault().cloned();
     }
-    let timed = known.mission.problem().init.iter().filter(|e| matches!(e, InitialElement::Timed(..)));
+    let timed = beliefs.mission.problem().init.iter().filter(|e| matches!(e, InitialElement::Timed(..)));
     let mut init: Vec<InitialElement> = timed.cloned().collect();
     init.extend(records("init")?.iter().map(element_from_record).collect::<Option<Vec<_>>>()?);
-    known.mission.set_init(init);
-    known.goal = data.get("goal")?.as_str().map(ToOwned::to_owned);
-    if let Some(goal) = &known.goal {
-        let goal = known.mission.goal(goal).ok()?;
-        known.mission.set_goal(goal);
+    beliefs.mission.set_init(init);
+    beliefs.goal = data.get("goal")?.as_str().map(ToOwned::to_owned);
+    if let Some(goal) = &beliefs.goal {
+        let goal = beliefs.mission.goal(goal).ok()?;
+        beliefs.mission.set_goal(goal);
     }
     Some(())
 }
 
-/// What is planned and asked for.
-fn restore_work(known: &mut Beliefs, data: &Value) -> Option<()> {
+/// Restores plan, effects, receipts and filters.
+fn restore_work(beliefs: &mut Beliefs, data: &Value) -> Option<()> {
     let number = |name: &str| data.get(name).and_then(Value::as_u64);
     let truth = |name: &str| data.get(name).and_then(Value::as_bool);
     let text = |value: &Value| value.as_str().map(ToOwned::to_owned);
     let texts = |value: &Value| value.as_array()?.iter().map(text).collect::<Option<Vec<_>>>();
     let pairs = |name: &str| data.get(name).and_then(Value::as_object);
-    known.available = texts(data.get("available")?)?.into_iter().collect();
+    beliefs.available = texts(data.get("available")?)?.into_iter().collect();
     let status = |(name, value): (&String, &Value)| Some((name.clone(), texts(value)?));
-    known.statuses = pairs("statuses")?.iter().map(status).collect::<Option<BTreeMap<_, _>>>()?;
-    known.violated = texts(data.get("violated")?)?.into_iter().collect();
+    beliefs.statuses = pairs("statuses")?.iter().map(status).collect::<Option<BTreeMap<_, _>>>()?;
+    beliefs.violated = texts(data.get("violated")?)?.into_iter().collect();
     let pair = |(name, value): (&String, &Value)| Some((name.clone(), text(value)?));
-    known.configuration = pairs("configuration")?.iter().map(pair).collect::<Option<BTreeMap<_, _>>>()?;
-    known.plan = match data.get("plan")? {
+    beliefs.configuration = pairs("configuration")?.iter().map(pair).collect::<Option<BTreeMap<_, _>>>()?;
+    beliefs.plan = match data.get("plan")? {
         Value::Null => None,
         steps => Some(steps.as_array()?.iter().map(PlannedStep::from_record).collect::<Option<_>>()?),
     };
-    known.running = match data.get("running")? {
+    beliefs.running = match data.get("running")? {
         Value::Null => None,
         record => Some(running_from_record(record)?),
     };
-    known.failures = match data.get("failures")? {
+    beliefs.failures = match data.get("failures")? {
         Value::Null => None,
         record => Some((PlannedStep::from_record(record.get(0)?)?, record.get(1)?.as_u64()? as u32)),
     };
-    (known.reached, known.stuck) = (truth("reached")?, truth("stuck")?);
-    known.unproved = truth("unproved")?;
-    known.retry = match data.get("retry")? {
+    (beliefs.reached, beliefs.stuck) = (truth("reached")?, truth("stuck")?);
+    beliefs.unproved = truth("unproved")?;
+    beliefs.retry = match data.get("retry")? {
         Value::Null => None,
         record => Some(Retry {
             at: Duration::from_micros(record.get(0)?.as_u64()?),
             attempt: u32::try_from(record.get(1)?.as_u64()?).ok()?,
         }),
     };
-    known.hopes = texts(data.get("hopes")?)?.into_iter().collect();
-    known.hoped = Duration::from_micros(number("hoped")?);
-    (known.actions, known.effects, known.lines) = (number("actions")?, number("effects")?, number("lines")?);
-    known.numbers = Numbers::from_record(data.get("numbers")?)?;
-    known.now = Duration::from_micros(number("now")?);
-    known.filters = FilterStates::from_record(data.get("filters")?)?;
-    known.receipts = Receipts::from_record(data.get("receipts")?)?;
+    beliefs.improvement_causes = texts(data.get("hopes")?)?.into_iter().collect();
+    beliefs.improvement_since = Duration::from_micros(number("hoped")?);
+    (beliefs.actions, beliefs.effects, beliefs.lines) =
+        (number("actions")?, number("effects")?, number("lines")?);
+    beliefs.numbers = Numbers::from_record(data.get("numbers")?)?;
+    beliefs.now = Duration::from_micros(number("now")?);
+    beliefs.filters = FilterStates::from_record(data.get("filters")?)?;
+    beliefs.receipts = Receipts::from_record(data.get("receipts")?)?;
     let wait = |record: &Value| {
         let (since, repeats) = (record.get(1)?.as_u64()?, record.get(2)?.as_u64()?);
         let wait = Wait { since: Duration::from_micros(since), repeats: u32::try_from(repeats).ok()? };
         Some((record.get(0)?.as_u64()?, wait))
     };
-    known.waits = data.get("waits")?.as_array()?.iter().map(wait).collect::<Option<_>>()?;
-    known.reports_actions = truth("reports_actions")?;
+    beliefs.waits = data.get("waits")?.as_array()?.iter().map(wait).collect::<Option<_>>()?;
+    beliefs.reports_actions = truth("reports_actions")?;
     let effects = data.get("outstanding")?.as_array()?.iter().map(effect_from_record);
-    known.outstanding =
+    beliefs.outstanding =
         effects.collect::<Option<Vec<_>>>()?.into_iter().map(|effect| (effect.number, effect)).collect();
     Some(())
 }
 
-fn micros(time: Duration) -> u64 {
+fn microseconds(time: Duration) -> u64 {
     u64::try_from(time.as_micros()).unwrap_or(u64::MAX)
 }
 
@@ -217,12 +218,12 @@ fn running_from_record(record: &Value) -> Option<Running> {
         suspended: record.get(4)?.as_bool()?,
         provisional: record.get(5)?.as_bool()?,
         request: record.get(6)?.as_u64()?,
-        heard: Duration::from_micros(record.get(7)?.as_u64()?),
+        last_report: Duration::from_micros(record.get(7)?.as_u64()?),
         overdue: u32::try_from(record.get(8)?.as_u64()?).ok()?,
         progressed: record.get(9)?.as_bool()?,
         started: record.get(10)?.as_bool()?,
         resumed: record.get(11)?.as_bool()?,
-        instructed: configuration_from_record(record.get(12)?)?,
+        sent_configuration: configuration_from_record(record.get(12)?)?,
     })
 }
 
@@ -275,7 +276,7 @@ fn statement_from_record(record: &Value) -> Option<Statement> {
     Some(Statement { predicate: text(record.get(0)?)?, arguments })
 }
 
-/// An entry of `:init`; timed ones never change and are not recorded.
+/// Serializes an element of `:init`. Timed initial literals never change, so that they are not recorded.
 fn element_to_record(element: &InitialElement) -> Option<Value> {
     let words = |atom: &Atom| -> Vec<String> {
         let arguments = atom.arguments.iter().map(|term| match term {

@@ -1,11 +1,11 @@
-//! What is left when an action is under way, as a domain: that action comes first, with whatever designs serve it.
+//! Domain of the remaining mission while an action is under way. The action must come first, with any designs.
 //!
-//! The paper plans from the state in which an action has ended. Ours plans from the state as it is, with what is left of the
-//! action under way as the first step, so that its designs and all that follows are chosen together. A copy of its
-//! schema has its other arguments fixed, takes what is left of its duration and its increases and decreases, and opens
-//! a gate that every other action waits for. Where a condition on the start of the action mentions a value that the
-//! action changes, what has been changed so far with the designs at hand counts as not yet changed: the condition asks
-//! whether what is left can be done.
+//! The paper plans from the state in which the action has ended. Here, planning starts in the current state, with the
+//! remainder of the action as the first step, so that its designs and all later ones are chosen together. A copy of the
+//! action's schema has the other arguments fixed. Its duration, increases and decreases are scaled to the remainder. It
+//! adds a gate fact that all other actions require. A condition at the start of the action may mention a value that the
+//! action changes. In such conditions, the changes already made are subtracted: the condition asks whether the remainder
+//! can be executed.
 
 use num_rational::BigRational;
 use pddl::ast::{
@@ -15,14 +15,14 @@ use pddl::ast::{
 
 use crate::mapek::step::PlannedStep;
 
-/// Of the duration of an action that has done all it should and has not ended, so much is taken to be left: one part of so
-/// many. Progress comes in hundredths.
+/// Divisor for the least remaining duration: an action with full progress that has not ended has 1/`LEAST_LEFT` of its
+/// duration left. Progress has a resolution of 1/100.
 const LEAST_LEFT: u32 = 1000;
 
-/// Holds once the action under way has ended; no file has such a predicate.
+/// Predicate that holds once the action under way has ended. No input file declares it.
 pub(super) const GATE: &str = "metaplan_resumed";
 
-/// The domain for what is left when so much of `running` is done, from 0 to 1.
+/// Returns the domain of the remaining mission. `done` is the completed share of `running`, from 0 to 1.
 pub(crate) fn resume(domain: &Domain, running: &PlannedStep, done: &BigRational) -> Domain {
     let mut gated = domain.clone();
     gated.predicates.push(Declaration { identifier: identifier(GATE), parameters: Vec::new() });
@@ -42,6 +42,7 @@ pub(crate) fn resume(domain: &Domain, running: &PlannedStep, done: &BigRational)
                 require(&mut copy, Condition::Equal(variable, constant, Span::default()));
             }
         }
+        // The gate opens only once, so that the remainder occurs exactly once.
         require(&mut copy, Condition::Not(Box::new(Condition::Atom(gate()))));
         open(&mut copy);
         // Of schemas with one name the first that is possible is taken.
@@ -50,23 +51,25 @@ pub(crate) fn resume(domain: &Domain, running: &PlannedStep, done: &BigRational)
     gated
 }
 
-/// A goal that asks for the end of the action under way, too.
+/// Extends a goal by the end of the action under way.
 pub(crate) fn resumed_goal(goal: &Condition) -> Condition {
     Condition::And(vec![goal.clone(), Condition::Atom(gate())])
 }
 
-/// What is left of an action.
+/// Scales an action to its remainder.
 fn shorten(action: &mut Action, done: &BigRational) {
     let ActionBody::Durative { duration, conditions, effects } = &mut action.body else { return };
-    let left = BigRational::from_integer(1.into()) - done;
-    // The start and the end of what takes no time are one happening, in which one spoils what the other needs.
-    let time_left = left.clone().max(BigRational::new(1.into(), LEAST_LEFT.into()));
+    let remaining_share = BigRational::from_integer(1.into()) - done;
+    // Without a duration, start and end would be one happening, in which the end effects could violate start
+    // conditions.
+    let time_left = remaining_share.clone().max(BigRational::new(1.into(), LEAST_LEFT.into()));
     let whole = duration.iter().find(|constraint| constraint.operator == Comparison::Equal);
     let whole = whole.map(|constraint| constraint.expression.clone());
     let mut changes = Vec::new();
     for (_, effect) in effects.iter_mut() {
-        shorten_effect(effect, &left, whole.as_ref(), &mut changes);
+        shorten_effect(effect, &remaining_share, whole.as_ref(), &mut changes);
     }
+    // Conditions at the end are about the final values, which the remainder reaches.
     for (_, condition) in conditions.iter_mut().filter(|(time, _)| *time != ConditionTime::AtEnd) {
         restore_condition(condition, done, &changes);
     }
@@ -75,29 +78,33 @@ fn shorten(action: &mut Action, done: &BigRational) {
     }
 }
 
-/// Leaves so much of the increases and decreases, and notes what each whole one adds to which function.
+/// Scales increases and decreases to `remaining_share`, and appends the change of each whole effect to `changes`.
 fn shorten_effect(
     effect: &mut Effect,
-    left: &BigRational,
+    remaining_share: &BigRational,
     whole: Option<&Expression>,
     changes: &mut Vec<(Atom, Expression)>,
 ) {
     match effect {
-        Effect::And(parts) => parts.iter_mut().for_each(|part| shorten_effect(part, left, whole, changes)),
-        Effect::ForAll(_, body) | Effect::When(_, body) => shorten_effect(body, left, whole, changes),
+        Effect::And(parts) => {
+            parts.iter_mut().for_each(|part| shorten_effect(part, remaining_share, whole, changes))
+        }
+        Effect::ForAll(_, body) | Effect::When(_, body) => {
+            shorten_effect(body, remaining_share, whole, changes)
+        }
         Effect::Assign(kind @ (Assignment::Increase | Assignment::Decrease), target, value, _) => {
             if let Some(whole) = whole {
                 substitute(value, &|part| matches!(part, Expression::Duration(_)).then(|| whole.clone()));
             }
             let sign = BigRational::from_integer(if *kind == Assignment::Increase { 1 } else { -1 }.into());
             changes.push((target.clone(), product(&sign, value.clone())));
-            *value = product(left, value.clone());
+            *value = product(remaining_share, value.clone());
         }
         Effect::Assign(..) | Effect::Add(_) | Effect::Delete(_) => {}
     }
 }
 
-/// Takes back what has been changed so far, in a condition.
+/// Subtracts the changes that were already made from the values in a condition.
 fn restore_condition(condition: &mut Condition, done: &BigRational, changes: &[(Atom, Expression)]) {
     match condition {
         Condition::And(parts) | Condition::Or(parts) => {
@@ -129,10 +136,10 @@ fn restore_condition(condition: &mut Condition, done: &BigRational, changes: &[(
     }
 }
 
-/// Replaces parts of an expression; what comes in their place is not looked at again.
+/// Replaces parts of an expression. Replacements are not visited.
 fn substitute(expression: &mut Expression, replace: &dyn Fn(&Expression) -> Option<Expression>) {
-    if let Some(other) = replace(expression) {
-        *expression = other;
+    if let Some(replacement) = replace(expression) {
+        *expression = replacement;
     } else if let Expression::Operation(_, parts, _) = expression {
         for part in parts {
             substitute(part, replace);
@@ -146,7 +153,7 @@ fn product(factor: &BigRational, expression: Expression) -> Expression {
 }
 
 fn is_same(left: &Atom, right: &Atom) -> bool {
-    let same = |(left, right): (&Term, &Term)| match (left, right) {
+    let are_equal = |(left, right): (&Term, &Term)| match (left, right) {
         (Term::Variable(left), Term::Variable(right)) | (Term::Constant(left), Term::Constant(right)) => {
             left.name == right.name
         }
@@ -154,16 +161,16 @@ fn is_same(left: &Atom, right: &Atom) -> bool {
     };
     left.predicate.name == right.predicate.name
         && left.arguments.len() == right.arguments.len()
-        && left.arguments.iter().zip(&right.arguments).all(same)
+        && left.arguments.iter().zip(&right.arguments).all(are_equal)
 }
 
-fn require(action: &mut Action, more: Condition) {
+fn require(action: &mut Action, added: Condition) {
     match &mut action.body {
         ActionBody::Instantaneous { precondition, .. } => {
             let before = std::mem::replace(precondition, Condition::And(Vec::new()));
-            *precondition = Condition::And(vec![before, more]);
+            *precondition = Condition::And(vec![before, added]);
         }
-        ActionBody::Durative { conditions, .. } => conditions.push((ConditionTime::AtStart, more)),
+        ActionBody::Durative { conditions, .. } => conditions.push((ConditionTime::AtStart, added)),
     }
 }
 

@@ -1,4 +1,4 @@
-//! Reports of sensors, components and functions, through their filters, to changes of what is believed.
+//! Applies reports of sensors, components and functions to the beliefs, after their filters.
 
 use num_rational::BigRational;
 use ontology::tomasys::change::Status;
@@ -6,28 +6,29 @@ use ontology::tomasys::change::Status;
 use crate::knowledge::RobotReport;
 use crate::mapek::fields::Refusal;
 use crate::mapek::filter::Accepted;
-use crate::mapek::monitor::Taking;
+use crate::mapek::monitor::BeliefUpdate;
 use crate::message::did_you_mean;
 
-impl Taking<'_> {
-    /// A function was seen with a design that was not asked for: it has it from now on, and so has the action under way. Whether that is
-    /// worth a change is asked as when a design comes back.
+impl BeliefUpdate<'_> {
+    /// Applies an observed design of a function that was not requested. The function and the action under way have this
+    /// design from now on. A change back is considered in the same way as for a design that is available again.
     pub(super) fn observed(&mut self, function: &str, design: Option<&str>) -> Result<(), Refusal> {
         let designs = self.beliefs.mission.designs_of(function);
         if designs.is_empty() {
             return Err(Refusal::new("M306", format!("there is no function `{function}` that has designs")));
         }
-        if let Some(design) = design.filter(|design| designs.iter().all(|known| known != design)) {
-            let meant = did_you_mean(design, designs.iter().map(String::as_str));
-            let text = format!("{function} has no design `{design}`; it has {}{meant}", designs.join(", "));
+        if let Some(design) = design.filter(|design| designs.iter().all(|name| name != design)) {
+            let suggestion = did_you_mean(design, designs.iter().map(String::as_str));
+            let text =
+                format!("{function} has no design `{design}`; it has {}{suggestion}", designs.join(", "));
             return Err(Refusal::new("M306", text));
         }
         let before = match design {
             Some(design) => self.beliefs.configuration.insert(function.to_owned(), design.to_owned()),
             None => self.beliefs.configuration.remove(function),
         };
-        // What was asked for may be on its way: the action goes on with that.
-        let pending = self.beliefs.pending().find(|(own, _)| *own == function).map(|(_, to)| to.to_owned());
+        // If a request is pending, the action continues with the requested design.
+        let pending = self.beliefs.pending().find(|(name, _)| *name == function).map(|(_, to)| to.to_owned());
         let is_news = before.as_deref() != design;
         let is_crossing =
             (is_news || design.is_none()) && pending.as_ref().is_some_and(|to| design != Some(to));
@@ -36,7 +37,11 @@ impl Taking<'_> {
         if !is_news || pending.is_some() {
             return Ok(());
         }
-        let Some(running) = self.beliefs.running.as_mut().filter(|own| own.step.design(function).is_some())
+        let Some(running) = self
+            .beliefs
+            .running
+            .as_mut()
+            .filter(|running_action| running_action.step.design(function).is_some())
         else {
             return Ok(());
         };
@@ -48,13 +53,13 @@ impl Taking<'_> {
         } else {
             let action = running.action;
             self.changes
-                .must
+                .reasons
                 .push(format!("{function} has no design any more, and action {action} needs it"));
         }
         Ok(())
     }
 
-    /// Takes over what a filter has accepted.
+    /// Applies a value or status that a filter has accepted.
     pub(super) fn accept(&mut self, accepted: Accepted) -> Result<(), Refusal> {
         match accepted {
             Accepted::Value(attribute, value) => self.measured(&attribute, &value),
@@ -65,7 +70,7 @@ impl Taking<'_> {
         }
     }
 
-    /// Takes a sample over, unless its filter holds it back.
+    /// Applies a sample unless its filter holds it back.
     pub(super) fn sampled(&mut self, attribute: &str, value: &BigRational) -> Result<(), Refusal> {
         let is_known = self.monitor.attributes.contains(attribute);
         let (states, now, filtered) =
@@ -79,7 +84,7 @@ impl Taking<'_> {
         }
     }
 
-    /// Takes the status of a component over, unless its filter holds it back.
+    /// Applies the status of a component unless its filter holds it back.
     pub(super) fn component(&mut self, component: &str, status: Status) -> Result<(), Refusal> {
         let name = match self.monitor.components.get(component) {
             Some(name) => Some(name.clone()),

@@ -1,4 +1,4 @@
-//! How eager the loop is: the section `adaptation` of a manifest.
+//! Settings of the adaptation loop: the section `adaptation` of a manifest.
 
 use std::path::Path;
 use std::time::Duration;
@@ -70,11 +70,11 @@ pub struct AdaptationSection {
     deadline_factor: Option<Spanned<toml::Value>>,
 }
 
-/// A file with the section `adaptation` alone.
+/// A file that contains only the section `adaptation`.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Section {
-    /// How eager the loop is.
+    /// Settings of the adaptation loop.
     #[serde(default)]
     adaptation: AdaptationSection,
 }
@@ -91,10 +91,10 @@ pub enum SafeReaction {
 }
 
 impl AdaptationSection {
-    /// What it says, and what is so unless it says otherwise.
+    /// Returns the settings, with defaults for missing keys.
     ///
     /// # Errors
-    /// A value that is not a number, or negative.
+    /// A value is not a number, or negative.
     pub fn settings(&self, origin: &ManifestPath) -> Result<Settings, Message> {
         let filters = filters(&self.confirm_time, &self.heal_time, &self.components, &self.measured, origin)?;
         let (stay_close, safe_reaction) = (self.stay_close, self.safe_reaction);
@@ -126,7 +126,7 @@ impl AdaptationSection {
     }
 }
 
-/// How eager the loop is.
+/// Settings of the adaptation loop.
 ///
 /// ```
 /// use std::time::Duration;
@@ -138,38 +138,38 @@ impl AdaptationSection {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Settings {
-    /// Another plan replaces one that could be kept only if its metric is better by this much, in the metric's unit.
+    /// Minimum benefit of a new plan over a valid current plan, in the metric's unit. 0 is any benefit.
     pub minimum_benefit: BigRational,
-    /// So long must a design be available again before a better plan is looked for. Five seconds unless said otherwise.
+    /// Time for which a design must be available again before a better plan is sought. Default: 5 s.
     pub settle: Duration,
-    /// How long one plan may take; the best so far is used then, if there is one. Ten seconds unless said otherwise.
+    /// Time limit of one plan, after which the incumbent is used. Default: 10 s.
     pub time_limit: Option<Duration>,
-    /// Whether, of plans that are as good and as long, one is chosen that has most steps of the plan at hand. The choice then
-    /// depends on what has happened, and no longer on the situation alone.
+    /// Whether to prefer, among optimal plans of equal length, one that shares most steps with the current plan. The
+    /// choice then depends on the history, and not only on the situation.
     pub stay_close: bool,
-    /// Filters of what is measured and of what components report.
+    /// Filters for measurements and component reports.
     pub filters: FilterSettings,
-    /// What is done at once where the action under way cannot go on as it is.
+    /// Immediate reaction if the action under way cannot go on unchanged.
     pub safe_reaction: SafeReaction,
-    /// How long an effect may remain without acknowledgement, and an action without a report, at least. Ten seconds unless said
-    /// otherwise; zero means for ever.
+    /// Minimum time after which an unacknowledged effect, or an action without reports, is overdue. 0 disables
+    /// deadlines. Default: 10 s.
     pub deadline: Duration,
-    /// An action is overdue when nothing was heard of it for its expected duration times this.
+    /// Factor of an action's expected duration after which an action without reports is overdue.
     pub deadline_factor: f64,
-    /// The unit of the domain's times.
+    /// Unit of the domain's times.
     pub time_unit: TimeUnit,
 }
 
 impl Settings {
-    /// Nothing is damped: every report is believed at once, and a better plan is looked for at once.
+    /// Settings without damping: every report is believed at once, and a better plan is sought at once.
     pub fn immediate() -> Self {
         Self { settle: Duration::ZERO, filters: FilterSettings::none(), ..Self::default() }
     }
 
-    /// Reads a file with the section `adaptation` alone; names in it are those of a knowledge base.
+    /// Reads a file that contains only the section `adaptation`. Its names refer to a knowledge base.
     ///
     /// # Errors
-    /// The file cannot be read, or all that is wrong with the section.
+    /// The file cannot be read, or contains errors; all of them are returned.
     pub fn read(file: &Path, knowledge: Option<&Knowledge>) -> Result<Self, Errors> {
         let (section, origin) = manifest::read::<Section>(file)?;
         let settings = section.adaptation.settings(&origin)?;
@@ -177,10 +177,10 @@ impl Settings {
         Ok(settings)
     }
 
-    /// Compares the names of filters with those of a knowledge base.
+    /// Checks that the knowledge base has all names in the filter settings.
     ///
     /// # Errors
-    /// M143 for each name that it does not have.
+    /// M143 for each unknown name.
     pub(crate) fn check(&self, knowledge: Option<&Knowledge>, origin: &ManifestPath) -> Result<(), Errors> {
         let mistakes = self.filters.mistakes(knowledge).into_iter().map(|(key, name, message)| {
             let path: [Key; 3] = ["adaptation".into(), key.into(), name.as_str().into()];
@@ -190,7 +190,7 @@ impl Settings {
         Errors::unless_empty(origin.quote(mistakes))
     }
 
-    /// Settings that let noise switch designs, each as a warning; for `lint`.
+    /// Warnings for settings with which noise changes designs, for `lint`.
     pub(crate) fn doubts(&self, knowledge: Option<&Knowledge>) -> Vec<Message> {
         let mut doubts = self.filters.doubts(knowledge);
         if self.settle.is_zero() && knowledge.is_some() {
@@ -202,49 +202,49 @@ impl Settings {
         doubts
     }
 
-    /// Filters of what is measured and of what components report.
+    /// Sets [`Settings::filters`].
     #[must_use]
     pub fn with_filters(self, filters: FilterSettings) -> Self {
         Self { filters, ..self }
     }
 
-    /// What is done at once where the action under way cannot go on as it is.
+    /// Sets [`Settings::safe_reaction`].
     #[must_use]
     pub fn with_safe_reaction(self, safe_reaction: SafeReaction) -> Self {
         Self { safe_reaction, ..self }
     }
 
-    /// How long an effect may remain without acknowledgement, and an action without a report, at least; zero means for ever.
+    /// Sets [`Settings::deadline`].
     #[must_use]
     pub fn with_deadline(self, deadline: Duration) -> Self {
         Self { deadline, ..self }
     }
 
-    /// The unit of the domain's times.
+    /// Sets [`Settings::time_unit`].
     #[must_use]
     pub fn with_time_unit(self, time_unit: TimeUnit) -> Self {
         Self { time_unit, ..self }
     }
 
-    /// Another plan replaces one that could be kept only if its metric is better by this much.
+    /// Sets [`Settings::minimum_benefit`].
     #[must_use]
     pub fn with_minimum_benefit(self, minimum_benefit: BigRational) -> Self {
         Self { minimum_benefit, ..self }
     }
 
-    /// So long must a design be available again before a better plan is looked for.
+    /// Sets [`Settings::settle`].
     #[must_use]
     pub fn with_settle(self, settle: Duration) -> Self {
         Self { settle, ..self }
     }
 
-    /// How long one plan may take; none for as long as it takes.
+    /// Sets [`Settings::time_limit`]; `None` for no limit.
     #[must_use]
     pub fn with_time_limit(self, time_limit: impl Into<Option<Duration>>) -> Self {
         Self { time_limit: time_limit.into(), ..self }
     }
 
-    /// Whether, of plans that are as good and as long, one is chosen that has most steps of the plan at hand.
+    /// Sets [`Settings::stay_close`].
     #[must_use]
     pub fn with_stay_close(self, stay_close: bool) -> Self {
         Self { stay_close, ..self }
@@ -267,12 +267,12 @@ impl Default for Settings {
     }
 }
 
-/// Time for which a design must be back unless said otherwise. Nothing is urgent about a better plan, and a driver that is
-/// restarted by its supervisor comes and goes within seconds.
+/// Default settle time. A better plan is not urgent, and a driver that its supervisor restarts fails and recovers
+/// within seconds.
 const SETTLE: Duration = Duration::from_secs(5);
 
-/// How long an effect may remain without acknowledgement unless said otherwise.
+/// Default deadline.
 const DEADLINE: Duration = Duration::from_secs(10);
 
-/// How long one plan may take unless said otherwise. A robot waits meanwhile.
+/// Default time limit of one plan. The robot waits during planning.
 const TIME_LIMIT: Duration = Duration::from_secs(10);

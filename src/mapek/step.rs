@@ -1,4 +1,4 @@
-//! Steps of a plan as the loop keeps them: with exact numbers, and so that they can be written to the journal.
+//! Steps of a plan with exact numbers, and their serialization for the journal.
 
 use std::borrow::Cow;
 
@@ -15,21 +15,21 @@ use crate::number;
 /// An action with its configuration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlannedStep {
-    /// The name of the action schema.
+    /// Name of the action schema.
     pub action: String,
     /// All arguments in the order of the schema's parameters, designs among them.
     pub arguments: Vec<String>,
-    /// How many of them stand in the domain's file; the knowledge base has added the others to a plain domain.
+    /// Number of arguments in the domain file. The knowledge base adds the others to a plain domain.
     pub written: usize,
-    /// The function and the design chosen for it, in the order of the parameters.
+    /// Functions with their chosen designs, in the order of the parameters.
     pub configuration: Vec<(String, String)>,
-    /// How long it takes, in the domain's time unit.
+    /// Duration in the domain's time unit.
     pub duration: BigRational,
-    /// What it adds to the metric.
+    /// Contribution to the metric.
     pub cost: BigRational,
 }
 
-/// The step as an object of the format.
+/// JSON object of the format.
 impl Serialize for PlannedStep {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut object = serializer.serialize_map(None)?;
@@ -68,7 +68,7 @@ impl JsonSchema for PlannedStep {
 }
 
 impl PlannedStep {
-    /// A step of a plan for a mission.
+    /// Converts a step of the planner.
     pub(crate) fn new(mission: &Mission, step: &planner::Step) -> Self {
         Self {
             action: step.action.clone(),
@@ -80,14 +80,15 @@ impl PlannedStep {
         }
     }
 
-    /// The action with all its arguments, as PDDL writes it: `(move a b)`.
+    /// The action with all arguments in PDDL syntax: `(move a b)`.
     pub fn call(&self) -> String {
         let words: Vec<&str> =
             std::iter::once(&self.action).chain(&self.arguments).map(String::as_str).collect();
         format!("({})", words.join(" "))
     }
 
-    /// `move wp1 wp2 (f_localization = fd_amcl_kinect)`: without functions and designs among the arguments.
+    /// Short text in which functions and designs are not repeated as arguments: `move wp1 wp2 (f_localization =
+    /// fd_amcl_kinect)`.
     pub fn summary(&self) -> String {
         let configured = |word: &str| self.configuration.iter().any(|(f, d)| f == word || d == word);
         let mut text = self.action.clone();
@@ -99,23 +100,23 @@ impl PlannedStep {
         if pairs.is_empty() { text } else { format!("{text} ({})", pairs.join(", ")) }
     }
 
-    /// The arguments without those that say which design fills which function.
+    /// The arguments, with `None` in place of designs.
     pub fn context(&self) -> Vec<Option<&str>> {
         let is_design = |word: &str| self.configuration.iter().any(|(_, design)| design == word);
         self.arguments.iter().map(|word| (!is_design(word)).then_some(word.as_str())).collect()
     }
 
-    /// How long it takes, in the domain's time unit, as the nearest double.
+    /// Duration in the domain's time unit, rounded to the nearest double.
     pub fn duration_rounded(&self) -> f64 {
         number::to_f64(&self.duration)
     }
 
-    /// The design of a function.
+    /// Design chosen for a function.
     pub fn design(&self, function: &str) -> Option<&str> {
-        self.configuration.iter().find(|(known, _)| known == function).map(|(_, design)| design.as_str())
+        self.configuration.iter().find(|(name, _)| name == function).map(|(_, design)| design.as_str())
     }
 
-    /// The same action with another design for a function.
+    /// Returns the action with another design for a function.
     #[must_use]
     pub fn with_design(&self, function: &str, design: &str) -> Self {
         let Some(old) = self.design(function).map(ToOwned::to_owned) else { return self.clone() };
@@ -123,25 +124,25 @@ impl PlannedStep {
         for word in step.arguments.iter_mut().filter(|word| **word == old) {
             design.clone_into(word);
         }
-        for (_, word) in step.configuration.iter_mut().filter(|(known, _)| known == function) {
+        for (_, word) in step.configuration.iter_mut().filter(|(name, _)| name == function) {
             design.clone_into(word);
         }
         step
     }
 
-    /// The step for the validator.
+    /// Converts the step for the validator.
     pub(crate) fn to_plan_step(&self) -> PlanStep {
         PlanStep {
             action: Name::new(&self.action),
             arguments: self.arguments.iter().map(|argument| Name::new(argument)).collect(),
             start: None,
-            // What the planner has chosen; where the domain says how long it takes, the validator compares.
+            // The duration was chosen by the planner. The validator computes it from the domain.
             duration: None,
             line: 0,
         }
     }
 
-    /// Writes what stands behind the name of the step as an object of the format.
+    /// Writes the fields after the name of the step.
     pub(crate) fn fields<M: SerializeMap>(&self, object: &mut M) -> Result<(), M::Error> {
         let written = self.arguments.get(..self.written).unwrap_or(&self.arguments);
         object.serialize_entry("arguments", written)?;
@@ -150,7 +151,7 @@ impl PlannedStep {
         object.serialize_entry("cost", &number::to_json(&self.cost))
     }
 
-    /// Everything, for the journal.
+    /// Serializes all fields for the journal.
     pub(crate) fn to_record(&self) -> Value {
         json!([
             self.action,
@@ -162,7 +163,7 @@ impl PlannedStep {
         ])
     }
 
-    /// The inverse of [`PlannedStep::to_record`].
+    /// Inverse of [`PlannedStep::to_record`].
     pub(crate) fn from_record(record: &Value) -> Option<Self> {
         let text = |value: &Value| value.as_str().map(ToOwned::to_owned);
         let [action, arguments, written, configuration, duration, cost] = record.as_array()?.as_slice()
@@ -180,19 +181,19 @@ impl PlannedStep {
     }
 }
 
-/// Functions with their designs, as an object of the format.
+/// Converts functions with designs to an object of the format.
 pub(super) fn configuration_to_json(configuration: &[(String, String)]) -> Map<String, Value> {
     configuration.iter().map(|(function, design)| (function.clone(), json!(design))).collect()
 }
 
-/// Functions with their designs, from an array of pairs in the journal.
+/// Parses functions with designs from the journal's array of pairs.
 pub(super) fn configuration_from_record(record: &Value) -> Option<Vec<(String, String)>> {
     let text = |value: &Value| value.as_str().map(ToOwned::to_owned);
     let pair = |value: &Value| Some((text(value.get(0)?)?, text(value.get(1)?)?));
     record.as_array()?.iter().map(pair).collect()
 }
 
-/// Steps for the validator.
+/// Converts steps to a plan for the validator.
 pub(crate) fn plan_text<'a>(steps: impl IntoIterator<Item = &'a PlannedStep>) -> PlanText {
     PlanText { steps: steps.into_iter().map(PlannedStep::to_plan_step).collect() }
 }

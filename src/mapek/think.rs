@@ -1,8 +1,8 @@
-//! Planning beside the loop: a copy of the loop finds plans on another thread while the loop goes on reacting.
+//! Planning in parallel to the loop: a copy of the loop plans on another thread while the loop reacts to observations.
 //!
-//! The copy deliberates, and its questions are kept with their answers. The loop then deliberates itself with these answers, which
-//! takes no search, provided that nothing has been observed meanwhile that makes another question of it. Progress of the action under
-//! way, ticks and reports of what is known do not: the plan is then adopted without a claim that it is the best.
+//! The copy deliberates, and records its questions with the answers. The loop then deliberates with these answers,
+//! without a search, if no observation has changed the question meanwhile. Progress of the action under way, ticks, and
+//! repeated reports do not change the question, but after progress the plan is no longer proved optimal.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -13,7 +13,7 @@ use crate::mapek::answer::Answer;
 use crate::mapek::ask::Outcome;
 use crate::mapek::control::Loop;
 use crate::mapek::event::{Event, Observation};
-use crate::mapek::memo::Asked;
+use crate::mapek::memo::StoredQuestion;
 
 /// A copy of a loop that deliberates on another thread.
 #[derive(Debug)]
@@ -22,73 +22,74 @@ pub struct Thinker {
     limits: Limits,
 }
 
-/// Plans that were found by a [`Thinker`].
+/// Plans computed by a [`Thinker`].
 #[derive(Debug)]
 pub struct Thoughts {
     question: u64,
-    answers: Vec<(Asked, Outcome)>,
-    /// Whether planning was stopped: the plans are of no use.
+    answers: Vec<(StoredQuestion, Outcome)>,
+    /// Whether planning was interrupted, so that the plans must not be used.
     is_stopped: bool,
 }
 
 impl Thinker {
-    /// The flag that makes planning stop soon when it is set.
+    /// Flag that interrupts planning when set.
     pub fn stop(&self) -> Arc<AtomicBool> {
         self.limits.interrupt()
     }
 
-    /// Finds the plans that the loop needs to deliberate.
+    /// Computes the plans that the next deliberation of the loop needs.
     pub fn think(mut self) -> Thoughts {
-        self.control.planner.asked = Some(Vec::new());
+        self.control.planner.question_log = Some(Vec::new());
         self.control.deliberate();
-        let answers = self.control.planner.asked.take().unwrap_or_default();
+        let answers = self.control.planner.question_log.take().unwrap_or_default();
         Thoughts { question: self.control.question, answers, is_stopped: self.limits.reached() }
     }
 }
 
 impl Loop {
-    /// A copy that finds plans for what there is to deliberate on, as the loop is now.
+    /// Copies the loop for planning on another thread.
     pub fn thinker(&self) -> Thinker {
         let (mut control, limits) = (self.clone(), Limits::none());
         control.planner.limits = limits.clone();
         Thinker { control, limits }
     }
 
-    /// Returns `true` if what these plans were looked for is still what there is to deliberate on.
+    /// Returns `true` if the planning problem has not changed since the copy was made, and planning was not
+    /// interrupted.
     pub fn is_answered_by(&self, thoughts: &Thoughts) -> bool {
         !thoughts.is_stopped && thoughts.question == self.question
     }
 
-    /// Returns `true` if an observation is about an action or an effect that was not asked for yet.
+    /// Returns `true` if an observation mentions an action or an effect that has not been requested yet.
     pub fn is_ahead(&self, observation: &Observation) -> bool {
-        let known = self.beliefs();
+        let beliefs = self.beliefs();
         observation.events.iter().flatten().any(|event| match event {
             Event::Started { action }
             | Event::Succeeded { action }
             | Event::Failed { action, .. }
             | Event::Cancelled { action }
-            | Event::Progress { action, .. } => *action > known.actions,
+            | Event::Progress { action, .. } => *action > beliefs.actions,
             Event::Acknowledged { effect } | Event::ReconfigurationFailed { effect } => {
-                *effect > known.effects
+                *effect > beliefs.effects
             }
             _ => false,
         })
     }
 
-    /// The number of the question: planning that began with another number is of no use.
+    /// Number of the current planning problem. Plans for another number are obsolete.
     pub fn question(&self) -> u64 {
         self.question
     }
 
-    /// As [`Loop::deliberate`], if no plan is needed for it that has to be searched for; nothing has changed otherwise.
+    /// Runs [`Loop::deliberate`] if no search is necessary. Otherwise returns `None`, and the loop is unchanged.
     pub fn deliberate_at_once(&mut self) -> Option<Vec<Answer>> {
         if !self.has_agenda() {
             return Some(Vec::new());
         }
         let before = self.checkpoint();
-        self.planner.is_idle = true;
+        self.planner.forbids_search = true;
         let answers = self.deliberate();
-        self.planner.is_idle = false;
+        self.planner.forbids_search = false;
         if std::mem::take(&mut self.planner.is_missing) {
             self.roll_back(before);
             return None;
@@ -96,22 +97,24 @@ impl Loop {
         Some(answers)
     }
 
-    /// As [`Loop::deliberate`], with plans that were found elsewhere; nothing has changed if they do not answer all that is asked, or
-    /// do not fit the situation. With `is_late` they may be answers to a question that has changed since.
+    /// Runs [`Loop::deliberate`] with computed plans. Returns `None` if they are incomplete or do not fit the
+    /// situation; the loop is then unchanged. With `is_late`, the planning problem may have changed since.
     pub fn deliberate_with(&mut self, thoughts: Thoughts, is_late: bool) -> Option<Vec<Answer>> {
         if thoughts.is_stopped || !self.is_answered_by(&thoughts) && !is_late {
             return None;
         }
+        // A checkpoint covers only changes before the first plan, so that the whole loop is copied.
         let before = self.clone();
         self.planner.prepared = thoughts.answers.into();
-        self.planner.is_idle = true;
+        self.planner.forbids_search = true;
         let answers = self.deliberate();
+        // A late plan may not fit the current situation.
         let misfits = || self.beliefs.plan.is_some() && self.beliefs.violation().is_some();
         if self.planner.is_missing || misfits() {
             *self = before;
             return None;
         }
-        self.planner.is_idle = false;
+        self.planner.forbids_search = false;
         self.planner.prepared.clear();
         Some(answers)
     }

@@ -1,40 +1,40 @@
-//! How planning goes, to be looked at from outside while the loop plans: it has no clock and no thread of its own.
+//! Observation of planning from another thread. Has no clock and no thread.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
 use num_rational::BigRational;
 
-/// A look at the planner of a loop; copies look at the same one.
+/// Shared handle to the state of a loop's planner. Clones share it.
 #[derive(Debug, Clone, Default)]
-pub struct Watch(Arc<Mutex<Looked>>);
+pub struct Watch(Arc<Mutex<WatchState>>);
 
 #[derive(Debug, Default)]
-struct Looked {
-    begun: u64,
+struct WatchState {
+    started_count: u64,
     planning: Option<Planning>,
 }
 
-/// A plan is being looked for.
+/// State of a search.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Planning {
-    /// Which one, from 1: another number is another plan.
+    /// Number of the search, from 1.
     pub number: u64,
-    /// What the steps of the best plan so far add to the metric, if the planner has said that it has one.
+    /// Cost of the incumbent, if reported.
     pub cost: Option<BigRational>,
-    /// No plan adds less, as far as the planner has said.
+    /// Lower bound on the cost of every plan, if reported.
     pub lower_bound: Option<BigRational>,
 }
 
 impl Watch {
-    /// What is being planned now.
+    /// Returns the state of the current search, if any.
     pub fn look(&self) -> Option<Planning> {
         self.state(|state| state.planning.clone())
     }
 
     pub(super) fn begin(&self) {
         self.state(|state| {
-            state.begun += 1;
-            state.planning = Some(Planning { number: state.begun, ..Planning::default() });
+            state.started_count += 1;
+            state.planning = Some(Planning { number: state.started_count, ..Planning::default() });
         });
     }
 
@@ -50,7 +50,8 @@ impl Watch {
         self.state(|state| state.planning = None);
     }
 
-    fn state<T>(&self, use_it: impl FnOnce(&mut Looked) -> T) -> T {
-        use_it(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    fn state<T>(&self, access: impl FnOnce(&mut WatchState) -> T) -> T {
+        // A panic of the planner must not hide its state from observers.
+        access(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }

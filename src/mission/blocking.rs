@@ -49,6 +49,7 @@ impl fmt::Display for Blocking {
 /// plan. `None` if the mission has no knowledge base, or if a limit was reached.
 pub fn blocking(mission: &Mission, problem: &Problem, config: &Config) -> Option<Blocking> {
     let mut config = config.clone();
+    // A limit on the number of steps would hide longer plans.
     config.horizon = None;
     let config = &config;
     let designs = mission.knowledge()?.view().function_designs();

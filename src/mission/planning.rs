@@ -29,7 +29,7 @@ pub trait Planning {
     /// are accepted.
     ///
     /// # Errors
-    /// As [`Planning::ground`].
+    /// Errors of [`Planning::ground`].
     fn ground_exact(
         &self,
         problem: &Problem,
@@ -102,7 +102,7 @@ impl Planning for Mission {
 /// Grounds a filled problem with a variant of the domain.
 ///
 /// # Errors
-/// As [`Planning::ground`].
+/// Errors of [`Planning::ground`].
 pub(crate) fn ground_with(
     mission: &Mission,
     domain: &Domain,

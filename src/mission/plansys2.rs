@@ -47,6 +47,7 @@ pub fn spaced(mission: &Mission, problem: &Problem, plan: Plan, reading: &Readin
         });
         later.steps[next].start = after.fold(start.clone(), BigRational::max).into();
     }
+    // Delays can violate timed initial literals.
     let verdict = verdict_of(mission, problem, &later, reading, limits);
     if verdict.is_ok_and(|verdict| verdict.violation.is_none()) { later } else { plan }
 }

@@ -79,14 +79,14 @@ pub(super) fn clauses(derived: &Derived) -> Option<Vec<Clause>> {
 }
 
 /// Returns the type tests of variables. `None` if a variable name occurs twice.
-fn typed(variables: &[TypedName], known: &mut BTreeSet<Name>) -> Option<Vec<Literal>> {
+fn typed(variables: &[TypedName], names: &mut BTreeSet<Name>) -> Option<Vec<Literal>> {
     let mut types = Vec::new();
-    for own in variables {
-        let name = &own.identifier.name;
-        if !known.insert(name.clone()) {
+    for variable in variables {
+        let name = &variable.identifier.name;
+        if !names.insert(name.clone()) {
             return None;
         }
-        match &own.r#type.alternatives[..] {
+        match &variable.r#type.alternatives[..] {
             [] => {}
             [r#type] => {
                 types.push(Literal::Holds(of_type(&r#type.name), vec![Operand::Variable(name.clone())]));
@@ -138,8 +138,8 @@ fn disjuncts(condition: &Condition, variables: &mut BTreeSet<Name>) -> Option<Ve
 
 pub(super) fn operand(term: &Term) -> Operand {
     match term {
-        Term::Variable(own) => Operand::Variable(own.name.clone()),
-        Term::Constant(own) => Operand::Constant(own.name.clone()),
+        Term::Variable(identifier) => Operand::Variable(identifier.name.clone()),
+        Term::Constant(identifier) => Operand::Constant(identifier.name.clone()),
     }
 }
 
@@ -191,7 +191,9 @@ impl Clause {
         let substitute_all = |operands: Vec<Operand>| operands.into_iter().map(substitute).collect();
         let part = |part: Literal| match part {
             Literal::Holds(name, operands) => Literal::Holds(name, substitute_all(operands)),
-            Literal::Equal(same, left, right) => Literal::Equal(same, substitute(left), substitute(right)),
+            Literal::Equal(is_equality, left, right) => {
+                Literal::Equal(is_equality, substitute(left), substitute(right))
+            }
         };
         Self {
             head: self.head,
@@ -203,7 +205,7 @@ impl Clause {
     /// Resolves the conjunct at `at` with a clause that concludes it, whose variables are renamed
     /// by `depth`. `None` if the two do not unify.
     pub fn unfolded(&self, at: usize, by: &Self, depth: usize) -> Option<Self> {
-        let Literal::Holds(_, wanted) = &self.body[at] else { return None };
+        let Literal::Holds(_, operands_of_atom) = &self.body[at] else { return None };
         let operands = by.body.iter().flat_map(Literal::operands).chain(&by.arguments);
         let names = operands.filter_map(|operand| match operand {
             Operand::Variable(name) => Some(name.clone()),
@@ -216,7 +218,7 @@ impl Clause {
         let by = by.clone().with(&fresh.collect());
         let mut body = self.body.clone();
         body.remove(at);
-        let pairs = wanted.iter().cloned().zip(by.arguments);
+        let pairs = operands_of_atom.iter().cloned().zip(by.arguments);
         body.extend(pairs.map(|(left, right)| Literal::Equal(true, left, right)));
         body.extend(by.body);
         Self { head: self.head.clone(), arguments: self.arguments.clone(), body }.resolved()

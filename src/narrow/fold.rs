@@ -20,21 +20,21 @@ pub(super) struct Folded {
 }
 
 impl Folded {
-    /// Settles predicates in `known`, and predicates whose axioms mention no others, as far as
+    /// Settles predicates in `vocabulary_of_base`, and predicates whose axioms mention no others, as far as
     /// possible. Actions and timed initial literals change the predicates in `changed`; of these,
     /// timed initial literals change those in `timed`.
     pub fn new(
         domain: &Domain,
         (changed, timed): (&BTreeSet<Name>, &BTreeSet<Name>),
         guards: &Guards,
-        known: &HashSet<Name>,
+        vocabulary_of_base: &HashSet<Name>,
     ) -> Self {
         let axioms: Vec<(&Name, Option<Vec<Clause>>)> = domain
             .derived
             .iter()
             .map(|axiom| (&axiom.head.identifier.name, clause::clauses(axiom)))
             .collect();
-        let vocabulary = with_small(&axioms, known.clone());
+        let vocabulary = with_small(&axioms, vocabulary_of_base.clone());
         let mut clauses_by_head: BTreeMap<Name, Option<Vec<Clause>>> = BTreeMap::new();
         for (head, clauses) in axioms {
             add(&mut clauses_by_head, head, clauses.filter(|_| vocabulary.contains(head)));
@@ -68,29 +68,29 @@ impl Folded {
     }
 }
 
-/// Adds to `known` the predicates whose axioms mention only predicates in it. Other axioms, for
+/// Adds to `vocabulary` the predicates whose axioms mention only predicates in it. Other axioms, for
 /// example about maps, may have very large extensions.
-fn with_small(axioms: &[(&Name, Option<Vec<Clause>>)], mut known: HashSet<Name>) -> HashSet<Name> {
-    let is_small = |clauses: &[Clause], known: &HashSet<Name>| {
+fn with_small(axioms: &[(&Name, Option<Vec<Clause>>)], mut vocabulary: HashSet<Name>) -> HashSet<Name> {
+    let is_small = |clauses: &[Clause], vocabulary: &HashSet<Name>| {
         let is_known = |part: &Literal| match part {
-            Literal::Holds(name, _) => part.is_type() || known.contains(name),
+            Literal::Holds(name, _) => part.is_type() || vocabulary.contains(name),
             Literal::Equal(..) => true,
         };
         clauses.iter().all(|clause| clause.is_bound() && clause.body.iter().all(is_known))
     };
     let mut large: BTreeSet<&Name> = axioms.iter().map(|(head, _)| *head).collect();
-    large.retain(|head| !known.contains(*head));
+    large.retain(|head| !vocabulary.contains(*head));
     loop {
         let is_small = |(_, clauses): &&(&Name, Option<Vec<Clause>>)| {
-            clauses.as_ref().is_some_and(|clauses| is_small(clauses, &known))
+            clauses.as_ref().is_some_and(|clauses| is_small(clauses, &vocabulary))
         };
         let next = large.iter().copied().find(|head| {
             let mut matching = axioms.iter().filter(|(other, _)| other == head);
             matching.all(|axiom| is_small(&axiom))
         });
-        let Some(next) = next else { return known };
+        let Some(next) = next else { return vocabulary };
         large.remove(next);
-        known.insert(next.clone());
+        vocabulary.insert(next.clone());
     }
 }
 
@@ -143,10 +143,10 @@ fn fixpoint(
     }
 }
 
-fn add(all: &mut BTreeMap<Name, Option<Vec<Clause>>>, head: &Name, more: Option<Vec<Clause>>) {
-    let entry = all.entry(head.clone()).or_insert_with(|| Some(Vec::new()));
-    match (entry.as_mut(), more) {
-        (Some(known), Some(more)) => known.extend(more),
+fn add(clauses_by_head: &mut BTreeMap<Name, Option<Vec<Clause>>>, head: &Name, clauses: Option<Vec<Clause>>) {
+    let entry = clauses_by_head.entry(head.clone()).or_insert_with(|| Some(Vec::new()));
+    match (entry.as_mut(), clauses) {
+        (Some(earlier), Some(clauses)) => earlier.extend(clauses),
         _ => *entry = None,
     }
 }
@@ -165,8 +165,8 @@ struct Relations<'o> {
 
 impl Relations<'_> {
     fn insert(&mut self, predicate: &Name, arguments: Vec<Name>) -> bool {
-        let (rows, all) = self.relations.entry(predicate.clone()).or_default();
-        let is_new = all.insert(arguments.clone());
+        let (rows, distinct_rows) = self.relations.entry(predicate.clone()).or_default();
+        let is_new = distinct_rows.insert(arguments.clone());
         if is_new {
             rows.push(arguments);
         }
@@ -181,9 +181,9 @@ impl Relations<'_> {
     /// first; types and inequalities as soon as their variables are bound.
     fn order<'b>(&self, body: &'b [Literal]) -> Vec<&'b Literal> {
         // Greedy join ordering: each step takes the cheapest remaining conjunct.
-        let (mut left, mut order): (Vec<&Literal>, Vec<&Literal>) = (body.iter().collect(), Vec::new());
+        let (mut remaining, mut order): (Vec<&Literal>, Vec<&Literal>) = (body.iter().collect(), Vec::new());
         let mut bound: BTreeSet<&Name> = BTreeSet::new();
-        while !left.is_empty() {
+        while !remaining.is_empty() {
             let cost = |part: &Literal| {
                 let operands = part.operands();
                 let is_free =
@@ -196,8 +196,8 @@ impl Relations<'_> {
                 // few new variables, and small relations come first.
                 (free > 0, is_test && free > 0, is_apart && free > 0, free, rows)
             };
-            let best = (0..left.len()).min_by_key(|&index| cost(left[index])).unwrap_or(0);
-            let next = left.remove(best);
+            let best = (0..remaining.len()).min_by_key(|&index| cost(remaining[index])).unwrap_or(0);
+            let next = remaining.remove(best);
             bound.extend(next.operands().into_iter().filter_map(|operand| match operand {
                 Operand::Variable(name) => Some(name),
                 Operand::Constant(_) => None,
@@ -210,52 +210,55 @@ impl Relations<'_> {
     fn matches<'k>(
         &'k self,
         order: &[&'k Literal],
-        found: &mut Bindings<'k>,
-        each: &mut dyn FnMut(&Bindings<'k>),
+        bindings: &mut Bindings<'k>,
+        visit: &mut dyn FnMut(&Bindings<'k>),
     ) {
-        let Some((part, rest)) = order.split_first() else { return each(found) };
-        let free = part.operands().into_iter().find(|operand| value(operand, found).is_none());
+        let Some((part, remaining)) = order.split_first() else { return visit(bindings) };
+        let free = part.operands().into_iter().find(|operand| value(operand, bindings).is_none());
         match (part, free) {
             // No atom binds this variable, so it ranges over all objects.
             (Literal::Equal(..), Some(Operand::Variable(name))) => {
                 for object in self.objects {
-                    found.insert(name, object);
-                    self.matches(order, found, each);
-                    found.remove(name);
+                    bindings.insert(name, object);
+                    self.matches(order, bindings, visit);
+                    bindings.remove(name);
                 }
             }
-            (Literal::Equal(same, left, right), _) => {
-                if (value(left, found) == value(right, found)) == *same {
-                    self.matches(rest, found, each);
+            (Literal::Equal(is_equality, left, right), _) => {
+                if (value(left, bindings) == value(right, bindings)) == *is_equality {
+                    self.matches(remaining, bindings, visit);
                 }
             }
             (Literal::Holds(predicate, operands), _) => {
                 for row in self.rows(predicate) {
                     // A partial match may have bound some variables before it failed.
-                    let before = found.clone();
+                    let before = bindings.clone();
                     if row.len() == operands.len()
-                        && operands.iter().zip(row).all(|(operand, argument)| bind(operand, argument, found))
+                        && operands
+                            .iter()
+                            .zip(row)
+                            .all(|(operand, argument)| bind(operand, argument, bindings))
                     {
-                        self.matches(rest, found, each);
+                        self.matches(remaining, bindings, visit);
                     }
-                    *found = before;
+                    *bindings = before;
                 }
             }
         }
     }
 
     /// Adds the instances of a head. Arguments that the body does not bind range over all objects.
-    fn heads(&self, clause: &Clause, found: &Bindings<'_>, new: &mut Vec<Fact>) {
-        let mut rows: Vec<(Vec<Name>, Bindings<'_>)> = vec![(Vec::new(), found.clone())];
+    fn heads(&self, clause: &Clause, bindings: &Bindings<'_>, new: &mut Vec<Fact>) {
+        let mut rows: Vec<(Vec<Name>, Bindings<'_>)> = vec![(Vec::new(), bindings.clone())];
         for argument in &clause.arguments {
             rows = rows
                 .into_iter()
-                .flat_map(|(row, found)| {
-                    let values = match (value(argument, &found), argument) {
-                        (Some(known), _) => vec![(known.clone(), found)],
+                .flat_map(|(row, bindings)| {
+                    let values = match (value(argument, &bindings), argument) {
+                        (Some(value_of_argument), _) => vec![(value_of_argument.clone(), bindings)],
                         (None, Operand::Variable(name)) => {
                             let with = |object| {
-                                let mut extended = found.clone();
+                                let mut extended = bindings.clone();
                                 extended.insert(name, object);
                                 (Name::clone(object), extended)
                             };
@@ -263,7 +266,9 @@ impl Relations<'_> {
                         }
                         (None, Operand::Constant(_)) => Vec::new(),
                     };
-                    values.into_iter().map(move |(value, found)| ([row.clone(), vec![value]].concat(), found))
+                    values
+                        .into_iter()
+                        .map(move |(value, bindings)| ([row.clone(), vec![value]].concat(), bindings))
                 })
                 .collect();
         }
@@ -271,21 +276,21 @@ impl Relations<'_> {
     }
 }
 
-fn value<'k>(operand: &'k Operand, found: &Bindings<'k>) -> Option<&'k Name> {
+fn value<'k>(operand: &'k Operand, bindings: &Bindings<'k>) -> Option<&'k Name> {
     match operand {
-        Operand::Variable(name) => found.get(name).copied(),
+        Operand::Variable(name) => bindings.get(name).copied(),
         Operand::Constant(name) => Some(name),
     }
 }
 
-fn bind<'k>(operand: &'k Operand, argument: &'k Name, found: &mut Bindings<'k>) -> bool {
+fn bind<'k>(operand: &'k Operand, argument: &'k Name, bindings: &mut Bindings<'k>) -> bool {
     match operand {
         Operand::Constant(name) => name == argument,
         Operand::Variable(name) => {
-            if let Some(known) = found.get(name) {
-                return *known == argument;
+            if let Some(bound_value) = bindings.get(name) {
+                return *bound_value == argument;
             }
-            found.insert(name, argument);
+            bindings.insert(name, argument);
             true
         }
     }

@@ -34,33 +34,33 @@ pub(crate) fn narrowed<'t>(
     problem: &'t Problem,
 ) -> (Cow<'t, Domain>, Cow<'t, Problem>) {
     match mission.completed_predicates() {
-        Some(known) => {
-            let (domain, problem) = narrow(domain, problem, known);
+        Some(completed) => {
+            let (domain, problem) = narrow(domain, problem, completed);
             (Cow::Owned(domain), Cow::Owned(problem))
         }
         None => (Cow::Borrowed(domain), Cow::Borrowed(problem)),
     }
 }
 
-/// Narrows the predicates in `known` and their consequences. Other predicates are of maps and tasks
+/// Narrows the predicates in `completed` and their consequences. Other predicates are of maps and tasks
 /// and may have large extensions, so grounding handles them.
-fn narrow(domain: &Domain, problem: &Problem, known: &HashSet<Name>) -> (Domain, Problem) {
+fn narrow(domain: &Domain, problem: &Problem, completed: &HashSet<Name>) -> (Domain, Problem) {
     let mentioned = Mentioned::by_domain(domain).and_problem(problem);
     let facts: BTreeSet<Fact> = problem
         .init
         .iter()
         .filter_map(InitialElement::fact)
-        .filter(|(predicate, _)| known.contains(predicate))
+        .filter(|(predicate, _)| completed.contains(predicate))
         .collect();
     let heads = domain.derived.iter().map(|axiom| &axiom.head.identifier.name);
     let varying = mentioned.changed.iter().chain(heads).cloned().collect();
     let mut guards: Guards = settle::guards(domain, &varying, &mentioned.timed);
     guards.retain(|guard @ (predicate, _, class)| {
-        known.contains(predicate)
-            && known.contains(class)
+        completed.contains(predicate)
+            && completed.contains(class)
             && facts.iter().all(|fact| settle::keeps(fact, guard, &facts))
     });
-    let folded = Folded::new(domain, (&mentioned.changed, &mentioned.timed), &guards, known);
+    let folded = Folded::new(domain, (&mentioned.changed, &mentioned.timed), &guards, completed);
     let (mut domain, mut problem) = (domain.clone(), problem.clone());
     folded.shorten(&mut domain);
     drop_unused(&mut domain, &problem);
@@ -73,7 +73,9 @@ fn narrow(domain: &Domain, problem: &Problem, known: &HashSet<Name>) -> (Domain,
     let hierarchy = TypeHierarchy::of(&domain);
     let is_of = |object: &Name, r#type: &Name| {
         let expected = TypeExpression { alternatives: vec![r#type.clone().into()] };
-        types.get(object).is_some_and(|own| own.iter().any(|own| hierarchy.fits(own, &expected)))
+        types.get(object).is_some_and(|types_of_object| {
+            types_of_object.iter().any(|expression| hierarchy.fits(expression, &expected))
+        })
     };
     let conclusions = folded.facts(&facts, &names, &is_of);
     let conclusions = conclusions.into_iter().filter(|fact| !facts.contains(fact));
@@ -99,9 +101,9 @@ fn drop_unused(domain: &mut Domain, problem: &Problem) {
             break;
         }
     }
-    let (kept, unused): (Vec<_>, Vec<_>) =
+    let (needed, unused): (Vec<_>, Vec<_>) =
         derived.into_iter().partition(|axiom| used.contains(&axiom.head.identifier.name));
-    domain.derived = kept;
+    domain.derived = needed;
     let unused: BTreeSet<Name> = unused.into_iter().map(|axiom| axiom.head.identifier.name).collect();
     domain.predicates.retain(|declared| !unused.contains(&declared.identifier.name));
 }

@@ -13,7 +13,7 @@ use pddl::ast::{
 };
 
 use super::clause::{Clause, Fact, Literal};
-use super::settle::{Additions, additions, same};
+use super::settle::{Additions, additions, are_equal};
 
 /// A fact that an action may add.
 #[derive(Debug, Clone)]
@@ -60,7 +60,8 @@ impl Possible {
                     Term::Constant(constant) => Some(Argument::Object(constant.name.clone())),
                     Term::Variable(variable) if bound.contains(&&variable.name) => None,
                     Term::Variable(_) => {
-                        let required = classes.iter().filter(|(class, of)| is_class(class) && same(of, term));
+                        let required =
+                            classes.iter().filter(|(class, of)| is_class(class) && are_equal(of, term));
                         let required: Vec<Name> = required.map(|(class, _)| class.clone()).collect();
                         (!required.is_empty()).then_some(Argument::Of(required))
                     }
@@ -116,10 +117,10 @@ impl Possible {
                         members_by_class.fold(first, |one, other| one.intersection(&other).cloned().collect())
                     }
                 };
-                let longer = |row: &Vec<Name>| -> Vec<Vec<Name>> {
+                let extended = |row: &Vec<Name>| -> Vec<Vec<Name>> {
                     values.iter().map(|object| [row.clone(), vec![object.clone()]].concat()).collect()
                 };
-                rows = rows.iter().flat_map(longer).collect();
+                rows = rows.iter().flat_map(extended).collect();
             }
             facts.extend(rows.into_iter().map(|row| (addition.predicate.clone(), row)));
         }
@@ -177,8 +178,8 @@ impl Possible {
 
     fn condition(&self, condition: &mut Condition) {
         match condition {
-            Condition::Atom(own) if self.bounded.contains(&own.predicate.name) => {
-                *condition = Condition::And(vec![possible_atom(own), Condition::Atom(own.clone())]);
+            Condition::Atom(atom) if self.bounded.contains(&atom.predicate.name) => {
+                *condition = Condition::And(vec![possible_atom(atom), Condition::Atom(atom.clone())]);
             }
             other => other.parts_mut().for_each(|part| self.condition(part)),
         }
@@ -197,6 +198,6 @@ pub(super) fn possible(name: &Name) -> Name {
     Name::new(&format!("possible-{name}"))
 }
 
-fn possible_atom(own: &Atom) -> Condition {
-    Condition::Atom(Atom { predicate: possible(&own.predicate.name).into(), ..own.clone() })
+fn possible_atom(atom: &Atom) -> Condition {
+    Condition::Atom(Atom { predicate: possible(&atom.predicate.name).into(), ..atom.clone() })
 }

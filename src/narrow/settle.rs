@@ -37,13 +37,13 @@ pub(super) fn guards(domain: &Domain, varying: &BTreeSet<Name>, timed: &BTreeSet
         let Additions { classes, atoms } = additions(action, varying);
         for (atom, bound) in atoms {
             for (position, argument) in atom.arguments.iter().enumerate() {
-                let is_asked = |of: &Term| same(of, argument) && !is_bound(argument, &bound);
+                let is_asked = |of: &Term| are_equal(of, argument) && !is_bound(argument, &bound);
                 let required = classes.iter().filter(|(_, of)| is_asked(of)).map(|(class, _)| class.clone());
                 let required: BTreeSet<Name> = required.collect();
                 let key = (atom.predicate.name.clone(), position);
                 guards
                     .entry(key)
-                    .and_modify(|all| all.retain(|class| required.contains(class)))
+                    .and_modify(|common| common.retain(|class| required.contains(class)))
                     .or_insert(required);
             }
         }
@@ -69,9 +69,10 @@ pub(super) fn additions<'a>(action: &'a Action, varying: &BTreeSet<Name>) -> Add
         ActionBody::Instantaneous { precondition, effect } => (vec![precondition], vec![effect]),
         // A condition at the start need not hold when the action adds the fact, but classes never
         // change.
-        ActionBody::Durative { conditions, effects, .. } => {
-            (conditions.iter().map(|(_, own)| own).collect(), effects.iter().map(|(_, own)| own).collect())
-        }
+        ActionBody::Durative { conditions, effects, .. } => (
+            conditions.iter().map(|(_, part)| part).collect(),
+            effects.iter().map(|(_, part)| part).collect(),
+        ),
     };
     let mut atoms = Vec::new();
     for effect in effects {
@@ -82,43 +83,43 @@ pub(super) fn additions<'a>(action: &'a Action, varying: &BTreeSet<Name>) -> Add
 
 /// Returns the unary atoms that a condition requires, except for `varying` predicates, whose
 /// members differ between states.
-fn classes<'c>(asked: &[&'c Condition], varying: &BTreeSet<Name>) -> Vec<(Name, &'c Term)> {
-    let (mut parts, mut found) = (asked.to_vec(), Vec::new());
+fn classes<'c>(conditions: &[&'c Condition], varying: &BTreeSet<Name>) -> Vec<(Name, &'c Term)> {
+    let (mut parts, mut found_classes) = (conditions.to_vec(), Vec::new());
     while let Some(part) = parts.pop() {
         match part {
-            Condition::And(more) => parts.extend(more),
+            Condition::And(conjuncts) => parts.extend(conjuncts),
             Condition::Atom(atom) if !varying.contains(&atom.predicate.name) => {
                 // Only unary predicates are classes.
-                if let [own] = &atom.arguments[..] {
-                    found.push((atom.predicate.name.clone(), own));
+                if let [argument] = &atom.arguments[..] {
+                    found_classes.push((atom.predicate.name.clone(), argument));
                 }
             }
             _ => {}
         }
     }
-    found
+    found_classes
 }
 
 /// The atoms that an effect adds, each with the variables that quantifiers within the effect bind.
-fn added<'e>(effect: &'e Effect, bound: &[&'e Name], found: &mut Vec<(&'e Atom, Vec<&'e Name>)>) {
+fn added<'e>(effect: &'e Effect, bound: &[&'e Name], atoms: &mut Vec<(&'e Atom, Vec<&'e Name>)>) {
     match effect {
         Effect::And(parts) => {
             for part in parts {
-                added(part, bound, found);
+                added(part, bound, atoms);
             }
         }
-        Effect::Add(atom) => found.push((atom, bound.to_vec())),
+        Effect::Add(atom) => atoms.push((atom, bound.to_vec())),
         Effect::ForAll(variables, inner) => {
             let quantified = variables.iter().map(|variable| &variable.identifier.name);
-            added(inner, &bound.iter().copied().chain(quantified).collect::<Vec<_>>(), found);
+            added(inner, &bound.iter().copied().chain(quantified).collect::<Vec<_>>(), atoms);
         }
         // The condition of the effect only restricts the added facts, so ignoring it is safe.
-        Effect::When(_, inner) => added(inner, bound, found),
+        Effect::When(_, inner) => added(inner, bound, atoms),
         Effect::Delete(_) | Effect::Assign(..) => {}
     }
 }
 
-pub(super) fn same(left: &Term, right: &Term) -> bool {
+pub(super) fn are_equal(left: &Term, right: &Term) -> bool {
     match (left, right) {
         (Term::Variable(left), Term::Variable(right)) | (Term::Constant(left), Term::Constant(right)) => {
             left.name == right.name
@@ -128,7 +129,7 @@ pub(super) fn same(left: &Term, right: &Term) -> bool {
 }
 
 fn is_bound(term: &Term, bound: &[&Name]) -> bool {
-    matches!(term, Term::Variable(own) if bound.contains(&&own.name))
+    matches!(term, Term::Variable(variable) if bound.contains(&&variable.name))
 }
 
 /// The clauses of settled predicates, and those of open predicates.
@@ -137,36 +138,38 @@ pub(super) type Parted = (BTreeMap<Name, Vec<Clause>>, BTreeMap<Name, Option<Vec
 /// Unfolds clauses until no further predicate becomes settled. Returns the settled clauses, in
 /// which no open predicate occurs, and the open ones.
 pub(super) fn settle(
-    mut all: BTreeMap<Name, Option<Vec<Clause>>>,
+    mut clauses_by_head: BTreeMap<Name, Option<Vec<Clause>>>,
     changed: &BTreeSet<Name>,
     guards: &Guards,
 ) -> Parted {
     loop {
-        let open = open(&all, changed);
-        let candidates = all.keys().filter(|head| open.contains(*head));
+        let open = open(&clauses_by_head, changed);
+        let candidates = clauses_by_head.keys().filter(|head| open.contains(*head));
         let resolved = candidates.into_iter().find_map(|head| {
-            let clauses = Unfold { all: &all, open: &open, guards, head }.clauses()?;
+            let clauses =
+                Unfold { clauses_by_head: &clauses_by_head, open: &open, guards, head }.clauses()?;
             Some((head.clone(), clauses))
         });
         let Some((head, clauses)) = resolved else {
             let (open, settled): (BTreeMap<_, _>, BTreeMap<_, _>) =
-                all.into_iter().partition(|(head, _)| open.contains(head));
+                clauses_by_head.into_iter().partition(|(head, _)| open.contains(head));
             let settled = settled.into_iter().filter_map(|(head, clauses)| Some((head, clauses?)));
             return (settled.collect(), open);
         };
         // A newly settled predicate may make further predicates settled, so the loop starts again.
-        all.insert(head, Some(clauses));
+        clauses_by_head.insert(head, Some(clauses));
     }
 }
 
 /// Returns the predicates that may differ between states.
-fn open(all: &BTreeMap<Name, Option<Vec<Clause>>>, changed: &BTreeSet<Name>) -> BTreeSet<Name> {
+fn open(clauses_by_head: &BTreeMap<Name, Option<Vec<Clause>>>, changed: &BTreeSet<Name>) -> BTreeSet<Name> {
     let mut open = changed.clone();
     loop {
-        let asks = |clauses: &Vec<Clause>| clauses.iter().any(|clause| first_open(clause, &open).is_some());
-        let newly_open: Vec<Name> = all
+        let depends_on_open =
+            |clauses: &Vec<Clause>| clauses.iter().any(|clause| first_open(clause, &open).is_some());
+        let newly_open: Vec<Name> = clauses_by_head
             .iter()
-            .filter(|(head, clauses)| !open.contains(*head) && clauses.as_ref().is_none_or(asks))
+            .filter(|(head, clauses)| !open.contains(*head) && clauses.as_ref().is_none_or(depends_on_open))
             .map(|(head, _)| head.clone())
             .collect();
         if newly_open.is_empty() {
@@ -182,7 +185,7 @@ fn first_open(clause: &Clause, open: &BTreeSet<Name>) -> Option<usize> {
 
 /// Unfolding of one predicate's clauses.
 struct Unfold<'a> {
-    all: &'a BTreeMap<Name, Option<Vec<Clause>>>,
+    clauses_by_head: &'a BTreeMap<Name, Option<Vec<Clause>>>,
     open: &'a BTreeSet<Name>,
     guards: &'a Guards,
     head: &'a Name,
@@ -192,7 +195,7 @@ impl Unfold<'_> {
     /// Returns clauses without open atoms, or `None` if open atoms remain.
     fn clauses(&self) -> Option<Vec<Clause>> {
         let mut agenda: Vec<(Clause, usize)> =
-            self.all[self.head].as_ref()?.iter().map(|clause| (clause.clone(), 0)).collect();
+            self.clauses_by_head[self.head].as_ref()?.iter().map(|clause| (clause.clone(), 0)).collect();
         let (mut done, mut count) = (BTreeSet::new(), 0);
         while let Some((clause, depth)) = agenda.pop() {
             count += 1;
@@ -215,7 +218,7 @@ impl Unfold<'_> {
             }
             // Predicates that actions change have no clauses, and not all axioms of a domain are
             // clauses.
-            let by = self.all.get(name)?.as_ref()?;
+            let by = self.clauses_by_head.get(name)?.as_ref()?;
             agenda.extend(by.iter().filter_map(|by| Some((clause.unfolded(at, by, depth + 1)?, depth + 1))));
         }
         Some(done.into_iter().collect())
@@ -244,7 +247,7 @@ impl Unfold<'_> {
             }
             _ => false,
         };
-        self.all[self.head].iter().flatten().any(is_inclusion)
+        self.clauses_by_head[self.head].iter().flatten().any(is_inclusion)
     }
 }
 

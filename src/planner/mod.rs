@@ -183,7 +183,7 @@ impl<'m, 'r> Planner<'m, 'r> {
     /// the validator. Replaces the objectives of [`Planner::minimize`].
     ///
     /// # Errors
-    /// As [`Planner::plan`].
+    /// Errors of [`Planner::plan`].
     pub fn pareto(mut self, objectives: [&str; 2]) -> Result<PlannedFront<'m>, Errors> {
         if self.separation.is_some() || self.alternatives.is_some() {
             return Err(apart("a front has neither plans whose actions overlap nor alternatives"));
@@ -194,9 +194,10 @@ impl<'m, 'r> Planner<'m, 'r> {
         let task = self.mission.ground(&self.problem, &objectives.metrics, &self.config.limits)?;
         let preparation = Preparation { ground: began.elapsed(), ..Preparation::default() };
         let config = self.config.clone();
-        let front = planner::pareto(&task, &config, &mut self.hear());
+        let front = planner::pareto(&task, &config, &mut self.improvement_listener());
         let reading = Reading::sequential(task.is_timed());
         for point in &front.points {
+            // No plan is shown before the validator has accepted it.
             objectives.confirm(self.mission, &self.problem, point, &reading, &config.limits)?;
         }
         let Self { mission, problem, .. } = self;
@@ -212,7 +213,7 @@ impl<'m, 'r> Planner<'m, 'r> {
         let limits = self.config.limits.clone();
         let task = self.mission.ground_concurrent(&self.problem, &objectives.metrics, separation, &limits)?;
         let ground = began.elapsed();
-        let mut solution = optimize_concurrent(&task, &limits, &mut self.hear());
+        let mut solution = optimize_concurrent(&task, &limits, &mut self.improvement_listener());
         let reading = Reading::concurrent(separation);
         if let Some(plan) = solution.plan.take() {
             let mut problem = self.problem.clone();
@@ -236,12 +237,12 @@ impl<'m, 'r> Planner<'m, 'r> {
             Err(refused) => return Err(refused),
         };
         let ground = began.elapsed();
-        let point = planner::lexicographic(&task, &config, &mut self.hear());
+        let point = planner::lexicographic(&task, &config, &mut self.improvement_listener());
         let reading = Reading::sequential(task.is_timed());
         let alternatives = match self.alternatives {
-            Some(most) => {
+            Some(limit) => {
                 (self.stage)("the plan is proved; other plans that are as good are looked for");
-                self.others(&task, &point.solution, most)?
+                self.further_plans(&task, &point.solution, limit)?
             }
             None => None,
         };
@@ -272,8 +273,13 @@ impl<'m, 'r> Planner<'m, 'r> {
     }
 
     /// Computes further plans; the validator executes each of them.
-    fn others(&self, task: &Task, solution: &Solution, most: usize) -> Result<Option<Alternatives>, Errors> {
-        let Some(mut found) = alternatives(task, solution, most, &self.config) else {
+    fn further_plans(
+        &self,
+        task: &Task,
+        solution: &Solution,
+        limit: usize,
+    ) -> Result<Option<Alternatives>, Errors> {
+        let Some(mut found) = alternatives(task, solution, limit, &self.config) else {
             return Ok(None);
         };
         let reading = Reading::sequential(task.is_timed());
@@ -328,7 +334,7 @@ impl<'m, 'r> Planner<'m, 'r> {
 
     /// Returns a callback that forwards improvements to the listener, and sets the interruption
     /// flag if the listener returns `Break`.
-    fn hear(&mut self) -> impl FnMut(Improvement) {
+    fn improvement_listener(&mut self) -> impl FnMut(Improvement) {
         let flag = self.config.limits.interrupt();
         let report = &mut self.report;
         move |improvement| {

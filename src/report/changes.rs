@@ -44,10 +44,10 @@ fn differences(
     missing: &str,
 ) -> Vec<String> {
     let names: BTreeSet<&String> = before.keys().chain(after.keys()).collect();
-    let of = |all: &BTreeMap<String, String>, name: &String| {
-        all.get(name).cloned().unwrap_or_else(|| missing.to_owned())
+    let value_of = |values: &BTreeMap<String, String>, name: &String| {
+        values.get(name).cloned().unwrap_or_else(|| missing.to_owned())
     };
-    let changed = names.into_iter().map(|name| (name, of(before, name), of(after, name)));
+    let changed = names.into_iter().map(|name| (name, value_of(before, name), value_of(after, name)));
     let changed = changed.filter(|(_, old, new)| old != new);
     changed.map(|(name, old, new)| format!("{name}: {old} before, {new} now.")).collect()
 }
@@ -77,15 +77,15 @@ fn measured(mission: &Mission) -> BTreeMap<String, String> {
 /// Returns the differences of the problems.
 fn task(before: &Mission, after: &Mission) -> Vec<String> {
     let (old, new) = (stated(before), stated(after));
-    let only = |own: &BTreeSet<String>, other: &BTreeSet<String>| {
-        own.difference(other).cloned().collect::<Vec<_>>().join(" ")
+    let only = |facts: &BTreeSet<String>, other_facts: &BTreeSet<String>| {
+        facts.difference(other_facts).cloned().collect::<Vec<_>>().join(" ")
     };
-    let (gone, come) = (only(&old, &new), only(&new, &old));
-    match (gone.is_empty(), come.is_empty()) {
+    let (removed, added) = (only(&old, &new), only(&new, &old));
+    match (removed.is_empty(), added.is_empty()) {
         (true, true) => Vec::new(),
-        (false, true) => vec![format!("The task: {gone} before, and not now.")],
-        (true, false) => vec![format!("The task: {come} now, and not before.")],
-        (false, false) => vec![format!("The task: {gone} before, {come} now.")],
+        (false, true) => vec![format!("The task: {removed} before, and not now.")],
+        (true, false) => vec![format!("The task: {added} now, and not before.")],
+        (false, false) => vec![format!("The task: {removed} before, {added} now.")],
     }
 }
 
@@ -104,7 +104,7 @@ fn stated(mission: &Mission) -> BTreeSet<String> {
 
 fn shown(atom: &Atom) -> String {
     let arguments = atom.arguments.iter().map(|term| match term {
-        Term::Constant(own) | Term::Variable(own) => &own.name,
+        Term::Constant(identifier) | Term::Variable(identifier) => &identifier.name,
     });
     let words: Vec<&str> = std::iter::once(&atom.predicate.name).chain(arguments).map(Name::as_str).collect();
     format!("({})", words.join(" "))
@@ -129,7 +129,7 @@ fn designs(before: &Mission, after: &Mission) -> Vec<Change> {
 /// Returns the differences of the plans.
 fn plans(before: &Plan, after: &Plan, costs: &[Cost; 2]) -> Vec<String> {
     let text = match costs {
-        [Cost::Of(old), Cost::Of(new)] => return both(before, after, [old, new]),
+        [Cost::Of(old), Cost::Of(new)] => return cost_and_design_differences(before, after, [old, new]),
         [Cost::Of(old), Cost::NoPlan] => format!("There is no plan now. The plan before costs {old}."),
         [Cost::Of(old), Cost::NotFound] => format!("No plan was found now. The plan before costs {old}."),
         [Cost::NoPlan, Cost::Of(new)] => format!("The plan costs {new} now. Before, there was no plan."),
@@ -143,7 +143,7 @@ fn plans(before: &Plan, after: &Plan, costs: &[Cost; 2]) -> Vec<String> {
 }
 
 /// Sentences about the differences between two plans with these costs.
-fn both(before: &Plan, after: &Plan, [old_cost, new_cost]: [&str; 2]) -> Vec<String> {
+fn cost_and_design_differences(before: &Plan, after: &Plan, [old_cost, new_cost]: [&str; 2]) -> Vec<String> {
     let mut texts = Vec::new();
     if old_cost == new_cost {
         texts.push(format!("The plan costs {new_cost}, as before."));
@@ -161,25 +161,26 @@ fn both(before: &Plan, after: &Plan, [old_cost, new_cost]: [&str; 2]) -> Vec<Str
             .collect()
     };
     texts.extend(differences(&used(before), &used(after), "none"));
-    texts.push(kept(before, after));
+    texts.push(shared(before, after));
     texts
 }
 
 /// Sentence with the number of actions that both plans have. An action counts as often as it is in
 /// both plans. Its designs do not matter.
-fn kept(before: &Plan, after: &Plan) -> String {
+fn shared(before: &Plan, after: &Plan) -> String {
     let mut old: Vec<&str> = before.steps.iter().map(|step| step.label.as_str()).collect();
     let in_both = after.steps.iter().filter(|step| {
         let position = old.iter().position(|label| *label == step.label);
+        // Each action of the old plan is matched at most once.
         position.map(|position| old.swap_remove(position)).is_some()
     });
-    let (kept, new, old) = (in_both.count(), after.steps.len(), before.steps.len());
+    let (shared, new, old) = (in_both.count(), after.steps.len(), before.steps.len());
     let plural = |count: usize| if count == 1 { "1 action".to_owned() } else { format!("{count} actions") };
     if new == 0 {
         return format!("The plan has no actions now; it had {} before.", plural(old));
     }
-    let are = if kept == 1 || new == 1 { "is" } else { "are" };
-    format!("{kept} of {} {are} also in the plan before, which has {}.", plural(new), plural(old))
+    let are = if shared == 1 || new == 1 { "is" } else { "are" };
+    format!("{shared} of {} {are} also in the plan before, which has {}.", plural(new), plural(old))
 }
 
 #[cfg(test)]

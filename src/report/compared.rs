@@ -21,7 +21,7 @@ pub fn comparison_sheet(mission: &str, comparisons: &[(Option<Pair>, Comparison)
     }
     parts.push(Part::Heading("All measures".to_owned()));
     parts.push(table(rows));
-    let front: usize = comparisons.iter().map(|(_, own)| own.front.len()).sum();
+    let front: usize = comparisons.iter().map(|(_, comparison)| comparison.front.len()).sum();
     Sheet {
         name: format!("{mission}: plans beside policies"),
         description: "All candidates are measured in one decision process, exactly.".to_owned(),
@@ -49,9 +49,10 @@ fn front(comparison: &Comparison) -> Points {
     let kinds: Vec<String> =
         comparison.candidates.iter().map(|candidate| candidate.kind.to_string()).collect();
     let kinds: Vec<(&Option<Pair>, &str)> = kinds.iter().map(|kind| (&None, kind.as_str())).collect();
-    let points = comparison.candidates.iter().zip(labels(&kinds)).filter_map(|(own, label)| {
-        let (time, success) = (own.measures.time?, own.measures.no_collision);
-        let about = format!("{label}, {}: time {}, probability {}", own.name, shown(time), shown(success));
+    let points = comparison.candidates.iter().zip(labels(&kinds)).filter_map(|(candidate, label)| {
+        let (time, success) = (candidate.measures.time?, candidate.measures.no_collision);
+        let about =
+            format!("{label}, {}: time {}, probability {}", candidate.name, shown(time), shown(success));
         Some((label, about, time, success))
     });
     Points {
@@ -165,7 +166,7 @@ fn none_accomplished(missions: usize) -> String {
     format!("0 of {missions} accomplished")
 }
 
-fn own(runs: &[Run], strategy: Strategy) -> impl Iterator<Item = &Run> {
+fn runs_of(runs: &[Run], strategy: Strategy) -> impl Iterator<Item = &Run> {
     runs.iter().filter(move |run| run.strategy == strategy)
 }
 
@@ -176,17 +177,18 @@ fn distribution(
     figure: &dyn Fn(&Run) -> Option<f64>,
 ) -> Part {
     let group = |strategy: &Strategy| {
-        let values = own(runs, *strategy).filter_map(|run| {
+        let values = runs_of(runs, *strategy).filter_map(|run| {
             let value = figure(run)?;
             Some((value, format!("{}, seed {}: {}", strategy.name(), run.seed, rounded(value))))
         });
         let values: Vec<(f64, String)> = values.collect();
         let sample: Vec<f64> = values.iter().map(|(value, _)| *value).collect();
         let mean = Sample::of(&sample).map(|sample| {
+            // A single value has no confidence interval.
             let half_width = if sample.count > 1 { sample.half_width } else { 0.0 };
             (hundredths(sample.mean), hundredths(half_width))
         });
-        let nothing = nothing(own(runs, *strategy).count());
+        let nothing = nothing(runs_of(runs, *strategy).count());
         Group { name: strategy.name().to_owned(), values, mean, nothing }
     };
     let groups = strategies.iter().map(group).collect();
@@ -197,10 +199,10 @@ fn figures(strategies: &[Strategy], runs: &[Run]) -> Part {
     let header = ["strategy", "missions", "accomplished", "mean cost, if accomplished", "failed actions"];
     let line = |strategy: &Strategy| {
         let costs: Vec<f64> =
-            own(runs, *strategy).filter(|run| run.accomplished).map(|run| run.cost).collect();
+            runs_of(runs, *strategy).filter(|run| run.accomplished).map(|run| run.cost).collect();
         let cost = Sample::of(&costs).map_or_else(|| "none accomplished".to_owned(), |sample| mean(&sample));
-        let failed: usize = own(runs, *strategy).map(|run| run.failed).sum();
-        let counts = [own(runs, *strategy).count(), costs.len()].map(|count| count.to_string());
+        let failed: usize = runs_of(runs, *strategy).map(|run| run.failed).sum();
+        let counts = [runs_of(runs, *strategy).count(), costs.len()].map(|count| count.to_string());
         let [missions, accomplished] = counts;
         vec![strategy.name().to_owned(), missions, accomplished, cost, failed.to_string()]
     };

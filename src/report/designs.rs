@@ -9,7 +9,7 @@ use rules::{Derivation, Reason as Why, Symbols};
 
 use crate::explain::{Causes, causes};
 use crate::knowledge::Knowledge;
-use crate::mapek::{said, unavailable};
+use crate::mapek::{fact_text, unavailable};
 use crate::mission::Mission;
 use crate::number::decimal;
 
@@ -18,22 +18,22 @@ pub fn designs(mission: &Mission, steps: &[Step]) -> Vec<Design> {
     let Some(knowledge) = mission.knowledge() else { return Vec::new() };
     let (components, measurements) = (knowledge.view().components(), knowledge.view().measurements());
     let each = knowledge.catalogue().designs().iter();
-    each.map(|design| one(knowledge, design, (&components, &measurements), steps)).collect()
+    each.map(|design| design_picture(knowledge, design, (&components, &measurements), steps)).collect()
 }
 
-fn one(
+fn design_picture(
     knowledge: &Knowledge,
     design: &FunctionDesign,
     (components, measurements): (&[Component], &[Measurement]),
     steps: &[Step],
 ) -> Design {
     let name = design.individual.name.clone();
-    let uses = |step: &Step| step.configuration.iter().any(|(_, own)| *own == name);
-    let components = design.components.iter().map(|own| {
-        let component = components.iter().find(|component| component.individual == *own);
+    let uses = |step: &Step| step.configuration.iter().any(|(_, chosen)| *chosen == name);
+    let components = design.components.iter().map(|required_component| {
+        let component = components.iter().find(|component| component.individual == *required_component);
         match component.and_then(|component| component.status.as_deref()) {
-            Some(status) => format!("{} ({status})", own.name),
-            None => own.name.clone(),
+            Some(status) => format!("{} ({status})", required_component.name),
+            None => required_component.name.clone(),
         }
     });
     let requirements = design.requirements.iter().map(|requirement| required(requirement, measurements));
@@ -105,14 +105,15 @@ pub(super) fn because(knowledge: &Knowledge, design: &str, available: bool) -> V
 }
 
 /// Converts a derivation to a tree. A fact that was explained before is only named.
-fn tree(derivation: &Derivation, at: usize, symbols: &Symbols, told: &mut BTreeSet<usize>) -> Reason {
+fn tree(derivation: &Derivation, at: usize, symbols: &Symbols, explained: &mut BTreeSet<usize>) -> Reason {
     let step = &derivation.steps[at];
-    let fact = said(&step.fact, symbols);
+    let fact = fact_text(&step.fact, symbols);
     let leaf = |text: String| Reason { text, supports: Vec::new() };
     if matches!(step.reason, Why::Asserted) {
         return leaf(format!("{fact} is stated"));
     }
-    if !told.insert(at) {
+    // A derivation is a directed acyclic graph. Shared facts are expanded once.
+    if !explained.insert(at) {
         return leaf(format!("{fact}, as above"));
     }
     let mut under = Vec::new();
@@ -120,13 +121,15 @@ fn tree(derivation: &Derivation, at: usize, symbols: &Symbols, told: &mut BTreeS
         Why::Asserted => return leaf(fact),
         Why::Equality { supports } => ("equality of names".to_owned(), supports.clone()),
         Why::Rule { identity, supports, absent, aggregates, .. } => {
-            under.extend(absent.iter().map(|fact| leaf(format!("{} does not hold", said(fact, symbols)))));
+            under.extend(
+                absent.iter().map(|fact| leaf(format!("{} does not hold", fact_text(fact, symbols)))),
+            );
             let counted = aggregates.iter().flat_map(|aggregate| aggregate.matches.iter().flatten());
             let label = identity.label.as_ref().map(ToString::to_string);
             let label = label.unwrap_or_else(|| identity.to_string());
             (format!("the rule “{label}”"), supports.iter().chain(counted).copied().collect())
         }
     };
-    under.extend(supports.iter().map(|support| tree(derivation, *support, symbols, told)));
+    under.extend(supports.iter().map(|support| tree(derivation, *support, symbols, explained)));
     Reason { text: format!("{fact} follows by {by}"), supports: under }
 }

@@ -20,7 +20,7 @@ pub fn log_picture(name: &str, journal: &JournalReport) -> Log {
                 happenings.push(Happening { record, time, kind: Kind::Event, text, because: Vec::new() });
             }
             Value::Array(answers) => happenings.extend(answers.iter().map(|answer| {
-                let (kind, text, because) = told(answer);
+                let (kind, text, because) = happening(answer);
                 Happening { record, time, kind, text, because }
             })),
             _ => {}
@@ -38,7 +38,7 @@ pub fn log_picture(name: &str, journal: &JournalReport) -> Log {
 }
 
 /// Converts an answer of the loop to its kind, a sentence, and details.
-fn told(answer: &Value) -> (Kind, String, Vec<Reason>) {
+fn happening(answer: &Value) -> (Kind, String, Vec<Reason>) {
     let word = |field: &str| plain(&answer[field]);
     match answer["answer"].as_str().unwrap_or_default() {
         "inferred" => inferred(answer),

@@ -30,10 +30,12 @@ pub(super) fn map(scene: Scene<'_>, plan: &Plan, steps: &mut [Step]) -> Option<M
     let moving = places_of_most(scene, plan, &movements)?;
     let places = moving.places;
     let number: BTreeMap<&Name, usize> = places.iter().zip(0..).collect();
-    for (own, step) in plan.steps.iter().zip(steps) {
-        let mut ways = moving.movements.iter().filter(|movement| *movement.action == Name::new(&own.action));
+    for (planned_step, step) in plan.steps.iter().zip(steps) {
+        let mut ways =
+            moving.movements.iter().filter(|movement| *movement.action == Name::new(&planned_step.action));
         step.way = ways.find_map(|movement| {
-            let at = |parameter: usize| number.get(&Name::new(own.arguments.get(parameter)?)).copied();
+            let at =
+                |parameter: usize| number.get(&Name::new(planned_step.arguments.get(parameter)?)).copied();
             Some((at(movement.parameters.0)?, at(movement.parameters.1)?))
         });
     }

@@ -62,11 +62,11 @@ fn axis(plan: &Plan) -> Axis {
     if is_sequence && takes_none { Axis::Steps } else { Axis::Time }
 }
 
-fn steps(known: &Designs, plan: &Plan, axis: Axis) -> Vec<picture::Step> {
+fn steps(functions_of_designs: &Designs, plan: &Plan, axis: Axis) -> Vec<picture::Step> {
     let mut before: BTreeMap<String, String> = BTreeMap::new();
     let mut drawn = Vec::new();
     for (index, step) in plan.steps.iter().enumerate() {
-        let configuration = configuration(step, known);
+        let configuration = configuration(step, functions_of_designs);
         let changed = configuration.iter().filter_map(|(function, design)| {
             let old = before.get(function).filter(|old| *old != design)?;
             Some((function.clone(), old.clone()))
@@ -95,12 +95,14 @@ fn steps(known: &Designs, plan: &Plan, axis: Axis) -> Vec<picture::Step> {
 
 /// Returns the configuration of a step. If the domain does not relate a design to a function, the
 /// knowledge base does. Of several designs of one function the last counts.
-fn configuration(step: &Step, known: &Designs) -> Vec<(String, String)> {
+fn configuration(step: &Step, functions_of_designs: &Designs) -> Vec<(String, String)> {
     if !step.configuration.is_empty() {
         return step.configuration.clone();
     }
-    let of_arguments =
-        step.arguments.iter().filter_map(|name| Some((known.get(name)?.clone(), name.clone())));
+    let of_arguments = step
+        .arguments
+        .iter()
+        .filter_map(|name| Some((functions_of_designs.get(name)?.clone(), name.clone())));
     of_arguments.collect::<BTreeMap<String, String>>().into_iter().collect()
 }
 

@@ -72,17 +72,19 @@ impl Checker<'_> {
         }
     }
 
-    fn numbers(&mut self, own: &Simulation) {
-        for (name, value) in
-            [("step", own.step), ("time_budget", own.time_budget), ("patience", own.patience)]
-        {
+    fn numbers(&mut self, simulation: &Simulation) {
+        for (name, value) in [
+            ("step", simulation.step),
+            ("time_budget", simulation.time_budget),
+            ("patience", simulation.patience),
+        ] {
             self.positive(vec![name.into()], value);
         }
-        if !(0.0..1.0).contains(&own.noise) {
-            let text = format!("`noise` is {}, but should be at least 0 and below 1", own.noise);
+        if !(0.0..1.0).contains(&simulation.noise) {
+            let text = format!("`noise` is {}, but should be at least 0 and below 1", simulation.noise);
             self.wrong(vec!["noise".into()], text);
         }
-        if own.step > 0.0 && own.time_budget / own.step > 1e6 {
+        if simulation.step > 0.0 && simulation.time_budget / simulation.step > 1e6 {
             self.wrong(vec!["time_budget".into()], "`time_budget` is more than a million times `step`");
         }
     }
@@ -104,7 +106,7 @@ impl Checker<'_> {
     }
 
     /// Checks an event; returns its condition.
-    fn event(&mut self, index: usize, event: &Disturbance, own: &Simulation) -> Option<Condition> {
+    fn event(&mut self, index: usize, event: &Disturbance, simulation: &Simulation) -> Option<Condition> {
         let path = |rest: &[&str]| -> Vec<Key> {
             let begin = ["events".into(), index.into()];
             begin.into_iter().chain(rest.iter().map(|key| Key::from(*key))).collect()
@@ -122,10 +124,10 @@ impl Checker<'_> {
             }
             (Some(at), None) => {
                 self.not_negative(path(&["at"]), at);
-                if at > own.time_budget {
+                if at > simulation.time_budget {
                     let text = format!(
                         "`at` is {at}, but the mission ends at {} (`time_budget`), so the event never takes place",
-                        own.time_budget
+                        simulation.time_budget
                     );
                     self.wrong(path(&["at"]), text);
                 }

@@ -111,7 +111,7 @@ impl Experiment {
             time_budget: self.simulation.time_budget,
             configuration: BTreeMap::new(),
             configurations: BTreeSet::new(),
-            upset: None,
+            stalled_since: None,
             run: Run { strategy, seed, time_unit: self.time_unit, ..Run::default() },
         };
         let ending = stage.play(limits, log)?;
@@ -129,7 +129,7 @@ struct Stage {
     configuration: BTreeMap<String, String>,
     configurations: BTreeSet<BTreeMap<String, String>>,
     /// Time since which the running action has stalled without a reaction.
-    upset: Option<f64>,
+    stalled_since: Option<f64>,
     run: Run,
 }
 
@@ -167,7 +167,7 @@ impl Stage {
                 return Ok(Some(ending));
             }
             queue.extend(self.world.pass()?);
-            self.look();
+            self.record_stall();
         }
     }
 
@@ -198,9 +198,9 @@ impl Stage {
     }
 
     /// Records the time at which the running action stalls.
-    fn look(&mut self) {
-        if self.upset.is_none() && !self.world.goes_on() {
-            self.upset = Some(self.world.time);
+    fn record_stall(&mut self) {
+        if self.stalled_since.is_none() && !self.world.goes_on() {
+            self.stalled_since = Some(self.world.time);
         }
     }
 
@@ -214,11 +214,11 @@ impl Stage {
             if matches!(effect.command, Command::Request { .. }) {
                 self.configurations.insert(self.configuration.clone());
             }
-            if let Some(since) = self.upset.take() {
+            if let Some(since) = self.stalled_since.take() {
                 self.run.reactions.push(self.world.time - since);
             }
             queue.extend(self.world.obey(effect));
-            self.look();
+            self.record_stall();
         }
     }
 

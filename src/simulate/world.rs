@@ -56,7 +56,7 @@ pub struct World {
     pub time: f64,
     job: Option<Job>,
     phases: Vec<f64>,
-    upsets: Vec<ComponentChange>,
+    component_changes: Vec<ComponentChange>,
     /// Time of each disturbance, once determined; infinite after the disturbance has happened.
     times: Vec<Option<f64>>,
     /// `true` if the robot is lost.
@@ -82,7 +82,7 @@ impl World {
         let mut random = fastrand::Rng::with_seed(seed);
         let phases =
             settings.signals.iter().map(|signal| signal.phase.unwrap_or_else(|| random.f64())).collect();
-        let mut upsets = Vec::new();
+        let mut component_changes = Vec::new();
         for failure in &settings.failures {
             let mut time = 0.0;
             loop {
@@ -92,18 +92,22 @@ impl World {
                     break;
                 }
                 let component = failure.component.clone();
-                upsets.push(ComponentChange {
+                component_changes.push(ComponentChange {
                     time: rounded(time),
                     component: component.clone(),
                     status: Status::Failed,
                 });
                 let Some(recovery) = failure.recovery else { break };
                 time += recovery;
-                upsets.push(ComponentChange { time: rounded(time), component, status: Status::Recovered });
+                component_changes.push(ComponentChange {
+                    time: rounded(time),
+                    component,
+                    status: Status::Recovered,
+                });
             }
         }
         // Failures of different components are generated one component after the other.
-        upsets.sort_by(|left, right| left.time.total_cmp(&right.time));
+        component_changes.sort_by(|left, right| left.time.total_cmp(&right.time));
         let times = settings
             .events
             .iter()
@@ -118,7 +122,7 @@ impl World {
             time: 0.0,
             job: None,
             phases,
-            upsets,
+            component_changes,
             times,
             lost: false,
             inspected: 0.0,
@@ -169,11 +173,11 @@ impl World {
 
     /// Returns `true` if the running action can proceed, or if no action is running.
     pub fn goes_on(&self) -> bool {
-        self.job.as_ref().is_none_or(|job| self.left(job).is_some())
+        self.job.as_ref().is_none_or(|job| self.remaining_time(job).is_some())
     }
 
     /// Returns the time that the remaining part of an action takes, if it can proceed.
-    fn left(&self, job: &Job) -> Option<f64> {
+    fn remaining_time(&self, job: &Job) -> Option<f64> {
         if job.suspended {
             return None;
         }
@@ -201,7 +205,7 @@ impl World {
     /// A disturbance or a signal that does not fit the mission.
     pub fn pass(&mut self) -> Result<Vec<Event>, Message> {
         let mut events = Vec::new();
-        let remaining = self.job.as_ref().and_then(|job| self.left(job));
+        let remaining = self.job.as_ref().and_then(|job| self.remaining_time(job));
         let step = remaining.map_or(self.settings.step, |remaining| remaining.min(self.settings.step));
         self.time = rounded(self.time + step);
         self.work(step, remaining, &mut events);
@@ -211,10 +215,10 @@ impl World {
         Ok(events)
     }
 
-    fn work(&mut self, step: f64, left: Option<f64>, events: &mut Vec<Event>) {
+    fn work(&mut self, step: f64, remaining_time: Option<f64>, events: &mut Vec<Event>) {
         let Some(mut job) = self.job.take() else { return };
         // The action has stalled.
-        let Some(left) = left else {
+        let Some(remaining_time) = remaining_time else {
             job.waited += step;
             if job.waited >= self.settings.patience {
                 let reason = "it cannot go on".to_owned();
@@ -226,8 +230,8 @@ impl World {
         };
         job.waited = 0.0;
         // The last step ends exactly with the action.
-        let whole = step >= left;
-        let share = if whole { 1.0 - job.progress } else { (1.0 - job.progress) * step / left };
+        let whole = step >= remaining_time;
+        let share = if whole { 1.0 - job.progress } else { (1.0 - job.progress) * step / remaining_time };
         job.progress = rounded(job.progress + share);
         self.use_up(&job.step, share, whole, events);
         if self
@@ -244,7 +248,7 @@ impl World {
             events.insert(0, Event::Progress { action: job.action, fraction: exact(job.progress) });
             self.job = Some(job);
         }
-        self.look();
+        self.watch();
     }
 
     /// Applies the changes of a share of an action and, if `whole`, all its effects at the end.
@@ -278,7 +282,7 @@ impl World {
 
     /// Records the time at which the pipeline is found, and schedules events whose conditions hold
     /// for the first time.
-    fn look(&mut self) {
+    fn watch(&mut self) {
         if self.found.is_none() && self.watched.found.as_ref().is_some_and(|found| self.holds(found)) {
             self.found = Some(self.time);
         }
@@ -318,9 +322,9 @@ impl World {
                 events.push(Event::Fact { name, value });
             }
         }
-        while self.upsets.first().is_some_and(|upset| upset.time <= self.time) {
-            let upset = self.upsets.remove(0);
-            self.report(upset.component, upset.status, events)?;
+        while self.component_changes.first().is_some_and(|change| change.time <= self.time) {
+            let change = self.component_changes.remove(0);
+            self.report(change.component, change.status, events)?;
         }
         Ok(())
     }
@@ -336,10 +340,10 @@ impl World {
     /// Returns the initial values of the signals.
     ///
     /// # Errors
-    /// As [`World::pass`].
+    /// Errors of [`World::pass`].
     pub fn first_look(&mut self) -> Result<Vec<Event>, Message> {
         let mut events = Vec::new();
-        self.look();
+        self.watch();
         self.disturb(&mut events)?;
         self.swing(&mut events)?;
         Ok(events)

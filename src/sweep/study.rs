@@ -16,7 +16,7 @@ use crate::message::{Errors, Message, did_you_mean};
 use crate::setup::Setup;
 
 /// Maximum number of runs; more are considered a mistake.
-const MOST_RUNS: usize = 10_000_000;
+const MAX_RUNS: usize = 10_000_000;
 
 /// What is run, and what is varied.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
@@ -249,8 +249,8 @@ impl Study {
             }
         }
         let runs = keys.iter().try_fold(1_usize, |runs, (_, values)| runs.checked_mul(values.len()));
-        if runs.is_none_or(|runs| runs > MOST_RUNS) {
-            mistakes.push(wrong(&[], format!("the study has more than {MOST_RUNS} runs")));
+        if runs.is_none_or(|runs| runs > MAX_RUNS) {
+            mistakes.push(wrong(&[], format!("the study has more than {MAX_RUNS} runs")));
         }
         if !mistakes.is_empty() {
             return Err(place.quote(mistakes).into());
@@ -410,8 +410,8 @@ fn values(variation: &Variation) -> Result<Vec<Value>, String> {
         }
         Variation::Range(Range { from, to, step }) => {
             let count = to.checked_sub(*from).map_or(0, |span| span / step);
-            if count as usize >= MOST_RUNS {
-                return Err(format!("has more than {MOST_RUNS} values"));
+            if count as usize >= MAX_RUNS {
+                return Err(format!("has more than {MAX_RUNS} values"));
             }
             (*from..=*to).step_by(*step as usize).map(|value| json!(value)).collect()
         }

@@ -1,4 +1,4 @@
-//! Designs for functions in need: beside what MROS chose in its recorded runs, and in the loop.
+//! Selection of designs for objectives: compared with recorded choices of MROS, and in the keeper.
 
 #![allow(clippy::print_stdout)] // a skipped test says so
 
@@ -29,7 +29,7 @@ fn real(files: &[&str]) -> Knowledge {
     Knowledge::read(&Sources { documents, options, ..Sources::default() }).expect("readable")
 }
 
-/// Where the configuration in force is another one than MROS's on purpose: the run, its steps, and why.
+/// Intended deviations from MROS's configuration: the run, its steps, and the reason.
 const DIFFERENCES: [(&str, &[usize], &str); 3] = [
     (
         "suave_cancel_ungrounded",
@@ -54,8 +54,8 @@ fn number(text: &str) -> Option<BigRational> {
     literal.as_rational()
 }
 
-/// Takes over what a recorded step says, as far as it is something that a robot can say to us.
-fn hear(configurator: &mut Configurator, step: &Value) {
+/// Applies a recorded step, if a robot can report it.
+fn apply_step(configurator: &mut Configurator, step: &Value) {
     let text = |key: &str| step[key].as_str().unwrap_or_default();
     match (text("op"), text("message")) {
         ("objective", _) => {
@@ -95,11 +95,11 @@ fn hear(configurator: &mut Configurator, step: &Value) {
     }
 }
 
-/// Which design serves which objective.
+/// Returns the design of each served objective.
 fn served(configurator: &Configurator) -> BTreeMap<String, String> {
     let objectives = configurator.objectives().into_iter();
-    let pair = |own: ontology::runtime::Objective| {
-        Some((own.individual.name, own.groundings.into_iter().next()?.design?.name))
+    let pair = |objective: ontology::runtime::Objective| {
+        Some((objective.individual.name, objective.groundings.into_iter().next()?.design?.name))
     };
     objectives.filter_map(pair).collect()
 }
@@ -111,7 +111,7 @@ fn served_by_mros(step: &Value) -> BTreeMap<String, String> {
 }
 
 #[test]
-fn where_mros_chooses_legally_so_do_we() {
+fn choices_equal_those_of_mros_except_for_listed_differences() {
     let Ok(folder) = std::fs::read_dir(PathBuf::from(SHARED).join("golden/trace")) else {
         println!("skipped: the recorded runs of MROS are not there");
         return;
@@ -125,11 +125,12 @@ fn where_mros_chooses_legally_so_do_we() {
         let scenario = trace["scenario"].as_str().expect("scenario").to_owned();
         let list = |key: &str| trace[key].as_array().expect("a list").clone();
         let documents = list("kb_files");
-        let documents: Vec<&str> = documents.iter().map(|own| own.as_str().expect("text")).collect();
+        let documents: Vec<&str> =
+            documents.iter().map(|document| document.as_str().expect("text")).collect();
         let mut configurator = Configurator::new(real(&documents), Wishes::default()).expect("no wishes");
         for (at, step) in list("steps").iter().enumerate() {
             if step["op"] != "cycle" {
-                hear(&mut configurator, step);
+                apply_step(&mut configurator, step);
                 continue;
             }
             cycles += 1;
@@ -151,7 +152,7 @@ fn where_mros_chooses_legally_so_do_we() {
     assert_eq!(cycles, 80);
 }
 
-/// Two functions; their best designs both use the arm, and take more energy together than there is.
+/// Two functions. Their best designs both use the arm, and together exceed the energy budget.
 const ROBOT: &str = r"
 @prefix t: <http://metacontrol.org/tomasys#> .
 @prefix owl: <http://www.w3.org/2002/07/owl#> .
@@ -174,11 +175,11 @@ fn robot() -> Knowledge {
     robot_with("")
 }
 
-/// The robot with more statements.
-fn robot_with(more: &str) -> Knowledge {
+/// The robot with additional statements.
+fn robot_with(statements: &str) -> Knowledge {
     let directory = tempfile::tempdir().expect("a directory");
     let file = directory.path().join("robot.ttl");
-    std::fs::write(&file, format!("{ROBOT}{more}")).expect("written");
+    std::fs::write(&file, format!("{ROBOT}{statements}")).expect("written");
     let (documents, rules) = (vec![file], vec!["coadaptation".to_owned()]);
     Knowledge::read(&Sources { documents, rules, ..Sources::default() }).expect("readable")
 }
@@ -194,71 +195,73 @@ fn chosen(wishes: Wishes) -> (Vec<Option<String>>, BigRational) {
 }
 
 #[test]
-fn functions_that_compete_are_chosen_for_together() {
+fn competing_functions_are_configured_jointly() {
     let name = |name: &str| Some(name.to_owned());
     let sum = |text: &str| number(text).expect("a number");
-    // First grasp, then look.
+    // Functions in alphabetical order: first grasp, then look.
     assert_eq!(chosen(Wishes::default()), (vec![name("fd_grasp_firm"), name("fd_look_close")], sum("1.7")));
     let exclusive = BTreeSet::from(["c_arm".to_owned()]);
     let wishes = Wishes { exclusive, ..Wishes::default() };
     assert_eq!(chosen(wishes.clone()), (vec![name("fd_push"), name("fd_look_close")], sum("1.4")));
-    // Five are not enough for both: firm and far are 1.0, push and close six.
-    let budget = |most: &str| Wishes { budgets: vec![("energy".to_owned(), sum(most))], ..wishes.clone() };
+    // A budget of 5 excludes the best pair: firm and far have utility 1.0; push and close need 6.
+    let budget = |limit: &str| Wishes { budgets: vec![("energy".to_owned(), sum(limit))], ..wishes.clone() };
     assert_eq!(chosen(budget("5")), (vec![name("fd_grasp_firm"), name("fd_look_far")], sum("1.0")));
     assert_eq!(chosen(budget("1")).0, [name("fd_push"), None]);
     let cheap = Wishes { worth: Worth::Least("energy".to_owned()), ..Wishes::default() };
     assert_eq!(chosen(cheap), (vec![name("fd_push"), name("fd_look_far")], sum("-2")));
 }
 
-fn said(keeper: &mut Keeper, line: &str) -> Vec<KeeperAnswer> {
+fn deliver(keeper: &mut Keeper, line: &str) -> Vec<KeeperAnswer> {
     keeper.handle(&Observation::parse(line))
 }
 
-/// What is asked for: objective, from, to.
-fn asked(answers: &[KeeperAnswer]) -> Vec<(&str, Option<&str>, Option<&str>)> {
-    let asked = answers.iter().filter_map(|answer| match answer {
+/// Requested reconfigurations: objective, previous design, new design.
+fn reconfigurations(answers: &[KeeperAnswer]) -> Vec<(&str, Option<&str>, Option<&str>)> {
+    let reconfigurations = answers.iter().filter_map(|answer| match answer {
         KeeperAnswer::Service(Service::Reconfigure { objective, from, to, .. }) => {
             Some((objective.as_str(), from.as_deref(), to.as_deref()))
         }
         _ => None,
     });
-    asked.collect()
+    reconfigurations.collect()
 }
 
 #[test]
-fn the_loop_asks_for_designs_and_takes_failures_back() {
+fn a_failed_design_is_replaced_and_requested_again_once_realisable() {
     let mut keeper = Keeper::new(Configurator::new(robot(), Wishes::default()).expect("no wishes"), None);
     assert_eq!(keeper.start(), []);
     let answers =
-        said(&mut keeper, r#"{"event":"objective_added","objective":"o1","function":"f_look","seq":1}"#);
-    assert_eq!(asked(&answers), [("o1", None, Some("fd_look_close"))]);
-    // The robot cannot take it, so the next best is asked for, and the best again as soon as the robot can take it.
-    let answers = said(&mut keeper, r#"{"event":"reconfiguration_failed","effect":1,"seq":2}"#);
-    assert_eq!(asked(&answers), [("o1", None, Some("fd_look_far"))]);
-    assert_eq!(asked(&said(&mut keeper, r#"{"event":"acknowledged","effect":2}"#)), []);
-    said(&mut keeper, r#"{"event":"design_status","design":"fd_look_close","realisable":true}"#);
-    // A failure after the acknowledgement counts, too; a doubled one changes nothing.
+        deliver(&mut keeper, r#"{"event":"objective_added","objective":"o1","function":"f_look","seq":1}"#);
+    assert_eq!(reconfigurations(&answers), [("o1", None, Some("fd_look_close"))]);
+    // After the refusal, the next best design is requested, and the best again once it is realisable.
+    let answers = deliver(&mut keeper, r#"{"event":"reconfiguration_failed","effect":1,"seq":2}"#);
+    assert_eq!(reconfigurations(&answers), [("o1", None, Some("fd_look_far"))]);
+    assert_eq!(reconfigurations(&deliver(&mut keeper, r#"{"event":"acknowledged","effect":2}"#)), []);
+    deliver(&mut keeper, r#"{"event":"design_status","design":"fd_look_close","realisable":true}"#);
+    // A failure after the acknowledgement counts, too. Its duplicate changes nothing.
     let failed = r#"{"event":"reconfiguration_failed","effect":2}"#;
-    assert_eq!(asked(&said(&mut keeper, failed)), [("o1", None, Some("fd_look_close"))]);
-    assert_eq!(said(&mut keeper, failed), []);
-    said(&mut keeper, r#"{"event":"design_status","design":"fd_look_far","realisable":true}"#);
-    let answers = said(&mut keeper, r#"{"event":"component_status","component":"c_arm","status":"FALSE"}"#);
-    assert_eq!(asked(&answers), [("o1", Some("fd_look_close"), Some("fd_look_far"))]);
-    // No camera, no design; the one that there is stays. With the camera back it is served again.
+    assert_eq!(reconfigurations(&deliver(&mut keeper, failed)), [("o1", None, Some("fd_look_close"))]);
+    assert_eq!(deliver(&mut keeper, failed), []);
+    deliver(&mut keeper, r#"{"event":"design_status","design":"fd_look_far","realisable":true}"#);
     let answers =
-        said(&mut keeper, r#"{"event":"component_status","component":"c_camera","status":"FALSE"}"#);
+        deliver(&mut keeper, r#"{"event":"component_status","component":"c_arm","status":"FALSE"}"#);
+    assert_eq!(reconfigurations(&answers), [("o1", Some("fd_look_close"), Some("fd_look_far"))]);
+    // Without the camera no design is available, and the current one stays. With the camera, the objective is served
+    // again.
+    let answers =
+        deliver(&mut keeper, r#"{"event":"component_status","component":"c_camera","status":"FALSE"}"#);
     assert!(
         answers.iter().any(|answer| matches!(answer, KeeperAnswer::Service(Service::Unserved { .. }))),
         "{answers:?}"
     );
-    assert_eq!(asked(&answers), []);
-    assert_eq!(asked(&said(&mut keeper, r#"{"event":"tick"}"#)), []);
-    said(&mut keeper, r#"{"event":"component_status","component":"c_arm","status":"RECOVERED"}"#);
+    assert_eq!(reconfigurations(&answers), []);
+    assert_eq!(reconfigurations(&deliver(&mut keeper, r#"{"event":"tick"}"#)), []);
+    deliver(&mut keeper, r#"{"event":"component_status","component":"c_arm","status":"RECOVERED"}"#);
     let answers =
-        said(&mut keeper, r#"{"event":"component_status","component":"c_camera","status":"RECOVERED"}"#);
-    assert_eq!(asked(&answers), [("o1", Some("fd_look_far"), Some("fd_look_close"))]);
-    let again = r#"{"event":"objective_added","objective":"o1","function":"f_look","seq":1}"#;
-    assert_eq!(said(&mut keeper, again), [KeeperAnswer::Loop(Answer::Duplicate { sequence: 1 })]);
+        deliver(&mut keeper, r#"{"event":"component_status","component":"c_camera","status":"RECOVERED"}"#);
+    assert_eq!(reconfigurations(&answers), [("o1", Some("fd_look_far"), Some("fd_look_close"))]);
+    let duplicate = r#"{"event":"objective_added","objective":"o1","function":"f_look","seq":1}"#;
+    assert_eq!(deliver(&mut keeper, duplicate), [KeeperAnswer::Loop(Answer::Duplicate { sequence: 1 })]);
     for (line, code) in [
         (r#"{"event":"objective_added","objective":"o2","function":"f_lok"}"#, "M306"),
         (r#"{"event":"objective_added","objective":"o1","function":"f_look"}"#, "M306"),
@@ -270,13 +273,13 @@ fn the_loop_asks_for_designs_and_takes_failures_back() {
             "M302",
         ),
     ] {
-        let answers = said(&mut keeper, line);
-        let is_refused = |answer: &KeeperAnswer| matches!(answer, KeeperAnswer::Loop(Answer::Error { code: own, .. }) if own == code);
+        let answers = deliver(&mut keeper, line);
+        let is_refused = |answer: &KeeperAnswer| matches!(answer, KeeperAnswer::Loop(Answer::Error { code: error_code, .. }) if error_code == code);
         assert!(matches!(&answers[..], [only] if is_refused(only)), "{line}: {answers:?}");
     }
-    let answers = said(&mut keeper, r#"{"event":"objective_removed","objective":"o1"}"#);
-    assert_eq!(asked(&answers), [("o1", Some("fd_look_close"), None)]);
-    assert_eq!(said(&mut keeper, r#"{"event":"acknowledged","effect":6}"#), []);
+    let answers = deliver(&mut keeper, r#"{"event":"objective_removed","objective":"o1"}"#);
+    assert_eq!(reconfigurations(&answers), [("o1", Some("fd_look_close"), None)]);
+    assert_eq!(deliver(&mut keeper, r#"{"event":"acknowledged","effect":6}"#), []);
 }
 
 #[test]
@@ -290,11 +293,13 @@ fn a_contradiction_elsewhere_does_not_stop_adaptation() {
         None,
     );
     keeper.start();
-    said(&mut keeper, r#"{"event":"objective_added","objective":"o1","function":"f_look"}"#);
-    let answers = said(&mut keeper, r#"{"event":"component_status","component":"c_lamp","status":"FALSE"}"#);
+    deliver(&mut keeper, r#"{"event":"objective_added","objective":"o1","function":"f_look"}"#);
+    let answers =
+        deliver(&mut keeper, r#"{"event":"component_status","component":"c_lamp","status":"FALSE"}"#);
     let is_contradicted =
         |answer: &KeeperAnswer| matches!(answer, KeeperAnswer::Loop(Answer::Contradicted { .. }));
     assert!(answers.iter().any(is_contradicted), "{answers:?}");
-    let answers = said(&mut keeper, r#"{"event":"component_status","component":"c_arm","status":"FALSE"}"#);
-    assert_eq!(asked(&answers), [("o1", Some("fd_look_close"), Some("fd_look_far"))]);
+    let answers =
+        deliver(&mut keeper, r#"{"event":"component_status","component":"c_arm","status":"FALSE"}"#);
+    assert_eq!(reconfigurations(&answers), [("o1", Some("fd_look_close"), Some("fd_look_far"))]);
 }

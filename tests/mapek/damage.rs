@@ -1,10 +1,10 @@
-//! No observation is dropped, and nothing is done with what is damaged: bursts of faults, also while actions wait for
-//! their cancellation or stand still.
+//! No observation is dropped, and damaged designs are not used: bursts of faults, also while an action is being
+//! cancelled or suspended.
 //!
-//! After each line, whatever came before it and in whatever order: (a) the designs that are available and the objectives
-//! in error are those of fresh knowledge that is told the last word on each component and each attribute, in another
-//! order, and those that the definition of the shipped rules gives; (b) no design is asked for, kept at work or
-//! taken up again that fresh knowledge calls unavailable.
+//! Oracle after each line, in any order of lines: (a) Available designs and objectives in error equal those of a fresh
+//! knowledge base that gets the last report of each component and attribute in another order. They also equal the
+//! definition of the shipped rules. (b) No design is requested, used or resumed that the fresh knowledge base makes
+//! unavailable.
 #![expect(clippy::print_stdout, reason = "figures are what the long test is for")]
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -19,22 +19,28 @@ use serde_json::{Value, json};
 use crate::common::{control, feed};
 use crate::worlds::{Place, generated, shipped, suave};
 
-/// The last word on everything.
+/// Last report of each component and attribute.
 #[derive(Debug, Clone, Default)]
-struct Told {
+struct LastReports {
     components: BTreeMap<String, &'static str>,
     attributes: BTreeMap<String, String>,
 }
 
 type Statuses = BTreeMap<String, Vec<String>>;
 
-/// Fresh knowledge that is told the last words in a random order; what is available, and what is in error.
-fn fresh(place: &Place, told: &Told, control: &Loop, random: &mut Rng) -> (BTreeSet<String>, Statuses) {
-    let mission = place.begun.beliefs().mission();
+/// Applies the last reports to a fresh knowledge base in random order. Returns available designs and objectives in
+/// error.
+fn fresh(
+    place: &Place,
+    last_reports: &LastReports,
+    control: &Loop,
+    random: &mut Rng,
+) -> (BTreeSet<String>, Statuses) {
+    let mission = place.started.beliefs().mission();
     let mut knowledge: Knowledge = mission.knowledge().expect("a knowledge base").clone();
     let mut words: Vec<(bool, &str, &str)> = Vec::new();
-    words.extend(told.components.iter().map(|(name, status)| (true, name.as_str(), *status)));
-    words.extend(told.attributes.iter().map(|(name, value)| (false, name.as_str(), value.as_str())));
+    words.extend(last_reports.components.iter().map(|(name, status)| (true, name.as_str(), *status)));
+    words.extend(last_reports.attributes.iter().map(|(name, value)| (false, name.as_str(), value.as_str())));
     random.shuffle(&mut words);
     let grounded = at_work(control);
     let early = random.bool();
@@ -61,11 +67,11 @@ fn fresh(place: &Place, told: &Told, control: &Loop, random: &mut Rng) -> (BTree
         knowledge.runtime().objectives().into_iter().filter(ontology::runtime::Objective::is_in_error);
     (
         designs.map(|design| design.individual.name).collect(),
-        objectives.map(|own| (own.individual.name, own.statuses)).collect(),
+        objectives.map(|objective| (objective.individual.name, objective.statuses)).collect(),
     )
 }
 
-/// Which function has which design, as the loop has told its knowledge base.
+/// Functions with their designs, as grounded in the knowledge base of the loop.
 fn at_work(control: &Loop) -> Vec<(String, String)> {
     let knowledge = control.beliefs().mission().knowledge().expect("a knowledge base");
     let mut pairs = Vec::new();
@@ -78,48 +84,53 @@ fn at_work(control: &Loop) -> Vec<(String, String)> {
     pairs
 }
 
-/// What is wrong with a design by definition: a component that has failed, or that depends on one that has; a bound that
-/// the last measurement breaks.
-fn defects(place: &Place, told: &Told, design: &str) -> (bool, bool) {
-    let mut failed: BTreeSet<&str> = told
+/// Defects of a design by definition: whether it requires a component that has failed, directly or by dependency; and
+/// whether the last measurement violates a bound.
+fn defects(place: &Place, last_reports: &LastReports, design: &str) -> (bool, bool) {
+    let mut failed: BTreeSet<&str> = last_reports
         .components
         .iter()
         .filter(|(_, status)| **status == "FALSE")
         .map(|(name, _)| name.as_str())
         .collect();
     for _ in 0..place.depends.len() {
-        let more = place.depends.iter().filter(|(_, other)| failed.contains(other.as_str()));
-        failed.extend(more.map(|(own, _)| own.as_str()).collect::<Vec<_>>());
+        let dependents = place.depends.iter().filter(|(_, dependency)| failed.contains(dependency.as_str()));
+        failed.extend(dependents.map(|(component, _)| component.as_str()).collect::<Vec<_>>());
     }
-    let design = place.designs.iter().find(|known| known.name == design).expect("a design");
+    let design = place.designs.iter().find(|candidate| candidate.name == design).expect("a design");
     let exact = |text: &String| -> BigRational {
         let literal = rules::Literal::parse(text, Some("http://www.w3.org/2001/XMLSchema#decimal"), None);
         literal.as_rational().expect("a number")
     };
     let broken = design.bounds.iter().any(|(attribute, minimum, maximum)| {
-        let Some(value) = told.attributes.get(attribute).map(exact) else { return false };
-        minimum.as_ref().is_some_and(|least| value < *least)
-            || maximum.as_ref().is_some_and(|most| value > *most)
+        let Some(value) = last_reports.attributes.get(attribute).map(exact) else { return false };
+        minimum.as_ref().is_some_and(|lower| value < *lower)
+            || maximum.as_ref().is_some_and(|upper| value > *upper)
     });
     (design.components.iter().any(|component| failed.contains(component.as_str())), broken)
 }
 
-/// One life of a robot.
 struct Life<'a> {
     place: &'a Place,
     control: Loop,
-    told: Told,
+    last_reports: LastReports,
     random: Rng,
     log: Vec<String>,
 }
 
 impl<'a> Life<'a> {
     fn new(place: &'a Place, seed: u64) -> Self {
-        let control = place.begun.clone();
-        Self { place, control, told: Told::default(), random: Rng::with_seed(seed), log: Vec::new() }
+        let control = place.started.clone();
+        Self {
+            place,
+            control,
+            last_reports: LastReports::default(),
+            random: Rng::with_seed(seed),
+            log: Vec::new(),
+        }
     }
 
-    /// Between one and five reports at one instant.
+    /// One to five reports in one line.
     fn burst(&mut self) -> String {
         let count = if self.random.bool() { 1 } else { self.random.usize(2..=5) };
         let (mut components, mut measured) = (Vec::new(), Vec::new());
@@ -133,12 +144,12 @@ impl<'a> Life<'a> {
                 components.push((name.clone(), status));
             }
         }
-        // Of several values with one key the first counts.
+        // Of several values with one key, the first counts.
         for (name, status) in components.iter().rev() {
-            self.told.components.insert(name.clone(), status);
+            self.last_reports.components.insert(name.clone(), status);
         }
         for (name, value) in measured.iter().rev() {
-            self.told.attributes.insert(name.clone(), value.clone());
+            self.last_reports.attributes.insert(name.clone(), value.clone());
         }
         if let ([(name, status)], []) = (&components[..], &measured[..]) {
             return json!({ "event": "component_status", "component": name, "status": status }).to_string();
@@ -155,9 +166,9 @@ impl<'a> Life<'a> {
     }
 
     fn line(&mut self) -> String {
-        let known = self.control.beliefs();
-        let running = known.running().map(|(action, _)| action);
-        let (cancelling, choice) = (known.cancelling(), self.random.u32(..10));
+        let beliefs = self.control.beliefs();
+        let running = beliefs.running().map(|(action, _)| action);
+        let (cancelling, choice) = (beliefs.cancelling(), self.random.u32(..10));
         match (running, choice) {
             (Some(action), 0) => json!({ "event": "action_started", "action": action }),
             (Some(action), 1) => json!({ "event": "action_progress", "action": action, "fraction": 0.5 }),
@@ -183,18 +194,19 @@ impl<'a> Life<'a> {
             "refused: {}",
             context()
         );
-        let (available, statuses) = fresh(self.place, &self.told, &self.control, &mut self.random.clone());
-        let known = self.control.beliefs();
-        assert_eq!(*known.available(), available, "{}", context());
-        assert_eq!(*known.statuses(), statuses, "{}", context());
+        let (available, statuses) =
+            fresh(self.place, &self.last_reports, &self.control, &mut self.random.clone());
+        let beliefs = self.control.beliefs();
+        assert_eq!(*beliefs.available(), available, "{}", context());
+        assert_eq!(*beliefs.statuses(), statuses, "{}", context());
         if self.place.is_plain {
             for design in &self.place.designs {
-                let is_sound = defects(self.place, &self.told, &design.name) == (false, false);
+                let is_sound = defects(self.place, &self.last_reports, &design.name) == (false, false);
                 assert_eq!(available.contains(&design.name), is_sound, "{}: {}", design.name, context());
             }
             let mut expected = Statuses::new();
             for (function, design) in at_work(&self.control) {
-                let (failed, broken) = defects(self.place, &self.told, &design);
+                let (failed, broken) = defects(self.place, &self.last_reports, &design);
                 let words = [(failed, "IN_ERROR_COMPONENT"), (broken, "IN_ERROR_NFR")];
                 let words: Vec<String> =
                     words.iter().filter(|(is_so, _)| *is_so).map(|(_, word)| (*word).to_owned()).collect();
@@ -205,7 +217,7 @@ impl<'a> Life<'a> {
             assert_eq!(statuses, expected, "{}", context());
         }
         let allowed = |design: &String| assert!(available.contains(design), "{design}: {}", context());
-        let running = known.running().map(|(_, step)| step.configuration.iter().map(|(_, design)| design));
+        let running = beliefs.running().map(|(_, step)| step.configuration.iter().map(|(_, design)| design));
         for effect in answers.iter().filter_map(Answer::effect) {
             match &effect.command {
                 Command::Reconfigure { to, .. } => allowed(to),
@@ -216,14 +228,14 @@ impl<'a> Life<'a> {
                 _ => {}
             }
         }
-        if !known.cancelling() && !known.suspended() {
+        if !beliefs.cancelling() && !beliefs.suspended() {
             running.into_iter().flatten().for_each(allowed);
         }
         self.random.u64(..);
     }
 }
 
-/// So many lives, a dozen lines each, spread over all places; how many lines there were.
+/// Runs `lives` robots for some lines each, distributed over all places. Returns the number of lines.
 fn check(lives: u64, missions: u64) -> usize {
     let mut places = shipped();
     places.extend(suave());
@@ -241,13 +253,13 @@ fn check(lives: u64, missions: u64) -> usize {
 }
 
 #[test]
-fn nothing_is_done_with_what_is_damaged() {
+fn damaged_designs_are_never_used() {
     check(120, 8);
 }
 
 #[test]
 #[ignore = "takes a quarter of an hour; only a release build is of interest"]
-fn nothing_is_done_with_what_is_damaged_in_a_hundred_thousand_lives() {
+fn damaged_designs_are_never_used_in_a_hundred_thousand_lives() {
     println!("{} lines in 100,000 lives", check(100_000, 500));
 }
 
@@ -255,8 +267,8 @@ fn kinect(status: &str) -> String {
     json!({ "event": "component_status", "component": "c_kinect", "status": status }).to_string()
 }
 
-/// The answers that are errors, and those that ask for something, in a few words.
-fn said(answers: &[Answer]) -> Vec<String> {
+/// Short texts of errors, contradictions and effects.
+fn outcomes(answers: &[Answer]) -> Vec<String> {
     let word = |answer: &Answer| match answer {
         Answer::Error { code, .. } => Some(format!("error {code}")),
         Answer::Contradicted { contradictions } => Some(format!("{} contradictions", contradictions.len())),
@@ -273,53 +285,59 @@ fn said(answers: &[Answer]) -> Vec<String> {
 }
 
 #[test]
-fn a_second_fault_while_an_action_waits_for_its_cancellation_is_kept() {
+fn a_second_fault_during_a_cancellation_is_recorded() {
     let mut ugv = control("ugv");
     ugv.start();
     feed(&mut ugv, r#"{"event":"action_started","action":1}"#);
     feed(&mut ugv, r#"{"event":"action_succeeded","action":1}"#);
-    assert_eq!(said(&feed(&mut ugv, &kinect("FALSE"))), ["suspend", "cancel"]);
+    assert_eq!(outcomes(&feed(&mut ugv, &kinect("FALSE"))), ["suspend", "cancel"]);
     let bright = r#"{"event":"measured","attribute":"ambient_light","value":0.95}"#;
-    assert_eq!(said(&feed(&mut ugv, bright)), [""; 0]);
+    assert_eq!(outcomes(&feed(&mut ugv, bright)), [""; 0]);
     let both = vec!["IN_ERROR_COMPONENT".to_owned(), "IN_ERROR_NFR".to_owned()];
     assert_eq!(ugv.beliefs().statuses().get("o_f_localization"), Some(&both));
     let lidar = "move wp2 wp3 (f_localization = fd_amcl_lidar)";
     let answers = feed(&mut ugv, r#"{"event":"action_cancelled","action":2}"#);
-    assert_eq!(said(&answers), ["fd_amcl_lidar", lidar]);
-    // The Kinect works again, but the light still forbids it.
-    assert_eq!(said(&feed(&mut ugv, &kinect("OK"))), [""; 0]);
+    assert_eq!(outcomes(&answers), ["fd_amcl_lidar", lidar]);
+    // The Kinect works again, but the light still makes its designs unavailable.
+    assert_eq!(outcomes(&feed(&mut ugv, &kinect("OK"))), [""; 0]);
     let dim = r#"{"event":"measured","attribute":"ambient_light","value":0.3}"#;
-    assert_eq!(said(&feed(&mut ugv, dim)), ["fd_amcl_kinect"]);
+    assert_eq!(outcomes(&feed(&mut ugv, dim)), ["fd_amcl_kinect"]);
 }
 
-/// What a rule concludes of a component contradicts what it says itself: both stay, the worse counts, and it is said.
+/// A rule derives a failure that contradicts the component's own report. Both statements are kept, the failure counts,
+/// and the contradiction is reported.
 #[test]
-fn a_failure_that_contradicts_what_rules_conclude_is_kept() {
+fn a_failure_that_contradicts_a_conclusion_is_recorded() {
     let place = (0..100).map(generated).find(|place| !place.depends.is_empty()).expect("a mission");
-    let (own, other) = place.depends[0].clone();
-    let mut control = place.begun.clone();
+    let (dependent, failing) = place.depends[0].clone();
+    let mut control = place.started.clone();
     let report = |control: &mut Loop, component: &str, status: &str| {
         let event = json!({ "event": "component_status", "component": component, "status": status });
         feed(control, &event.to_string())
     };
-    report(&mut control, &own, "RECOVERED");
-    let answers = report(&mut control, &other, "FALSE");
+    report(&mut control, &dependent, "RECOVERED");
+    let answers = report(&mut control, &failing, "FALSE");
     let contradicted = |answer: &Answer| match answer {
         Answer::Contradicted { contradictions } => Some(contradictions.clone()),
         _ => None,
     };
-    let found = answers.iter().find_map(contradicted).expect("it is said");
-    assert!(found.iter().any(|one| one.facts.iter().any(|fact| fact.contains(&own))), "{found:?}");
+    let contradictions_found = answers.iter().find_map(contradicted).expect("it is said");
+    assert!(
+        contradictions_found
+            .iter()
+            .any(|contradiction| contradiction.facts.iter().any(|fact| fact.contains(&dependent))),
+        "{contradictions_found:?}"
+    );
     let knowledge = control.beliefs().mission().knowledge().expect("a knowledge base");
     let components = knowledge.view().components();
     let status =
         |name: &str| components.iter().find(|c| c.individual.name == name).and_then(|c| c.status.clone());
-    assert_eq!(status(&other).as_deref(), Some("FALSE"));
+    assert_eq!(status(&failing).as_deref(), Some("FALSE"));
     for design in
-        place.designs.iter().filter(|d| d.components.contains(&own) || d.components.contains(&other))
+        place.designs.iter().filter(|d| d.components.contains(&dependent) || d.components.contains(&failing))
     {
         assert!(!control.beliefs().available().contains(&design.name), "{}", design.name);
     }
-    let answers = report(&mut control, &other, "RECOVERED");
+    let answers = report(&mut control, &failing, "RECOVERED");
     assert_eq!(answers.iter().find_map(contradicted), Some(Vec::new()), "{answers:?}");
 }

@@ -1,11 +1,11 @@
-//! The two experiments of the paper, asserted event by event, and what else the loop promises.
+//! The two experiments of the paper event by event, and other properties of the loop.
 
 use metaplan::mapek::{Answer, Command, Loop};
 use serde_json::Value;
 
 use crate::common::{control, feed};
 
-/// An answer in a few words; latencies and reasons are left out.
+/// Short text of an answer, without reasons; `None` for irrelevant answers.
 fn words(answer: &Answer) -> Option<String> {
     Some(match answer {
         Answer::Inferred { designs, objectives } => {
@@ -39,12 +39,12 @@ fn words(answer: &Answer) -> Option<String> {
     })
 }
 
-/// Feeds lines and compares the answers to each.
+/// Delivers lines and compares the answers to each.
 fn check(control: &mut Loop, script: &[(&str, &[&str])]) {
     for (line, expected) in script {
         let answers = if *line == "start" { control.start() } else { feed(control, line) };
-        let said: Vec<String> = answers.iter().filter_map(words).collect();
-        assert_eq!(said, *expected, "{line}");
+        let texts: Vec<String> = answers.iter().filter_map(words).collect();
+        assert_eq!(texts, *expected, "{line}");
     }
 }
 
@@ -85,7 +85,8 @@ fn the_kinect_fails_at_wp2() {
     check(
         &mut ugv,
         &[
-            // No other design is safe enough among the obstacles: the action is cancelled, and then route and design change.
+            // No other design is safe enough among the obstacles: the action is cancelled, and then route and design
+            // change.
             (KINECT_FAILS, &[KINECT_LOST, "suspend 2", "cancel 2"]),
             (
                 r#"{"event":"action_cancelled","action":2}"#,
@@ -116,7 +117,7 @@ fn the_kinect_fails_on_the_way_to_wp2() {
     check(
         &mut ugv,
         &[(
-            // Another design serves: the action goes on with it at once, and then the rest of the way changes.
+            // Another design is possible: the action continues with it at once, and then the remaining route changes.
             KINECT_FAILS,
             &[
                 KINECT_LOST,
@@ -146,10 +147,10 @@ fn the_battery_of_the_uuv_drops() {
                 ],
             ),
             (r#"{"event":"action_started","action":1}"#, &[]),
-            // Half of the search is done, and the battery is where it should be then: 100 - 33 / 2.
+            // Half of the search is done, and the battery has the expected value: 100 - 33 / 2.
             (r#"{"event":"action_progress","action":1,"fraction":0.5}"#, &[]),
             (r#"{"event":"fact_changed","name":"battery","value":83.5}"#, &[]),
-            // It drops to 15: what is left of the search needs more with any design.
+            // At 15 percent, the remainder of the search needs more battery with any design.
             (
                 r#"{"event":"fact_changed","name":"battery","value":15}"#,
                 &["reconfigure f_maintain_motion: fd_speed_high to fd_speed_low", "cancel 1"],
@@ -183,9 +184,9 @@ fn the_battery_of_the_uuv_drops() {
     );
 }
 
-/// An action that has done all it should and has not ended yet goes on.
+/// An action with full progress that has not ended continues.
 #[test]
-fn an_action_that_is_all_done_is_not_cancelled() {
+fn an_action_with_full_progress_is_not_cancelled() {
     for (mission, change) in [
         ("uuv", r#"{"event":"fact_changed","name":"battery","value":"50"}"#),
         ("ugv", r#"{"event":"component_status","component":"c_kinect","status":"FALSE"}"#),
@@ -205,7 +206,7 @@ fn an_action_that_is_all_done_is_not_cancelled() {
 }
 
 #[test]
-fn what_the_plan_does_not_use_may_fail() {
+fn the_plan_survives_failures_of_unused_components() {
     let mut ugv = ugv_at_wp2();
     check(
         &mut ugv,
@@ -230,7 +231,7 @@ fn what_the_plan_does_not_use_may_fail() {
     );
 }
 
-/// The Kinect is back.
+/// Availability when the Kinect has recovered.
 const BACK: &str = "+fd_amcl_kinect, +fd_mrpt_kinect";
 const BETTER: [&str; 2] = [
     "plan 304: move wp3 wp6 (f_localization = fd_amcl_kinect); move_in_the_dark wp6 wp9 (f_localization = fd_amcl_kinect)",
@@ -238,7 +239,7 @@ const BETTER: [&str; 2] = [
 ];
 
 #[test]
-fn a_better_design_returns() {
+fn a_recovered_better_design_is_used_after_the_settle_time() {
     // From `wp3` the Kinect saves 2 percent of battery for each of two moves.
     let detour = |benefit: i64, settle: u64| {
         let mut ugv = control("ugv");
@@ -272,7 +273,7 @@ fn a_better_design_returns() {
             (r#"{"event":"tick","time":12}"#, &BETTER),
         ],
     );
-    // It is gone again before it has settled.
+    // The design is lost again within the settle time.
     check(
         &mut detour(0, 10),
         &[
@@ -290,7 +291,7 @@ fn a_better_design_returns() {
 }
 
 #[test]
-fn diagnostics_are_taken_as_they_are() {
+fn diagnostic_arrays_are_accepted() {
     let array = |message: &str, values: &[(&str, &str)]| {
         let values: Vec<Value> =
             values.iter().map(|(key, value)| serde_json::json!({ "key": key, "value": value })).collect();
@@ -342,7 +343,7 @@ fn the_goal_changes_and_actions_fail() {
         let answers = feed(&mut ugv, &format!(r#"{{"event":"action_failed","action":{action}}}"#));
         assert!(answers.iter().any(|answer| answer.effect().is_some()), "{answers:?}");
     }
-    // Three times in a row are enough; when the situation changes, there is hope again.
+    // After three consecutive failures planning pauses. After a change of the situation it is tried again.
     check(
         &mut ugv,
         &[(r#"{"event":"action_failed","action":4}"#, &["no plan: failed"]), (r#"{"event":"tick"}"#, &[])],
@@ -352,7 +353,7 @@ fn the_goal_changes_and_actions_fail() {
 }
 
 #[test]
-fn an_action_is_suspended_where_nothing_else_can_be_done() {
+fn an_action_is_suspended_without_any_plan() {
     let mut uuv = control("uuv");
     uuv.start();
     let thruster = |number: u32, status: &str| {
@@ -363,13 +364,13 @@ fn an_action_is_suspended_where_nothing_else_can_be_done() {
         &mut uuv,
         &[
             (r#"{"event":"action_progress","action":1,"fraction":0.75}"#, &[]),
-            // No speed is left: to cancel the search would lose three quarters of it, and gain nothing.
+            // No speed is available. Cancelling the search would lose three quarters of it without any benefit.
             (&thruster(1, "FALSE"), &[stands, "suspend 1", "no plan: unsolvable"]),
             (r#"{"event":"tick"}"#, &[]),
             (r#"{"event":"component_status","component":"c_sonar","status":"OK"}"#, &[]),
             (&thruster(3, "FALSE"), &[]),
             (r#"{"event":"fact_changed","name":"battery","value":90}"#, &["no plan: unsolvable"]),
-            // Low speed is back, and serves.
+            // The low speed is available again, and is used.
             (
                 &thruster(1, "RECOVERED"),
                 &[
@@ -388,7 +389,7 @@ fn an_action_is_suspended_where_nothing_else_can_be_done() {
                     "request 2: follow_pipeline pl1 (f_follow_pipeline = fd_follow, f_maintain_motion = fd_speed_low)",
                 ],
             ),
-            // A robot that cannot suspend says that the action has ended.
+            // A robot that cannot suspend reports the end of the action.
             (
                 &thruster(1, "FALSE"),
                 &[
@@ -403,7 +404,7 @@ fn an_action_is_suspended_where_nothing_else_can_be_done() {
 }
 
 #[test]
-fn an_action_is_cancelled_where_another_way_is_better_than_another_design() {
+fn an_action_is_cancelled_if_another_route_is_better() {
     let mut ugv = ugv_at_wp2();
     for line in [KINECT_FAILS, r#"{"event":"action_cancelled","action":2}"#] {
         feed(&mut ugv, line);
@@ -411,7 +412,7 @@ fn an_action_is_cancelled_where_another_way_is_better_than_another_design() {
     check(
         &mut ugv,
         &[
-            // The robot is on its way to wp3, which turns out to be long, when the Kinect is back and the lidar fails.
+            // The move to wp3 becomes long. Then the Kinect recovers and the lidar fails.
             (
                 r#"{"event":"fact_changed","name":"travel_time wp2 wp3","value":30}"#,
                 &["kept: it is still the best"],

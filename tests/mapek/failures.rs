@@ -1,5 +1,5 @@
-//! The loop beside other ways of control where components fail that no shipped scenario lets fail: one and two at a time,
-//! early and late, for ever, for a while, and again and again.
+//! The loop compared with other strategies under failures that no shipped scenario contains: one and two components,
+//! early and late, permanent, temporary, and repeated.
 #![expect(clippy::print_stdout, reason = "the table is what the long test is for")]
 
 use std::collections::BTreeMap;
@@ -14,16 +14,16 @@ struct Robot {
     mission: &'static str,
     /// Components that fail together.
     failing: &'static [&'static [&'static str]],
-    /// How many of these the mission can do without for good; they come first.
+    /// Number of leading entries of `failing` whose permanent failure the mission tolerates.
     spare: usize,
-    /// What its simulation has beside failures: step, patience.
+    /// Parameters of the simulation: step and patience.
     pace: (f64, f64),
     lifeline: Option<&'static str>,
-    /// When components fail, at the earliest, and within which time from then.
+    /// Earliest times of failures, and lengths of the intervals in which they occur.
     times: [(f64, f64); 2],
-    /// After how long they recover at the earliest, and within which time from then.
+    /// Shortest times to recovery, and lengths of the intervals in which it occurs.
     recoveries: [(f64, f64); 2],
-    /// The mean time to a failure, and the time to its recovery, where components fail again and again.
+    /// Mean time to a failure and time to its recovery, for repeated failures.
     random: (f64, f64),
 }
 
@@ -67,32 +67,32 @@ const ROBOTS: [Robot; 2] = [
     },
 ];
 
-/// All that may happen to a robot, with names.
+/// All scenarios of a robot with their names.
 fn scenarios(robot: &Robot) -> Vec<(String, Simulation)> {
-    let mut all = Vec::new();
+    let mut scenarios = Vec::new();
     for (failing, number) in robot.failing.iter().zip(0..) {
         let name = failing.join(" and ");
         for (time, when) in robot.times.iter().zip(["early", "late"]) {
-            let back = robot.recoveries.iter().zip(["briefly", "long"]);
-            let back = back.map(|(recovery, length)| (Some(*recovery), length));
-            let ever = (number < robot.spare).then_some((None, "for good"));
-            for (recovery, length) in back.chain(ever) {
+            let temporary = robot.recoveries.iter().zip(["briefly", "long"]);
+            let temporary = temporary.map(|(recovery, length)| (Some(*recovery), length));
+            let permanent = (number < robot.spare).then_some((None, "for good"));
+            for (recovery, length) in temporary.chain(permanent) {
                 let events = once(failing, *time, recovery);
-                all.push((format!("{name}, {when}, {length}"), simulation(robot, events, Vec::new())));
+                scenarios.push((format!("{name}, {when}, {length}"), simulation(robot, events, Vec::new())));
             }
         }
-        let again = |component: &&str| RandomFailure {
+        let repeated_failure = |component: &&str| RandomFailure {
             component: (*component).to_owned(),
             mean_time: robot.random.0,
             recovery: Some(robot.random.1),
         };
-        let failures = failing.iter().map(again).collect();
-        all.push((format!("{name}, again and again"), simulation(robot, Vec::new(), failures)));
+        let failures = failing.iter().map(repeated_failure).collect();
+        scenarios.push((format!("{name}, again and again"), simulation(robot, Vec::new(), failures)));
     }
-    all
+    scenarios
 }
 
-/// Components that fail together, and may recover together.
+/// Failure of components, and optionally their common recovery.
 fn once(failing: &[&str], time: (f64, f64), recovery: Option<(f64, f64)>) -> Vec<Disturbance> {
     let disturbance = |at: f64, within: f64| Disturbance {
         at: Some(at),
@@ -105,8 +105,8 @@ fn once(failing: &[&str], time: (f64, f64), recovery: Option<(f64, f64)>) -> Vec
     let names = || failing.iter().map(|name| (*name).to_owned()).collect();
     let mut events = vec![Disturbance { fail: names(), ..disturbance(time.0, time.1) }];
     if let Some((after, within)) = recovery {
-        let back = disturbance(time.0 + time.1 + after, within);
-        events.push(Disturbance { recover: names(), ..back });
+        let recovery_event = disturbance(time.0 + time.1 + after, within);
+        events.push(Disturbance { recover: names(), ..recovery_event });
     }
     events
 }
@@ -119,18 +119,18 @@ fn simulation(robot: &Robot, events: Vec<Disturbance>, failures: Vec<RandomFailu
     simulation
 }
 
-/// What a scenario has come to beside one other way of control.
+/// Comparison of the loop with another strategy in one scenario.
 struct Comparison {
     strategy: Strategy,
-    /// Mean cost of accomplished missions, and how many they are.
-    figures: String,
-    /// In how many missions the loop did better.
+    /// Mean cost and number of accomplished missions.
+    mean_cost_and_count: String,
+    /// Number of missions in which the loop is better.
     better: usize,
-    /// The seeds of those in which it did worse.
+    /// Seeds of missions in which the loop is worse.
     worse: Vec<u64>,
 }
 
-/// Plays a scenario with all ways of control: the loop's figures, and the comparison with each other way.
+/// Simulates a scenario with all strategies. Returns the figures of the loop, and its comparisons with the others.
 fn play(setup: &Setup, settings: &Simulation, seeds: u64) -> (String, Vec<Comparison>) {
     let (mission, control) = (setup.mission.clone(), setup.settings.clone());
     let experiment = Experiment::new(mission, control, settings.clone(), setup.time_unit);
@@ -143,19 +143,19 @@ fn play(setup: &Setup, settings: &Simulation, seeds: u64) -> (String, Vec<Compar
         (1..=seeds).map(run).collect()
     };
     let joint = runs(Strategy::Joint);
-    let others = Strategy::ALL.into_iter().filter(|&strategy| strategy != Strategy::Joint);
+    let baselines = Strategy::ALL.into_iter().filter(|&strategy| strategy != Strategy::Joint);
     let compare = |strategy: Strategy| {
-        let theirs = runs(strategy);
-        let pairs = || joint.iter().zip(&theirs);
-        let worse = pairs().filter(|(joint, other)| other.is_better_than(joint));
+        let baseline_runs = runs(strategy);
+        let pairs = || joint.iter().zip(&baseline_runs);
+        let worse = pairs().filter(|(joint, baseline)| baseline.is_better_than(joint));
         Comparison {
             strategy,
-            figures: figures(&theirs),
-            better: pairs().filter(|(joint, other)| joint.is_better_than(other)).count(),
+            mean_cost_and_count: mean_cost_and_count(&baseline_runs),
+            better: pairs().filter(|(joint, baseline)| joint.is_better_than(baseline)).count(),
             worse: worse.map(|(joint, _)| joint.seed).collect(),
         }
     };
-    (figures(&joint), others.map(compare).collect())
+    (mean_cost_and_count(&joint), baselines.map(compare).collect())
 }
 
 fn setup(robot: &Robot) -> Setup {
@@ -163,8 +163,8 @@ fn setup(robot: &Robot) -> Setup {
     Setup::read(&manifest).expect("the mission is read")
 }
 
-/// The mean cost of accomplished missions, and how many they are.
-fn figures(runs: &[Run]) -> String {
+/// Formats mean cost and number of accomplished missions.
+fn mean_cost_and_count(runs: &[Run]) -> String {
     let done: Vec<f64> = runs.iter().filter(|run| run.accomplished).map(|run| run.cost).collect();
     if done.is_empty() {
         return "none".to_owned();
@@ -172,31 +172,31 @@ fn figures(runs: &[Run]) -> String {
     format!("{:.2} ({})", done.iter().sum::<f64>() / done.len() as f64, done.len())
 }
 
-/// Plays all scenarios of a robot with so many seeds and prints the table; for each strategy in how many missions the loop did
-/// better, and in how many worse.
+/// Simulates all scenarios of a robot and prints the table. For each strategy, returns the numbers of missions in which
+/// the loop is better and worse.
 fn table(robot: &Robot, seeds: u64) -> BTreeMap<&'static str, (usize, usize)> {
     let setup = setup(robot);
     let mut total: BTreeMap<&str, (usize, usize)> = BTreeMap::new();
     println!("scenario: joint; others with the numbers of missions in which the loop did better and worse");
     for (name, settings) in scenarios(robot) {
-        let (joint, others) = play(&setup, &settings, seeds);
-        let cell = |other: &Comparison| {
-            let Comparison { strategy, figures, better, worse } = other;
+        let (joint, comparisons) = play(&setup, &settings, seeds);
+        let cell = |comparison: &Comparison| {
+            let Comparison { strategy, mean_cost_and_count, better, worse } = comparison;
             let seeds = if worse.is_empty() { String::new() } else { format!(" {worse:?}") };
-            format!("{} {figures} {better}:{}{seeds}", strategy.name(), worse.len())
+            format!("{} {mean_cost_and_count} {better}:{}{seeds}", strategy.name(), worse.len())
         };
-        let cells: Vec<String> = others.iter().map(cell).collect();
+        let cells: Vec<String> = comparisons.iter().map(cell).collect();
         println!("{name}: {joint}; {}", cells.join("; "));
-        for other in &others {
-            let sum = total.entry(other.strategy.name()).or_default();
-            *sum = (sum.0 + other.better, sum.1 + other.worse.len());
+        for comparison in &comparisons {
+            let sum = total.entry(comparison.strategy.name()).or_default();
+            *sum = (sum.0 + comparison.better, sum.1 + comparison.worse.len());
         }
     }
     println!("{}: {total:?}", robot.mission);
     total
 }
 
-/// Nobody who does not know what will fail and recover is always better off. But where the loop is not, that has to be bad luck.
+/// Without knowledge of future failures, no strategy is always better. But the loop may be worse only rarely.
 fn check(robot: &Robot) {
     for (strategy, (better, worse)) in table(robot, 30) {
         assert!(worse * 10 <= better, "{strategy}: better {better}, worse {worse}");

@@ -1,5 +1,5 @@
-//! A journal that was damaged in every way that is small enough to try: it is refused, or what is wrong is said, or the loop
-//! is as it would be undamaged. Never is it wrong without a word.
+//! Fault injection into journals: after each small damage, the journal is refused, or the damage is reported, or the
+//! loop has the undamaged state.
 #![expect(clippy::print_stdout, reason = "figures are what the long test is for")]
 
 use std::collections::BTreeMap;
@@ -14,12 +14,12 @@ use serde_json::Value;
 use crate::common::control;
 use crate::journal::{script, state};
 
-/// Two generations and a segment that has begun.
+/// Small enough for two generations and an open segment.
 const POLICY: Policy = Policy { sync: Sync::Never, snapshot_every: 9 };
 
 type Files = BTreeMap<String, Vec<u8>>;
 
-/// Runs the script; what is in the directory then.
+/// Runs the script and returns the files of the journal.
 fn written(pristine: &Loop) -> Files {
     let directory = tempfile::tempdir().expect("a directory");
     let mut control = pristine.clone();
@@ -42,22 +42,22 @@ fn written(pristine: &Loop) -> Files {
 #[derive(Debug, PartialEq)]
 enum Outcome {
     Refused,
-    /// Something was cut off, or is missing, and that was said.
-    Said,
-    /// State, and effects that are asked for again.
+    /// A part was cut off or is missing, and this was reported.
+    Reported,
+    /// State, and repeated effects.
     Sound(Value, Vec<Answer>),
 }
 
-/// A directory for a moment: in memory where there is such a place, since hundreds of thousands of journals are opened, each of
-/// which is forced to the disk.
-fn moment() -> tempfile::TempDir {
+/// Creates a temporary directory, in memory if possible: hundreds of thousands of journals are opened, and each is
+/// flushed to disk.
+fn temporary_directory() -> tempfile::TempDir {
     let memory = Path::new("/dev/shm");
     let in_memory = memory.is_dir().then(|| tempfile::tempdir_in(memory).ok()).flatten();
     in_memory.unwrap_or_else(|| tempfile::tempdir().expect("a directory"))
 }
 
 fn open(files: &Files, pristine: &Loop) -> Outcome {
-    let directory = moment();
+    let directory = temporary_directory();
     for (name, bytes) in files {
         std::fs::write(directory.path().join(name), bytes).expect("a file");
     }
@@ -81,21 +81,21 @@ fn open(files: &Files, pristine: &Loop) -> Outcome {
     let answers = journal.begin(&mut control).expect("written");
     let is_lost = recovery.warnings.iter().any(|warning| warning.message.contains("are missing"));
     if recovery.cut > 0 || is_lost {
-        return Outcome::Said;
+        return Outcome::Reported;
     }
     let sound = Outcome::Sound(state(&control), answers);
     drop(journal);
-    // What was completed is complete, and says so.
-    let again = JournalReport::read(directory.path()).expect("a journal");
-    assert!(again.is_sound(), "{:?}", again.messages);
+    // The recovered journal is complete and reports no damage.
+    let report = JournalReport::read(directory.path()).expect("a journal");
+    assert!(report.is_sound(), "{:?}", report.messages);
     sound
 }
 
-/// What became of so many faults.
+/// Number of faults per outcome.
 #[derive(Debug, Default)]
 struct Count {
     refused: usize,
-    said: usize,
+    reported: usize,
     harmless: usize,
 }
 
@@ -116,21 +116,21 @@ impl Suite {
         Self { pristine, files, sound, count: Count::default() }
     }
 
-    fn check(&mut self, what: &str, change: impl FnOnce(&mut Files)) {
+    fn check(&mut self, fault: &str, change: impl FnOnce(&mut Files)) {
         let mut files = self.files.clone();
         change(&mut files);
         match open(&files, &self.pristine) {
             Outcome::Refused => self.count.refused += 1,
-            Outcome::Said => self.count.said += 1,
+            Outcome::Reported => self.count.reported += 1,
             sound @ Outcome::Sound(..) => {
-                assert!(sound == self.sound, "{what}: wrong without a word");
+                assert!(sound == self.sound, "{fault}: wrong without a word");
                 self.count.harmless += 1;
             }
         }
     }
 
-    /// All faults, of those by bits and bytes every so many.
-    fn all(&mut self, stride: usize) {
+    /// Injects all kinds of faults; bit and byte faults only at every `stride`-th position.
+    fn inject_all(&mut self, stride: usize) {
         let names: Vec<String> = self.files.keys().cloned().collect();
         for name in &names {
             let length = self.files[name].len();
@@ -155,17 +155,17 @@ impl Suite {
             self.check(&format!("no {name}"), |files| {
                 files.remove(name);
             });
-            for other in &names {
-                self.check(&format!("{name} for {other}"), |files| {
-                    files.insert(other.clone(), files[name].clone());
+            for replaced in &names {
+                self.check(&format!("{name} for {replaced}"), |files| {
+                    files.insert(replaced.clone(), files[name].clone());
                 });
-                self.check(&format!("neither {name} nor {other}"), |files| {
+                self.check(&format!("neither {name} nor {replaced}"), |files| {
                     files.remove(name);
-                    files.remove(other);
+                    files.remove(replaced);
                 });
             }
-            for (what, tail) in [("zeros", &[0; 512][..]), ("a text", b"hello"), ("a line", b"hello\n")] {
-                self.check(&format!("{what} after {name}"), |files| {
+            for (fault, tail) in [("zeros", &[0; 512][..]), ("a text", b"hello"), ("a line", b"hello\n")] {
+                self.check(&format!("{fault} after {name}"), |files| {
                     files.get_mut(name).expect("a file").extend_from_slice(tail);
                 });
             }
@@ -173,7 +173,7 @@ impl Suite {
         self.check("CRLF everywhere", |files| files.values_mut().for_each(|bytes| *bytes = crlf(bytes)));
     }
 
-    /// Records removed, doubled and exchanged.
+    /// Removes, duplicates and exchanges records.
     fn lines(&mut self, names: &[String], thorough: bool) {
         for name in names {
             let bytes = self.files[name].clone();
@@ -181,28 +181,28 @@ impl Suite {
             self.check(&format!("CRLF in {name}"), |files| {
                 files.insert(name.clone(), crlf(&bytes));
             });
-            let mut with = |what: &str, lines: Vec<&[u8]>| {
-                self.check(&format!("{what} of {name}"), |files| {
+            let mut with = |fault: &str, lines: Vec<&[u8]>| {
+                self.check(&format!("{fault} of {name}"), |files| {
                     files.insert(name.clone(), lines.concat());
                 });
             };
             for index in 0..lines.len() {
-                let mut less = lines.clone();
-                less.remove(index);
-                with(&format!("line {index} removed"), less);
-                let rest = lines.len() - index;
-                for count in (2..=rest).filter(|&count| thorough || count == rest) {
-                    let mut less = lines.clone();
-                    less.drain(index..index + count);
-                    with(&format!("lines from {index}, {count} of them, removed"), less);
+                let mut shortened = lines.clone();
+                shortened.remove(index);
+                with(&format!("line {index} removed"), shortened);
+                let remaining = lines.len() - index;
+                for count in (2..=remaining).filter(|&count| thorough || count == remaining) {
+                    let mut shortened = lines.clone();
+                    shortened.drain(index..index + count);
+                    with(&format!("lines from {index}, {count} of them, removed"), shortened);
                 }
-                let mut more = lines.clone();
-                more.insert(index, lines[index]);
-                with(&format!("line {index} doubled"), more);
-                for other in (0..index).filter(|&other| thorough || other + 1 == index) {
+                let mut extended = lines.clone();
+                extended.insert(index, lines[index]);
+                with(&format!("line {index} doubled"), extended);
+                for earlier in (0..index).filter(|&earlier| thorough || earlier + 1 == index) {
                     let mut exchanged = lines.clone();
-                    exchanged.swap(index, other);
-                    with(&format!("lines {index} and {other} exchanged"), exchanged);
+                    exchanged.swap(index, earlier);
+                    with(&format!("lines {index} and {earlier} exchanged"), exchanged);
                 }
             }
         }
@@ -214,22 +214,22 @@ fn crlf(bytes: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn a_damaged_journal_is_never_wrong_without_a_word() {
+fn damage_to_a_journal_never_goes_unnoticed() {
     let mut suite = Suite::new();
-    suite.all(997);
+    suite.inject_all(997);
 }
 
 #[test]
 #[ignore = "takes minutes; only a release build is of interest"]
-fn every_bit_and_every_byte_of_a_journal() {
+fn damage_to_every_bit_and_byte_is_noticed() {
     let mut suite = Suite::new();
-    suite.all(1);
+    suite.inject_all(1);
     println!("{:?}", suite.count);
 }
 
-/// A crash between two steps of a checkpoint, in any generation: the loop goes on from the snapshot before.
+/// A crash between two steps of a checkpoint: the loop continues from the previous snapshot.
 #[test]
-fn a_snapshot_that_was_not_written_any_more_is_no_loss() {
+fn an_unfinished_snapshot_loses_nothing() {
     let suite = Suite::new();
     let newest = suite.files.keys().rfind(|name| name.starts_with("snapshot")).expect("a snapshot").clone();
     assert!(!newest.ends_with("000001"), "{newest}: there is a generation before");
@@ -239,17 +239,17 @@ fn a_snapshot_that_was_not_written_any_more_is_no_loss() {
         files.remove(&newest);
         files.extend(damaged.map(|bytes| (newest.clone(), bytes)));
         assert!(open(&files, &suite.pristine) == suite.sound, "the newest snapshot");
-        // The new segment had only just been begun.
+        // The new segment contains only its header.
         let segment = format!("journal-{number}");
-        let begun = files[&segment].split_inclusive(|byte| *byte == b'\n').next().expect("a line").to_vec();
-        files.insert(segment, begun);
+        let header = files[&segment].split_inclusive(|byte| *byte == b'\n').next().expect("a line").to_vec();
+        files.insert(segment, header);
         files.remove("lock");
         let outcome = open(&files, &suite.pristine);
         assert!(matches!(outcome, Outcome::Sound(..)), "the newest segment: {outcome:?}");
     }
 }
 
-/// Opening a journal must fail with these words, and leave the file as it is.
+/// Asserts that opening the journal fails with a message.
 fn refused(directory: &Path, control: &Loop, words: &str) {
     let refused = Journal::open(directory, POLICY, &mut control.clone());
     let message = refused.map(|(journal, _)| journal).expect_err("it is refused").message.clone();
@@ -257,7 +257,7 @@ fn refused(directory: &Path, control: &Loop, words: &str) {
 }
 
 #[test]
-fn what_is_no_journal_is_left_as_it_is() {
+fn files_other_than_journals_are_not_changed() {
     let pristine = control("ugv");
     let directory = tempfile::tempdir().expect("a directory");
     let file = directory.path().join("journal-000000");
@@ -266,7 +266,7 @@ fn what_is_no_journal_is_left_as_it_is() {
         refused(directory.path(), &pristine, "is not a journal");
         assert_eq!(std::fs::read_to_string(&file).expect("a file"), text);
     }
-    // As the version before began one; nothing in it is damaged, so that nothing is to be restored.
+    // Header of the previous format version. It is not damaged, so that nothing must be repaired.
     let first = "6bcb2ca5 [\"mission\",\"metaplan-journal/1\",\"302a8d68\"]\n";
     std::fs::write(&file, first).expect("a file");
     let words = "or begin the mission anew with a journal in another directory; nothing was changed";
@@ -309,7 +309,7 @@ fn links_and_pipes_are_refused_at_once_and_files_are_private() {
 }
 
 #[test]
-fn a_journal_belongs_to_all_that_decisions_rest_on() {
+fn a_journal_is_refused_after_a_change_of_its_mission() {
     let directory = crate::worlds::own_files(7);
     let read = |directory: &Path| {
         let Setup { mission, settings, .. } =

@@ -24,7 +24,7 @@ domain = "domain.pddl"
 problem = "problem.pddl"
 "#;
 
-/// A design that estimates an attribute needs so much of it, or else it is not realisable.
+/// Makes a design unrealisable if the measured visibility is below its estimation.
 const RULES: &str = r"
 @prefix t: <http://metacontrol.org/tomasys#> .
 @prefix s: <http://www.metacontrol.org/suave#> .
@@ -53,7 +53,7 @@ const PROBLEM: &str = "
 (define (problem fleet) (:domain suave) (:init) (:goal (inspected)) (:metric minimize (total-time)))
 ";
 
-/// The files of the mission, the manifest `m.toml` among them.
+/// Files of the mission, with the manifest `m.toml`.
 pub fn files() -> Option<tempfile::TempDir> {
     let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared");
     if !shared.is_dir() {
@@ -82,22 +82,22 @@ fn fleet() -> Option<Vec<Loop>> {
     Some(vec![first; ROBOTS])
 }
 
-/// What the visibility sensor of a robot says: it swings, each robot's at its own pace, with all its digits.
+/// Report of a robot's visibility sensor: a sine with a phase per robot, in full precision.
 fn measurement(robot: usize, round: usize) -> Observation {
     let turn = round as f64 / 80.0 + robot as f64 / ROBOTS as f64;
     let value = 2.25 + 1.5 * (std::f64::consts::TAU * turn).sin();
     Observation::parse(&format!(r#"{{"event":"measured","attribute":"water_visibility","value":{value}}}"#))
 }
 
-/// Feeds every robot so many measurements; all times, and how often a function got another design.
+/// Delivers measurements to every robot. Returns all reaction times and the number of reconfigurations.
 fn feed(fleet: &mut [Loop], rounds: std::ops::Range<usize>) -> (Vec<Duration>, usize) {
     let (mut times, mut reconfigurations) = (Vec::new(), 0);
     for round in rounds {
         for (robot, control) in fleet.iter_mut().enumerate() {
             let observation = measurement(robot, round);
-            let begun = Instant::now();
+            let start = Instant::now();
             let answers = control.handle(&observation, Duration::from_secs(round as u64));
-            times.push(begun.elapsed());
+            times.push(start.elapsed());
             let _ = control.decision(&answers);
             reconfigurations += answers.iter().filter(|answer| answer.effect().is_some()).count();
             assert!(!answers.iter().any(|answer| matches!(answer, Answer::Error { .. })), "{answers:?}");
@@ -107,7 +107,7 @@ fn feed(fleet: &mut [Loop], rounds: std::ops::Range<usize>) -> (Vec<Duration>, u
 }
 
 #[test]
-fn every_robot_adapts_by_itself() {
+fn every_robot_adapts_independently() {
     let Some(mut fleet) = fleet() else { return };
     fleet.truncate(4);
     for control in &mut fleet {
@@ -121,7 +121,7 @@ fn every_robot_adapts_by_itself() {
 
 #[test]
 #[ignore = "measures; only a release build is of interest"]
-fn a_hundred_robots() {
+fn a_hundred_robots_process_ten_thousand_events_a_second() {
     let Some(mut fleet) = fleet() else { return };
     for control in &mut fleet {
         control.start();
@@ -129,10 +129,10 @@ fn a_hundred_robots() {
     println!("{ROBOTS} robots: {:?} kB", resident());
     let (mut rate, mut memory) = (f64::INFINITY, Vec::new());
     for part in 0..10 {
-        let (begun, worked) = (Instant::now(), processor_time());
+        let (start, worked) = (Instant::now(), processor_time());
         let (mut times, reconfigurations) = feed(&mut fleet, part * 1000..(part + 1) * 1000);
         let events = times.len();
-        let wall = begun.elapsed();
+        let wall = start.elapsed();
         let work = processor_time().zip(worked).map_or(wall, |(now, before)| now.saturating_sub(before));
         let speed = |time: Duration| events as f64 / time.as_secs_f64();
         rate = rate.min(speed(work));

@@ -1,4 +1,4 @@
-//! Random events, valid and invalid, and what must hold after each of them.
+//! Random valid and invalid events, with invariants after each.
 
 use std::collections::BTreeSet;
 
@@ -8,13 +8,13 @@ use serde_json::{Value, json};
 
 use crate::common::{control, feed};
 
-/// What a mission can report.
+/// Possible reports of a mission.
 pub struct World {
     pub mission: &'static str,
     components: &'static [&'static str],
-    /// Name, and the range of values.
+    /// Name and range of values.
     measured: &'static [(&'static str, f64, f64)],
-    /// Name, and possible values.
+    /// Name and possible values.
     facts: &'static [(&'static str, &'static [&'static str])],
     goals: &'static [&'static str],
 }
@@ -63,18 +63,18 @@ const INVALID: [&str; 14] = [
     r#"{"event":"tick","extra":1}"#,
 ];
 
-/// A source of events.
+/// Generator of events.
 pub struct Fuzz {
     pub world: &'static World,
     pub random: fastrand::Rng,
-    /// After so many events the knowledge is compared with knowledge from scratch.
+    /// Number of events between comparisons of the knowledge base with one from scratch.
     pub compare_every: usize,
-    /// A loop to which nothing has happened.
+    /// A loop without observations.
     pristine: Loop,
 }
 
-fn pick<'a, T>(random: &mut fastrand::Rng, all: &'a [T]) -> &'a T {
-    &all[random.usize(..all.len())]
+fn pick<'a, T>(random: &mut fastrand::Rng, choices: &'a [T]) -> &'a T {
+    &choices[random.usize(..choices.len())]
 }
 
 impl Fuzz {
@@ -83,14 +83,14 @@ impl Fuzz {
         Self { world, random, compare_every: 10, pristine: control(world.mission) }
     }
 
-    /// A loop that has begun.
+    /// Creates a loop and starts it.
     pub fn begin(&self) -> Loop {
         let mut control = self.pristine.clone();
         control.start();
         control
     }
 
-    /// The next line, and whether it is valid.
+    /// Generates the next line. Returns `true` with it if it is valid.
     pub fn next(&mut self, control: &Loop) -> (String, bool) {
         let random = &mut self.random;
         if random.u32(..10) == 0 {
@@ -129,7 +129,7 @@ impl Fuzz {
         (event.to_string(), true)
     }
 
-    /// Two to five reports at one instant.
+    /// Two to five reports in one line.
     fn burst(&mut self) -> Value {
         let (random, world) = (&mut self.random, self.world);
         let (mut components, mut measured) = (Vec::new(), Vec::new());
@@ -150,7 +150,7 @@ impl Fuzz {
     }
 }
 
-/// Feeds `count` random lines, checking after each.
+/// Delivers `count` random lines and checks the invariants after each.
 pub fn run(world: &'static World, seed: u64, count: usize) -> Loop {
     let mut fuzz = Fuzz::new(world, seed);
     let mut loop_ = fuzz.begin();
@@ -160,12 +160,12 @@ pub fn run(world: &'static World, seed: u64, count: usize) -> Loop {
     loop_
 }
 
-/// Feeds one line and checks what must hold.
+/// Delivers one line and checks the invariants.
 pub fn step(control: &mut Loop, fuzz: &mut Fuzz, number: usize) -> Vec<Answer> {
     let (line, valid) = fuzz.next(control);
     let before = (!valid).then(|| without_counters(control));
     let answers = feed(control, &line);
-    // The plans that were made are for the journal; without one nobody else takes them away.
+    // Computed plans accumulate until a decision takes them.
     let _ = control.decision(&answers);
     let context = || format!("line {number} of {}: {line}\n{answers:#?}", fuzz.world.mission);
     if let Some(before) = before {
@@ -192,20 +192,20 @@ fn without_counters(control: &Loop) -> Value {
 }
 
 fn invariants(control: &Loop, context: &dyn Fn() -> String) {
-    let known = control.beliefs();
-    let mission = known.mission();
+    let beliefs = control.beliefs();
+    let mission = beliefs.mission();
     let base = mission.knowledge().expect("a knowledge base");
     let designs = base.view().function_designs();
     let available: BTreeSet<String> =
         designs.into_iter().filter(|design| design.available).map(|design| design.individual.name).collect();
-    assert_eq!(*known.available(), available, "{}", context());
+    assert_eq!(*beliefs.available(), available, "{}", context());
     assert!(base.contradictions().is_empty(), "{}", context());
-    assert!(known.outstanding().count() < 32, "{}", context());
-    let cancelling = known.cancelling();
-    let Some(plan) = known.plan() else { return };
-    assert!(!known.suspended(), "a plan beside a suspended action: {}", context());
+    assert!(beliefs.outstanding().count() < 32, "{}", context());
+    let cancelling = beliefs.cancelling();
+    let Some(plan) = beliefs.plan() else { return };
+    assert!(!beliefs.suspended(), "a plan beside a suspended action: {}", context());
     assert!(!cancelling, "a plan beside an action to be cancelled: {}", context());
-    let running = known.running().map(|(_, step)| step);
+    let running = beliefs.running().map(|(_, step)| step);
     let steps: Vec<&PlannedStep> = running.into_iter().chain(plan).collect();
     for step in &steps {
         for (_, design) in &step.configuration {
@@ -226,16 +226,16 @@ fn incremental_is_from_scratch(control: &Loop, context: &dyn Fn() -> String) {
     assert_eq!(texts(engine), texts(&scratch), "{}", context());
 }
 
-fn restored_is_equal(loop_: &Loop, mut other: Loop, context: &dyn Fn() -> String) {
-    other.restore(&loop_.snapshot()).expect("the snapshot fits");
-    assert_eq!(other.snapshot(), loop_.snapshot(), "{}", context());
+fn restored_is_equal(loop_: &Loop, mut restored: Loop, context: &dyn Fn() -> String) {
+    restored.restore(&loop_.snapshot()).expect("the snapshot fits");
+    assert_eq!(restored.snapshot(), loop_.snapshot(), "{}", context());
     let facts = |loop_: &Loop| {
         let engine = loop_.beliefs().mission().knowledge().expect("a knowledge base").engine();
         let facts: BTreeSet<String> =
             engine.facts().map(|fact| fact.display(engine.symbols()).to_string()).collect();
         facts
     };
-    assert_eq!(facts(&other), facts(loop_), "{}", context());
+    assert_eq!(facts(&restored), facts(loop_), "{}", context());
 }
 
 #[test]

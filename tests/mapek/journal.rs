@@ -1,4 +1,5 @@
-//! The journal, in this process: cut at any byte, it brings the loop back, and no acknowledged effect is repeated.
+//! The journal within one process: after a cut at any byte, the loop is restored, and no acknowledged effect is
+//! repeated.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -11,7 +12,7 @@ use crate::common::control;
 
 pub const POLICY: Policy = Policy { sync: Sync::Never, snapshot_every: 7 };
 
-/// What a robot reports on its way through the UGV mission, with every kind of event.
+/// Reports of a robot during the UGV mission, with every kind of event.
 pub fn script() -> Vec<String> {
     let events = [
         r#""event":"action_started","action":1"#,
@@ -40,7 +41,7 @@ pub fn script() -> Vec<String> {
     numbered(&events)
 }
 
-/// What a robot reports in the UUV mission whose thrusters fail, so that its action is suspended, and whose battery drops.
+/// Reports of a robot in the UUV mission. Its thrusters fail, so that an action is suspended, and its battery drops.
 pub fn uuv_script() -> Vec<String> {
     let events = [
         r#""event":"action_started","action":1"#,
@@ -69,21 +70,21 @@ pub fn uuv_script() -> Vec<String> {
     numbered(&events)
 }
 
-/// Lines with numbers and times.
+/// Adds sequence numbers and times.
 fn numbered(events: &[&str]) -> Vec<String> {
     let line =
         |(index, event): (usize, &&str)| format!(r#"{{{event},"seq":{},"time":{}.25}}"#, index + 1, index);
     events.iter().enumerate().map(line).collect()
 }
 
-/// What has left the program, by number.
+/// Effects that the program has sent, by number.
 #[derive(Debug, Default, PartialEq)]
 pub struct Robot {
     pub effects: BTreeMap<u64, Effect>,
 }
 
 impl Robot {
-    /// The effects that no other one replaces: only these have to arrive.
+    /// Effects that no other one replaces. Only these must arrive.
     fn needed(&self) -> Vec<&Effect> {
         let replaced: Vec<u64> = self.effects.values().flat_map(|effect| effect.supersedes.clone()).collect();
         self.effects.values().filter(|effect| !replaced.contains(&effect.number)).collect()
@@ -96,7 +97,8 @@ impl Robot {
             assert!(before.is_none() || effect.repeated, "{effect:?} comes twice without a word");
             assert!(before.is_none_or(|before| before == plain), "{effect:?} has changed");
             if effect.repeated {
-                let waiting = control.beliefs().outstanding().any(|other| other.number == effect.number);
+                let waiting =
+                    control.beliefs().outstanding().any(|outstanding| outstanding.number == effect.number);
                 assert!(waiting, "{effect:?} was acknowledged");
             }
         }
@@ -110,7 +112,7 @@ fn open(directory: &Path, pristine: &Loop) -> (Journal, Loop, Recovery, Vec<Answ
     (journal, control, recovery, answers)
 }
 
-/// Sends all lines that were not handled yet.
+/// Delivers all lines that were not handled yet.
 fn go_on(journal: &mut Journal, control: &mut Loop, robot: &mut Robot) {
     for (index, line) in script().iter().enumerate() {
         if control.beliefs().sequence() < Some(index as u64 + 1) {
@@ -120,14 +122,14 @@ fn go_on(journal: &mut Journal, control: &mut Loop, robot: &mut Robot) {
     }
 }
 
-/// All that a loop knows, but for how many lines it was sent: a line that was refused may be sent again.
+/// State of a loop without the number of lines, because refused lines may be repeated.
 pub fn state(control: &Loop) -> serde_json::Value {
     let mut state = control.snapshot().0;
     state.as_object_mut().expect("an object").remove("lines");
     state
 }
 
-/// The state and the effects of a run that nothing disturbs.
+/// State and effects of an undisturbed run.
 fn undisturbed(pristine: &Loop) -> (serde_json::Value, Robot, tempfile::TempDir) {
     let directory = tempfile::tempdir().expect("a directory");
     let (mut journal, mut control, _, answers) = open(directory.path(), pristine);
@@ -139,17 +141,17 @@ fn undisturbed(pristine: &Loop) -> (serde_json::Value, Robot, tempfile::TempDir)
 }
 
 #[test]
-fn a_journal_cut_anywhere_brings_the_loop_back() {
+fn a_journal_cut_anywhere_restores_the_loop() {
     check(60);
 }
 
 #[test]
 #[ignore = "takes a minute"]
-fn a_journal_cut_at_five_hundred_places_brings_the_loop_back() {
+fn a_journal_cut_at_five_hundred_places_restores_the_loop() {
     check(500);
 }
 
-/// Cuts the journal at so many places.
+/// Cuts the journal at random positions.
 fn check(cuts: usize) {
     let pristine = control("ugv");
     let (state, effects, _directory) = undisturbed(&pristine);
@@ -166,8 +168,8 @@ fn check(cuts: usize) {
             robot.take(&control, &answers);
         }
         drop(journal);
-        // The last line or two of the last segment are not there, or not whole: only what was not sent may be lost,
-        // so what the robot has received from lost lines is forgotten.
+        // The last one or two lines of the last segment are missing or incomplete. Only unsent effects may be lost, so
+        // that the robot forgets what it received for lost lines.
         let last = last_segment(directory.path());
         let text = std::fs::read(&last).expect("a journal");
         let lines: Vec<&[u8]> = text.split_inclusive(|&byte| byte == b'\n').collect();
@@ -175,8 +177,8 @@ fn check(cuts: usize) {
         let keep = random.usize(sound..=text.len());
         std::fs::write(&last, &text[..keep]).expect("cut");
         let (mut journal, mut control, recovery, answers) = open(directory.path(), &pristine);
-        let known = control.beliefs().sequence().unwrap_or(0);
-        let mut robot = Robot { effects: received[known.saturating_sub(1) as usize].clone() };
+        let handled = control.beliefs().sequence().unwrap_or(0);
+        let mut robot = Robot { effects: received[handled.saturating_sub(1) as usize].clone() };
         let torn = keep > sound && text[keep - 1] != b'\n' && text.get(keep) != Some(&b'\n');
         assert_eq!(recovery.cut > 0, torn);
         robot.take(&control, &answers);
@@ -186,19 +188,19 @@ fn check(cuts: usize) {
     }
 }
 
-/// What a robot has received when it has sent so many lines, by their number.
+/// Effects that a robot has received, by the number of lines that it has sent.
 fn received(pristine: &Loop) -> Vec<BTreeMap<u64, Effect>> {
     let mut control = pristine.clone();
     let mut robot = Robot::default();
     let answers = control.start();
     robot.take(&control, &answers);
-    let mut all = vec![robot.effects.clone()];
+    let mut effects_by_lines = vec![robot.effects.clone()];
     for line in script() {
         let answers = crate::common::feed(&mut control, &line);
         robot.take(&control, &answers);
-        all.push(robot.effects.clone());
+        effects_by_lines.push(robot.effects.clone());
     }
-    all
+    effects_by_lines
 }
 
 fn last_segment(directory: &Path) -> std::path::PathBuf {
@@ -209,7 +211,7 @@ fn last_segment(directory: &Path) -> std::path::PathBuf {
 }
 
 #[test]
-fn damage_is_not_a_crash() {
+fn a_damaged_journal_is_refused() {
     let pristine = control("ugv");
     let (_, _, directory) = undisturbed(&pristine);
     let last = last_segment(directory.path());
@@ -222,7 +224,7 @@ fn damage_is_not_a_crash() {
 }
 
 #[test]
-fn a_journal_belongs_to_its_mission() {
+fn a_journal_of_another_mission_is_refused() {
     let (_, _, directory) = undisturbed(&control("ugv"));
     let refused = Journal::open(directory.path(), POLICY, &mut control("uuv"));
     let message = refused.expect_err("another mission's journal").message.clone();

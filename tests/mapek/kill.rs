@@ -1,4 +1,4 @@
-//! The program killed again and again: what it does and knows in the end is what it does and knows undisturbed.
+//! The program is killed repeatedly. In the end, its effects and its state equal those of an undisturbed run.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead as _, BufReader, Write as _};
@@ -13,21 +13,22 @@ use serde_json::Value;
 use crate::common::control;
 use crate::journal::{POLICY, script, state, uuv_script};
 
-/// A mission, and what its robot reports.
+/// A mission with the reports of its robot.
 struct Story {
     mission: &'static str,
     script: Vec<String>,
 }
 
 impl Story {
-    /// What a robot has acknowledged that has sent so many lines.
+    /// Effects acknowledged in the first `sent` lines.
     fn acknowledged(&self, sent: usize) -> Vec<u64> {
         let effect = |line: &String| serde_json::from_str::<Value>(line).ok()?.get("effect")?.as_u64();
         self.script[..sent].iter().filter_map(effect).collect()
     }
 }
 
-/// The manifest of a shipped mission, in which every report counts at once: scripts name effects as they come then.
+/// Manifest of a shipped mission in which every report counts at once. The scripts depend on the resulting numbers of
+/// effects.
 fn manifest(mission: &str) -> PathBuf {
     let root = env!("CARGO_MANIFEST_DIR");
     let text = std::fs::read_to_string(format!("{root}/missions/{mission}.toml")).expect("a manifest");
@@ -38,7 +39,7 @@ fn manifest(mission: &str) -> PathBuf {
     file
 }
 
-/// A running program, and what it writes.
+/// A running program with its output.
 struct Program {
     child: Child,
     stdin: ChildStdin,
@@ -64,7 +65,7 @@ impl Program {
         let (sender, lines) = channel();
         std::thread::spawn(move || {
             for line in stdout.lines().map_while(Result::ok) {
-                // The last line of a killed program may not be whole.
+                // The last line of a killed program can be incomplete.
                 let Ok(value) = serde_json::from_str(&line) else { break };
                 if sender.send(value).is_err() {
                     break;
@@ -75,13 +76,13 @@ impl Program {
     }
 }
 
-/// What has left the program, and what it knew at the end.
+/// Output of the program, and its state at the end.
 #[derive(Debug, Default, PartialEq)]
 struct Robot {
     effects: BTreeMap<u64, Value>,
-    /// The numbers of effects as they came for the first time.
+    /// Numbers of effects in the order of their first arrival.
     order: Vec<u64>,
-    /// The numbers of effects that were acknowledged, in this order.
+    /// Numbers of acknowledged effects, in the order of acknowledgement.
     acknowledged: Vec<u64>,
     state: Value,
 }
@@ -102,9 +103,9 @@ impl Robot {
         }
     }
 
-    /// Talks to the program until it ends; then what it knew is read from its journal.
+    /// Runs the program to its end, and reads the state from its journal.
     fn finish(&mut self, mut program: Program, story: &Story, journal: &Path) {
-        self.talk(&mut program, story, usize::MAX);
+        self.send_lines(&mut program, story, usize::MAX);
         drop(program.stdin);
         assert!(program.child.wait().expect("it ends").success());
         for line in program.lines {
@@ -118,24 +119,24 @@ impl Robot {
         self.state = state(&control);
     }
 
-    /// Sends the lines that were not handled, waiting for each but the last of `patience` to be handled.
-    fn talk(&mut self, program: &mut Program, story: &Story, patience: usize) {
+    /// Sends the unhandled lines, at most `patience` + 1. Waits until each is handled, except the last one.
+    fn send_lines(&mut self, program: &mut Program, story: &Story, patience: usize) {
         let ready = program.lines.recv().expect("a first line");
         assert_eq!(ready["answer"], "ready", "{ready}");
-        let known = ready["seq"].as_u64().unwrap_or(0) as usize;
-        self.acknowledged = story.acknowledged(known);
-        self.hear(program);
-        for (index, line) in story.script.iter().enumerate().skip(known).take(patience.saturating_add(1)) {
-            if writeln!(program.stdin, "{line}").is_err() || index - known == patience {
+        let handled = ready["seq"].as_u64().unwrap_or(0) as usize;
+        self.acknowledged = story.acknowledged(handled);
+        self.read_answers(program);
+        for (index, line) in story.script.iter().enumerate().skip(handled).take(patience.saturating_add(1)) {
+            if writeln!(program.stdin, "{line}").is_err() || index - handled == patience {
                 return;
             }
-            self.hear(program);
+            self.read_answers(program);
             self.acknowledged = story.acknowledged(index + 1);
         }
     }
 
-    /// Takes the answers to a line.
-    fn hear(&mut self, program: &Program) {
+    /// Reads the answers to a line.
+    fn read_answers(&mut self, program: &Program) {
         for answer in &program.lines {
             let is_last = answer["answer"] == "handled";
             self.take(answer);
@@ -146,22 +147,22 @@ impl Robot {
     }
 }
 
-/// Runs a story to its end, killing the program `kills` times at most; returns how often it was killed.
+/// Runs a story to its end and kills the program at most `kills` times. Returns the number of kills.
 fn run(story: &Story, random: &mut fastrand::Rng, kills: usize) -> (Robot, usize) {
     let directory = tempfile::tempdir().expect("a directory");
     let mut robot = Robot::default();
     let mut killed = 0;
-    // Now and then few deaths are enough for one run.
+    // Some runs end after few kills.
     while killed < kills && (killed == 0 || random.u32(..10) > 0) {
         let mut program = Program::start(story.mission, directory.path());
-        // Sometimes it dies before it has said a word.
+        // In some cases the program is killed before its first output.
         if random.u32(..8) == 0 {
             std::thread::sleep(Duration::from_micros(random.u64(..20_000)));
         } else {
-            robot.talk(&mut program, story, random.usize(0..6));
+            robot.send_lines(&mut program, story, random.usize(0..6));
             std::thread::sleep(Duration::from_micros(random.u64(..8_000)));
         }
-        // SIGKILL; what was written before is still read.
+        // Kill with SIGKILL. Earlier output is still read.
         program.child.kill().expect("it is killed");
         program.child.wait().expect("it ends");
         for line in program.lines {
@@ -194,18 +195,18 @@ fn check(seed: u64, count: usize) {
 }
 
 #[test]
-fn killed_at_random_points() {
+fn a_program_killed_at_random_points_recovers() {
     check(11, 12);
 }
 
 #[test]
 #[ignore = "takes a minute or two"]
-fn killed_at_five_hundred_random_points() {
+fn a_program_killed_at_five_hundred_points_recovers() {
     check(12, 500);
 }
 
 #[test]
-fn a_journal_has_one_process_at_a_time() {
+fn a_second_process_cannot_open_a_journal() {
     let directory = tempfile::tempdir().expect("a directory");
     let mut first = Program::start("ugv", directory.path());
     assert!(first.lines.iter().any(|answer| answer["answer"] == "handled"));
@@ -222,10 +223,10 @@ fn a_journal_has_one_process_at_a_time() {
     let owner = format!("another process (number {}) uses the journal", first.child.id());
     assert!(message.contains("M322") && message.contains(&owner), "{message}");
     assert_eq!(std::fs::read(directory.path().join("journal-000000")).expect("a journal"), before);
-    // The refused process has not disturbed the first.
+    // The refused process has not disturbed the first one.
     writeln!(first.stdin, r#"{{"event":"tick"}}"#).expect("it listens");
     assert!(first.lines.iter().take(6).any(|answer| answer["answer"] == "handled"));
-    // A process that was killed has nothing any more.
+    // The lock of a killed process is released.
     first.child.kill().expect("it is killed");
     first.child.wait().expect("it ends");
     let (status, message) = second();

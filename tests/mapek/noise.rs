@@ -1,4 +1,4 @@
-//! Noise of sensors and of components, with the settings of shipped missions and with filters of a manifest.
+//! Noisy sensors and components, with the settings of shipped missions and with filters from a manifest.
 
 use std::path::Path;
 use std::time::Duration;
@@ -9,12 +9,13 @@ use metaplan::setup::Setup;
 use num_rational::BigRational;
 use serde_json::json;
 
-/// A loop that has begun, for the ground vehicle with more text in its manifest.
-fn begun(more: &str) -> Loop {
+/// Starts a loop for the ground vehicle with additional text in its manifest.
+fn started(settings_text: &str) -> Loop {
     let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("missions");
     let text = std::fs::read_to_string(directory.join("ugv.toml")).expect("a manifest");
     let Setup { mission, settings, .. } =
-        Setup::parse("ugv.toml", &format!("{text}\n{more}"), &directory).expect("the mission is read");
+        Setup::parse("ugv.toml", &format!("{text}\n{settings_text}"), &directory)
+            .expect("the mission is read");
     let mut control = Loop::new(mission, settings).expect("the mission can be planned for");
     control.start();
     control
@@ -45,25 +46,25 @@ fn words(answers: &[Answer]) -> Vec<String> {
 
 #[test]
 fn a_noisy_light_costs_one_reconfiguration() {
-    let mut control = begun("");
+    let mut control = started("");
     let mut answers = Vec::new();
     for sample in 1..=200 {
         let value = if sample % 2 == 1 { 0.801 } else { 0.799 };
         answers.extend(feed(&mut control, &light(value), f64::from(sample)));
     }
     assert_eq!(reconfigurations(&answers), 1, "{answers:#?}");
-    // Of a hundred samples that are held back three are told.
+    // Only three of a hundred held samples are reported.
     let filtered: Vec<_> =
-        answers.iter().map(Answer::to_json).filter(|own| own["answer"] == "filtered").collect();
-    let held: Vec<_> = filtered.iter().filter_map(|own| own["held"].as_u64()).collect();
+        answers.iter().map(Answer::to_json).filter(|answer| answer["answer"] == "filtered").collect();
+    let held: Vec<_> = filtered.iter().filter_map(|answer| answer["held"].as_u64()).collect();
     assert_eq!(held, [1, 10, 100], "{filtered:?}");
     assert_eq!(filtered[0]["because"], "hysteresis");
 }
 
 #[test]
-fn a_real_failure_and_a_far_value_count_at_once() {
+fn failures_and_clear_crossings_count_at_once() {
     for line in [kinect("FALSE"), kinect("ERROR"), light(0.9)] {
-        let mut control = begun("");
+        let mut control = started("");
         let answers = feed(&mut control, &line, 1.0);
         assert_eq!(words(&answers)[0], "inferred", "{line}: {answers:?}");
         assert_eq!(reconfigurations(&answers), 1, "{line}: {answers:?}");
@@ -72,14 +73,15 @@ fn a_real_failure_and_a_far_value_count_at_once() {
 
 #[test]
 fn a_component_that_comes_and_goes_costs_one_reconfiguration() {
-    let mut control = begun("");
+    let mut control = started("");
     let mut answers = Vec::new();
     for tenth in 0..200_u32 {
         let status = if tenth % 2 == 0 { "FALSE" } else { "RECOVERED" };
         answers.extend(feed(&mut control, &kinect(status), f64::from(tenth) / 10.0));
     }
     assert_eq!(reconfigurations(&answers), 1);
-    // It is in order again: after the time to heal it counts, and after that to settle a better plan is looked for.
+    // The component has recovered: the recovery counts after the heal time, and a better plan is sought after the
+    // settle time.
     let healed = control.due().expect("a recovery is held back");
     assert_eq!(healed, Duration::from_secs_f64(21.9));
     assert_eq!(words(&feed(&mut control, r#"{"event":"tick"}"#, 21.8)), [""; 0]);
@@ -90,8 +92,8 @@ fn a_component_that_comes_and_goes_costs_one_reconfiguration() {
 }
 
 #[test]
-fn a_failure_is_confirmed_where_the_mission_wants_it() {
-    let mut control = begun("[adaptation.components.c_kinect]\nconfirm_time = 0.5");
+fn a_failure_is_confirmed_if_the_mission_requires_it() {
+    let mut control = started("[adaptation.components.c_kinect]\nconfirm_time = 0.5");
     let answers = feed(&mut control, &kinect("FALSE"), 1.0);
     assert_eq!(words(&answers), ["filtered"]);
     assert_eq!(answers[0].to_json()["due"], 1.5);
@@ -104,8 +106,8 @@ fn a_failure_is_confirmed_where_the_mission_wants_it() {
 #[test]
 fn a_silent_sensor_has_a_stated_outcome() {
     for (stale, is_lost) in [("worst", true), ("keep", false), ("unknown", false)] {
-        let more = format!("[adaptation.measured.ambient_light]\nperiod = 2\nstale = \"{stale}\"");
-        let mut control = begun(&more);
+        let settings_text = format!("[adaptation.measured.ambient_light]\nperiod = 2\nstale = \"{stale}\"");
+        let mut control = started(&settings_text);
         assert_eq!(words(&feed(&mut control, &light(0.3), 1.0)), [""; 0]);
         assert_eq!(words(&feed(&mut control, r#"{"event":"tick"}"#, 3.0)), [""; 0], "{stale}");
         let answers = feed(&mut control, r#"{"event":"tick"}"#, 3.1);
@@ -113,9 +115,12 @@ fn a_silent_sensor_has_a_stated_outcome() {
         assert_eq!(answers[0].to_json()["outcome"], stale);
         assert_eq!(words(&answers).contains(&"inferred".to_owned()), is_lost, "{answers:?}");
         let values = control.beliefs().mission().knowledge().expect("a knowledge base").view().measurements();
-        let value = values.into_iter().find(|own| own.attribute == "ambient_light").and_then(|own| own.value);
+        let value = values
+            .into_iter()
+            .find(|measurement| measurement.attribute == "ambient_light")
+            .and_then(|measurement| measurement.value);
         assert_eq!(value.is_none(), stale == "unknown", "{value:?}");
-        // It is told once, and a sample ends it.
+        // Silence is reported once, and ends with a sample.
         assert_eq!(words(&feed(&mut control, r#"{"event":"tick"}"#, 9.0)), [""; 0]);
         feed(&mut control, &light(0.3), 10.0);
         assert_eq!(
@@ -130,10 +135,10 @@ fn a_silent_sensor_has_a_stated_outcome() {
 }
 
 #[test]
-fn a_restored_loop_filters_on_exactly() {
-    let more = "[adaptation.measured.ambient_light]\nhysteresis = 0.05\ndebounce = 1\nagree = 2\nof = 3\nperiod = 5\n\
+fn a_restored_loop_has_the_same_filter_states() {
+    let settings_text = "[adaptation.measured.ambient_light]\nhysteresis = 0.05\ndebounce = 1\nagree = 2\nof = 3\nperiod = 5\n\
         [adaptation.components.c_kinect]\nconfirm_time = 1";
-    let fresh = begun(more);
+    let fresh = started(settings_text);
     let mut random = fastrand::Rng::with_seed(11);
     for _ in 0..6 {
         let (mut whole, mut now) = (fresh.clone(), 0.0);
@@ -156,13 +161,13 @@ fn a_restored_loop_filters_on_exactly() {
 }
 
 #[test]
-fn designs_are_kept_from_noise_without_a_plan_too() {
+fn the_keeper_filters_noise_too() {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("missions/ugv.toml");
     let mission = Setup::read(&manifest).expect("the mission is read").mission;
     let knowledge = mission.knowledge().expect("a knowledge base").clone();
     let mut configurator = Configurator::new(knowledge, Wishes::default()).expect("no wishes");
     configurator.pursue(&Goal::of("f_localization")).expect("a function");
-    let begun = |settings: &FilterSettings| {
+    let started = |settings: &FilterSettings| {
         let mut keeper = Keeper::new(configurator.clone(), None).with_filters(settings);
         keeper.start();
         keeper
@@ -175,9 +180,12 @@ fn designs_are_kept_from_noise_without_a_plan_too() {
         let designs = keeper.configurator().objectives();
         let design = designs[0].groundings[0].design.as_ref().expect("a design").name.clone();
         let view = keeper.configurator().knowledge().view();
-        let own =
-            view.function_designs().into_iter().find(|own| own.individual.name == design).expect("a design");
-        let component = own.components[0].name.clone();
+        let design_in_use = view
+            .function_designs()
+            .into_iter()
+            .find(|design_in_use| design_in_use.individual.name == design)
+            .expect("a design");
+        let component = design_in_use.components[0].name.clone();
         (0..40_u32)
             .map(|tenth| {
                 let status = if tenth % 2 == 0 { "FALSE" } else { "RECOVERED" };
@@ -188,7 +196,7 @@ fn designs_are_kept_from_noise_without_a_plan_too() {
             .sum()
     };
     let (without, with) =
-        (flaps(&mut begun(&FilterSettings::none())), flaps(&mut begun(&FilterSettings::default())));
+        (flaps(&mut started(&FilterSettings::none())), flaps(&mut started(&FilterSettings::default())));
     assert!(without >= 40 && with <= 3, "{without} {with}");
     let mut settings = FilterSettings::default();
     let silent = MeasuredSettings {
@@ -198,7 +206,7 @@ fn designs_are_kept_from_noise_without_a_plan_too() {
         ..MeasuredSettings::default()
     };
     settings.measured.insert("ambient_light".to_owned(), silent);
-    let mut keeper = begun(&settings);
+    let mut keeper = started(&settings);
     keeper.handle_at(&Observation::parse(r#"{"event":"tick"}"#), Duration::from_secs(1));
     assert_eq!(keeper.due(), Some(Duration::from_micros(2_000_001)));
     let answers = keeper.handle_at(&Observation::parse(r#"{"event":"tick"}"#), Duration::from_secs(3));

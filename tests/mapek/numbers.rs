@@ -1,4 +1,5 @@
-//! The numbers of lines: none is lost, and none spoils those that follow. And memory: nothing grows with the history.
+//! Sequence numbers: no line is lost, and no number blocks later ones. Memory: the state does not grow with the
+//! history.
 #![expect(clippy::print_stdout, reason = "the table is what the long test is for")]
 
 use metaplan::mapek::{Answer, Loop};
@@ -13,7 +14,7 @@ fn ugv() -> Loop {
     control
 }
 
-/// The kinds of the answers that say what became of a line.
+/// Checks the answer about the acceptance of a line.
 fn check(control: &mut Loop, line: &str, expected: Option<&str>) {
     let kind = |answer: &Answer| match answer {
         Answer::Duplicate { .. } => Some("duplicate".to_owned()),
@@ -25,7 +26,7 @@ fn check(control: &mut Loop, line: &str, expected: Option<&str>) {
 }
 
 #[test]
-fn a_line_that_comes_late_is_not_lost() {
+fn a_late_line_is_accepted() {
     let mut ugv = ugv();
     check(&mut ugv, r#"{"event":"tick","seq":5}"#, None);
     let late = r#"{"event":"component_status","component":"c_kinect","status":"FALSE","seq":4}"#;
@@ -37,7 +38,7 @@ fn a_line_that_comes_late_is_not_lost() {
 }
 
 #[test]
-fn a_number_that_is_far_ahead_spoils_nothing() {
+fn a_number_far_ahead_does_not_block_later_ones() {
     let mut ugv = ugv();
     check(&mut ugv, r#"{"event":"tick","seq":18446744073709551615}"#, Some("M307"));
     check(&mut ugv, r#"{"event":"tick","seq":1}"#, None);
@@ -47,7 +48,7 @@ fn a_number_that_is_far_ahead_spoils_nothing() {
 }
 
 #[test]
-fn the_number_of_a_line_that_was_refused_can_be_used_again() {
+fn the_number_of_a_refused_line_can_be_reused() {
     let mut ugv = ugv();
     check(&mut ugv, r#"{"event":"unheard_of","seq":1}"#, Some("M303"));
     check(
@@ -69,7 +70,7 @@ fn very_many_gaps_make_old_numbers_stale() {
     check(&mut ugv, r#"{"event":"tick","seq":607}"#, None);
 }
 
-/// The Kinect fails and recovers, and nobody acknowledges anything.
+/// The Kinect fails and recovers, without acknowledgements.
 fn flap(control: &mut Loop, number: u64) {
     let status = if number.is_multiple_of(2) { "FALSE" } else { "TRUE" };
     feed(
@@ -79,7 +80,7 @@ fn flap(control: &mut Loop, number: u64) {
 }
 
 #[test]
-fn nothing_grows_while_nobody_listens() {
+fn state_without_acknowledgements_does_not_grow() {
     let mut ugv = ugv();
     let mut sizes = Vec::new();
     for number in 0..400 {
@@ -95,7 +96,7 @@ fn nothing_grows_while_nobody_listens() {
         "{:?}",
         ugv.beliefs().outstanding().collect::<Vec<_>>()
     );
-    // Plans of earlier lines are not kept for the journal that is not there.
+    // Without a journal, plans of earlier lines are not kept.
     assert!(ugv.decision(&[]).plans.len() <= 2);
     let superseded: usize = ugv.beliefs().outstanding().map(|effect| effect.supersedes.len()).sum();
     assert!(superseded > 0);
@@ -103,18 +104,18 @@ fn nothing_grows_while_nobody_listens() {
 
 #[test]
 #[ignore = "takes an hour; only a release build is of interest"]
-fn memory_over_ten_million_events() {
-    let most: u64 =
+fn memory_is_constant_over_ten_million_events() {
+    let event_count: u64 =
         std::env::var("METAPLAN_EVENTS").ok().and_then(|text| text.parse().ok()).unwrap_or(10_000_000);
     for acknowledging in [true, false] {
         let mut ugv = ugv();
         let (mut sizes, mut next) = (Vec::new(), 10_000);
         let mut number = 0;
-        while number < most {
+        while number < event_count {
             if number % 10 == 0 {
                 flap(&mut ugv, number / 10);
             } else {
-                // Across the bound and back, with all its digits.
+                // Oscillates around the bound, in full precision.
                 let value = 0.8 + 0.1 * (number as f64).sin();
                 feed(
                     &mut ugv,

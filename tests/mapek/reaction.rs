@@ -1,4 +1,4 @@
-//! Safe first, then optimal: what is asked for before anything is planned, and changes that are none.
+//! Safe first, then optimal: effects before planning, and reports without consequences.
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -11,8 +11,9 @@ use crate::common::{control, feed};
 
 fn with(settings: impl Fn(Settings) -> Settings) -> Loop {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("missions/ugv.toml");
-    let Setup { mission, settings: own, .. } = Setup::read(&manifest).expect("the mission is read");
-    let mut control = Loop::new(mission, settings(own)).expect("a loop");
+    let Setup { mission, settings: mission_settings, .. } =
+        Setup::read(&manifest).expect("the mission is read");
+    let mut control = Loop::new(mission, settings(mission_settings)).expect("a loop");
     control.start();
     feed(&mut control, r#"{"event":"action_started","action":1}"#);
     control
@@ -36,11 +37,11 @@ fn a_lost_design_is_replaced_before_planning() {
     let mut ugv = with(|settings| settings);
     let answers = react(&mut ugv, &status("c_kinect", "FALSE"));
     assert_eq!(kinds(&answers), ["inferred", "reconfigure", "inferred"]);
-    // The next loss is reacted to before anything is planned, too.
+    // A second loss also leads to a reaction before planning.
     let answers = react(&mut ugv, &status("c_lidar", "FALSE"));
     assert_eq!(kinds(&answers)[..2], ["inferred", "reconfigure"]);
     assert!(ugv.has_agenda());
-    // Planning then keeps a design that is there, or another: none that is lost is asked for.
+    // Planning requests available designs only.
     for answer in ugv.deliberate() {
         if let Some(Command::Reconfigure { to, .. }) = answer.effect().map(|effect| &effect.command) {
             assert!(ugv.beliefs().available().contains(to), "{to}");
@@ -50,14 +51,14 @@ fn a_lost_design_is_replaced_before_planning() {
 }
 
 #[test]
-fn a_standstill_can_be_preferred() {
+fn suspension_can_be_preferred() {
     let mut ugv = with(|settings| settings.with_safe_reaction(SafeReaction::Suspend));
     let answers = react(&mut ugv, &status("c_kinect", "FALSE"));
     assert_eq!(kinds(&answers), ["inferred", "suspend_action"]);
     let answers = ugv.deliberate();
     let effects: Vec<String> = kinds(&answers).into_iter().filter(|kind| kind.contains("re")).collect();
     assert_eq!(effects, ["plan_requested", "reconfigure", "inferred", "resume_action"]);
-    // What is well again before it is decided on goes on as it was.
+    // An action whose design recovers before the decision continues unchanged.
     let mut ugv = with(|settings| settings.with_safe_reaction(SafeReaction::Suspend));
     react(&mut ugv, &status("c_kinect", "FALSE"));
     react(&mut ugv, &status("c_kinect", "OK"));
@@ -65,9 +66,9 @@ fn a_standstill_can_be_preferred() {
     assert!(!ugv.beliefs().suspended());
 }
 
-/// A plan that was found beside the loop is adopted where only progress and time have passed, and dropped after any news.
+/// Plans of another thread are adopted after progress and the passing of time, and dropped after other news.
 #[test]
-fn plans_are_found_beside_the_loop() {
+fn plans_of_another_thread_are_adopted_unless_outdated() {
     for (line, serves) in [
         (r#"{"event":"tick"}"#.to_owned(), true),
         (r#"{"event":"action_progress","action":1,"fraction":0.5}"#.to_owned(), true),
@@ -91,7 +92,7 @@ fn plans_are_found_beside_the_loop() {
 }
 
 #[test]
-fn what_is_known_is_no_change() {
+fn a_report_of_a_known_fact_changes_nothing() {
     let mut ugv = with(|settings| settings);
     let here = r#"{"event":"fact_changed","name":"robot_at","value":"wp1"}"#;
     assert_eq!(feed(&mut ugv, here), Vec::new());
@@ -102,7 +103,7 @@ fn what_is_known_is_no_change() {
 }
 
 #[test]
-fn a_goal_that_is_undone_is_pursued_again() {
+fn a_goal_that_no_longer_holds_is_pursued_again() {
     let mut ugv = with(|settings| settings);
     feed(&mut ugv, r#"{"event":"goal_changed","goal":"(robot_at wp2)"}"#);
     let answers = feed(&mut ugv, r#"{"event":"action_succeeded","action":1}"#);
@@ -139,7 +140,7 @@ fn a_wrong_time_is_refused() {
             let line = status("c_kinect", status_).replace('}', &format!(r#","time":{time}}}"#));
             feed(&mut ugv, &line);
         }
-        // The recovery counts after some seconds.
+        // The recovery counts after the heal time.
         feed(&mut ugv, r#"{"event":"tick","time":9}"#);
         let answers = feed(&mut ugv, r#"{"event":"tick","time":5000}"#);
         assert!(
@@ -150,7 +151,7 @@ fn a_wrong_time_is_refused() {
 }
 
 #[test]
-fn deadlines_have_outcomes() {
+fn missed_deadlines_have_the_documented_outcomes() {
     let overdue = |answers: &[Answer]| {
         let outcome = |answer: &Answer| match answer {
             Answer::Overdue { .. } => answer.to_json()["outcome"].as_str().map(ToOwned::to_owned),
@@ -159,7 +160,7 @@ fn deadlines_have_outcomes() {
         answers.iter().filter_map(outcome).collect::<Vec<_>>()
     };
     let tick = |time: u32| format!(r#"{{"event":"tick","time":{time}}}"#);
-    // A robot that acknowledges: a reconfiguration is repeated, and then counts as failed.
+    // With acknowledgements, a reconfiguration is repeated, and then counts as failed.
     let mut ugv = with(|settings| settings);
     feed(&mut ugv, r#"{"event":"action_succeeded","action":1}"#);
     let mut ugv2 = control("ugv");
@@ -172,21 +173,21 @@ fn deadlines_have_outcomes() {
     let answers = feed(&mut ugv2, &tick(22));
     assert!(overdue(&answers).contains(&"failed".to_owned()), "{answers:?}");
     assert!(!ugv2.beliefs().available().contains("fd_amcl_lidar"));
-    // A robot that reports starts: a request is repeated, and then cancelled.
+    // With reports of starts, a request is repeated, and then cancelled.
     assert_eq!(overdue(&feed(&mut ugv, &tick(200))), ["repeated"]);
     assert_eq!(overdue(&feed(&mut ugv, &tick(400))), ["cancelled"]);
     assert!(ugv.beliefs().cancelling());
-    // Of a robot that reports nothing, nothing is expected: that is said, less and less often.
+    // Without any reports, the loop only reports missed deadlines, at increasing intervals.
     let mut silent = control("ugv");
     silent.start();
-    let said: usize = (1..2000).map(|time| overdue(&feed(&mut silent, &tick(time * 60))).len()).sum();
-    assert!((2..20).contains(&said), "{said}");
+    let report_count: usize = (1..2000).map(|time| overdue(&feed(&mut silent, &tick(time * 60))).len()).sum();
+    assert!((2..20).contains(&report_count), "{report_count}");
     assert!(!silent.beliefs().cancelling());
 }
 
-/// A search that was cut short is repeated after longer and longer pauses.
+/// An unfinished search is repeated after increasing pauses.
 #[test]
-fn a_search_that_was_cut_short_is_repeated() {
+fn an_unfinished_search_is_repeated() {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/program/ferry/mission.toml");
     let Setup { mission, settings, .. } = Setup::read(&manifest).expect("the mission is read");
     let settings = settings.with_time_limit(Duration::from_micros(1));
@@ -206,20 +207,20 @@ fn a_search_that_was_cut_short_is_repeated() {
     assert_eq!(ferry.beliefs().lines(), 0, "time that passes is no line");
 }
 
-/// Whatever planning takes, the safe effect does not wait for it: nothing is planned here at all.
+/// The safe effect does not wait for planning: nothing is planned in this test.
 #[test]
 fn a_planner_that_never_ends_does_not_delay_the_safe_effect() {
     let mut ugv = with(|settings| settings.with_time_limit(None));
-    let begun = Instant::now();
+    let start = Instant::now();
     for _ in 0..50 {
         assert!(kinds(&react(&mut ugv, &status("c_kinect", "FALSE"))).len() < 4);
         react(&mut ugv, &status("c_kinect", "OK"));
     }
     assert!(ugv.has_agenda());
-    assert!(begun.elapsed() < Duration::from_secs(5));
+    assert!(start.elapsed() < Duration::from_secs(5));
 }
 
-/// The processor time from an observation to its safe effect, beside a search that never ends.
+/// Processor time from an observation to its safe effect, in parallel to an endless search.
 #[test]
 #[ignore = "measures; only an optimised build is of interest"]
 #[expect(clippy::print_stdout, reason = "figures are what this test is for")]
@@ -239,16 +240,16 @@ fn the_safe_effect_comes_within_five_milliseconds() {
         for number in 0..count {
             let (_, step) = robot.beliefs().running().expect("an action is under way");
             let designs: Vec<&String> = step.configuration.iter().map(|(_, design)| design).collect();
-            // A design that is an argument and serves no function of the action.
+            // Default: a design that is an argument but serves no function of the action.
             let design =
                 designs.get(number % designs.len().max(1)).copied().unwrap_or(&step.arguments[0]).clone();
             let line = |realisable: bool| {
                 format!(r#"{{"event":"design_status","design":"{design}","realisable":{realisable}}}"#)
             };
-            let begun = (Instant::now(), ThreadTime::now());
+            let start = (Instant::now(), ThreadTime::now());
             let answers = react(&mut robot, &line(false));
-            walls.push(begun.0.elapsed());
-            times.push(begun.1.elapsed());
+            walls.push(start.0.elapsed());
+            times.push(start.1.elapsed());
             assert!(answers.iter().any(|answer| answer.effect().is_some()), "{mission}: {answers:?}");
             react(&mut robot, &line(true));
             if robot.beliefs().suspended() {
@@ -259,10 +260,10 @@ fn the_safe_effect_comes_within_five_milliseconds() {
             times.sort_unstable();
             [times.len() / 2, times.len() * 999 / 1000, times.len() - 1].map(|place| times[place])
         };
-        let ([median, most, greatest], wall) = (shares(&mut times), shares(&mut walls));
-        println!("{mission}: median {median:?}, p99.9 {most:?}, greatest {greatest:?} of processor time");
+        let ([median, tail, greatest], wall) = (shares(&mut times), shares(&mut walls));
+        println!("{mission}: median {median:?}, p99.9 {tail:?}, greatest {greatest:?} of processor time");
         println!("{mission}: median {:?}, p99.9 {:?}, greatest {:?} of wall time", wall[0], wall[1], wall[2]);
-        late.extend((most > Duration::from_millis(5)).then_some((mission, most)));
+        late.extend((tail > Duration::from_millis(5)).then_some((mission, tail)));
     }
     assert!(late.is_empty(), "{late:?}");
     assert!(!search.is_finished(), "the search has never ended");

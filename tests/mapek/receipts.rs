@@ -1,10 +1,10 @@
-//! Acknowledgements: messages that cross, are doubled, or come out of order.
+//! Acknowledgements that cross other messages, are duplicated, or arrive out of order.
 
 use metaplan::mapek::{Answer, Command, Loop};
 
 use crate::common::{control, feed};
 
-/// The commands among answers, each in a word.
+/// Short texts of the effects.
 fn words(answers: &[Answer]) -> Vec<String> {
     let word = |answer: &Answer| match &answer.effect()?.command {
         Command::Reconfigure { from, to, .. } => {
@@ -29,9 +29,9 @@ fn event(control: &mut Loop, event: &str, field: &str, number: u64) -> Vec<Answe
 
 const KINECT_FAILS: &str = r#"{"event":"component_status","component":"c_kinect","status":"FALSE"}"#;
 
-/// A report of progress that was on its way does not acknowledge a reconfiguration asked for in mid-action.
+/// A report of progress that was in transit does not acknowledge a reconfiguration during the action.
 #[test]
-fn a_report_that_was_on_its_way_acknowledges_nothing() {
+fn a_report_in_transit_acknowledges_nothing() {
     let mut ugv = control("ugv");
     ugv.start();
     event(&mut ugv, "action_started", "action", 1);
@@ -54,7 +54,7 @@ fn a_report_that_was_on_its_way_acknowledges_nothing() {
     assert_eq!(words(&answers)[0], "fd_amcl_kinect to fd_mrpt_lidar", "the next design is asked for");
 }
 
-/// Any sender with receipts acknowledges a reconfiguration when it arrives, and may report its failure later.
+/// A robot can report a failure after it has acknowledged the arrival of a reconfiguration.
 #[test]
 fn a_reconfiguration_may_fail_after_it_was_acknowledged() {
     let mut ugv = control("ugv");
@@ -66,14 +66,14 @@ fn a_reconfiguration_may_fail_after_it_was_acknowledged() {
     assert_eq!(design(&ugv), None, "the function has what it had before");
     assert!(!ugv.beliefs().available().contains("fd_amcl_kinect"));
     assert_eq!(words(&answers)[0], "none to fd_amcl_lidar");
-    // The failure is reported twice.
+    // The duplicate of the failure is ignored.
     assert!(event(&mut ugv, "reconfiguration_failed", "effect", 1).is_empty());
 }
 
-/// A reconfiguration that supersedes one that was never carried out fails: the superseded design is not believed, and the suspended
-/// action does not go on before a design was asked for.
+/// A reconfiguration fails that has superseded an unanswered one. The superseded design is not believed, and the
+/// suspended action does not resume before a design is requested.
 #[test]
-fn what_was_superseded_is_not_believed() {
+fn a_superseded_design_is_not_believed() {
     let mut ugv = control("ugv");
     ugv.start();
     let bright = r#"{"event":"measured","attribute":"ambient_light","value":0.9}"#;
@@ -103,7 +103,7 @@ fn what_was_superseded_is_not_believed() {
     assert!(words[..resume].iter().any(|word| word.starts_with("none to ")), "{words:?}");
 }
 
-/// Acknowledgements out of order: the greatest number counts.
+/// If acknowledgements arrive out of order, the greatest number counts.
 #[test]
 fn of_two_acknowledged_reconfigurations_the_later_one_counts() {
     for order in [[1, 3], [3, 1]] {
@@ -119,14 +119,14 @@ fn of_two_acknowledged_reconfigurations_the_later_one_counts() {
     }
 }
 
-/// A robot that acknowledges nothing: the start of an action implies what was asked for before its request, and no more.
+/// For a robot without acknowledgements, the start of an action implies only the reconfigurations before its request.
 #[test]
-fn silent_robots_are_believed_to_begin_as_they_were_asked_to() {
+fn a_start_implies_earlier_reconfigurations_without_acknowledgements() {
     let mut ugv = control("ugv");
     ugv.start();
     event(&mut ugv, "action_started", "action", 1);
     assert_eq!(design(&ugv), Some("fd_amcl_kinect"));
-    // A robot that acknowledges by number is not believed to have what it has not acknowledged.
+    // For a robot that acknowledges by number, unacknowledged designs are not believed.
     let mut ugv = control("ugv");
     ugv.start();
     event(&mut ugv, "acknowledged", "effect", 1);
@@ -137,7 +137,8 @@ fn silent_robots_are_believed_to_begin_as_they_were_asked_to() {
     assert_eq!(ugv.beliefs().pending().count(), 1);
 }
 
-/// The situation of a row: a reconfiguration from A to B, effect 3, in the state that the row names. A is the Kinect, B the lidar, C the camera.
+/// Creates the situation of a table row: reconfiguration 3 from A (Kinect) to B (lidar), in the state named by the row.
+/// C is the camera.
 fn situation(state: &str) -> Loop {
     let mut ugv = control("ugv");
     ugv.start();
@@ -169,11 +170,14 @@ fn situation(state: &str) -> Loop {
     ugv
 }
 
-/// Reacts to a line, which must lead to the reconfiguration with that number; nothing is planned.
+/// Reacts to a line without planning. The reaction must contain the reconfiguration with this number.
 fn feed_reconfiguration(ugv: &mut Loop, line: &str, number: u64) {
     let answers = react(ugv, line);
-    let found = answers.iter().filter_map(Answer::effect).find(|effect| effect.number == number);
-    assert!(found.is_some_and(|effect| matches!(effect.command, Command::Reconfigure { .. })), "{answers:?}");
+    let reconfiguration = answers.iter().filter_map(Answer::effect).find(|effect| effect.number == number);
+    assert!(
+        reconfiguration.is_some_and(|effect| matches!(effect.command, Command::Reconfigure { .. })),
+        "{answers:?}"
+    );
 }
 
 fn react(ugv: &mut Loop, line: &str) -> Vec<Answer> {
@@ -181,14 +185,14 @@ fn react(ugv: &mut Loop, line: &str) -> Vec<Answer> {
     ugv.react(&metaplan::mapek::Observation::parse(line), now)
 }
 
-/// A failure, after which the action stands still or has another design: what the row is about is not that.
+/// Delivers a failure without checks of the reaction.
 fn fail_quietly(ugv: &mut Loop, effect: u64) {
     react(ugv, &format!(r#"{{"event":"reconfiguration_failed","effect":{effect}}}"#));
 }
 
-/// The table of the book: state × message.
+/// The loop implements the table of states and messages in the reference.
 #[test]
-fn the_table_of_the_book_is_what_the_loop_does() {
+fn the_loop_implements_the_documented_table() {
     let page = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/reference/events.md");
     let page = std::fs::read_to_string(page).expect("the page");
     let table = page.split("<!-- table: receipts -->").nth(1).expect("the table");
@@ -203,8 +207,8 @@ fn the_table_of_the_book_is_what_the_loop_does() {
         let third = ugv.beliefs().pending().map(|(_, design)| design.to_owned()).next();
         let third = third.or_else(|| design(&ugv).map(ToOwned::to_owned)).unwrap_or_default();
         let name = |letter: &str| {
-            let known = names.iter().find(|(own, _)| *own == letter).map(|(_, name)| (*name).to_owned());
-            known.unwrap_or_else(|| third.clone())
+            let listed = names.iter().find(|(label, _)| *label == letter).map(|(_, name)| (*name).to_owned());
+            listed.unwrap_or_else(|| third.clone())
         };
         let before = if state.starts_with("superseded") { 4 } else { 3 };
         let line = match message.trim_matches('`') {
@@ -215,14 +219,14 @@ fn the_table_of_the_book_is_what_the_loop_does() {
         let answers = react(&mut ugv, &line);
         assert!(!answers.iter().any(|answer| matches!(answer, Answer::Error { .. })), "{row}: {answers:?}");
         assert_eq!(design(&ugv), Some(name(believed).as_str()), "{row}");
-        // What was asked for in answer to the message itself is another reconfiguration.
+        // Reconfigurations in response to the message have later numbers.
         let is_older = |effect: &&metaplan::mapek::Effect| effect.number <= before;
         let waiting = ugv.beliefs().outstanding().filter(is_older).find_map(|effect| match &effect.command {
             Command::Reconfigure { to, .. } => Some(to.clone()),
             _ => None,
         });
         let is_superseded =
-            answers.iter().filter_map(Answer::effect).any(|own| own.supersedes.contains(&before));
+            answers.iter().filter_map(Answer::effect).any(|label| label.supersedes.contains(&before));
         if pending != "no" {
             assert!(is_superseded || waiting == Some(name(pending)), "{row}: {waiting:?}");
         } else if !state.ends_with("failed") {
@@ -235,12 +239,12 @@ fn the_table_of_the_book_is_what_the_loop_does() {
     assert_eq!(count, 16);
 }
 
-/// Whether the lidar design was reported to be not realisable.
+/// Returns `true` if the lidar design was reported as unrealisable.
 fn lidar_refused(ugv: &Loop) -> bool {
     let snapshot = ugv.snapshot().0;
     let added = snapshot["added"].as_array().expect("statements");
-    added.iter().any(|own| {
-        let text = own.to_string();
+    added.iter().any(|statement| {
+        let text = statement.to_string();
         text.contains("fd_realisability") && text.contains("fd_amcl_lidar") && text.contains("false")
     })
 }

@@ -1,5 +1,5 @@
-//! A rule that runs away: no report is refused, nothing is begun while it is not known what follows, and all is as it would
-//! be without the rule once it has come to an end.
+//! A rule that does not terminate: no report is refused, and no action starts while conclusions are missing. Once the
+//! rule terminates, the state equals the one without the rule.
 
 use std::path::Path;
 use std::time::Duration;
@@ -11,7 +11,7 @@ use serde_json::json;
 
 use crate::common::feed;
 
-/// A counter that counts for ever as long as the first component is broken.
+/// A rule that counts without end while the first component has failed.
 const RUNAWAY: &str = "@prefix : <http://example.org/m#> .\n@prefix t: <http://metacontrol.org/tomasys#> .\n\
     [counting] t:c_status(:c_0, \"FALSE\") ^ :counts(?x, ?n) ^ swrlb:add(?m, ?n, 1) -> :counts(?x, ?m) .\n";
 
@@ -20,13 +20,13 @@ fn read(directory: &Path) -> Loop {
     Loop::new(mission, Settings::immediate()).expect("the mission can be planned for")
 }
 
-/// A mission with the rule that runs away, and a loop for it without the rule.
+/// A mission with the non-terminating rule, and a loop for the mission without it.
 fn mission(seed: u64) -> (tempfile::TempDir, Loop) {
     let directory = crate::worlds::own_files(seed);
-    let append = |name: &str, more: &str| {
+    let append = |name: &str, addition: &str| {
         let path = directory.path().join(name);
         let text = std::fs::read_to_string(&path).expect("text");
-        std::fs::write(&path, text + more).expect("written");
+        std::fs::write(&path, text + addition).expect("written");
     };
     append("kb.ttl", ":counter :counts 0 .\n:counts a owl:DatatypeProperty .\n");
     let tame = read(directory.path());
@@ -46,7 +46,7 @@ fn faults(answers: &[Answer]) -> Vec<Option<String>> {
     answers.iter().filter_map(fault).collect()
 }
 
-/// Nothing is asked for but to stop.
+/// Asserts that the only effects are suspensions and cancellations, and that no line is refused.
 fn nothing_begins(answers: &[Answer]) {
     for effect in answers.iter().filter_map(Answer::effect) {
         let stops = matches!(effect.command, Command::Suspend { .. } | Command::Cancel { .. });
@@ -56,7 +56,7 @@ fn nothing_begins(answers: &[Answer]) {
 }
 
 #[test]
-fn a_rule_that_runs_away_refuses_no_report() {
+fn reports_are_accepted_despite_a_nonterminating_rule() {
     let (directory, mut tame) = mission(3);
     let mut wild = read(directory.path());
     tame.start();
@@ -73,16 +73,16 @@ fn a_rule_that_runs_away_refuses_no_report() {
         feed(&mut tame, &component(number, status));
     }
     nothing_begins(&feed(&mut wild, r#"{"event":"tick"}"#));
-    // A restart knows no more, and forgets nothing.
-    let mut again = read(directory.path());
-    again.restore(&wild.snapshot()).expect("the snapshot fits");
-    assert_eq!(again.snapshot(), wild.snapshot());
-    for control in [&mut wild, &mut again] {
+    // A restored loop has the same missing conclusions.
+    let mut restored = read(directory.path());
+    restored.restore(&wild.snapshot()).expect("the snapshot fits");
+    assert_eq!(restored.snapshot(), wild.snapshot());
+    for control in [&mut wild, &mut restored] {
         let answers = feed(control, &component(0, "TRUE"));
         assert_eq!(faults(&answers), [None], "{answers:?}");
     }
     feed(&mut tame, &component(0, "TRUE"));
-    for control in [&wild, &again] {
+    for control in [&wild, &restored] {
         assert_eq!(control.beliefs().available(), tame.beliefs().available());
         assert_eq!(control.beliefs().statuses(), tame.beliefs().statuses());
         assert!(control.beliefs().running().is_some() && !control.beliefs().suspended());
@@ -90,7 +90,7 @@ fn a_rule_that_runs_away_refuses_no_report() {
 }
 
 #[test]
-fn a_journal_comes_back_to_where_a_rule_ran_away() {
+fn a_journal_restores_missing_conclusions() {
     let (directory, _) = mission(3);
     let place = tempfile::tempdir().expect("a directory");
     let policy = Policy { sync: Sync::Never, snapshot_every: 3 };
@@ -101,10 +101,10 @@ fn a_journal_comes_back_to_where_a_rule_ran_away() {
         journal.handle(&mut control, &component(number, status), Duration::ZERO).expect("written");
     }
     drop(journal);
-    let mut again = read(directory.path());
-    let (mut journal, recovery) = Journal::open(place.path(), policy, &mut again).expect("it opens again");
-    journal.begin(&mut again).expect("written");
+    let mut restored = read(directory.path());
+    let (mut journal, recovery) = Journal::open(place.path(), policy, &mut restored).expect("it opens again");
+    journal.begin(&mut restored).expect("written");
     assert!(recovery.warnings.is_empty(), "{:?}", recovery.warnings);
-    assert_eq!(again.snapshot(), control.snapshot());
-    assert!(again.beliefs().available().is_empty());
+    assert_eq!(restored.snapshot(), control.snapshot());
+    assert!(restored.beliefs().available().is_empty());
 }

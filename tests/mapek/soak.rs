@@ -1,4 +1,4 @@
-//! Long runs, to be asked for: `cargo test --release --test mapek -- --ignored --nocapture`.
+//! Long runs: `cargo test --release --test mapek -- --ignored --nocapture`.
 
 #![expect(clippy::print_stdout, reason = "figures are what these tests are for")]
 
@@ -11,25 +11,23 @@ use metaplan::mapek::{Answer, Loop};
 use crate::common::{control, feed};
 use crate::fuzz::{Fuzz, WORLDS, step};
 
-/// How long the soak lasts, in seconds, unless `METAPLAN_SOAK_SECONDS` says otherwise.
+/// Default length of the soak test in seconds; set `METAPLAN_SOAK_SECONDS` for another one.
 const SOAK_SECONDS: u64 = 3600;
 
-/// After so many events the soak compares the knowledge with knowledge from scratch; with every one of these numbers the
-/// comparison takes most of its time.
+/// Number of events between comparisons with knowledge from scratch. At 1, the comparison would take most of the time.
 const COMPARE_EVERY: usize = 3;
 
-/// Resident memory in kilobytes; none where the system does not say.
+/// Resident memory in kilobytes; `None` without `/proc`.
 pub fn resident() -> Option<usize> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|line| line.starts_with("VmRSS:"))?;
     line.split_whitespace().nth(1)?.parse().ok()
 }
 
-/// Processor time that this process has taken, which does not depend on what else the machine does; none where the system does
-/// not say.
+/// Processor time of this process, which is independent of other processes; `None` without `/proc`.
 pub fn processor_time() -> Option<Duration> {
     let status = std::fs::read_to_string("/proc/self/stat").ok()?;
-    // User and system time, in hundredths of a second, stand behind the name in parentheses.
+    // The fields after the name in parentheses contain user and system time in hundredths of a second.
     let fields: Vec<&str> = status.rsplit_once(')')?.1.split_whitespace().collect();
     let ticks: u64 = fields.get(11)?.parse::<u64>().ok()? + fields.get(12)?.parse::<u64>().ok()?;
     Some(Duration::from_millis(ticks * 10))
@@ -37,10 +35,10 @@ pub fn processor_time() -> Option<Duration> {
 
 #[test]
 #[ignore = "takes an hour"]
-fn an_hour_of_random_events() {
+fn invariants_hold_for_an_hour_of_random_events() {
     let seconds = std::env::var("METAPLAN_SOAK_SECONDS").ok().and_then(|text| text.parse().ok());
     let length = Duration::from_secs(seconds.unwrap_or(SOAK_SECONDS));
-    let begun = Instant::now();
+    let start = Instant::now();
     let mut loops: Vec<_> = WORLDS
         .iter()
         .map(|world| {
@@ -50,26 +48,26 @@ fn an_hour_of_random_events() {
         })
         .collect();
     let (mut number, mut memory, mut reported) = (0, Vec::new(), Duration::ZERO);
-    while begun.elapsed() < length {
+    while start.elapsed() < length {
         for (control, fuzz) in &mut loops {
             step(control, fuzz, number);
         }
         number += 1;
-        if begun.elapsed() >= reported {
+        if start.elapsed() >= reported {
             reported += length / 60;
             memory.extend(resident());
-            // A reader that has gone away, or a full disk, is no reason to stop.
+            // A closed pipe or a full disk must not end the test.
             let _ = writeln!(
                 std::io::stdout(),
                 "{:>5} s: {} events, {} comparisons from scratch, {:?} kB",
-                begun.elapsed().as_secs(),
+                start.elapsed().as_secs(),
                 2 * number,
                 2 * number.div_ceil(COMPARE_EVERY),
                 memory.last()
             );
         }
     }
-    // After a tenth of the time everything that is kept is there.
+    // The caches are full after a tenth of the time.
     let tenth = memory.len() / 10;
     if let (Some(early), Some(late)) = (memory[tenth..].iter().take(12).max(), memory.last()) {
         assert!(*late <= early + early / 5, "memory has grown from {early} to {late} kB");
@@ -86,10 +84,10 @@ fn reaction_times() {
         let mut adaptations: Vec<Duration> = Vec::new();
         for _ in 0..10_000 {
             let (line, _) = fuzz.next(&control);
-            let begun = Instant::now();
+            let start = Instant::now();
             let answers = feed(&mut control, &line);
             let text: String = answers.iter().map(|answer| answer.to_json().to_string()).collect();
-            let time = begun.elapsed();
+            let time = start.elapsed();
             let _ = control.decision(&answers);
             times.push(time);
             if text.contains("plan_requested") {
@@ -104,54 +102,54 @@ fn reaction_times() {
     }
 }
 
-/// What is reported again and again.
+/// A benchmark with two alternating reports.
 struct Rate {
-    what: &'static str,
-    /// In turn.
+    subject: &'static str,
+    /// Alternating reports.
     reports: [&'static str; 2],
-    /// What comes first.
+    /// Lines before the measurement.
     before: &'static [&'static str],
-    /// So many lines a second of one core should be taken at least, without a journal and with one.
+    /// Minimum number of lines per second of processor time, without and with a journal.
     least: [u64; 2],
 }
 
-/// After these lines there is nothing to be planned.
+/// After these lines, no planning is necessary.
 const DONE: &[&str] =
     &[r#"{"event":"goal_changed","goal":"(robot_at wp1)"}"#, r#"{"event":"action_cancelled","action":1}"#];
 
 const RATES: [Rate; 6] = [
     Rate {
-        what: "what the plan does without fails and recovers",
+        subject: "what the plan does without fails and recovers",
         reports: [CAMERA_FAILS, CAMERA_WORKS],
         before: &[],
         least: [5_000, 2_500],
     },
     Rate {
-        what: "what the plan uses fails and recovers",
+        subject: "what the plan uses fails and recovers",
         reports: [KINECT_FAILS, KINECT_WORKS],
         before: &[],
         least: [1_000, 500],
     },
     Rate {
-        what: "measurements that change nothing",
+        subject: "measurements that change nothing",
         reports: [DIM, DIMMER],
         before: &[],
         least: [20_000, 10_000],
     },
     Rate {
-        what: "measurements across a bound of the plan",
+        subject: "measurements across a bound of the plan",
         reports: [DIM, BRIGHT],
         before: &[],
         least: [1_000, 500],
     },
     Rate {
-        what: "measurements across a bound, without a plan",
+        subject: "measurements across a bound, without a plan",
         reports: [DIM, BRIGHT],
         before: DONE,
         least: [20_000, 10_000],
     },
     Rate {
-        what: "a component fails and recovers, without a plan",
+        subject: "a component fails and recovers, without a plan",
         reports: [KINECT_FAILS, KINECT_WORKS],
         before: DONE,
         least: [20_000, 10_000],
@@ -172,15 +170,15 @@ fn lines_a_second() {
     let pristine = control("ugv");
     for rate in &RATES {
         for (place, with_journal) in [false, true].into_iter().enumerate() {
-            let found = rate.measure(&pristine, with_journal);
-            println!("{}, journal: {with_journal}: {found} a second of one core", rate.what);
-            assert!(found >= rate.least[place], "{}: {found}", rate.what);
+            let rate_measured = rate.measure(&pristine, with_journal);
+            println!("{}, journal: {with_journal}: {rate_measured} a second of one core", rate.subject);
+            assert!(rate_measured >= rate.least[place], "{}: {rate_measured}", rate.subject);
         }
     }
 }
 
 impl Rate {
-    /// Lines a second of processor time of one core, with the answers as they are written.
+    /// Lines per second of processor time of one core, with serialization of the answers.
     fn measure(&self, pristine: &Loop, with_journal: bool) -> u64 {
         let lines = 10_000;
         let mut control = pristine.clone();
@@ -205,21 +203,21 @@ impl Rate {
         for line in self.before {
             handle(line, Duration::ZERO);
         }
-        let (begun, before) = (Instant::now(), processor_time());
+        let (start, before) = (Instant::now(), processor_time());
         for number in 0..lines {
-            std::hint::black_box(handle(self.reports[number % 2], begun.elapsed()));
+            std::hint::black_box(handle(self.reports[number % 2], start.elapsed()));
         }
-        let taken =
-            before.zip(processor_time()).map_or(begun.elapsed(), |(before, now)| now.saturating_sub(before));
-        (lines as f64 / taken.as_secs_f64()) as u64
+        let elapsed =
+            before.zip(processor_time()).map_or(start.elapsed(), |(before, now)| now.saturating_sub(before));
+        (lines as f64 / elapsed.as_secs_f64()) as u64
     }
 }
 
-fn report(mission: &str, what: &str, times: &mut [Duration]) {
+fn report(mission: &str, subject: &str, times: &mut [Duration]) {
     times.sort_unstable();
     let at = |share: usize| times[(times.len() - 1) * share / 1000];
     println!(
-        "{mission}, {what}: {} of them, median {:?}, p90 {:?}, p99 {:?}, p99.9 {:?}, most {:?}",
+        "{mission}, {subject}: {} of them, median {:?}, p90 {:?}, p99 {:?}, p99.9 {:?}, most {:?}",
         times.len(),
         at(500),
         at(900),

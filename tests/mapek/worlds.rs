@@ -1,4 +1,4 @@
-//! Missions with what their robots can report: those that are shipped, SUAVE's knowledge base, and generated ones.
+//! Missions with the possible reports of their robots: shipped ones, SUAVE's knowledge base, and generated ones.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -8,27 +8,27 @@ use metaplan::mapek::{Loop, Settings};
 use metaplan::setup::Setup;
 use num_rational::BigRational;
 
-/// What a design needs, as its knowledge base states it.
+/// Requirements of a design, as stated by the knowledge base.
 #[derive(Debug, Clone)]
 pub struct Design {
     pub name: String,
     pub components: Vec<String>,
-    /// Attribute, least and greatest value.
+    /// Attribute, minimum and maximum.
     pub bounds: Vec<(String, Option<BigRational>, Option<BigRational>)>,
 }
 
-/// A mission with what can be reported of it.
+/// A mission with its possible reports.
 pub struct Place {
     pub name: String,
-    /// A loop that has begun, and to which nothing has happened.
-    pub begun: Loop,
+    /// A started loop without observations.
+    pub started: Loop,
     pub components: Vec<String>,
     /// Attributes with values on, between and beyond all bounds.
     pub attributes: Vec<(String, Vec<String>)>,
     pub designs: Vec<Design>,
-    /// Component, and another one that it does not work without.
+    /// Pairs of a component and one that it depends on.
     pub depends: Vec<(String, String)>,
-    /// Whether the shipped rules, and dependencies, are all that says what is available.
+    /// Whether availability is determined by the shipped rules and dependencies only.
     pub is_plain: bool,
 }
 
@@ -36,9 +36,9 @@ impl Place {
     fn new(name: &str, manifest: &Path, depends: Vec<(String, String)>, is_plain: bool) -> Self {
         let mission = Setup::read(manifest).unwrap_or_else(|errors| panic!("{name}: {errors:?}")).mission;
         let settings = Settings::immediate().with_time_limit(None);
-        let mut begun = Loop::new(mission, settings).expect("the mission can be planned for");
-        begun.start();
-        let knowledge = begun.beliefs().mission().knowledge().expect("a knowledge base");
+        let mut started = Loop::new(mission, settings).expect("the mission can be planned for");
+        started.start();
+        let knowledge = started.beliefs().mission().knowledge().expect("a knowledge base");
         let view = knowledge.view();
         let components = view.components().into_iter().map(|component| component.individual.name).collect();
         let designs: Vec<Design> = view
@@ -56,14 +56,14 @@ impl Place {
             .collect();
         let mut attributes: Vec<(String, Vec<String>)> = Vec::new();
         for (attribute, minimum, maximum) in designs.iter().flat_map(|design| &design.bounds) {
-            let known = attributes.iter().position(|(name, _)| name == attribute).unwrap_or_else(|| {
+            let index = attributes.iter().position(|(name, _)| name == attribute).unwrap_or_else(|| {
                 attributes.push((attribute.clone(), vec!["0".to_owned(), "1000".to_owned()]));
                 attributes.len() - 1
             });
             for bound in minimum.iter().chain(maximum) {
                 for difference in [-1, 0, 1] {
                     let value = bound + BigRational::new(difference.into(), 100.into());
-                    attributes[known].1.push(rules::Decimal::from_rational(&value).to_string());
+                    attributes[index].1.push(rules::Decimal::from_rational(&value).to_string());
                 }
             }
         }
@@ -74,11 +74,10 @@ impl Place {
                 values.extend(["0", "0.5", "1.2", "2", "2.4", "3", "4"].map(ToOwned::to_owned));
             }
         }
-        Self { name: name.to_owned(), begun, components, attributes, designs, depends, is_plain }
+        Self { name: name.to_owned(), started, components, attributes, designs, depends, is_plain }
     }
 }
 
-/// The missions that are shipped.
 pub fn shipped() -> Vec<Place> {
     let place = |name: &str| {
         let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("missions/{name}.toml"));
@@ -87,7 +86,7 @@ pub fn shipped() -> Vec<Place> {
     ["ugv", "uuv", "ugv_plain", "uuv_plain", "camara_like"].map(place).into()
 }
 
-/// SUAVE's own knowledge base, where the shared material is beside the project.
+/// SUAVE's own knowledge base, if the shared material is installed next to the project.
 pub fn suave() -> Option<Place> {
     let directory = crate::fleet::files()?;
     Some(Place::new("suave", &directory.path().join("m.toml"), Vec::new(), false))
@@ -99,7 +98,7 @@ const PREFIXES: &str = "@prefix : <http://example.org/m#> .\n\
     <http://example.org/m> a owl:Ontology ; owl:imports <http://metacontrol.org/tomasys> .\n\
     :dependsOn a owl:ObjectProperty .\n";
 
-/// A component does not work without those that it depends on, whatever it says itself.
+/// A component fails with those that it depends on, regardless of its own reports.
 const DEPENDENCY: &str = "@prefix : <http://example.org/m#> .\n@prefix t: <http://metacontrol.org/tomasys#> .\n\
     [dependency] :dependsOn(?a, ?b) ^ t:c_status(?b, \"FALSE\") -> t:c_status(?a, \"FALSE\") .\n";
 
@@ -119,12 +118,12 @@ pub fn generated(seed: u64) -> Place {
     Place::new(&format!("generated {seed}"), &directory.path().join("m.toml"), depends, true)
 }
 
-/// The files of a generated mission, the manifest `m.toml` among them.
+/// Files of a generated mission, with the manifest `m.toml`.
 pub fn own_files(seed: u64) -> tempfile::TempDir {
     files(seed).0
 }
 
-/// The same, and which component depends on which.
+/// Files of a generated mission, and pairs of a component and one that it depends on.
 fn files(seed: u64) -> (tempfile::TempDir, Vec<(String, String)>) {
     let mut random = Rng::with_seed(seed);
     let (functions, components) = (random.usize(1..=2), random.usize(3..=5));
@@ -143,9 +142,9 @@ fn files(seed: u64) -> (tempfile::TempDir, Vec<(String, String)>) {
     let mut depends = Vec::new();
     for component in 1..components {
         if random.u32(..3) == 0 {
-            let other = random.usize(..component);
-            let _ = writeln!(text, ":c_{component} :dependsOn :c_{other} .");
-            depends.push((format!("c_{component}"), format!("c_{other}")));
+            let dependency = random.usize(..component);
+            let _ = writeln!(text, ":c_{component} :dependsOn :c_{dependency} .");
+            depends.push((format!("c_{component}"), format!("c_{dependency}")));
         }
     }
     for function in 0..functions {

@@ -1,4 +1,5 @@
-//! The judge: knows the designs, the messages and the robot, and nothing of how the loop decides.
+//! The judge of a simulation. It knows the designs, the messages and the robot, and is independent of the loop's
+//! decisions.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,40 +10,40 @@ use crate::robot::{Action, Robot};
 use crate::schedule::Message;
 use crate::{DESIGNS, FUNCTION, GOAL};
 
-/// Whatever the messages have said.
+/// Content of the delivered messages, and the demands that follow from them.
 #[derive(Debug, Default)]
 pub struct Judge {
-    /// Components that have failed by the reports that were delivered to the loop.
+    /// Failed components by the reports that were delivered to the loop.
     failed: BTreeSet<String>,
-    /// Designs that the robot has refused, or the loop has given up.
+    /// Designs that the robot has refused or the loop has abandoned.
     refused: BTreeSet<String>,
-    /// Effects that the loop has asked for.
-    asked: BTreeMap<u64, Effect>,
+    /// Effects that the loop has requested.
+    requested: BTreeMap<u64, Effect>,
     /// Effects that a later one has superseded.
     superseded: BTreeSet<u64>,
-    /// Effects that the loop has given up aloud.
+    /// Effects that the loop has abandoned with a report.
     given_up: BTreeSet<u64>,
-    /// The belief that follows from the messages by the table of the book.
+    /// The belief that follows from the messages by the table of `docs/reference/events.md`.
     belief: Belief,
-    /// Whether the last observation of the function that was delivered was outdated by then. Observations do not say how old they
-    /// are, so that no loop can know.
+    /// Whether the last delivered observation of the function was outdated on arrival. Observations have no time stamp,
+    /// so that no loop can detect this.
     is_misled: bool,
-    /// Whether such an observation has led to the design before the last reconfiguration.
+    /// Whether such an observation determined the design before the last reconfiguration.
     was_misled: bool,
-    /// Actions of which the loop has heard the start, and those of which it has heard progress.
+    /// Actions whose start, and actions whose progress, was delivered to the loop.
     started: BTreeSet<u64>,
     progressed: BTreeSet<u64>,
-    /// The action that is waited for beyond its deadline, as the loop has said.
+    /// The action that the loop waits for after its deadline, as it has reported.
     awaited: Option<u64>,
-    /// Actions of which the loop has heard the end.
+    /// Actions whose end was delivered to the loop.
     ended: BTreeSet<u64>,
-    /// The last decision on plans, and whether the goal is reached.
+    /// Last decision about plans, including that the goal is reached.
     plan: Plan,
-    /// Failed component with which the robot moves, and the number of steps in a row in which it has done so.
+    /// Failed component that the moving robot uses, and the number of consecutive steps of that motion.
     forbidden: Option<(&'static str, u64)>,
 }
 
-/// The last decision on plans.
+/// Last decision about plans.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 enum Plan {
     #[default]
@@ -52,8 +53,8 @@ enum Plan {
 }
 
 impl Judge {
-    /// Takes a line that was delivered to the loop.
-    pub fn hear(&mut self, event: &Value, is_taken: bool, robot: &Robot) {
+    /// Records a line that was delivered to the loop.
+    pub fn record_event(&mut self, event: &Value, is_taken: bool, robot: &Robot) {
         if !is_taken {
             return;
         }
@@ -76,7 +77,7 @@ impl Judge {
             "reconfiguration_failed" => {
                 self.is_misled |=
                     self.was_misled && self.belief.last.as_ref().map(|last| last.effect) == effect;
-                self.refused.extend(self.belief.fail(effect.unwrap_or_default()));
+                self.refused.extend(self.belief.record_failure(effect.unwrap_or_default()));
             }
             "design_status" => {
                 self.refused.remove(event["design"].as_str().unwrap_or_default());
@@ -84,16 +85,16 @@ impl Judge {
             "configuration_observed" => {
                 let design = event["design"].as_str().map(ToOwned::to_owned);
                 self.is_misled = design.is_some() && design != robot.design;
-                let latest = self.asked.last_key_value().map_or(0, |(number, _)| *number);
+                let latest = self.requested.last_key_value().map_or(0, |(number, _)| *number);
                 self.belief.observe(design, latest);
             }
             "action_started" | "action_progress" => {
                 self.started.extend(action);
                 self.progressed.extend(action.filter(|_| event["event"] == "action_progress"));
-                self.belief.imply(action.unwrap_or_default(), &self.asked);
+                self.belief.confirm_before_request(action.unwrap_or_default(), &self.requested);
             }
             "action_succeeded" => {
-                self.belief.imply(action.unwrap_or_default(), &self.asked);
+                self.belief.confirm_before_request(action.unwrap_or_default(), &self.requested);
                 self.ended.extend(action);
             }
             "action_failed" | "action_cancelled" => self.ended.extend(action),
@@ -102,15 +103,15 @@ impl Judge {
         self.is_misled &= self.belief.design != robot.design;
     }
 
-    /// Takes an answer of the loop.
+    /// Records an answer of the loop.
     pub fn note(&mut self, answer: &Answer) {
         match answer {
             Answer::Effect(effect) => {
                 self.superseded.extend(&effect.supersedes);
-                if self.asked.insert(effect.number, effect.clone()).is_none()
+                if self.requested.insert(effect.number, effect.clone()).is_none()
                     && let Command::Reconfigure { to, .. } = &effect.command
                 {
-                    self.belief.ask(effect.number, to);
+                    self.belief.request(effect.number, to);
                 }
                 if matches!(effect.command, Command::Request { .. }) && !effect.repeated {
                     (self.plan, self.awaited) = (Plan::Open, None);
@@ -135,14 +136,15 @@ impl Judge {
         }
     }
 
-    /// The component by whose failure a design is forbidden.
+    /// Returns a failed component that the design requires, if any.
     fn forbids(&self, design: &str) -> Option<&'static str> {
-        let components = DESIGNS.iter().find(|own| own.0 == design).map(|own| own.1).unwrap_or_default();
+        let components =
+            DESIGNS.iter().find(|entry| entry.0 == design).map(|entry| entry.1).unwrap_or_default();
         components.iter().find(|component| self.failed.contains(**component)).copied()
     }
 
-    /// (a) Once all effects have arrived that the loop waits for, and after them those that are on their way, no action moves with a
-    /// design that is forbidden by the reports delivered so far, without one, or with another one than the loop has given it.
+    /// (a) After the arrival of all outstanding effects and then of all effects in transit, no action moves without a
+    /// design, with a design that the delivered reports forbid, or with another design than the loop has requested.
     pub fn intended_motion<'a>(
         &self,
         robot: &Robot,
@@ -154,11 +156,11 @@ impl Judge {
             return Ok(());
         }
         let mut robot_then = robot.prospect();
-        // The loop cannot know of a failure before its report comes, unless it has observed the design since.
+        // The loop cannot know of a failure before its report arrives, unless it has observed the design since.
         let is_observed = self.belief.is_settled() && self.belief.design == robot.design;
         let is_unknown = |number: &u64| !self.belief.failed.contains(number) && !is_observed;
         let unknown = robot.refused.iter().filter(|number| is_unknown(number));
-        for effect in unknown.filter_map(|number| self.asked.get(number)) {
+        for effect in unknown.filter_map(|number| self.requested.get(number)) {
             robot_then.carry_out(effect);
         }
         let on_their_way: BTreeMap<u64, &Effect> = messages
@@ -167,16 +169,17 @@ impl Judge {
                 Message::Event(_) => None,
             })
             .collect();
-        // The order of arrival is the worst one: what is outdated comes last, unless something before has superseded it.
+        // Worst order of arrival: outdated effects arrive last, unless an earlier one has superseded them.
         for effect in beliefs.outstanding().chain(on_their_way.into_values()) {
             let is_moot =
                 self.ended.contains(&effect.action) && !matches!(effect.command, Command::Reconfigure { .. });
-            robot_then.seen.extend(&effect.supersedes);
-            if robot_then.seen.insert(effect.number) && !is_moot {
+            robot_then.processed.extend(&effect.supersedes);
+            if robot_then.processed.insert(effect.number) && !is_moot {
                 robot_then.carry_out(effect);
             }
         }
-        let Some(action) = robot_then.action.as_ref().filter(|own| !self.ended.contains(&own.number)) else {
+        let Some(action) = robot_then.action.as_ref().filter(|action| !self.ended.contains(&action.number))
+        else {
             return Ok(());
         };
         let goes_on = beliefs.running().is_some_and(|(number, _)| number == action.number)
@@ -184,7 +187,7 @@ impl Judge {
             && !beliefs.cancelling()
             && !control.has_agenda();
         if !action.is_moving() {
-            // A robot that has lost the design of its function in a restart waits for it, and the report of that may be lost.
+            // After a restart, a robot without a design waits for one, and the report of the restart may be lost.
             return if goes_on && (action.suspended || !robot.has_lost_design) {
                 Err(format!("(g) action {} stands still, and is to go on: {action:?}", action.number))
             } else {
@@ -209,8 +212,8 @@ impl Judge {
         }
     }
 
-    /// (f) A line that takes its design from the action under way is answered with a safe effect, before any planning: the best other
-    /// design, or a standstill. `before` is the action that went on before the line, with its design.
+    /// (f) If a line makes the design of the action under way unusable, the answers contain a safe effect before
+    /// planning: the best other design, or suspension. `before` is the moving action before the line, with its design.
     pub fn reaction(
         &self,
         before: Option<(u64, String)>,
@@ -226,9 +229,12 @@ impl Judge {
             Answer::Effect(effect) if effect.action == action && !effect.repeated => Some(&effect.command),
             _ => None,
         });
-        // Designs are ordered by their cost, the best one last.
+        // Designs are ordered by decreasing cost.
         let available = control.beliefs().available();
-        let best = DESIGNS.iter().map(|own| own.0).rfind(|own| available.contains(*own));
+        let best = DESIGNS
+            .iter()
+            .map(|design_name| design_name.0)
+            .rfind(|design_name| available.contains(*design_name));
         let is_safe = effects.any(|command| match command {
             Command::Suspend { .. } | Command::Cancel { .. } => true,
             Command::Reconfigure { to, .. } => Some(to.as_str()) == best,
@@ -236,7 +242,8 @@ impl Judge {
         });
         let beliefs = control.beliefs();
         let has_best = beliefs.running().and_then(|(_, step)| step.design(FUNCTION)) == best;
-        // A reconfiguration to the best design may be on its way already; and after a failure the function may still have it.
+        // A reconfiguration to the best design may be in transit already, or the function may still have it after a
+        // failure.
         let is_on_its_way = beliefs.pending().any(|(_, to)| Some(to) == best);
         let is_there = self.belief.is_settled() && self.belief.design.as_deref() == best;
         if is_safe || best.is_some() && has_best && (is_on_its_way || is_there) {
@@ -248,7 +255,7 @@ impl Judge {
         }
     }
 
-    /// (e) After a restart of the loop all reconfigurations without an answer are asked for again at once.
+    /// (e) After a restart of the loop, all unanswered reconfigurations are requested again at once.
     pub fn repeated(&self, answers: &[Answer]) -> Result<(), String> {
         let numbers: BTreeSet<u64> =
             answers.iter().filter_map(Answer::effect).map(|effect| effect.number).collect();
@@ -258,7 +265,7 @@ impl Judge {
         }
     }
 
-    /// (h) After planning an action stands still only if no design is available, or there is no plan.
+    /// (h) After planning, an action is suspended only if no design is available or no plan exists.
     pub fn standstill(&self, control: &Loop) -> Result<(), String> {
         let beliefs = control.beliefs();
         let is_possible = DESIGNS.iter().any(|(design, _)| beliefs.available().contains(*design));
@@ -269,7 +276,7 @@ impl Judge {
         Ok(())
     }
 
-    /// (a) The robot does not move with a forbidden design for longer than the bound, in steps.
+    /// (a) The robot moves with a forbidden design for at most `bound` consecutive steps.
     pub fn motion(&mut self, robot: &Robot, bound: Option<u64>) -> Result<(), String> {
         let is_moving = robot.action.as_ref().is_some_and(Action::is_moving);
         let forbidden = robot.design.as_ref().filter(|_| is_moving).and_then(|design| self.forbids(design));
@@ -284,7 +291,7 @@ impl Judge {
         }
     }
 
-    /// (b) The believed design is the one that follows from the messages; and where nothing is pending it is the actual one.
+    /// (b) The believed design follows from the messages. If nothing is pending, it is the actual design.
     pub fn configuration<'a>(
         &self,
         robot: &Robot,
@@ -297,18 +304,19 @@ impl Judge {
         }
         let is_on_its_way = messages.any(|message| match message {
             Message::Effect(effect) => {
-                matches!(effect.command, Command::Reconfigure { .. }) && !robot.seen.contains(&effect.number)
+                matches!(effect.command, Command::Reconfigure { .. })
+                    && !robot.processed.contains(&effect.number)
             }
             Message::Event(event) => {
                 let is_about_designs = ["acknowledged", "reconfiguration_failed", "configuration_observed"];
                 is_about_designs.iter().any(|kind| event["event"] == *kind)
             }
         });
-        // Where the report of a restart is lost nobody can know that the function has no design.
+        // If the report of a restart is lost, the loop cannot know that the function has no design.
         let is_unknowable = self.is_misled || robot.has_lost_design;
         let is_certain = self.belief.is_settled() && !is_on_its_way && !is_unknowable;
         match believed {
-            // By the table no design is believed where it is not certain.
+            // By the table, an uncertain design is not believed.
             Some(_) if is_certain && believed != robot.design.as_ref() => {
                 Err(format!("(b) believed {believed:?}, actual {:?}", robot.design))
             }
@@ -316,7 +324,8 @@ impl Judge {
         }
     }
 
-    /// Returns `true` if a robot that reports what it has reported so far would have reported more of an action by now.
+    /// Returns `true` if a robot with the reporting habits observed until now would have reported more about an action by
+    /// now.
     fn is_report_due(&self, action: u64) -> bool {
         if self.started.contains(&action) {
             self.progressed.contains(&action)
@@ -325,20 +334,20 @@ impl Judge {
         }
     }
 
-    /// (c) Each effect was carried out, superseded, about an action that has ended, or given up aloud. (d) The goal is reached, or
-    /// there is no plan.
+    /// (c) Each effect was carried out, superseded, abandoned with a report, or belongs to an action that has ended.
+    /// (d) The goal is reached, or no plan exists.
     pub fn at_the_end(&self, robot: &Robot) -> Result<(), String> {
         let is_open = |(number, effect): &(&u64, &Effect)| {
             let is_moot =
                 self.ended.contains(&effect.action) && !matches!(effect.command, Command::Reconfigure { .. });
-            let is_closed = robot.seen.contains(number)
+            let is_closed = robot.processed.contains(number)
                 || self.superseded.contains(number)
                 || self.given_up.contains(number)
                 || self.belief.implied.contains(number);
-            // Of a robot that has never acknowledged anything, as far as the loop was told, nothing is expected.
+            // No acknowledgements are expected from a robot that has never acknowledged anything to the loop.
             !is_closed && !is_moot && self.belief.has_receipts
         };
-        let open: Vec<&u64> = self.asked.iter().filter(is_open).map(|(number, _)| number).collect();
+        let open: Vec<&u64> = self.requested.iter().filter(is_open).map(|(number, _)| number).collect();
         if !open.is_empty() {
             return Err(format!("(c) effects {open:?} were neither carried out nor given up"));
         }
@@ -348,47 +357,47 @@ impl Judge {
         match self.plan {
             Plan::Reached if robot.place == GOAL && robot.action.is_none() => Ok(()),
             Plan::Reached => Err(format!("(d) the goal is reached, but the robot is at {}", robot.place)),
-            // The same step has failed three times in a row; it is not tried again until something changes.
+            // One step has failed three times in a row. It is not tried again until something changes.
             Plan::None("failed") => Ok(()),
             Plan::None("unsolvable") if !is_possible => Ok(()),
-            // A robot that has forgotten its action, and reports as little of actions as it did of this one, is waited for.
+            // The loop waits for a robot that has forgotten its action if the robot never sends the missing reports.
             Plan::Open if self.awaited.is_some_and(|action| !self.is_report_due(action)) => Ok(()),
             plan => Err(format!("(d) the last decision is {plan:?}; a plan is possible: {is_possible}")),
         }
     }
 }
 
-/// The last reconfiguration that was carried out, as far as the loop was told.
+/// The last reconfiguration that was carried out according to the delivered messages.
 #[derive(Debug)]
 struct Last {
     effect: u64,
     design: String,
-    /// The design before, and the reconfiguration that has led to it, if one has.
+    /// Previous design, and the reconfiguration that had set it, if any.
     before: Option<(String, Option<u64>)>,
 }
 
 /// Design that the loop must believe, by the table of `docs/reference/events.md`.
 ///
-/// The author had read `src/mapek/acknowledge.rs` before, so a misreading of the table may be in both. Independent
-/// of the loop is only the comparison with the robot's actual design.
+/// Its author had read `src/mapek/acknowledge.rs`, so that both can contain the same misreading of the table. Only the
+/// comparison with the robot's actual design is independent of the loop.
 #[derive(Debug, Default)]
 struct Belief {
     design: Option<String>,
-    /// Whether anything was ever acknowledged by its number.
+    /// Whether any reconfiguration was acknowledged by its number.
     has_receipts: bool,
-    /// The reconfiguration that was asked for last and has no answer, and those before that were superseded without one.
+    /// The last reconfiguration, if unanswered, and the earlier unanswered ones that it has superseded.
     pending: BTreeMap<u64, String>,
     superseded: BTreeMap<u64, String>,
-    /// The greatest reconfiguration that was acknowledged and has not failed since.
+    /// The acknowledged reconfiguration with the greatest number, if it has not failed since.
     last: Option<Last>,
     greatest: u64,
-    /// Reconfigurations up to this one may have been carried out before or after an observation.
+    /// Reconfigurations up to this number may have been carried out before or after an observation.
     crossed: u64,
-    /// Reconfigurations that count as carried out since nothing had been acknowledged by its number.
+    /// Reconfigurations that count as carried out, implied by a report before the first acknowledgement by number.
     implied: BTreeSet<u64>,
-    /// Reconfigurations that have failed, as the loop was told.
+    /// Failed reconfigurations according to the delivered messages.
     failed: BTreeSet<u64>,
-    /// Superseded reconfigurations up to this one have no effect on the design that was observed after them.
+    /// Superseded reconfigurations up to this number did not determine the design that was observed after them.
     settled: u64,
 }
 
@@ -397,7 +406,7 @@ impl Belief {
         self.pending.is_empty() && self.superseded.range(self.settled + 1..).next().is_none()
     }
 
-    fn ask(&mut self, effect: u64, to: &str) {
+    fn request(&mut self, effect: u64, to: &str) {
         self.superseded.append(&mut self.pending);
         self.pending.insert(effect, to.to_owned());
     }
@@ -427,11 +436,12 @@ impl Belief {
         }
     }
 
-    /// As long as nothing was acknowledged by its number, a report of an action implies the reconfigurations before its request.
-    fn imply(&mut self, action: u64, asked: &BTreeMap<u64, Effect>) {
+    /// Until a reconfiguration is acknowledged by its number, a report of an action implies the reconfigurations before
+    /// its request.
+    fn confirm_before_request(&mut self, action: u64, requested: &BTreeMap<u64, Effect>) {
         let is_request =
-            |own: &&Effect| own.action == action && matches!(own.command, Command::Request { .. });
-        let request = asked.values().find(is_request).map_or(0, |own| own.number);
+            |effect: &&Effect| effect.action == action && matches!(effect.command, Command::Request { .. });
+        let request = requested.values().find(is_request).map_or(0, |effect| effect.number);
         let implied: Vec<u64> = self.pending.range(..request).map(|(number, _)| *number).collect();
         for effect in implied {
             if !self.has_receipts {
@@ -441,12 +451,12 @@ impl Belief {
         }
     }
 
-    /// A failure; returns the design that counts as not realisable then.
-    fn fail(&mut self, effect: u64) -> Option<String> {
+    /// Records a failure. Returns the design that then counts as unrealisable.
+    fn record_failure(&mut self, effect: u64) -> Option<String> {
         self.failed.insert(effect);
         if let Some(design) = self.pending.remove(&effect).or_else(|| self.superseded.remove(&effect)) {
-            // It was carried out if the function was seen with the design.
-            self.design.take_if(|own| *own == design);
+            // If the function was observed with the design, the reconfiguration had been carried out.
+            self.design.take_if(|design_before| *design_before == design);
             return Some(design);
         }
         if let Some(last) = &mut self.last {
@@ -456,12 +466,12 @@ impl Belief {
         if self.design.as_ref() == Some(&design) {
             self.design = before.as_ref().map(|before| before.0.clone());
         }
-        // The reconfiguration before may fail, too.
+        // The previous reconfiguration can fail, too.
         self.last = before.and_then(|(design, effect)| Some(Last { effect: effect?, design, before: None }));
         Some(design)
     }
 
-    /// A reconfiguration that is given up may still be carried out.
+    /// Abandons a reconfiguration, which may still be carried out.
     fn give_up(&mut self, effect: u64) -> Option<String> {
         let to = self.pending.remove(&effect)?;
         self.design = None;
@@ -473,7 +483,7 @@ impl Belief {
         let is_news = self.design != design;
         match self.pending.last_key_value().map(|(_, to)| to.clone()) {
             None => {
-                // They may still be on their way.
+                // Superseded reconfigurations may still be in transit.
                 let last = self.superseded.last_key_value().map_or(0, |(number, _)| *number);
                 (self.settled, self.crossed) = (self.settled.max(last), self.crossed.max(last));
             }

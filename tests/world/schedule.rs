@@ -1,4 +1,4 @@
-//! One schedule: the loop, the robot, and the messages between them.
+//! A schedule: the loop, the robot, and the messages between them.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -11,25 +11,25 @@ use crate::judge::Judge;
 use crate::robot::Robot;
 use crate::{COMPONENTS, DESIGNS, FUNCTION};
 
-/// A step of virtual time.
+/// Length of a simulation step.
 const STEP: Duration = Duration::from_millis(500);
 
-/// Steps with faults, and fair steps after them.
+/// Number of steps with faults, and of fair steps after them.
 const STEPS: (u64, u64) = (60, 300);
 
-/// Number of messages that are printed of a schedule with a violation.
+/// Number of logged messages in the report of a violation.
 const MAX_LOG: usize = 400;
 
-/// Steps that a belated message is under way: longer than two deadlines.
+/// Additional delay of a belated message, in steps: longer than two deadlines.
 const BELATED: (u64, u64) = (45, 90);
 
-/// Number of lines after which the loop gets a new snapshot to be restored from.
+/// Number of lines after which a new snapshot is taken.
 const SNAPSHOT_EVERY: usize = 23;
 
-/// Number of lines that are reacted to before there is a deliberation, at most.
+/// Upper limit on the number of reactions before a deliberation.
 const MAX_UNDELIBERATED: u32 = 4;
 
-/// Faults of a schedule: each in so many of a hundred cases.
+/// Faults of a schedule. Unless stated otherwise, each number is a percentage.
 #[derive(Debug, Clone, Copy)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a fault of its own")]
 pub struct Faults {
@@ -42,29 +42,29 @@ pub struct Faults {
     pub fails: u32,
     pub crashes: u32,
     pub restarts: u32,
-    /// Reconfigurations that fail after they were acknowledged.
+    /// Reconfigurations that fail after their acknowledgement.
     pub late: u32,
     /// Observations of the function's design.
     pub observes: u32,
-    /// Messages that arrive after deadlines have passed.
+    /// Messages that arrive after the deadlines.
     pub belated: u32,
-    /// Whether a robot that restarts does not know any more which action was under way.
+    /// Whether a restarting robot forgets the action under way.
     pub forgets: bool,
-    /// Whether the effects of the start may be lost, too.
+    /// Whether the effects of the start can be lost, too.
     pub start: bool,
-    /// Whether lines have numbers.
+    /// Whether lines have sequence numbers.
     pub numbered: bool,
-    /// Whether plans are looked for beside the input.
+    /// Whether planning runs in parallel to the input.
     pub beside: bool,
-    /// Whether a robot of which nothing fails any more reports things once only.
+    /// Whether a fair robot reports only once.
     pub quiet: bool,
 }
 
 impl Faults {
-    /// Those of a seed: each kind is absent from some schedules.
+    /// Faults of a seed. Each kind is absent from some schedules.
     pub fn of(seed: u64) -> Self {
         let mut random = Rng::with_seed(seed ^ 0x5eed);
-        let mut share = |most: u32| if random.bool() { 0 } else { random.u32(0..=most) };
+        let mut share = |maximum: u32| if random.bool() { 0 } else { random.u32(0..=maximum) };
         Self {
             lost: share(30),
             doubled: share(30),
@@ -86,40 +86,40 @@ impl Faults {
         .with_later_kinds(seed)
     }
 
-    /// The kinds that were added when seeds of violations had been kept already: they change nothing of the others.
+    /// Adds kinds that were introduced after seeds of violations had been recorded. The other kinds must not change.
     fn with_later_kinds(self, seed: u64) -> Self {
         let mut random = Rng::with_seed(seed ^ 0x1a7e);
-        let mut share = |most: u32| if random.bool() { 0 } else { random.u32(0..=most) };
+        let mut share = |maximum: u32| if random.bool() { 0 } else { random.u32(0..=maximum) };
         let (late, observes) = (share(4), share(6));
         Self { late, observes, belated: share(8), forgets: random.bool(), ..self }
     }
 
-    /// The same without the kinds that were added later.
+    /// Removes the kinds that were introduced later.
     pub fn of_earlier_kinds(self) -> Self {
         Self { late: 0, observes: 0, belated: 0, forgets: false, ..self }
     }
 
-    /// The same where the effects of the start may be lost.
+    /// Allows the loss of the effects of the start.
     pub fn with_lost_start(self) -> Self {
         Self { start: true, ..self }
     }
 }
 
-/// A message on its way.
+/// A message in transit.
 #[derive(Debug, Clone)]
 pub enum Message {
     Effect(Effect),
     Event(Value),
 }
 
-/// A step of the loop, as its journal has it.
+/// A step of the loop, as recorded in its journal.
 #[derive(Debug)]
 enum Step {
     React(String, Duration),
     Deliberate(Vec<Value>),
 }
 
-/// The schedule as it goes.
+/// A running schedule.
 pub struct Schedule<'a> {
     pristine: &'a Loop,
     control: Loop,
@@ -129,17 +129,17 @@ pub struct Schedule<'a> {
     now: u64,
     /// Number of the last line.
     line: u64,
-    /// Messages by the step of their arrival and a random number that orders those of one step.
+    /// Messages in transit by step of arrival and a random number that orders messages of one step.
     messages: BTreeMap<(u64, u64), Message>,
-    /// A search for plans that goes on beside the input.
+    /// Plans that were computed in parallel to the input and are not adopted yet.
     thoughts: Option<Thoughts>,
-    /// Number of lines that were reacted to since the last deliberation.
+    /// Number of reactions since the last deliberation.
     undeliberated: u32,
-    /// What the loop was brought back from, and the steps since.
+    /// Last snapshot, and the steps since.
     snapshot: Option<Snapshot>,
     steps: Vec<Step>,
     judge: Judge,
-    /// Messages, where they are kept.
+    /// Messages, if recorded.
     log: Option<Vec<String>>,
 }
 
@@ -163,7 +163,7 @@ impl<'a> Schedule<'a> {
         }
     }
 
-    /// The same with a log, for a schedule that is known to violate something.
+    /// Enables the log, for a schedule with a known violation.
     pub fn with_log(self) -> Self {
         Self { log: Some(Vec::new()), ..self }
     }
@@ -175,7 +175,7 @@ impl<'a> Schedule<'a> {
         }
     }
 
-    /// Runs it to its end.
+    /// Runs the schedule to its end.
     ///
     /// # Errors
     /// The first violation, with the last messages.
@@ -222,7 +222,7 @@ impl<'a> Schedule<'a> {
             && let Some(report) = self.robot.fail_late()
         {
             self.log(|| "a reconfiguration fails late".to_owned());
-            // A robot repeats this report until it has arrived: without it nobody can know.
+            // A robot repeats this report until it arrives: otherwise no loop could know of the failure.
             self.report_safely(report);
         }
         if self.faults.observes > 0 && self.chance(self.faults.observes) {
@@ -266,14 +266,14 @@ impl<'a> Schedule<'a> {
         self.judge.motion(&self.robot, bound)
     }
 
-    /// Reports of a robot of which nothing fails any more.
+    /// Reports of a fair robot.
     fn fair_reports(&mut self) {
         if self.now == STEPS.0 + 1 && self.random.bool() {
             self.robot.failed.clear();
         }
         let is_first = self.now == STEPS.0 + 1;
         if is_first || !self.faults.quiet && self.now % 20 == 1 {
-            for report in self.robot.again() {
+            for report in self.robot.periodic_reports() {
                 self.report(report);
             }
         }
@@ -284,10 +284,10 @@ impl<'a> Schedule<'a> {
         }
     }
 
-    /// Number of steps for which the robot may move with a design that is forbidden by delivered reports; none where the last
+    /// Number of steps for which the robot may move with a design that the delivered reports forbid. `None` if the last
     /// message about it may have been lost or refused.
     fn bound(&self) -> Option<u64> {
-        // Two deadlines and a step each way: the effect is repeated once, and then given up.
+        // Two deadlines and one step each way: the effect is repeated once, and then abandoned.
         let deadlines = 2 * 20 + 6;
         let is_reliable = self.faults.lost == 0
             && self.faults.refuses == 0
@@ -317,16 +317,16 @@ impl<'a> Schedule<'a> {
         self.post(&Message::Event(event));
     }
 
-    /// Sends a report that is not lost.
+    /// Sends a report that cannot be lost.
     fn report_safely(&mut self, event: Value) {
         let lost = std::mem::take(&mut self.faults.lost);
         self.report(event);
         self.faults.lost = lost;
     }
 
-    /// Sends a message, which may be lost, doubled and overtaken.
+    /// Sends a message, which can be lost, duplicated and overtaken.
     fn post(&mut self, message: &Message) {
-        // As long as nothing was acknowledged the loop cannot know whether this robot ever acknowledges anything.
+        // Before the first acknowledgement, the loop cannot know whether this robot sends any.
         let is_safe = self.now == 0 && !self.faults.start;
         if !is_safe && self.chance(self.faults.lost) {
             self.log(|| format!("lost {message:?}"));
@@ -335,7 +335,7 @@ impl<'a> Schedule<'a> {
         let copies = 1 + u32::from(self.chance(self.faults.doubled));
         for _ in 0..copies {
             let (mut arrival, mut order) = (self.now, (1 << 41) + self.messages.len() as u64);
-            // Fair messages stay in their order.
+            // Fair messages arrive in order.
             if self.is_unfair() {
                 arrival += self.random.u64(0..=self.faults.delay);
                 order = self.random.u64(..1 << 40);
@@ -351,21 +351,21 @@ impl<'a> Schedule<'a> {
         }
     }
 
-    /// Delivers a line, or the passing of time, to the loop, and judges what follows.
+    /// Delivers a line or a timer to the loop, and judges the reaction.
     fn deliver(&mut self, line: &str) -> Result<(), String> {
         if line != Observation::TIMER {
             self.log(|| format!("loop hears {line}"));
         }
         self.steps.push(Step::React(line.to_owned(), self.time()));
-        let known = self.control.beliefs();
-        let going_on = known.running().filter(|_| !known.cancelling() && !known.suspended());
+        let beliefs = self.control.beliefs();
+        let going_on = beliefs.running().filter(|_| !beliefs.cancelling() && !beliefs.suspended());
         let before = going_on.and_then(|(action, step)| Some((action, step.design(FUNCTION)?.to_owned())));
         let answers = self.control.react(&Observation::recorded(line), self.time());
         let is_taken = !answers.iter().any(|answer| {
             matches!(answer, Answer::Error { .. } | Answer::Duplicate { .. } | Answer::Stale { .. })
         });
         if let Ok(event) = serde_json::from_str::<Value>(line) {
-            self.judge.hear(&event, is_taken, &self.robot);
+            self.judge.record_event(&event, is_taken, &self.robot);
         }
         self.control.decision(&[]);
         for answer in &answers {
@@ -374,14 +374,14 @@ impl<'a> Schedule<'a> {
         self.judge.reaction(before, &self.control, &answers)?;
         self.send(answers);
         self.undeliberated += 1;
-        // The effect that makes the robot safe precedes any planning.
+        // The safe effect precedes planning.
         self.judge.intended_motion(&self.robot, &self.control, self.messages.values())?;
         self.continue_deliberation()?;
         self.judge.intended_motion(&self.robot, &self.control, self.messages.values())?;
         self.judge.configuration(&self.robot, &self.control, self.messages.values())
     }
 
-    /// Deliberates at once, begins a search beside the input, or concludes one.
+    /// Deliberates, starts planning in parallel to the input, or adopts its plans.
     fn continue_deliberation(&mut self) -> Result<(), String> {
         if !self.faults.beside || self.undeliberated >= MAX_UNDELIBERATED {
             return self.finish_deliberation();
@@ -434,7 +434,7 @@ impl<'a> Schedule<'a> {
         }
     }
 
-    /// Sends effects, and notes other answers.
+    /// Sends the effects and logs all answers.
     fn send(&mut self, answers: Vec<Answer>) {
         for answer in answers {
             self.log(|| answer.to_json().to_string());
@@ -444,23 +444,25 @@ impl<'a> Schedule<'a> {
         }
     }
 
-    /// The loop ends, and comes back from its snapshot and the steps since.
+    /// Replaces the loop by one that is restored from its snapshot and the later steps.
     fn crash(&mut self) -> Result<(), String> {
         self.log(|| "crash".to_owned());
-        let mut again = self.pristine.clone();
+        let mut restored = self.pristine.clone();
         if let Some(snapshot) = &self.snapshot {
-            again.restore(snapshot).map_err(|message| message.message.clone())?;
+            restored.restore(snapshot).map_err(|message| message.message.clone())?;
         }
         for step in &self.steps {
             match step {
-                Step::React(line, now) => drop(again.react(&Observation::recorded(line), *now)),
-                Step::Deliberate(plans) => drop(again.deliberate_again(plans)),
+                Step::React(line, now) => drop(restored.react(&Observation::recorded(line), *now)),
+                Step::Deliberate(plans) => drop(restored.deliberate_again(plans)),
             }
         }
-        if again.snapshot() != self.control.snapshot() || again.has_agenda() != self.control.has_agenda() {
+        if restored.snapshot() != self.control.snapshot()
+            || restored.has_agenda() != self.control.has_agenda()
+        {
             return Err("(e) another state after a restart".to_owned());
         }
-        self.control = again;
+        self.control = restored;
         self.thoughts = None;
         let repeated = self.control.repeat();
         for answer in &repeated {
@@ -472,7 +474,7 @@ impl<'a> Schedule<'a> {
     }
 }
 
-/// An effect as its number, action and command.
+/// Short text of an effect: number, kind, action and design.
 fn brief(effect: &Effect) -> String {
     let json = Answer::Effect(effect.clone()).to_json();
     format!("{} {} {} {}", json["effect"], json["answer"], json["action"], json["to"])

@@ -1,13 +1,13 @@
-//! Samples of one attribute to the values that reach the knowledge base: plausibility, hysteresis, debounce, staleness.
+//! Filter for the samples of one attribute: plausibility, hysteresis, debounce and staleness.
 //!
 //! Bounds of designs divide the values of an attribute into *cells*: within a cell each bound is either kept or missed.
-//! A value of the believed cell is accepted at once. A bound is missed as soon as a sample misses it, and kept again only
-//! by a sample that keeps it by its band (a Schmitt trigger with the threshold of loss at the bound \[1\]). Where one
-//! design needs at least a value and another one at most a value within a band of it, either cell is left only by a
-//! sample beyond the band, since each crossing would take a design away. What crosses then is debounced.
+//! A value of the believed cell is accepted at once. A bound is missed as soon as a sample misses it. It is kept again
+//! only after a sample that keeps it by at least its band (a Schmitt trigger whose lower threshold is the bound \[1\]).
+//! If a lower bound of one design and an upper bound of another are within one band, each crossing makes a design
+//! unavailable. Either cell is then left only by a sample beyond the band. Crossings are debounced.
 //!
-//! Time is a number of microseconds that never goes back. Extra calls of [`AttributeFilter::elapse`] change nothing of
-//! what is accepted.
+//! Times are in microseconds and monotonic. Additional calls of [`AttributeFilter::elapse`] do not change the accepted
+//! values.
 //!
 //! - \[1\] O. H. Schmitt: A thermionic trigger, Journal of Scientific Instruments 15, 1938.
 
@@ -31,11 +31,11 @@ pub(crate) enum Side {
 /// A value beyond which a design cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Bound {
-    /// The bound, in the attribute's unit.
+    /// Value of the bound, in the attribute's unit.
     pub value: BigRational,
     /// Side on which the design can be used.
     pub side: Side,
-    /// Distance from the bound, in the attribute's unit, from which a missed bound is kept again.
+    /// Distance by which a sample must keep a missed bound, in the attribute's unit.
     pub band: BigRational,
 }
 
@@ -68,9 +68,10 @@ impl Stale {
 pub(crate) struct AttributeFilter {
     /// Bounds of designs, in any order.
     pub bounds: Vec<Bound>,
-    /// Number of the last `of` samples that must lie in another cell than the believed value; 0 and 1 for no such condition.
+    /// Number of the last `of` samples that must lie in another cell than the believed value; 0 and 1 disable the
+    /// condition.
     pub agree: usize,
-    /// Number of samples of which `agree` must agree; at least `agree` counts.
+    /// Number of considered samples; at least `agree`.
     pub of: usize,
     /// Time for which all samples must lie in another cell than the believed value.
     pub debounce: Micros,
@@ -93,21 +94,21 @@ pub(crate) struct AttributeState {
     believed: Option<BigRational>,
     /// Last plausible sample.
     plausible: Option<BigRational>,
-    /// Last sample that was set aside as a jump.
+    /// Last sample rejected as a jump.
     suspect: Option<BigRational>,
-    /// For each of the last samples whether it lies in another cell than the believed value, oldest first.
+    /// For each of the last samples, oldest first: whether it lies in another cell than the believed value.
     recent: VecDeque<bool>,
-    /// Time since which all samples lie in another cell, and the last of them.
+    /// Time since which all samples lie in another cell, and the last of these samples.
     crossing: Option<(Micros, BigRational)>,
     /// Time of the last plausible sample.
-    heard: Option<Micros>,
+    last_sample_time: Option<Micros>,
     /// Whether the sensor counts as silent.
     silent: bool,
-    /// Number of samples that were held back since the last change of cell.
+    /// Number of held samples since the last change of cell.
     pub held: u64,
 }
 
-/// Reason for which a sample is held back.
+/// Reason for holding a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Hold {
     /// It is outside the plausible range.
@@ -135,23 +136,24 @@ impl Hold {
 /// Verdict on a sample.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Verdict {
-    /// The value that is believed from now on. It differs from the sample where some but not all bounds are crossed clearly.
+    /// Newly believed value. It differs from the sample if the sample crosses some of the bounds by less than their
+    /// bands.
     Accepted(BigRational),
-    /// The believed value stays.
+    /// The sample is held, and the believed value is unchanged.
     Held(Hold),
 }
 
 /// Something that becomes due without a sample.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Elapsed {
-    /// A crossing has lasted for long enough: the value that is believed from now on.
+    /// A crossing has lasted for the debounce time. Newly believed value.
     Accepted(BigRational),
-    /// The sensor counts as silent since its last plausible sample; with the outcome `worst`, the value believed from now on.
+    /// The sensor counts as silent since its last plausible sample. Newly believed value with the outcome `worst`.
     Silent(Option<BigRational>),
 }
 
 impl AttributeFilter {
-    /// Takes a sample at a time. Whatever was due before must have been taken with [`AttributeFilter::elapse`].
+    /// Filters a sample. Call [`AttributeFilter::elapse`] for earlier due times first.
     pub(crate) fn sample(&self, state: &mut AttributeState, now: Micros, value: &BigRational) -> Verdict {
         let verdict = self.judge(state, now, value);
         if matches!(verdict, Verdict::Held(_)) {
@@ -171,7 +173,7 @@ impl AttributeFilter {
         }
         state.suspect = None;
         state.plausible = Some(value.clone());
-        state.heard = Some(now);
+        state.last_sample_time = Some(now);
         state.silent = false;
         let Some(believed) = &state.believed else {
             state.believed = Some(value.clone());
@@ -193,20 +195,22 @@ impl AttributeFilter {
         }
         let since = state.crossing.as_ref().map_or(now, |(since, _)| *since);
         state.crossing = Some((since, value.clone()));
-        if self.is_ripe(state, now) { self.accept(state, value) } else { Verdict::Held(Hold::Debounce) }
+        if self.is_confirmed(state, now) { self.accept(state, value) } else { Verdict::Held(Hold::Debounce) }
     }
 
-    /// Returns `true` if a sample is too far from the one before, and no sample that was set aside confirms it.
+    /// Returns `true` if a sample is implausibly far from the previous one, and the last rejected sample does not
+    /// confirm it.
     fn is_jump(&self, state: &AttributeState, value: &BigRational) -> bool {
         let Some(jump) = &self.jump else { return false };
-        let is_near =
-            |other: &BigRational| if value > other { value - other <= *jump } else { other - value <= *jump };
+        let is_near = |sample: &BigRational| {
+            if value > sample { value - sample <= *jump } else { sample - value <= *jump }
+        };
         state.plausible.as_ref().is_some_and(|last| !is_near(last))
             && !state.suspect.as_ref().is_some_and(is_near)
     }
 
-    /// Returns `true` if the crossing has lasted for long enough and enough samples agree.
-    fn is_ripe(&self, state: &AttributeState, now: Micros) -> bool {
+    /// Returns `true` if a crossing has lasted for the debounce time and enough samples agree.
+    fn is_confirmed(&self, state: &AttributeState, now: Micros) -> bool {
         let agreeing = state.recent.iter().filter(|crosses| **crosses).count();
         let lasted =
             state.crossing.as_ref().is_some_and(|(since, _)| now >= since.saturating_add(self.debounce));
@@ -215,7 +219,8 @@ impl AttributeFilter {
 
     /// Believes a sample that has crossed bounds.
     fn accept(&self, state: &mut AttributeState, value: &BigRational) -> Verdict {
-        let target = state.believed.as_ref().map_or_else(|| value.clone(), |own| self.target(own, value));
+        let target =
+            state.believed.as_ref().map_or_else(|| value.clone(), |current| self.target(current, value));
         state.believed = Some(target.clone());
         state.recent.clear();
         state.crossing = None;
@@ -225,39 +230,39 @@ impl AttributeFilter {
 
     /// Time at which something becomes due without a sample.
     pub(crate) fn due(&self, state: &AttributeState) -> Option<Micros> {
-        let silent = self.silent_from(state);
-        let ripe = self.ripe_from(state);
-        [silent, ripe].into_iter().flatten().min()
+        let silent = self.silent_at(state);
+        let confirmed = self.confirmed_from(state);
+        [silent, confirmed].into_iter().flatten().min()
     }
 
-    /// Time from which the sensor counts as silent, if it does not yet.
-    fn silent_from(&self, state: &AttributeState) -> Option<Micros> {
+    /// Time at which the sensor will count as silent; `None` if it already does.
+    fn silent_at(&self, state: &AttributeState) -> Option<Micros> {
         let period = self.period.filter(|_| !state.silent)?;
-        Some(state.heard.unwrap_or(0).saturating_add(period).saturating_add(1))
+        Some(state.last_sample_time.unwrap_or(0).saturating_add(period).saturating_add(1))
     }
 
-    /// Time from which a crossing has lasted for long enough, if enough samples agree.
-    fn ripe_from(&self, state: &AttributeState) -> Option<Micros> {
+    /// Time at which a crossing will have lasted for the debounce time; `None` if too few samples agree.
+    fn confirmed_from(&self, state: &AttributeState) -> Option<Micros> {
         let (since, _) = state.crossing.as_ref()?;
-        let ripe = since.saturating_add(self.debounce);
-        self.is_ripe(state, ripe).then_some(ripe)
+        let confirmed = since.saturating_add(self.debounce);
+        self.is_confirmed(state, confirmed).then_some(confirmed)
     }
 
-    /// Begins to wait for samples at a time, unless that was done before.
+    /// Starts the period of silence, unless a sample has arrived.
     pub(crate) fn begin(state: &mut AttributeState, now: Micros) {
-        state.heard.get_or_insert(now);
+        state.last_sample_time.get_or_insert(now);
     }
 
-    /// Takes the first thing that has become due up to a time; to be called until nothing has.
+    /// Returns the first change that is due at a time. Call until it returns `None`.
     pub(crate) fn elapse(&self, state: &mut AttributeState, now: Micros) -> Option<Elapsed> {
         let due = self.due(state).filter(|due| *due <= now)?;
-        if self.ripe_from(state) == Some(due) {
+        if self.confirmed_from(state) == Some(due) {
             let (_, value) = state.crossing.clone()?;
             let Verdict::Accepted(value) = self.accept(state, &value) else { return None };
             return Some(Elapsed::Accepted(value));
         }
         state.silent = true;
-        // What a silent sensor had begun to report is not continued.
+        // A crossing before the silence does not count after it.
         state.crossing = None;
         state.recent.clear();
         let worst = if self.stale == Stale::Worst { self.worst() } else { None };
@@ -265,70 +270,70 @@ impl AttributeFilter {
             state.believed = Some(worst.clone());
             state.held = 0;
         }
-        // The jump back from silence is plausible.
+        // The first sample after silence can be far from the last one.
         state.plausible = None;
         Some(Elapsed::Silent(worst))
     }
 
-    /// For each bound, in order, whether a value keeps it.
+    /// Whether a value keeps each bound, in the order of the bounds.
     fn cell(&self, value: &BigRational) -> Vec<bool> {
         self.bounds.iter().map(|bound| bound.keeps(value)).collect()
     }
 
-    /// The value to be believed after a sample, were it not debounced: the sample, or a value that still misses the bounds
+    /// Value to be believed after a sample, without debouncing: the sample, or a value that still misses those bounds
     /// that the sample keeps by less than their bands.
     fn target(&self, believed: &BigRational, sample: &BigRational) -> BigRational {
         let is_missed =
             |bound: &&Bound| !bound.keeps(believed) && bound.keeps(sample) && !bound.keeps_clearly(sample);
-        let most = self.bounds.iter().filter(|bound| bound.side == Side::Most).filter(is_missed);
-        let least = self.bounds.iter().filter(|bound| bound.side == Side::Least).filter(is_missed);
-        let target = match (most.max_by_key(|bound| &bound.value), least.min_by_key(|bound| &bound.value)) {
+        let upper = self.bounds.iter().filter(|bound| bound.side == Side::Most).filter(is_missed);
+        let lower = self.bounds.iter().filter(|bound| bound.side == Side::Least).filter(is_missed);
+        let target = match (upper.max_by_key(|bound| &bound.value), lower.min_by_key(|bound| &bound.value)) {
             (Some(bound), _) | (None, Some(bound)) => self.beyond(bound),
             (None, None) => return sample.clone(),
         };
         if self.cell(&target) == self.cell(believed) { believed.clone() } else { target }
     }
 
-    /// A value that misses a bound, between it and the next one.
+    /// A value that misses a bound, between this bound and the next one.
     fn beyond(&self, bound: &Bound) -> BigRational {
         let two = BigRational::from_integer(2.into());
-        let others = self.bounds.iter().map(|other| &other.value);
+        let values = self.bounds.iter().map(|neighbour| &neighbour.value);
         if bound.side == Side::Most {
-            let next = others.filter(|other| **other > bound.value).min();
-            let room =
+            let next = values.filter(|neighbour| **neighbour > bound.value).min();
+            let distance =
                 next.map_or_else(|| bound.band.clone(), |next| (next - &bound.value).min(bound.band.clone()));
-            &bound.value + room / two
+            &bound.value + distance / two
         } else {
-            let next = others.filter(|other| **other < bound.value).max();
-            let room =
+            let next = values.filter(|neighbour| **neighbour < bound.value).max();
+            let distance =
                 next.map_or_else(|| bound.band.clone(), |next| (&bound.value - next).min(bound.band.clone()));
-            &bound.value - room / two
+            &bound.value - distance / two
         }
     }
 
-    /// The value that keeps the fewest bounds, the least of them; none without bounds.
+    /// The value that keeps the fewest bounds; the least of several. `None` without bounds.
     pub(crate) fn worst(&self) -> Option<BigRational> {
-        let one = BigRational::from_integer(1.into());
+        let unit = BigRational::from_integer(1.into());
         let two = BigRational::from_integer(2.into());
         let mut values: Vec<&BigRational> = self.bounds.iter().map(|bound| &bound.value).collect();
         values.sort();
         values.dedup();
         let (first, last) = (*values.first()?, *values.last()?);
         let between = values.windows(2).map(|pair| (pair[0] + pair[1]) / &two);
-        let mut candidates: Vec<BigRational> = vec![first - &one, last + &one];
+        let mut candidates: Vec<BigRational> = vec![first - &unit, last + &unit];
         candidates.extend(between);
         candidates.retain(|value| {
             self.minimum.as_ref().is_none_or(|minimum| value >= minimum || value < first)
                 && self.maximum.as_ref().is_none_or(|maximum| value <= maximum || value > last)
         });
         candidates.sort();
-        let kept = |value: &BigRational| self.bounds.iter().filter(|bound| bound.keeps(value)).count();
-        candidates.into_iter().min_by_key(kept)
+        let kept_bounds = |value: &BigRational| self.bounds.iter().filter(|bound| bound.keeps(value)).count();
+        candidates.into_iter().min_by_key(kept_bounds)
     }
 }
 
 impl Bound {
-    /// Returns `true` if a design with this bound can be used at a value.
+    /// Returns `true` if a value satisfies the bound.
     pub(crate) fn keeps(&self, value: &BigRational) -> bool {
         match self.side {
             Side::Least => *value >= self.value,
@@ -336,7 +341,7 @@ impl Bound {
         }
     }
 
-    /// Returns `true` if a value keeps the bound by its band.
+    /// Returns `true` if a value satisfies the bound by at least its band.
     pub(crate) fn keeps_clearly(&self, value: &BigRational) -> bool {
         match self.side {
             Side::Least => *value >= &self.value + &self.band,
@@ -346,12 +351,12 @@ impl Bound {
 }
 
 impl AttributeState {
-    /// A filter that believes a value from the start.
+    /// Initial memory of a filter with a believed value.
     pub(crate) fn believing(value: Option<BigRational>) -> Self {
         Self { believed: value, ..Self::default() }
     }
 
-    /// For a snapshot.
+    /// Serializes the memory for a snapshot.
     pub(crate) fn to_record(&self) -> Value {
         let text = |value: &Option<BigRational>| value.as_ref().map(ToString::to_string);
         json!([
@@ -360,7 +365,7 @@ impl AttributeState {
             text(&self.suspect),
             self.recent,
             self.crossing.as_ref().map(|(since, value)| json!([since, value.to_string()])),
-            self.heard,
+            self.last_sample_time,
             self.silent,
             self.held
         ])
@@ -368,7 +373,7 @@ impl AttributeState {
 
     /// Inverse of [`AttributeState::to_record`].
     pub(crate) fn from_record(record: &Value) -> Option<Self> {
-        let [believed, plausible, suspect, recent, crossing, heard, silent, held] =
+        let [believed, plausible, suspect, recent, crossing, last_sample_time, silent, held] =
             record.as_array()?.as_slice()
         else {
             return None;
@@ -385,7 +390,11 @@ impl AttributeState {
                 Value::Null => None,
                 pair => Some((pair.get(0)?.as_u64()?, pair.get(1)?.as_str()?.parse().ok()?)),
             },
-            heard: if heard.is_null() { None } else { Some(heard.as_u64()?) },
+            last_sample_time: if last_sample_time.is_null() {
+                None
+            } else {
+                Some(last_sample_time.as_u64()?)
+            },
             silent: silent.as_bool()?,
             held: held.as_u64()?,
         })

@@ -1,4 +1,4 @@
-//! Reports of one component to the statuses that reach the knowledge base: times to confirm a failure and a recovery.
+//! Filter for the reports of one component: a failure or recovery must be reported for some time before it is believed.
 
 use ontology::tomasys::change::Status;
 use serde_json::{Value, json};
@@ -8,25 +8,25 @@ use crate::mapek::filter::attribute::Micros;
 /// Filter of one component. The default accepts every report at once.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct ComponentFilter {
-    /// Time for which all reports must say that the component has failed.
+    /// Time for which all reports must be failures before a failure is believed.
     pub confirm: Micros,
-    /// Time for which all reports must say that the component is in order.
+    /// Time for which no report may be a failure before a recovery is believed.
     pub heal: Micros,
 }
 
 /// Memory of the filter of one component.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct ComponentState {
-    /// Whether the component is believed to have failed, if anything is believed.
+    /// Whether the component is believed to have failed; `None` if unknown.
     has_failed: Option<bool>,
-    /// Time since which all reports say otherwise, and the last of them.
+    /// Time since which all reports differ from the belief, and the last of these reports.
     change: Option<(Micros, Status)>,
-    /// Number of reports that were held back since the last change.
+    /// Number of held reports since the last change.
     pub held: u64,
 }
 
 impl ComponentFilter {
-    /// Takes a report at a time; returns `true` if it is believed from now on.
+    /// Filters a report. Returns `true` if it is believed.
     pub(crate) fn report(&self, state: &mut ComponentState, now: Micros, status: Status) -> bool {
         let fails = status == Status::Failed;
         if state.has_failed.unwrap_or(false) == fails {
@@ -50,7 +50,7 @@ impl ComponentFilter {
         Some(since.saturating_add(self.time(*status)))
     }
 
-    /// The status that is believed from now on, if a change has lasted for long enough.
+    /// Returns the newly believed status if a change is confirmed at a time.
     pub(crate) fn elapse(&self, state: &mut ComponentState, now: Micros) -> Option<Status> {
         self.due(state).filter(|due| *due <= now)?;
         let (_, status) = state.change?;
@@ -69,12 +69,12 @@ impl ComponentFilter {
 }
 
 impl ComponentState {
-    /// A filter that believes from the start whether the component has failed.
+    /// Initial memory of a filter with a belief.
     pub(crate) fn believing(has_failed: Option<bool>) -> Self {
         Self { has_failed, ..Self::default() }
     }
 
-    /// For a snapshot.
+    /// Serializes the memory for a snapshot.
     pub(crate) fn to_record(&self) -> Value {
         json!([self.has_failed, self.change.map(|(since, status)| json!([since, word(status)])), self.held])
     }
@@ -93,7 +93,7 @@ impl ComponentState {
     }
 }
 
-/// A status as events spell it.
+/// Spelling of a status in events.
 pub(super) fn word(status: Status) -> &'static str {
     match status {
         Status::Failed => "FALSE",
@@ -103,5 +103,7 @@ pub(super) fn word(status: Status) -> &'static str {
 }
 
 fn status(word: &str) -> Option<Status> {
-    [Status::Failed, Status::Recovered, Status::Working].into_iter().find(|own| self::word(*own) == word)
+    [Status::Failed, Status::Recovered, Status::Working]
+        .into_iter()
+        .find(|candidate| self::word(*candidate) == word)
 }

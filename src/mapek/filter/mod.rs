@@ -1,7 +1,8 @@
-//! Filters between what sensors report and what is believed: a pure function of samples, reports and their times.
+//! Filters between sensor reports and beliefs: a pure function of samples, reports and their times.
 //!
-//! [`Filters`] is the configuration, from the section `adaptation` of a manifest and the bounds of the knowledge base;
-//! [`FilterStates`] is the memory, a part of the beliefs and of snapshots. No filter has a clock: time comes with observations.
+//! [`Filters`] is the configuration, from the section `adaptation` of a manifest and the bounds of the knowledge base.
+//! [`FilterStates`] is the memory, a part of the beliefs and of snapshots. Filters have no clock: times are given by
+//! observations.
 
 mod attribute;
 mod component;
@@ -30,7 +31,7 @@ use crate::message::Message;
 use crate::number;
 
 impl FilterSettings {
-    /// Attributes that switch designs and whose noise does so, too, each with the reason; for `lint`.
+    /// Warnings for attributes whose noise changes designs, for `lint`.
     pub(crate) fn doubts(&self, knowledge: Option<&Knowledge>) -> Vec<Message> {
         let filters = Filters::new(self, knowledge);
         let is_noisy = |(_, filter): &(&String, &AttributeFilter)| {
@@ -55,12 +56,12 @@ impl FilterSettings {
     }
 }
 
-/// Filters of a knowledge base, by local name.
+/// Filters by local name.
 #[derive(Debug, Clone)]
 pub(crate) struct Filters {
     measured: BTreeMap<String, AttributeFilter>,
     components: BTreeMap<String, ComponentFilter>,
-    others: ComponentFilter,
+    default_component: ComponentFilter,
     has_components: bool,
 }
 
@@ -71,19 +72,19 @@ pub(crate) struct FilterStates {
     components: BTreeMap<String, ComponentState>,
 }
 
-/// Something that is believed from now on.
+/// A newly believed report.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Accepted {
-    /// The value of an attribute, by local name.
+    /// Value of an attribute, by local name.
     Value(String, BigRational),
-    /// The status of a component, by local name or IRI.
+    /// Status of a component, by local name or IRI.
     Status(String, Status),
-    /// An attribute has no known value.
+    /// An attribute whose value has become unknown.
     Unknown(String),
 }
 
 impl Filters {
-    /// Filters as the settings say, with the bounds of a knowledge base.
+    /// Filters from the settings and the bounds of a knowledge base.
     pub(crate) fn new(settings: &FilterSettings, knowledge: Option<&Knowledge>) -> Self {
         let mut bounds = knowledge.map(stated_bounds).unwrap_or_default();
         for name in settings.measured.keys() {
@@ -91,44 +92,49 @@ impl Filters {
         }
         let nothing = MeasuredSettings::default();
         let measured = bounds.into_iter().map(|(name, mut bounds)| {
-            let own = settings.measured.get(&name).unwrap_or(&nothing);
-            // On which side of such a bound a design can be used is not known.
+            let entry = settings.measured.get(&name).unwrap_or(&nothing);
+            // The side on which a design can be used is unknown for bounds from the manifest.
             bounds.extend(
-                own.bounds
+                entry
+                    .bounds
                     .iter()
                     .flat_map(|bound| [(bound.clone(), Side::Least), (bound.clone(), Side::Most)]),
             );
             bounds.sort();
             bounds.dedup();
             let band = |value: &BigRational| {
-                own.hysteresis.clone().unwrap_or_else(|| (value * &settings.band).abs())
+                entry.hysteresis.clone().unwrap_or_else(|| (value * &settings.band).abs())
             };
             let bounds = bounds.into_iter().map(|(value, side)| Bound { band: band(&value), value, side });
-            (name, own.filter(bounds.collect()))
+            (name, entry.filter(bounds.collect()))
         });
-        let times = |own: &ComponentTimes| ComponentFilter {
-            confirm: micros(own.confirm_time.unwrap_or(settings.confirm_time)),
-            heal: micros(own.heal_time.unwrap_or(settings.heal_time)),
+        let times = |entry: &ComponentTimes| ComponentFilter {
+            confirm: micros(entry.confirm_time.unwrap_or(settings.confirm_time)),
+            heal: micros(entry.heal_time.unwrap_or(settings.heal_time)),
         };
         Self {
             measured: measured.collect(),
-            components: settings.components.iter().map(|(name, own)| (name.clone(), times(own))).collect(),
-            others: times(&ComponentTimes::default()),
+            components: settings
+                .components
+                .iter()
+                .map(|(name, entry)| (name.clone(), times(entry)))
+                .collect(),
+            default_component: times(&ComponentTimes::default()),
             has_components: knowledge.is_some_and(|knowledge| !knowledge.view().components().is_empty()),
         }
     }
 
-    /// The memory of filters that believe what the knowledge base states.
+    /// Initial memory with the values and statuses that the knowledge base states.
     pub(crate) fn states(&self, knowledge: Option<&Knowledge>) -> FilterStates {
         let Some(knowledge) = knowledge else { return FilterStates::default() };
         let view = knowledge.view();
-        let values = view.measurements().into_iter().map(|own| (own.attribute, own.value));
+        let values = view.measurements().into_iter().map(|element| (element.attribute, element.value));
         let values: BTreeMap<String, Option<BigRational>> = values.collect();
         let state = |name: &String| AttributeState::believing(values.get(name).cloned().flatten());
-        let statuses = view.components().into_iter().filter_map(|own| {
-            let has_failed = ["FALSE", "ERROR", "false"].contains(&own.status?.as_str());
-            // A recovery is confirmed only from a failure that was reported: what the mission states is corrected at once.
-            (!has_failed).then(|| (own.individual.name, ComponentState::believing(Some(false))))
+        let statuses = view.components().into_iter().filter_map(|element| {
+            let has_failed = ["FALSE", "ERROR", "false"].contains(&element.status?.as_str());
+            // Only a reported failure delays a recovery: a failure stated by the mission is corrected at once.
+            (!has_failed).then(|| (element.individual.name, ComponentState::believing(Some(false))))
         });
         FilterStates {
             measured: self.measured.keys().map(|name| (name.clone(), state(name))).collect(),
@@ -136,7 +142,7 @@ impl Filters {
         }
     }
 
-    /// Takes a sample of an attribute; returns the value that is believed from now on, if the sample is not held back.
+    /// Filters a sample of an attribute. Returns the newly believed value, or `None` if the sample is held.
     pub(crate) fn sample(
         &self,
         states: &mut FilterStates,
@@ -151,7 +157,7 @@ impl Filters {
         match filter.sample(state, micros(now), value) {
             Verdict::Accepted(value) => Some(value),
             Verdict::Held(hold) => {
-                if is_told(state.held) {
+                if is_reported(state.held) {
                     answers.push(Answer::Filtered {
                         name: name.to_owned(),
                         value: number::to_json(value),
@@ -168,7 +174,7 @@ impl Filters {
         }
     }
 
-    /// Takes a report of a component; returns `true` if it is believed from now on.
+    /// Filters a report of a component. Returns `true` if it is believed.
     pub(crate) fn report(
         &self,
         states: &mut FilterStates,
@@ -178,10 +184,10 @@ impl Filters {
         answers: &mut Vec<Answer>,
     ) -> bool {
         let name = local_name(component);
-        let filter = self.components.get(name).unwrap_or(&self.others);
+        let filter = self.components.get(name).unwrap_or(&self.default_component);
         let state = states.components.entry(name.to_owned()).or_default();
         let is_believed = filter.report(state, micros(now), status);
-        if !is_believed && is_told(state.held) {
+        if !is_believed && is_reported(state.held) {
             answers.push(Answer::Filtered {
                 name: name.to_owned(),
                 value: json!(word(status)),
@@ -197,14 +203,13 @@ impl Filters {
     pub(crate) fn due(&self, states: &FilterStates) -> Option<Duration> {
         let measured =
             self.measured.iter().filter_map(|(name, filter)| filter.due(states.measured.get(name)?));
-        let components = states
-            .components
-            .iter()
-            .filter_map(|(name, state)| self.components.get(name).unwrap_or(&self.others).due(state));
+        let components = states.components.iter().filter_map(|(name, state)| {
+            self.components.get(name).unwrap_or(&self.default_component).due(state)
+        });
         measured.chain(components).min().map(Duration::from_micros)
     }
 
-    /// What has become due up to a time.
+    /// Returns the changes that are due at a time: first those of attributes, then those of components.
     pub(crate) fn elapse(
         &self,
         states: &mut FilterStates,
@@ -232,7 +237,7 @@ impl Filters {
             }
         }
         for (name, state) in &mut states.components {
-            let filter = self.components.get(name).unwrap_or(&self.others);
+            let filter = self.components.get(name).unwrap_or(&self.default_component);
             let status = filter.elapse(state, now);
             accepted.extend(status.map(|status| Accepted::Status(name.clone(), status)));
         }
@@ -241,7 +246,7 @@ impl Filters {
 }
 
 impl Accepted {
-    /// The report for the knowledge base.
+    /// Converts the report for the knowledge base.
     pub(crate) fn report(&self) -> (&str, RobotReport) {
         match self {
             Self::Value(name, value) => (name, RobotReport::measured(value)),
@@ -252,10 +257,10 @@ impl Accepted {
 }
 
 impl FilterStates {
-    /// For a snapshot.
+    /// Serializes the memory for a snapshot.
     pub(crate) fn to_record(&self) -> Value {
-        let measured = self.measured.iter().map(|(name, own)| (name.clone(), own.to_record()));
-        let components = self.components.iter().map(|(name, own)| (name.clone(), own.to_record()));
+        let measured = self.measured.iter().map(|(name, state)| (name.clone(), state.to_record()));
+        let components = self.components.iter().map(|(name, state)| (name.clone(), state.to_record()));
         json!([Value::Object(measured.collect()), Value::Object(components.collect())])
     }
 
@@ -266,16 +271,16 @@ impl FilterStates {
         let components = components.as_object()?.iter();
         Some(Self {
             measured: measured
-                .map(|(name, own)| Some((name.clone(), AttributeState::from_record(own)?)))
+                .map(|(name, state)| Some((name.clone(), AttributeState::from_record(state)?)))
                 .collect::<Option<_>>()?,
             components: components
-                .map(|(name, own)| Some((name.clone(), ComponentState::from_record(own)?)))
+                .map(|(name, state)| Some((name.clone(), ComponentState::from_record(state)?)))
                 .collect::<Option<_>>()?,
         })
     }
 }
 
-/// Bounds on measured attributes that the designs of a knowledge base state, by the local name of the attribute.
+/// Bounds on measured attributes from the designs of a knowledge base, by local name of the attribute.
 fn stated_bounds(knowledge: &Knowledge) -> BTreeMap<String, Vec<(BigRational, Side)>> {
     let view = knowledge.view();
     let operator = |iri: &str| {
@@ -284,8 +289,8 @@ fn stated_bounds(knowledge: &Knowledge) -> BTreeMap<String, Vec<(BigRational, Si
         value.as_literal().map(rules::Literal::lexical)
     };
     let kinds = view.attribute_types().into_iter();
-    // A measurement for which `measured OPERATOR estimation` holds rules a design of MROS out.
-    let compared: BTreeMap<String, Side> = kinds
+    // For the MROS model, a design is unavailable if `measured OPERATOR estimation` holds.
+    let ruled_out_sides: BTreeMap<String, Side> = kinds
         .filter_map(|kind| match operator(&kind.iri)?.as_str() {
             "<" | "<=" => Some((kind.name, Side::Least)),
             ">" | ">=" => Some((kind.name, Side::Most)),
@@ -295,12 +300,12 @@ fn stated_bounds(knowledge: &Knowledge) -> BTreeMap<String, Vec<(BigRational, Si
     let mut bounds: BTreeMap<String, Vec<(BigRational, Side)>> = BTreeMap::new();
     for design in view.function_designs() {
         for requirement in design.requirements {
-            let own = bounds.entry(requirement.attribute).or_default();
-            own.extend(requirement.minimum.map(|minimum| (minimum, Side::Least)));
-            own.extend(requirement.maximum.map(|maximum| (maximum, Side::Most)));
+            let attribute_bounds = bounds.entry(requirement.attribute).or_default();
+            attribute_bounds.extend(requirement.minimum.map(|minimum| (minimum, Side::Least)));
+            attribute_bounds.extend(requirement.maximum.map(|maximum| (maximum, Side::Most)));
         }
         for (attribute, estimation) in design.estimations {
-            if let Some(side) = compared.get(&attribute) {
+            if let Some(side) = ruled_out_sides.get(&attribute) {
                 bounds.entry(attribute).or_default().push((estimation, *side));
             }
         }
@@ -308,8 +313,8 @@ fn stated_bounds(knowledge: &Knowledge) -> BTreeMap<String, Vec<(BigRational, Si
     bounds
 }
 
-/// Returns `true` for the first, tenth, hundredth … sample that is held back.
-fn is_told(held: u64) -> bool {
+/// Returns `true` for the first, tenth, hundredth … held report, to limit the number of answers.
+fn is_reported(held: u64) -> bool {
     held > 0 && 10_u64.checked_pow(held.ilog10()) == Some(held)
 }
 

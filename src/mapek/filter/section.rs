@@ -1,4 +1,4 @@
-//! The keys of the section `adaptation` that set filters.
+//! Keys of the section `adaptation` that configure filters.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -81,7 +81,7 @@ pub struct MeasuredSection {
     stale: Stale,
 }
 
-/// Reads the keys that set filters.
+/// Reads the settings of all filters.
 ///
 /// # Errors
 /// The first value that is not a number, or out of range.
@@ -99,15 +99,15 @@ pub(crate) fn filters(
     if let Some(time) = seconds("heal_time", heal_time, origin)? {
         settings.heal_time = time;
     }
-    for (name, own) in components {
+    for (name, section) in components {
         let times = ComponentTimes {
-            confirm_time: seconds("confirm_time", &own.confirm_time, origin)?,
-            heal_time: seconds("heal_time", &own.heal_time, origin)?,
+            confirm_time: seconds("confirm_time", &section.confirm_time, origin)?,
+            heal_time: seconds("heal_time", &section.heal_time, origin)?,
         };
         settings.components.insert(name.clone(), times);
     }
-    for (name, own) in measured {
-        settings.measured.insert(name.clone(), own.settings(origin)?);
+    for (name, section) in measured {
+        settings.measured.insert(name.clone(), section.settings(origin)?);
     }
     Ok(settings)
 }

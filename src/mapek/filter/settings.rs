@@ -1,4 +1,4 @@
-//! The settings of all filters, as a mission states them.
+//! Settings of all filters of a mission.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -9,22 +9,21 @@ use crate::knowledge::Knowledge;
 use crate::mapek::filter::attribute::{AttributeFilter, Bound, Micros, Stale};
 use crate::message::{Message, did_you_mean};
 
-/// Default share of a bound that its band takes: the repeatability of ordinary sensors is 1 to 2 % of the reading.
+/// Default band as a share of the bound: the repeatability of ordinary sensors is 1 to 2 % of the reading.
 const BAND: (i64, i64) = (1, 50);
 
-/// Default time for which a component must be in order again. Drivers publish diagnostics once a second, so that two
-/// reports in a row say so.
+/// Default time to confirm a recovery: two reports of a driver that publishes diagnostics once a second.
 const HEAL: Duration = Duration::from_secs(2);
 
-/// What is filtered, as the mission says.
+/// Settings of all filters.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct FilterSettings {
-    /// Time for which a failure of a component must be reported before it is believed; 0 unless said otherwise.
+    /// Time for which a failure of a component must be reported before it is believed. Default: 0.
     pub confirm_time: Duration,
-    /// Time for which a recovery of a component must be reported before it is believed; 2 seconds unless said otherwise.
+    /// Time for which a recovery of a component must be reported before it is believed. Default: 2 s.
     pub heal_time: Duration,
-    /// Share of a bound that its band takes where no hysteresis is set; 0.02 unless said otherwise.
+    /// Band as a share of the bound, for attributes without a hysteresis. Default: 0.02.
     pub band: BigRational,
     /// Times of single components, by local name.
     pub components: BTreeMap<String, ComponentTimes>,
@@ -32,7 +31,7 @@ pub struct FilterSettings {
     pub measured: BTreeMap<String, MeasuredSettings>,
 }
 
-/// Times of a component; those of all components where none is set.
+/// Times of a component. Missing ones default to the times of all components.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct ComponentTimes {
     /// Time for which a failure must be reported before it is believed.
@@ -41,16 +40,16 @@ pub struct ComponentTimes {
     pub heal_time: Option<Duration>,
 }
 
-/// Filter of a measured attribute. The default has the bands of the knowledge base and nothing else.
+/// Filter of a measured attribute. The default uses bands at the bounds of the knowledge base, and nothing else.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct MeasuredSettings {
-    /// Band at each bound, in the attribute's unit; a share of the bound where none is set.
+    /// Band at each bound, in the attribute's unit. Default: a share of the bound.
     pub hysteresis: Option<BigRational>,
     /// Bounds that the designs of the knowledge base do not state, such as those in rules.
     pub bounds: Vec<BigRational>,
-    /// Number of the last `of` samples that must have crossed a bound; 0 for no such condition.
+    /// Number of the last `of` samples that must have crossed a bound; 0 disables the condition.
     pub agree: usize,
-    /// Number of samples of which `agree` must have crossed.
+    /// Number of considered samples.
     pub of: usize,
     /// Time for which all samples must have crossed a bound.
     pub debounce: Duration,
@@ -60,7 +59,7 @@ pub struct MeasuredSettings {
     pub maximum: Option<BigRational>,
     /// Greatest plausible distance from one sample to the next.
     pub jump: Option<BigRational>,
-    /// Time without a plausible sample after which the sensor is silent; never where none is set.
+    /// Time without a plausible sample after which the sensor is silent; `None` for never.
     pub period: Option<Duration>,
     /// Outcome for a silent sensor.
     pub stale: Stale,
@@ -79,26 +78,31 @@ impl Default for FilterSettings {
 }
 
 impl FilterSettings {
-    /// No filter: every report is believed at once.
+    /// Settings without filters: every report is believed at once.
     pub fn none() -> Self {
         Self { heal_time: Duration::ZERO, band: BigRational::default(), ..Self::default() }
     }
 
-    /// Names that the knowledge base does not have, each as an error with the key below `adaptation` that has it.
+    /// Errors for names that the knowledge base does not have, each with its key below `adaptation`.
     pub(crate) fn mistakes(&self, knowledge: Option<&Knowledge>) -> Vec<(&'static str, String, Message)> {
         let view = knowledge.map(Knowledge::view);
-        let attributes: Vec<String> =
-            view.iter().flat_map(ontology::tomasys::View::attribute_types).map(|own| own.name).collect();
+        let attributes: Vec<String> = view
+            .iter()
+            .flat_map(ontology::tomasys::View::attribute_types)
+            .map(|element| element.name)
+            .collect();
         let components: Vec<String> = view
             .iter()
             .flat_map(ontology::tomasys::View::components)
-            .map(|own| own.individual.name)
+            .map(|element| element.individual.name)
             .collect();
-        let unknown = |key: &'static str, kind: &str, name: &String, known: &[String]| {
-            let meant = did_you_mean(name, known.iter().map(String::as_str));
-            let text =
-                format!("the knowledge base has no {kind} `{name}`; it has: {}{meant}", known.join(", "));
-            (!known.contains(name)).then(|| (key, name.clone(), Message::error("M143", text)))
+        let unknown = |key: &'static str, kind: &str, name: &String, names: &[String]| {
+            let suggestion = did_you_mean(name, names.iter().map(String::as_str));
+            let text = format!(
+                "the knowledge base has no {kind} `{name}`; it has: {}{suggestion}",
+                names.join(", ")
+            );
+            (!names.contains(name)).then(|| (key, name.clone(), Message::error("M143", text)))
         };
         let measured = self
             .measured

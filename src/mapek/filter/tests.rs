@@ -1,4 +1,4 @@
-//! Filters against their definitions: oracles look at the whole history with each sample and keep no memory of their own.
+//! Filters against their definitions: the oracles evaluate the whole history at each sample, without memory.
 
 use std::time::Duration;
 
@@ -9,7 +9,7 @@ use ontology::tomasys::change::Status;
 use super::attribute::{AttributeFilter, AttributeState, Bound, Elapsed, Side, Stale, Verdict};
 use super::component::{ComponentFilter, ComponentState};
 
-/// Thousandths.
+/// Converts thousandths to a number.
 fn value(thousandths: i64) -> BigRational {
     BigRational::new(thousandths.into(), 1000.into())
 }
@@ -18,14 +18,14 @@ fn bound(thousandths: i64, side: Side, band: i64) -> Bound {
     Bound { value: value(thousandths), side, band: value(band) }
 }
 
-/// Returns `true` if a bound is kept after some samples: the last sample that misses it, or keeps it by its band, decides;
-/// without one, the first sample does.
+/// Returns `true` if a bound is kept after some samples. The last sample that misses it, or keeps it by its band,
+/// decides. Without such a sample, the first one decides.
 fn is_kept(bound: &Bound, samples: &[BigRational]) -> bool {
     let decisive = samples.iter().rev().find(|sample| !bound.keeps(sample) || bound.keeps_clearly(sample));
     bound.keeps(decisive.unwrap_or(&samples[0]))
 }
 
-/// Bounds that are farther from each other than their bands, and on both sides.
+/// Random bounds of the given sides, farther from each other than their bands.
 fn random_bounds(random: &mut Rng, sides: &[Side]) -> Vec<Bound> {
     let count = random.i64(1..=4);
     (0..count)
@@ -33,7 +33,7 @@ fn random_bounds(random: &mut Rng, sides: &[Side]) -> Vec<Bound> {
         .collect()
 }
 
-/// A sample near a bound, or anywhere.
+/// A random sample, often near a bound.
 fn random_sample(random: &mut Rng, bounds: &[Bound]) -> BigRational {
     if random.bool() {
         return value(random.i64(0..1200));
@@ -43,7 +43,7 @@ fn random_sample(random: &mut Rng, bounds: &[Bound]) -> BigRational {
 }
 
 #[test]
-fn each_bound_is_a_trigger_of_its_own() {
+fn bounds_are_independent_triggers() {
     let mut random = Rng::with_seed(1);
     for _ in 0..3_000 {
         let bounds = random_bounds(&mut random, &[Side::Least, Side::Most]);
@@ -54,11 +54,15 @@ fn each_bound_is_a_trigger_of_its_own() {
             if let Verdict::Accepted(value) = filter.sample(&mut state, now, &samples[samples.len() - 1]) {
                 believed = Some(value);
             }
-            let own = believed.as_ref().expect("the first sample is believed");
+            let current = believed.as_ref().expect("the first sample is believed");
             for bound in &bounds {
-                assert_eq!(bound.keeps(own), is_kept(bound, &samples), "{bounds:?} {samples:?} {own}");
-                // No filter makes a design available that the sample rules out.
-                assert!(bound.keeps(&samples[samples.len() - 1]) || !bound.keeps(own));
+                assert_eq!(
+                    bound.keeps(current),
+                    is_kept(bound, &samples),
+                    "{bounds:?} {samples:?} {current}"
+                );
+                // A filter never makes a design available that the sample makes unavailable.
+                assert!(bound.keeps(&samples[samples.len() - 1]) || !bound.keeps(current));
             }
         }
     }
@@ -76,12 +80,12 @@ fn noise_within_the_band_crosses_at_most_once() {
         for now in 0..40 {
             let sample = value(800 + random.i64(-15..=15));
             if let Verdict::Accepted(value) = filter.sample(&mut state, now, &sample) {
-                cells.push(bounds.iter().map(|own| own.keeps(&value)).collect::<Vec<_>>());
+                cells.push(bounds.iter().map(|bound| bound.keeps(&value)).collect::<Vec<_>>());
             }
         }
         cells.dedup();
         assert!(cells.len() <= 2, "{bounds:?} {cells:?}");
-        // Far across the bound counts at once.
+        // A sample far beyond the bound counts at once.
         for far in [500, 900] {
             let Verdict::Accepted(value) = filter.sample(&mut state, 50, &value(far)) else {
                 panic!("{far} is held")
@@ -91,53 +95,56 @@ fn noise_within_the_band_crosses_at_most_once() {
     }
 }
 
-/// Time, in hundredths of a second, and thousandths of a sample; none for a tick.
+/// Samples in thousandths with their times in hundredths of a second; `None` for a tick.
 type History = Vec<(u64, Option<i64>)>;
 
-/// The value that is believed at the end of a history, by definition: a sample of the believed cell at once, another one when, at some
-/// moment of the history, all samples in force during the last `debounce` lie in other cells, and `agree` of the last `of`
-/// samples do.
+/// Value believed at the end of a history, by definition. A sample of the believed cell counts at once. Another sample
+/// counts if, at some time in the history, all samples of the last `debounce` lie in other cells, and so do `agree` of
+/// the last `of` samples.
 fn believed(history: &History, debounce: u64, agree: usize, of: usize) -> i64 {
     let is_high = |value: i64| value > 500;
-    let mut own = history.iter().find_map(|(_, sample)| *sample).expect("a sample");
+    let mut current = history.iter().find_map(|(_, sample)| *sample).expect("a sample");
     let end = history.last().map_or(0, |(time, _)| *time);
-    // Samples before a change do not count any more.
-    let mut from = 0;
+    // Samples before a change of the believed value do not count.
+    let mut first_counted = 0;
     for now in 0..=end {
         let times: Vec<u64> =
             history.iter().filter(|(_, sample)| sample.is_some()).map(|(time, _)| *time).collect();
-        // A sample in force until now may complete the time before a sample of now is seen.
+        // The previous sample may complete the time before a sample at the same time counts.
         for inclusive in [false, true] {
-            let seen: Vec<(usize, u64, i64)> = history
+            let samples: Vec<(usize, u64, i64)> = history
                 .iter()
                 .filter(|(_, sample)| sample.is_some())
                 .enumerate()
                 .filter(|(_, (time, _))| *time < now || (inclusive && *time == now))
                 .map(|(at, (time, sample))| (at, *time, sample.unwrap_or_default()))
-                .filter(|(at, ..)| *at >= from)
+                .filter(|(at, ..)| *at >= first_counted)
                 .collect();
-            let Some((last_at, _, last)) = seen.last().copied() else { continue };
-            if is_high(last) == is_high(own) {
-                own = last;
+            let Some((last_at, _, last)) = samples.last().copied() else { continue };
+            if is_high(last) == is_high(current) {
+                current = last;
                 continue;
             }
-            let run: Vec<_> =
-                seen.iter().rev().take_while(|(_, _, sample)| is_high(*sample) != is_high(own)).collect();
+            let run: Vec<_> = samples
+                .iter()
+                .rev()
+                .take_while(|(_, _, sample)| is_high(*sample) != is_high(current))
+                .collect();
             let since = run.last().map_or(now, |(_, time, _)| *time);
-            let recent = seen.iter().rev().take(of.max(agree).max(1));
-            let agreeing = recent.filter(|(_, _, sample)| is_high(*sample) != is_high(own)).count();
+            let recent = samples.iter().rev().take(of.max(agree).max(1));
+            let agreeing = recent.filter(|(_, _, sample)| is_high(*sample) != is_high(current)).count();
             if now - since >= debounce && agreeing >= agree {
-                own = last;
-                from = last_at + 1;
+                current = last;
+                first_counted = last_at + 1;
             }
         }
         assert!(times.len() <= history.len());
     }
-    own
+    current
 }
 
 #[test]
-fn debounce_is_as_it_is_defined_and_ticks_change_nothing() {
+fn debounce_matches_its_definition_with_and_without_ticks() {
     let mut random = Rng::with_seed(3);
     for round in 0..3_000 {
         let (debounce, of) = (random.u64(0..6), random.usize(0..5));
@@ -157,7 +164,7 @@ fn debounce_is_as_it_is_defined_and_ticks_change_nothing() {
         let end = history[history.len() - 1].0 + 10;
         let mut results = Vec::new();
         for ticks in [false, true] {
-            let (mut state, mut own) = (AttributeState::default(), None);
+            let (mut state, mut current) = (AttributeState::default(), None);
             let mut next = 0;
             for now in 0..=end {
                 let sample = history.get(next).filter(|(time, _)| *time == now);
@@ -165,16 +172,16 @@ fn debounce_is_as_it_is_defined_and_ticks_change_nothing() {
                     continue;
                 }
                 while let Some(Elapsed::Accepted(value)) = filter.elapse(&mut state, now) {
-                    own = Some(value);
+                    current = Some(value);
                 }
                 if let Some((_, Some(sample))) = sample {
                     next += 1;
                     if let Verdict::Accepted(value) = filter.sample(&mut state, now, &value(*sample)) {
-                        own = Some(value);
+                        current = Some(value);
                     }
                 }
             }
-            results.push(own.expect("the first sample is believed"));
+            results.push(current.expect("the first sample is believed"));
             assert_eq!(filter.due(&state), None, "nothing is due at the end unless samples are missing");
         }
         let mut whole = history.clone();
@@ -214,7 +221,7 @@ fn implausible_samples_are_ignored_until_they_are_confirmed() {
 }
 
 #[test]
-fn silence_lasts_longer_than_the_period_and_is_noticed_once() {
+fn silence_is_reported_once_after_the_period() {
     let mut random = Rng::with_seed(4);
     for stale in [Stale::Keep, Stale::Unknown, Stale::Worst] {
         for _ in 0..500 {
@@ -227,12 +234,12 @@ fn silence_lasts_longer_than_the_period_and_is_noticed_once() {
             let period = filter.period.expect("there is one");
             let mut state = AttributeState::default();
             AttributeFilter::begin(&mut state, 0);
-            let (mut heard, mut silent) = (0, false);
+            let (mut last_sample, mut silent) = (0, false);
             for now in 0..60 {
                 let due = filter.due(&state);
                 let elapsed = filter.elapse(&mut state, now);
-                let is_new = !silent && now > heard + period;
-                assert_eq!(elapsed.is_some(), is_new, "{now} {heard} {period}");
+                let is_new = !silent && now > last_sample + period;
+                assert_eq!(elapsed.is_some(), is_new, "{now} {last_sample} {period}");
                 assert_eq!(due.is_some_and(|due| due <= now), is_new);
                 if let Some(Elapsed::Silent(worst)) = &elapsed {
                     let is_worst = worst.as_ref().is_some_and(|worst| *worst > value(700));
@@ -242,7 +249,7 @@ fn silence_lasts_longer_than_the_period_and_is_noticed_once() {
                 assert_eq!(filter.elapse(&mut state, now), None, "once");
                 if random.u32(..4) == 0 {
                     filter.sample(&mut state, now, &value(400));
-                    (heard, silent) = (now, false);
+                    (last_sample, silent) = (now, false);
                 }
             }
         }
@@ -256,14 +263,14 @@ fn the_worst_value_keeps_the_fewest_bounds() {
         let bounds = random_bounds(&mut random, &[Side::Least, Side::Most]);
         let filter = AttributeFilter { bounds: bounds.clone(), ..AttributeFilter::default() };
         let worst = filter.worst().expect("there are bounds");
-        let kept = |value: &BigRational| bounds.iter().filter(|bound| bound.keeps(value)).count();
-        let least = (-100..1500).map(|sample| kept(&value(sample))).min();
-        assert_eq!(Some(kept(&worst)), least, "{bounds:?}");
+        let kept_count = |value: &BigRational| bounds.iter().filter(|bound| bound.keeps(value)).count();
+        let minimum = (-100..1500).map(|sample| kept_count(&value(sample))).min();
+        assert_eq!(Some(kept_count(&worst)), minimum, "{bounds:?}");
     }
 }
 
 #[test]
-fn a_component_changes_when_all_reports_have_agreed_for_long_enough() {
+fn a_component_changes_after_reports_agree_for_the_confirmation_time() {
     let mut random = Rng::with_seed(6);
     for round in 0..3_000 {
         let filter = ComponentFilter { confirm: random.u64(0..3), heal: random.u64(0..6) };
@@ -271,7 +278,7 @@ fn a_component_changes_when_all_reports_have_agreed_for_long_enough() {
         let mut reports: Vec<(u64, bool)> = Vec::new();
         let mut expected = false;
         for now in 0..50 {
-            // By definition: the reports in force during the last seconds all say otherwise than is believed.
+            // By definition: all reports of the confirmation time differ from the belief.
             let is_ripe = |reports: &[(u64, bool)], believed: bool| {
                 let run = reports.iter().rev().take_while(|(_, fails)| *fails != believed);
                 let since = run.last().map(|(time, _)| *time);
@@ -304,7 +311,7 @@ fn a_component_changes_when_all_reports_have_agreed_for_long_enough() {
 }
 
 #[test]
-fn a_restored_filter_goes_on_exactly() {
+fn a_restored_filter_has_the_same_state() {
     let mut random = Rng::with_seed(7);
     for _ in 0..500 {
         let bounds = random_bounds(&mut random, &[Side::Least, Side::Most]);

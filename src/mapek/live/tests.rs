@@ -1,4 +1,4 @@
-//! The live planner against planning from scratch, in loops to which random things happen: the same plan each time.
+//! Differential test: the incremental planner against planning from scratch, in loops with random events.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -6,17 +6,17 @@ use std::time::{Duration, Instant};
 
 use planner::Limits;
 
-use crate::mapek::ask::Ask;
+use crate::mapek::ask::Question;
 use crate::mapek::plan::from_scratch;
 use crate::mapek::{Loop, Observation, PlannedStep, Settings, Watch};
 use crate::mission::Mission;
 use crate::setup::Setup;
 
-/// A mission, and what can happen in it.
+/// A mission with its possible events.
 struct World {
     name: String,
     mission: Mission,
-    /// Lines of events; `{a}` is the action under way, `{x}` a number from 0 to 1 with two decimals.
+    /// Lines of events; `{a}` is replaced by the action under way, `{x}` by a number from 0 to 1 with two decimals.
     events: Vec<String>,
 }
 
@@ -90,7 +90,7 @@ fn uuv(name: &str) -> World {
     World { name: name.to_owned(), mission: shipped(name), events }
 }
 
-/// The ground vehicle on a grid with so many waypoints, and corridors of all kinds.
+/// The ground vehicle on a grid of `width` by `height` waypoints, with corridors of all kinds.
 fn map(width: usize, height: usize, seed: u64) -> World {
     let mut random = fastrand::Rng::with_seed(seed);
     let count = width * height;
@@ -102,11 +102,11 @@ fn map(width: usize, height: usize, seed: u64) -> World {
     for place in 1..=count {
         let right = (place % width != 0).then_some(place + 1);
         let below = (place + width <= count).then_some(place + width);
-        for other in right.into_iter().chain(below) {
+        for neighbour in right.into_iter().chain(below) {
             let kind = ["corridor", "corridor", "corridor", "dark_corridor", "corridor_with_obstacles"];
             let kind = kind[random.usize(..kind.len())];
             let time = random.u32(1..6);
-            for (from, to) in [(place, other), (other, place)] {
+            for (from, to) in [(place, neighbour), (neighbour, place)] {
                 let _ = write!(text, " ({kind} wp{from} wp{to}) (= (travel_time wp{from} wp{to}) {time})");
             }
         }
@@ -127,48 +127,48 @@ fn map(width: usize, height: usize, seed: u64) -> World {
     ugv(&format!("map of {count} places"), mission, count)
 }
 
-/// What comparisons have come to.
+/// Counts of comparison results.
 #[derive(Default)]
 struct Tally {
     compared: usize,
-    /// Answers that the live planner had to leave to the other one.
-    left: usize,
+    /// Questions that the incremental planner could not answer.
+    unanswered: usize,
     live: Duration,
     scratch: Duration,
 }
 
 impl Tally {
-    /// Plans for the situation in both ways.
+    /// Plans in both ways and compares the results.
     fn compare(&mut self, control: &mut Loop, goes_on: bool, context: &dyn Fn() -> String) {
         let problem = control.beliefs.filled();
         let running = control.beliefs.running.as_ref().filter(|_| goes_on);
-        let ask = Ask {
+        let question = Question {
             mission: &control.beliefs.mission,
             problem: &problem,
             running,
             old: None,
             stay_close: false,
         };
-        let begun = Instant::now();
-        let found = control.planner.live.plan(&ask, &Limits::none(), &Watch::default());
-        self.live += begun.elapsed();
-        let begun = Instant::now();
-        let expected = from_scratch(&ask, Limits::none(), &Watch::default());
-        self.scratch += begun.elapsed();
-        let Some(found) = found else {
-            self.left += 1;
+        let start = Instant::now();
+        let answer = control.planner.live.plan(&question, &Limits::none(), &Watch::default());
+        self.live += start.elapsed();
+        let start = Instant::now();
+        let expected = from_scratch(&question, Limits::none(), &Watch::default());
+        self.scratch += start.elapsed();
+        let Some(answer) = answer else {
+            self.unanswered += 1;
             return;
         };
         self.compared += 1;
         let text = |steps: &Option<Vec<PlannedStep>>| {
             steps.as_ref().map(|steps| steps.iter().map(PlannedStep::to_record).collect::<Vec<_>>())
         };
-        assert_eq!(text(&found.steps), text(&expected.steps), "{}", context());
-        assert_eq!((&found.cost, found.proved), (&expected.cost, expected.proved), "{}", context());
+        assert_eq!(text(&answer.steps), text(&expected.steps), "{}", context());
+        assert_eq!((&answer.cost, answer.proved), (&expected.cost, expected.proved), "{}", context());
     }
 }
 
-/// Lets so many things happen, and plans after each, with and without the action under way.
+/// Applies `count` random events. After each, compares plans with and without the action under way.
 fn check(world: &World, seed: u64, count: usize) -> Tally {
     let mut random = fastrand::Rng::with_seed(seed);
     let mut control = Loop::new(world.mission.clone(), Settings::default()).expect("a loop");
@@ -181,7 +181,7 @@ fn check(world: &World, seed: u64, count: usize) -> Tally {
         let line = line.replace("{x}", &share);
         let now = control.beliefs().now() + Duration::from_millis(100);
         control.handle(&Observation::parse(&line), now);
-        control.planner.made.clear();
+        control.planner.computed.clear();
         let context = || format!("{}, seed {seed}, event {number}: {line}", world.name);
         tally.compare(&mut control, true, &context);
         if control.beliefs().running().is_some() {
@@ -201,30 +201,30 @@ fn worlds() -> Vec<World> {
 }
 
 #[test]
-fn plans_are_those_from_scratch() {
+fn plans_equal_those_from_scratch() {
     for world in worlds() {
         let tally = check(&world, 1, 40);
-        assert!(tally.compared > 40 && tally.left == 0, "{}: {} left", world.name, tally.left);
+        assert!(tally.compared > 40 && tally.unanswered == 0, "{}: {} left", world.name, tally.unanswered);
     }
     let tally = check(&map(6, 4, 1), 1, 5);
-    assert_eq!(tally.left, 0);
+    assert_eq!(tally.unanswered, 0);
 }
 
 #[test]
 #[ignore = "measures; only a release build is of interest"]
 #[expect(clippy::print_stdout, reason = "times are what this test is for")]
-fn more_plans_are_those_from_scratch_and_how_long_both_take() {
+fn plans_equal_those_from_scratch_with_times() {
     let maps = [(10, 5, 60), (10, 10, 40), (20, 10, 25)];
-    let mut all: Vec<(World, usize)> = worlds().into_iter().map(|world| (world, 600)).collect();
-    all.extend(maps.map(|(width, height, count)| (map(width, height, 7), count)));
-    for (world, count) in &all {
+    let mut cases: Vec<(World, usize)> = worlds().into_iter().map(|world| (world, 600)).collect();
+    cases.extend(maps.map(|(width, height, count)| (map(width, height, 7), count)));
+    for (world, count) in &cases {
         let tally = check(world, 2, *count);
-        let each = |time: Duration| time.as_secs_f64() * 1e3 / (tally.compared + tally.left) as f64;
+        let each = |time: Duration| time.as_secs_f64() * 1e3 / (tally.compared + tally.unanswered) as f64;
         println!(
             "{}: {} plans equal, {} left to planning from scratch; mean {:.2} ms live, {:.2} ms from scratch, ratio {:.1}",
             world.name,
             tally.compared,
-            tally.left,
+            tally.unanswered,
             each(tally.live),
             each(tally.scratch),
             tally.scratch.as_secs_f64() / tally.live.as_secs_f64()

@@ -22,7 +22,7 @@ use pddl::ast::{
 };
 
 use super::syntax::{
-    Binding, conditions, constants, effects, grounded, grows, in_expression, known, needed, object,
+    Binding, bound_arguments, conditions, constants, effects, grounded, grows, in_expression, needed, object,
     variables_of, walk,
 };
 
@@ -341,8 +341,8 @@ impl<'m> Numbers<'m> {
                 }
             }
             Condition::Atom(atom) => {
-                let arguments =
-                    known(atom, binding).filter(|_| !self.dynamic.contains(&atom.predicate.name))?;
+                let arguments = bound_arguments(atom, binding)
+                    .filter(|_| !self.dynamic.contains(&atom.predicate.name))?;
                 Some(self.facts.get(&atom.predicate.name).is_some_and(|facts| facts.contains(&arguments)))
             }
             Condition::Equal(left, right, _) => Some(object(left, binding)? == object(right, binding)?),
@@ -358,7 +358,7 @@ impl<'m> Numbers<'m> {
             }
             Condition::Atom(atom) if self.truth(condition, binding) == Some(true) => {
                 variables.iter().all(|variable| {
-                    let is_it = |term: &Term| matches!(term, Term::Variable(own) if own.name == **variable);
+                    let is_it = |term: &Term| matches!(term, Term::Variable(parameter) if parameter.name == **variable);
                     atom.arguments.iter().any(is_it)
                 })
             }
@@ -388,7 +388,7 @@ impl<'m> Numbers<'m> {
         match expression {
             Expression::Number(value, _) => Some(value.clone()),
             Expression::Fluent(atom) => {
-                self.values.get(&atom.predicate.name)?.get(&known(atom, binding)?).cloned()
+                self.values.get(&atom.predicate.name)?.get(&bound_arguments(atom, binding)?).cloned()
             }
             Expression::Operation(operation, parts, _) => {
                 let values: Option<Vec<BigRational>> =

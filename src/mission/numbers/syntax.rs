@@ -28,13 +28,13 @@ pub(super) fn object<'a>(term: &'a Term, binding: &'a Binding<'_>) -> Option<&'a
 }
 
 /// Returns the arguments of an atom, or `None` unless all of its variables are bound.
-pub(super) fn known(atom: &Atom, binding: &Binding<'_>) -> Option<Vec<Name>> {
+pub(super) fn bound_arguments(atom: &Atom, binding: &Binding<'_>) -> Option<Vec<Name>> {
     atom.arguments.iter().map(|term| object(term, binding).cloned()).collect()
 }
 
 /// The arguments of an atom whose variables are all bound.
 pub(super) fn grounded(atom: &Atom, binding: &Binding<'_>) -> Vec<Name> {
-    known(atom, binding).unwrap_or_default()
+    bound_arguments(atom, binding).unwrap_or_default()
 }
 
 /// Returns the distinct parameters of an action that an atom mentions, or `None` if the atom

@@ -10,16 +10,21 @@ use super::analysis::{MissingValue, NegativeDuration, Numbers};
 use crate::message::{Message, did_you_mean};
 
 /// Maximum number of functions without a value that a warning names; further ones are only counted.
-const NAMED: usize = 3;
+const MAX_NAMED: usize = 3;
 
 /// Messages about missing and negative numbers.
 impl Numbers<'_> {
-    pub(super) fn no_estimation(&self, own: &MissingValue, design: &str, attribute: &str) -> Message {
+    pub(super) fn no_estimation(
+        &self,
+        missing_value: &MissingValue,
+        design: &str,
+        attribute: &str,
+    ) -> Message {
         let individual = self.design(design);
         let estimated = individual.iter().flat_map(|design| design.estimations.keys().map(String::as_str));
         let text = format!(
             "the design `{design}` has no estimation of `{attribute}`, which {} needs, so it can never be used there{}",
-            quoted(&own.needed_by),
+            quoted(&missing_value.needed_by),
             did_you_mean(attribute, estimated)
         );
         self.about(design, "M230", text)
@@ -27,8 +32,8 @@ impl Numbers<'_> {
 
     pub(super) fn no_value(&self, missing: &[&MissingValue]) -> Message {
         let names: Vec<String> =
-            missing.iter().take(NAMED).map(|value| format!("`{}`", value.function)).collect();
-        let omitted = missing.len().saturating_sub(NAMED);
+            missing.iter().take(MAX_NAMED).map(|value| format!("`{}`", value.function)).collect();
+        let omitted = missing.len().saturating_sub(MAX_NAMED);
         let omitted = if omitted > 0 { format!(" and {omitted} more") } else { String::new() };
         let actions: BTreeSet<&String> = missing.iter().flat_map(|value| &value.needed_by).collect();
         let actions: Vec<String> = actions.into_iter().cloned().collect();
@@ -44,18 +49,22 @@ impl Numbers<'_> {
         at(source, Span { start, end: start + "(:init".len() as u32 }, "M231", text).with_help(help)
     }
 
-    pub(super) fn negative(&self, own: &NegativeDuration) -> Message {
-        let because =
-            if own.causes.is_empty() { String::new() } else { format!(" ({})", own.causes.join(", ")) };
+    pub(super) fn negative(&self, negative_duration: &NegativeDuration) -> Message {
+        let because = if negative_duration.causes.is_empty() {
+            String::new()
+        } else {
+            format!(" ({})", negative_duration.causes.join(", "))
+        };
         let text = format!(
             "`{}` would take {}, less than no time{because}, so it can never be done so",
-            own.action, own.duration
+            negative_duration.action, negative_duration.duration
         );
-        if let Some(design) = &own.design {
+        if let Some(design) = &negative_duration.design {
             return self.about(design, "M232", text);
         }
         let mut actions = self.domain.actions.iter().map(|action| &action.identifier);
-        let span = actions.find(|action| action.name.as_str() == own.action).map(|action| action.span);
+        let span =
+            actions.find(|action| action.name.as_str() == negative_duration.action).map(|action| action.span);
         at(self.mission.domain_source(), span.unwrap_or_default(), "M232", text)
     }
 }
