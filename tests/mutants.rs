@@ -61,7 +61,7 @@ type Oracle = (Tests, &'static str, u32);
 /// Lists of faults, each with the tests that must detect them.
 const SUITES: [(&str, &[Oracle]); 2] = [
     ("tests/oracle/mutants.toml", &ORACLES),
-    ("tests/world/mutants.toml", &[(Tests::World, "violate", 1_000)]),
+    ("tests/world/mutants.toml", &[(Tests::World, "violates", 1_000)]),
 ];
 
 /// Tests that run for each fault of the planner, in this order, until one fails.

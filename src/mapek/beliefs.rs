@@ -75,6 +75,8 @@ pub struct Beliefs {
     pub(super) numbers: Numbers,
     /// Time of the last line, since the start of the mission.
     pub(super) now: Duration,
+    /// Time of the last line that was not refused, since the start of the mission.
+    pub(super) considered: Duration,
     /// Memory of the filters for measurements and component reports.
     pub(super) filters: FilterStates,
 }
@@ -172,6 +174,7 @@ impl Beliefs {
             lines: 0,
             numbers: Numbers::default(),
             now: Duration::ZERO,
+            considered: Duration::ZERO,
             filters: FilterStates::default(),
         }
     }

@@ -210,6 +210,7 @@ impl Loop {
             let findings = analyze_change(&mut self.beliefs, changes.base, &mut answers);
             react(&mut self.beliefs, &self.settings, &findings, &mut changes, &mut answers);
             self.question += u64::from(changes.is_news() || !findings.is_empty());
+            self.beliefs.considered = self.beliefs.now;
             let agenda = self.agenda.get_or_insert_default();
             agenda.changes.extend(changes);
             agenda.findings.extend(findings);
@@ -292,10 +293,12 @@ impl Loop {
     /// a silent sensor, a search for a better plan, a repeated search, or a deadline. Handle a tick or a
     /// [timer](Observation::timer) at that time.
     pub fn due(&self) -> Option<Duration> {
+        // A refused line advances the time, but decides nothing that has become due.
         let improvement = self.beliefs.improvement_since.saturating_add(self.settings.settle);
-        let improvement = (!self.beliefs.improvement_causes.is_empty() && improvement > self.beliefs.now)
+        let improvement = (!self.beliefs.improvement_causes.is_empty()
+            && improvement > self.beliefs.considered)
             .then_some(improvement);
-        let retry = self.beliefs.retry.map(|retry| retry.at).filter(|at| *at > self.beliefs.now);
+        let retry = self.beliefs.retry.map(|retry| retry.at).filter(|at| *at > self.beliefs.considered);
         let filters = self.monitor.filters().due(&self.beliefs.filters);
         let deadline = deadlines::due(&self.beliefs, &self.settings);
         filters.into_iter().chain(improvement).chain(retry).chain(deadline).min()

@@ -107,6 +107,7 @@ pub(super) fn snapshot(beliefs: &Beliefs) -> Snapshot {
         "lines": beliefs.lines,
         "numbers": beliefs.numbers.to_record(),
         "now": microseconds(beliefs.now),
+        "considered": microseconds(beliefs.considered),
         "filters": beliefs.filters.to_record(),
     }))
 }
@@ -190,6 +191,7 @@ fn restore_work(beliefs: &mut Beliefs, data: &Value) -> Option<()> {
         (number("actions")?, number("effects")?, number("lines")?);
     beliefs.numbers = Numbers::from_record(data.get("numbers")?)?;
     beliefs.now = Duration::from_micros(number("now")?);
+    beliefs.considered = Duration::from_micros(number("considered")?);
     beliefs.filters = FilterStates::from_record(data.get("filters")?)?;
     beliefs.receipts = Receipts::from_record(data.get("receipts")?)?;
     let wait = |record: &Value| {

@@ -169,16 +169,18 @@ const REPAIRED_SEEDS: [u64; 18] =
 /// - An action never started, because its function had lost the design: 43186, 63592, 65974.
 /// - The only cancellation was lost, and the robot had never acknowledged anything to the loop: 165595.
 /// - A deliberation without a search changed the state although it was undone: 46304, 67888, 123382.
+/// - A refused line came at the time of another search: 540936.
+/// - Two reconfigurations were refused at the same time: 14748.
 /// - The judge was wrong about late failures, forgotten actions and robots without acknowledgements: 20, 529, 2245,
 ///   15852, 23994, 37483, 116491.
-const REPAIRED_SEEDS_OF_ALL_KINDS: [u64; 35] = [
-    20, 39, 201, 529, 2027, 2048, 2245, 3125, 3920, 4693, 15852, 23994, 33347, 36095, 36977, 37078, 37483,
-    39845, 43186, 46304, 54391, 57984, 63592, 65974, 66068, 67888, 69890, 78452, 104_954, 116_491, 123_382,
-    130_019, 165_595, 170_712, 14748,
+const REPAIRED_SEEDS_OF_ALL_KINDS: [u64; 36] = [
+    540_936, 20, 39, 201, 529, 2027, 2048, 2245, 3125, 3920, 4693, 15852, 23994, 33347, 36095, 36977, 37078,
+    37483, 39845, 43186, 46304, 54391, 57984, 63592, 65974, 66068, 67888, 69890, 78452, 104_954, 116_491,
+    123_382, 130_019, 165_595, 170_712, 14748,
 ];
 
 #[test]
-fn repaired_seeds_stay_repaired() {
+fn no_repaired_seed_violates_anything_again() {
     let violations_of_earlier_kinds =
         violations(REPAIRED_SEEDS.into_iter(), |seed| faults(seed).of_earlier_kinds());
     assert!(violations_of_earlier_kinds.is_empty(), "{}", summary(&violations_of_earlier_kinds));
