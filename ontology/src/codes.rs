@@ -1,6 +1,6 @@
-//! What the codes of messages mean that this crate gives.
+//! Descriptions of the message codes of this crate.
 
-/// Codes in their order, each with what it means, what causes it, and what to do.
+/// Code, meaning, cause and remedy of each message, in the order of the codes.
 pub const CODES: &[[&str; 4]] = &[
     [
         "O101",

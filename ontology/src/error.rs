@@ -1,16 +1,17 @@
-//! What can be wrong with a knowledge base: [`Error`] where it cannot be used, [`Warning`] where reading goes on.
+//! Problems of a knowledge base: an [`Error`] prevents its use, a [`Warning`] does not.
 //!
-//! Codes are stable: `O1xx` errors, `O2xx` warnings of reading, `O3xx` of lowering, `O4xx` about what the model says.
+//! Codes are stable: `O1xx` for errors, `O2xx` for warnings of the reader, `O3xx` for warnings of lowering,
+//! `O4xx` for warnings about the TOMASys model.
 
 use std::fmt;
 use std::path::PathBuf;
 
 use crate::read::syntax::Syntax;
 
-/// A place in a document: lines and columns count from 1, columns in characters.
+/// A place in a document. Lines and columns count from 1, columns in characters.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Position {
-    /// The document's path, or the name given for a text.
+    /// Path of the document, or the name given for a text.
     pub file: String,
     /// Line, from 1.
     pub line: u64,
@@ -19,7 +20,7 @@ pub struct Position {
 }
 
 impl Position {
-    /// The place `offset` bytes into `text`; the end of the text where it is shorter.
+    /// Converts a byte offset into `text` to a position. Offsets beyond the end give the end of the text.
     pub(crate) fn of_offset(file: &str, text: &[u8], offset: usize) -> Self {
         let before = &text[..offset.min(text.len())];
         let start = before.iter().rposition(|&byte| byte == b'\n').map_or(0, |index| index + 1);
@@ -37,59 +38,59 @@ impl fmt::Display for Position {
     }
 }
 
-/// Everything that is wrong with a knowledge base.
+/// All errors of a knowledge base.
 pub type Errors = diagnostics::Errors<Error>;
 
-/// Why a knowledge base cannot be used.
+/// The reason why a knowledge base cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// O101: the file is not there or cannot be read.
+    /// O101: a file is missing or unreadable.
     #[error("{}: error[O101]: the file cannot be read: {reason}", file.display())]
     Unreadable {
-        /// The file asked for.
+        /// Path of the file.
         file: PathBuf,
-        /// What the operating system says.
+        /// Message of the operating system.
         reason: String,
     },
-    /// O102: the document breaks the grammar of its syntax.
+    /// O102: a document is not well-formed.
     #[error("{position}: error[O102]: not well-formed {syntax}: {message}")]
     Malformed {
-        /// Where.
+        /// Position of the syntax error.
         position: Position,
-        /// The syntax that its content looks like.
+        /// Syntax detected from the content.
         syntax: Syntax,
-        /// What the parser says.
+        /// Message of the parser.
         message: String,
     },
-    /// O113: the document is in no syntax that is read.
+    /// O113: a document has an unsupported syntax.
     #[error("{position}: error[O113]: this is {what}")]
     OtherSyntax {
-        /// Its start.
+        /// Start of the document.
         position: Position,
-        /// What it looks like, and what would be right.
+        /// Detected syntax and a suggestion.
         what: &'static str,
     },
-    /// O103: an import is found nowhere.
+    /// O103: an import is not found.
     #[error(
         "{}: error[O103]: cannot find the import <{import}>; name a directory that contains it \
          (--directory), or a catalog with <uri name=\"{import}\" uri=\"FILE\"/> (--catalog), or go on without it \
          (--ignore-missing-imports)", place(file, position.as_ref())
     )]
     UnresolvedImport {
-        /// The document that imports.
+        /// The importing document.
         file: String,
-        /// Where it names the import, unless the syntax spells it in another way there.
+        /// Position of the import, if the document contains the IRI literally.
         position: Option<Position>,
-        /// The IRI that it imports.
+        /// The imported IRI.
         import: String,
     },
-    /// O104: a catalog cannot be read.
+    /// O104: a catalog is unreadable or malformed.
     #[error("{}: error[O104]: this is not a usable catalog: {reason}", file.display())]
     Catalog {
-        /// The catalog.
+        /// Path of the catalog.
         file: PathBuf,
-        /// Why not.
+        /// Cause of the failure.
         reason: String,
     },
     /// O105: the merged documents do not form an OWL ontology.
@@ -97,12 +98,12 @@ pub enum Error {
     NotAnOntology {
         /// The first document.
         file: String,
-        /// Where a document names what is wrong.
+        /// Position of the faulty statement in its document, if found.
         position: Option<Position>,
-        /// Why not.
+        /// Description of the fault.
         reason: String,
     },
-    /// O112: expressions within expressions, more than the reader takes.
+    /// O112: expressions are nested more deeply than the reader accepts.
     #[error(
         "{}: error[O112]: expressions are nested more than {deepest} deep{}",
         place(file, position.as_ref()), about.as_ref().map_or_else(String::new, |iri| format!(", in what is said of <{iri}>"))
@@ -110,54 +111,54 @@ pub enum Error {
     TooDeep {
         /// The document.
         file: String,
-        /// Of what the expression is said, where the syntax does not show the place.
+        /// Subject of the expression, if the syntax gives no position.
         about: Option<String>,
-        /// Where, if the syntax shows it.
+        /// Position of the expression, if the syntax gives one.
         position: Option<Position>,
-        /// How deep they may be.
+        /// Maximum nesting depth.
         deepest: usize,
     },
-    /// O106: a name that the knowledge base does not have.
+    /// O106: a name is not in the knowledge base.
     #[error("error[O106]: the knowledge base has no {kind} `{name}`; it has {}", listed(known))]
     Unknown {
-        /// What was asked for.
+        /// Kind of the entity.
         kind: &'static str,
-        /// By this name.
+        /// The unknown name.
         name: String,
-        /// The names that there are, sorted.
+        /// Existing names of this kind, sorted.
         known: Vec<String>,
     },
-    /// O107: a name that cannot be part of an IRI.
+    /// O107: a name cannot be part of an IRI.
     #[error("error[O107]: `{name}` cannot name an individual: `{character}` is not allowed in an IRI")]
     BadName {
         /// The name.
         name: String,
-        /// What is wrong with it.
+        /// The first character that IRIs do not allow.
         character: char,
     },
-    /// O108: an individual that is there already.
+    /// O108: an objective with this name exists.
     #[error("error[O108]: there is already an objective `{name}`")]
     Exists {
-        /// Its name.
+        /// The name.
         name: String,
     },
-    /// O110: a measurement that is not a number.
+    /// O110: a measured value is not a number.
     #[error("error[O110]: the value `{value}` of {attribute} is not a number")]
     NotANumber {
         /// The attribute type.
         attribute: String,
-        /// What was given as its value.
+        /// The value.
         value: String,
     },
-    /// O111: a syntax that cannot say what the knowledge base says.
+    /// O111: the output syntax cannot express the knowledge base.
     #[error("error[O111]: cannot be written in {syntax}: {reason}")]
     Unwritable {
-        /// The syntax.
+        /// The output syntax.
         syntax: &'static str,
-        /// Why not.
+        /// Description of the statement that the syntax cannot express.
         reason: String,
     },
-    /// O114: a retracted statement about an individual without a name.
+    /// O114: a retracted statement has an anonymous individual.
     #[error(
         "error[O114]: {statement} cannot be retracted: an individual without a name is another one in each document"
     )]
@@ -165,13 +166,13 @@ pub enum Error {
         /// The statement in functional-style syntax.
         statement: String,
     },
-    /// O109: the engine cannot make the change.
+    /// O109: the engine rejects the change.
     #[error("error[O109]: {0}")]
     Engine(#[from] rules::Error),
 }
 
 impl Error {
-    /// The stable code, `O1xx`.
+    /// Stable code, `O1xx`.
     pub fn code(&self) -> &'static str {
         match self {
             Self::Unreadable { .. } => "O101",
@@ -191,7 +192,7 @@ impl Error {
         }
     }
 
-    /// The place in a document, where the error has one.
+    /// Position in a document, if the error has one.
     pub fn position(&self) -> Option<&Position> {
         match self {
             Self::Malformed { position, .. } | Self::OtherSyntax { position, .. } => Some(position),
@@ -203,18 +204,19 @@ impl Error {
     }
 }
 
-/// What was read differently from how it is written, or not at all. The rest of the knowledge base holds.
+/// A statement that was not read, or was read in another way than it is written. The rest of the knowledge base
+/// is used.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
 #[non_exhaustive]
 pub enum Warning {
-    /// O201: an entity is used and declared nowhere.
+    /// O201: an entity is used without a declaration.
     #[error("{}warning[O201]: <{iri}> is declared nowhere; read as {kind} because of its use", before(position.as_ref()))]
     Undeclared {
-        /// The entity.
+        /// IRI of the entity.
         iri: String,
-        /// What it was taken for.
+        /// Kind inferred from the use of the entity.
         kind: &'static str,
-        /// Where a document spells it for the first time, as far as the text shows that.
+        /// Position of the first occurrence, if a document contains the IRI literally.
         position: Option<Position>,
     },
     /// O202: a statement that is not part of any OWL axiom or SWRL rule.
@@ -222,19 +224,19 @@ pub enum Warning {
     Unread {
         /// The statement or its subject.
         statement: String,
-        /// Why not.
+        /// Cause of the warning.
         reason: String,
     },
-    /// O203: a rule that could not be read.
+    /// O203: a rule could not be read.
     #[error("warning[O203]: rule <{ontology}>#{position}{} is left out: {reason}", label_suffix(label.as_deref()))]
     UnreadRule {
         /// Ontology of the rule.
         ontology: String,
-        /// Place among its rules, from 0.
+        /// Index of the rule in its ontology, from 0.
         position: u32,
-        /// The rule's label.
+        /// Label of the rule.
         label: Option<String>,
-        /// Why.
+        /// Cause of the failure.
         reason: String,
     },
     /// O204: a rule argument that is neither a declared variable nor a known individual.
@@ -247,7 +249,7 @@ pub enum Warning {
         iri: String,
         /// Ontology of the rule.
         ontology: String,
-        /// Place among its rules, from 0.
+        /// Index of the rule in its ontology, from 0.
         position: u32,
     },
     /// O205: two documents declare one ontology IRI.
@@ -257,22 +259,22 @@ pub enum Warning {
         iri: String,
         /// The document read first.
         first: String,
-        /// The other.
+        /// The document read second.
         second: String,
     },
-    /// O206: an import is found nowhere, and the reader was told to go on.
+    /// O206: an import is not found, and `ignore_missing_imports` is set.
     #[error(
         "warning[O206]: {}: the import <{import}> is left out: found nowhere", place(file, position.as_ref())
     )]
     MissingImport {
-        /// The document that imports.
+        /// The importing document.
         file: String,
-        /// Where it names the import, unless the syntax spells it in another way there.
+        /// Position of the import, if the document contains the IRI literally.
         position: Option<Position>,
-        /// The IRI that it imports.
+        /// The imported IRI.
         import: String,
     },
-    /// O207: a document takes away what is not stated.
+    /// O207: a document retracts a statement that is not stated.
     #[error(
         "warning[O207]: nothing states {statement}, so it cannot be retracted; what follows from other statements stays"
     )]
@@ -280,20 +282,20 @@ pub enum Warning {
         /// The statement in functional-style syntax.
         statement: String,
     },
-    /// O208: a document that changes a knowledge base imports another one.
+    /// O208: a document that changes a knowledge base has an import.
     #[error(
         "warning[O208]: {}: the import <{import}> is not followed, because the document changes a knowledge base; name \
          its file as a document of the knowledge base", place(file, position.as_ref())
     )]
     ImportOfUpdate {
-        /// The document that imports.
+        /// The importing document.
         file: String,
-        /// Where it names the import, unless the syntax spells it in another way there.
+        /// Position of the import, if the document contains the IRI literally.
         position: Option<Position>,
-        /// The IRI that it imports.
+        /// The imported IRI.
         import: String,
     },
-    /// O301: an axiom outside the profile that is turned into rules.
+    /// O301: an axiom, or a part of it, is outside the OWL 2 RL profile.
     #[error(
         "warning[O301]: {axiom} is {} ({reason}); conclusions that need {} are not drawn",
         if *partly { "used in part" } else { "left out" }, if *partly { "the rest" } else { "it" }
@@ -301,117 +303,117 @@ pub enum Warning {
     OutsideProfile {
         /// The axiom in functional-style syntax.
         axiom: String,
-        /// Whether a part of it is used.
+        /// `true` if a part of the axiom is used.
         partly: bool,
-        /// What is not supported.
+        /// The unsupported construct.
         reason: String,
     },
-    /// O302: a rule that the engine cannot evaluate.
+    /// O302: the engine rejects a rule.
     #[error("warning[O302]: rule <{ontology}>#{position}{} is left out: {reason}", label_suffix(label.as_deref()))]
     UnusableRule {
         /// Ontology of the rule.
         ontology: String,
-        /// Place among its rules, from 0.
+        /// Index of the rule in its ontology, from 0.
         position: u32,
-        /// The rule's label.
+        /// Label of the rule.
         label: Option<String>,
-        /// Why.
+        /// Cause of the rejection.
         reason: String,
     },
-    /// O303: a rule is disabled in the editor, and evaluated nevertheless.
+    /// O303: a rule is disabled in the editor, but evaluated.
     #[error("warning[O303]: rule <{ontology}>#{position}{} has isRuleEnabled false; it is evaluated all the same", label_suffix(label.as_deref()))]
     DisabledRule {
         /// Ontology of the rule.
         ontology: String,
-        /// Place among its rules, from 0.
+        /// Index of the rule in its ontology, from 0.
         position: u32,
-        /// The rule's label.
+        /// Label of the rule.
         label: Option<String>,
     },
-    /// O304: how much of the ontology lies outside the profile.
+    /// O304: summary of the axioms outside the OWL 2 RL profile.
     #[error(
         "warning[O304]: {outside} of {axioms} axioms are not used in full, because they lie outside OWL 2 RL; what is \
          concluded is right, and other things may follow, too"
     )]
     Profile {
-        /// Axioms that are left out, or used in part.
+        /// Number of axioms that are omitted or used in part.
         outside: usize,
-        /// All axioms.
+        /// Number of all axioms.
         axioms: usize,
     },
-    /// O401: a design that solves nothing.
+    /// O401: a design solves no function.
     #[error("warning[O401]: the function design <{design}> solves no function, so it is never chosen")]
     DesignWithoutFunction {
-        /// The design.
+        /// IRI of the design.
         design: String,
     },
-    /// O402: a function that nothing solves.
+    /// O402: no design solves a function.
     #[error(
         "warning[O402]: no function design solves the function <{function}>, so nothing that needs it can run"
     )]
     FunctionWithoutDesign {
-        /// The function.
+        /// IRI of the function.
         function: String,
     },
-    /// O403: a requirement that says no value.
+    /// O403: a requirement has no value.
     #[error("warning[O403]: the requirement <{requirement}> has no value, so everything meets it")]
     RequirementWithoutValue {
-        /// The requirement.
+        /// IRI of the requirement.
         requirement: String,
     },
-    /// O404: several stated values of a property that is declared functional.
+    /// O404: a functional property has several stated values.
     #[error(
         "warning[O404]: <{subject}> has {} values of <{property}>, which is functional: {}; {consequence}",
         values.len(), in_short(values)
     )]
     SeveralValues {
-        /// The individual.
+        /// IRI of the individual.
         subject: String,
-        /// The functional property.
+        /// IRI of the property.
         property: String,
-        /// The values, sorted, as N-Triples writes them.
+        /// The values in N-Triples syntax, sorted.
         values: Vec<String>,
-        /// What follows.
+        /// Consequence of the several values.
         consequence: &'static str,
     },
-    /// O405: an attribute that designs compare with a measurement that does not exist.
+    /// O405: designs compare an attribute with a measurement that does not exist.
     #[error(
         "warning[O405]: <{attribute}> is compared with what is measured, and nothing has been; until then no design is \
          ruled out by it"
     )]
     NothingMeasured {
-        /// The attribute type.
+        /// IRI of the attribute type.
         attribute: String,
     },
-    /// O406: a status of another datatype than the knowledge base asks for.
+    /// O406: a status has an unexpected datatype.
     #[error(
         "warning[O406]: <{subject}> has the status {value} of <{property}>, of which {expected} is expected; rules do \
          not see it"
     )]
     StatusDatatype {
-        /// The individual.
+        /// IRI of the individual.
         subject: String,
-        /// The status property.
+        /// IRI of the status property.
         property: String,
-        /// The value, as N-Triples writes it.
+        /// The value in N-Triples syntax.
         value: String,
-        /// What the property's range or the rules ask for.
+        /// Datatype that the property's range or the rules expect.
         expected: &'static str,
     },
 }
 
-/// The position with a colon, if there is one.
+/// Formats a position as a prefix of a message.
 fn before(position: Option<&Position>) -> String {
     position.map_or_else(String::new, |position| format!("{position}: "))
 }
 
-/// The position, or else the file.
+/// Returns the position, or the file if the position is unknown.
 fn place(file: &str, position: Option<&Position>) -> String {
     position.map_or_else(|| file.to_owned(), ToString::to_string)
 }
 
 impl Warning {
-    /// The stable code, `O2xx` or `O3xx`.
+    /// Stable code, `O2xx` to `O4xx`.
     pub fn code(&self) -> &'static str {
         match self {
             Self::Undeclared { .. } => "O201",
@@ -444,13 +446,14 @@ fn label_suffix(label: Option<&str>) -> String {
     label.map_or_else(String::new, |label| format!(" ({label})"))
 }
 
-/// The first of many values.
+/// Joins the values; beyond `MAX_LISTED_VALUES` + 1 of them, only the first `MAX_LISTED_VALUES` and the number
+/// of the others.
 fn in_short(values: &[String]) -> String {
-    match values.get(..MOST_VALUES).filter(|_| values.len() > MOST_VALUES + 1) {
-        Some(first) => format!("{} and {} more", first.join(", "), values.len() - MOST_VALUES),
+    match values.get(..MAX_LISTED_VALUES).filter(|_| values.len() > MAX_LISTED_VALUES + 1) {
+        Some(first) => format!("{} and {} more", first.join(", "), values.len() - MAX_LISTED_VALUES),
         None => values.join(", "),
     }
 }
 
-/// So many values are listed in a message.
-const MOST_VALUES: usize = 10;
+/// Maximum number of values listed in a message.
+const MAX_LISTED_VALUES: usize = 10;

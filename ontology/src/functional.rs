@@ -1,5 +1,5 @@
-//! Axioms as text in functional-style syntax, and rules in SWRL's human-readable syntax, with IRIs in full: for
-//! messages, and as labels of the rules that stand for axioms.
+//! Formats axioms in functional-style syntax and rules in SWRL's human-readable syntax, with full IRIs: for
+//! messages, and as labels of the rules that are lowered from axioms.
 
 use std::fmt::{Display, Formatter, Result};
 
@@ -9,11 +9,11 @@ use crate::owl::{
 };
 use crate::vocab::{local_name, xsd};
 
-/// `Name(argument argument …)`.
+/// Writes `Name(argument argument …)`.
 fn call(f: &mut Formatter<'_>, name: &str, arguments: &[&dyn Display]) -> Result {
     write!(f, "{name}(")?;
-    for (place, argument) in arguments.iter().enumerate() {
-        write!(f, "{}{argument}", if place == 0 { "" } else { " " })?;
+    for (index, argument) in arguments.iter().enumerate() {
+        write!(f, "{}{argument}", if index == 0 { "" } else { " " })?;
     }
     f.write_str(")")
 }
@@ -23,7 +23,7 @@ fn calls<T: Display>(f: &mut Formatter<'_>, name: &str, arguments: &[T]) -> Resu
     call(f, name, &arguments)
 }
 
-/// `<iri>`, or `_:label` for an anonymous individual.
+/// Formats an IRI as `<iri>`, or as `_:label` for an anonymous individual.
 struct Angle<'a>(&'a Iri);
 
 impl Display for Angle<'_> {
@@ -35,13 +35,13 @@ impl Display for Angle<'_> {
     }
 }
 
-/// Arguments without a name around them.
-struct Many<'a, T>(&'a [T]);
+/// Formats arguments separated by spaces.
+struct Joined<'a, T>(&'a [T]);
 
-impl<T: Display> Display for Many<'_, T> {
+impl<T: Display> Display for Joined<'_, T> {
     fn fmt(&self, f: &mut Formatter<'_>) -> Result {
-        for (place, argument) in self.0.iter().enumerate() {
-            write!(f, "{}{argument}", if place == 0 { "" } else { " " })?;
+        for (index, argument) in self.0.iter().enumerate() {
+            write!(f, "{}{argument}", if index == 0 { "" } else { " " })?;
         }
         Ok(())
     }
@@ -143,10 +143,10 @@ impl Display for Axiom {
             Self::SubClassOf(sub, sup) => call(f, "SubClassOf", &[sub, sup]),
             Self::EquivalentClasses(classes) => calls(f, "EquivalentClasses", classes),
             Self::DisjointClasses(classes) => calls(f, "DisjointClasses", classes),
-            Self::DisjointUnion(class, parts) => call(f, "DisjointUnion", &[&Angle(class), &Many(parts)]),
+            Self::DisjointUnion(class, parts) => call(f, "DisjointUnion", &[&Angle(class), &Joined(parts)]),
             Self::SubObjectPropertyOf(sub, sup) => call(f, "SubObjectPropertyOf", &[sub, sup]),
             Self::SubPropertyChainOf(chain, sup) => {
-                write!(f, "SubObjectPropertyOf(ObjectPropertyChain({}) {sup})", Many(chain))
+                write!(f, "SubObjectPropertyOf(ObjectPropertyChain({}) {sup})", Joined(chain))
             }
             Self::EquivalentObjectProperties(properties) => {
                 calls(f, "EquivalentObjectProperties", properties)
@@ -179,7 +179,7 @@ fn fmt_data_or_assertion(axiom: &Axiom, f: &mut Formatter<'_>) -> Result {
         Axiom::FunctionalDataProperty(property) => call(f, "FunctionalDataProperty", &[&Angle(property)]),
         Axiom::DatatypeDefinition(name, range) => call(f, "DatatypeDefinition", &[&Angle(name), range]),
         Axiom::HasKey(class, objects, data) => {
-            write!(f, "HasKey({class} ({}) ({}))", Many(objects), Many(&angles(data)))
+            write!(f, "HasKey({class} ({}) ({}))", Joined(objects), Joined(&angles(data)))
         }
         Axiom::SameIndividual(iris) => calls(f, "SameIndividual", &angles(iris)),
         Axiom::DifferentIndividuals(iris) => calls(f, "DifferentIndividuals", &angles(iris)),
@@ -196,7 +196,7 @@ fn fmt_data_or_assertion(axiom: &Axiom, f: &mut Formatter<'_>) -> Result {
         Axiom::NegativeDataPropertyAssertion(property, from, to) => {
             call(f, "NegativeDataPropertyAssertion", &[&Angle(property), &Angle(from), to])
         }
-        other => write!(f, "{other:?}"),
+        axiom => write!(f, "{axiom:?}"),
     }
 }
 

@@ -1,11 +1,11 @@
-//! Triples with an index by subject, in document order, from which triples can be taken.
+//! A set of triples in document order, with an index by subject. Triples can be removed.
 
 use oxrdf::{BlankNode, NamedNode, NamedOrBlankNode, Term, Triple};
 use rustc_hash::{FxHashMap as HashMap, FxHashSet as HashSet};
 
 use crate::vocab::rdf;
 
-/// A set of triples that keeps the order in which they were added.
+/// Triples in the order in which they were added. A removed triple leaves a `None`, so that indices stay valid.
 #[derive(Debug, Default)]
 pub(crate) struct Graph {
     triples: Vec<Option<Triple>>,
@@ -17,7 +17,7 @@ pub(crate) struct Graph {
 #[derive(Debug)]
 pub(crate) struct List {
     pub items: Vec<Term>,
-    /// Indices of the triples of its spine.
+    /// Indices of the triples that form the list.
     pub spine: Vec<usize>,
 }
 
@@ -40,11 +40,12 @@ impl Graph {
         self.add(Triple::new(subject.clone(), NamedNode::new_unchecked(predicate), object));
     }
 
-    /// Number of indices in use, taken triples included.
+    /// Number of indices in use, including indices of removed triples.
     pub(crate) fn len(&self) -> usize {
         self.triples.len()
     }
 
+    /// Removes a triple.
     pub(crate) fn take(&mut self, index: usize) -> Option<Triple> {
         self.triples.get_mut(index).and_then(Option::take)
     }
@@ -74,11 +75,12 @@ impl Graph {
         predicate: &'a str,
     ) -> impl Iterator<Item = &'a Term> + use<'a> {
         self.of(subject)
-            .filter(move |(_, t)| t.predicate.as_str() == predicate)
+            .filter(move |(_, triple)| triple.predicate.as_str() == predicate)
             .map(|(_, triple)| &triple.object)
     }
 
-    /// The only object of `subject predicate`, or a message that says why there is none.
+    /// Returns the only object of `subject predicate`; the error says if there is none, or if there are
+    /// several.
     pub(crate) fn object<'a>(
         &'a self,
         subject: &NamedOrBlankNode,
@@ -92,55 +94,55 @@ impl Graph {
         }
     }
 
-    /// The subjects of type `class` with the index of the triple that says so, in order.
+    /// The subjects of type `class` with the indices of their type triples, in order.
     pub(crate) fn instances(&self, class: &str) -> Vec<(usize, NamedOrBlankNode)> {
         let typed = self.iter().filter(|(_, triple)| is_type(triple, class));
         typed.map(|(index, triple)| (index, triple.subject.clone())).collect()
     }
 
-    /// The items of the list that starts at `head`, or a message that says what is wrong with it.
+    /// Returns the list that starts at `head`. The error describes a malformed or cyclic list.
     pub(crate) fn list(&self, head: &Term) -> Result<List, String> {
         let mut list = List { items: Vec::new(), spine: Vec::new() };
-        let (mut node, mut seen) = (head.clone(), HashSet::default());
+        let (mut node, mut visited) = (head.clone(), HashSet::default());
         loop {
             if matches!(&node, Term::NamedNode(iri) if iri.as_str() == rdf::NIL) {
                 return Ok(list);
             }
             let Some(subject) = subject_of(&node) else { return Err(format!("{node} is not a list")) };
-            if !seen.insert(subject.clone()) {
+            if !visited.insert(subject.clone()) {
                 return Err(format!("the list at {head} runs in a circle"));
             }
             list.items.push(self.object(&subject, rdf::FIRST)?.clone());
-            let rest = self.object(&subject, rdf::REST)?.clone();
+            let tail = self.object(&subject, rdf::REST)?.clone();
             list.spine.extend(self.of(&subject).map(|(index, _)| index));
             node = rest;
         }
     }
 
-    /// Adds a list and returns its head.
+    /// Adds a list and returns its head. `class` is the type of each list node.
     pub(crate) fn add_list(&mut self, items: impl IntoIterator<Item = Term>, class: Option<&str>) -> Term {
         let nodes: Vec<_> = items.into_iter().map(|item| (self.fresh(), item)).collect();
         let nil = Term::from(NamedNode::new_unchecked(rdf::NIL));
         let head = nodes.first().map_or_else(|| nil.clone(), |(node, _)| node.clone().into());
-        for (place, (node, item)) in nodes.iter().enumerate() {
+        for (index, (node, item)) in nodes.iter().enumerate() {
             let subject = node.clone().into();
             if let Some(class) = class {
                 self.state(&subject, rdf::TYPE, NamedNode::new_unchecked(class));
             }
             self.state(&subject, rdf::FIRST, item.clone());
-            let rest = nodes.get(place + 1).map_or_else(|| nil.clone(), |(next, _)| next.clone().into());
-            self.state(&subject, rdf::REST, rest);
+            let tail = nodes.get(index + 1).map_or_else(|| nil.clone(), |(next, _)| next.clone().into());
+            self.state(&subject, rdf::REST, tail);
         }
         head
     }
 
-    /// A blank node that occurs nowhere else.
+    /// Returns a new blank node.
     pub(crate) fn fresh(&mut self) -> BlankNode {
         self.fresh += 1;
         BlankNode::new_unchecked(format!("n{}", self.fresh))
     }
 
-    /// Blank nodes and how often each is an object.
+    /// Counts for each blank node the triples with this object.
     pub(crate) fn references(&self) -> HashMap<BlankNode, usize> {
         let mut counts = HashMap::default();
         for (_, triple) in self.iter() {
@@ -151,30 +153,30 @@ impl Graph {
         counts
     }
 
-    /// The triples that are left, in order.
+    /// Returns the triples that were not removed, in order.
     pub(crate) fn into_triples(self) -> Vec<Triple> {
         self.triples.into_iter().flatten().collect()
     }
 
-    /// The triples that are left, as an N-Triples document.
+    /// Writes the triples that were not removed as an N-Triples document.
     pub(crate) fn to_ntriples(&self) -> Vec<u8> {
         use std::io::Write;
         let mut text = Vec::with_capacity(self.triples.len() * 128);
         for (_, triple) in self.iter() {
-            // Writing to memory does not fail.
+            // Writing to a vector cannot fail.
             let _ = writeln!(text, "{triple} .");
         }
         text
     }
 }
 
-/// Whether the triple says that its subject is of type `class`.
+/// Returns `true` if the triple states that its subject has type `class`.
 pub(crate) fn is_type(triple: &Triple, class: &str) -> bool {
     triple.predicate.as_str() == rdf::TYPE
         && matches!(&triple.object, Term::NamedNode(object) if object.as_str() == class)
 }
 
-/// The term as a subject, unless it is a literal.
+/// Converts a term to a subject; `None` for a literal.
 pub(crate) fn subject_of(term: &Term) -> Option<NamedOrBlankNode> {
     match term {
         Term::NamedNode(node) => Some(node.clone().into()),
@@ -183,7 +185,7 @@ pub(crate) fn subject_of(term: &Term) -> Option<NamedOrBlankNode> {
     }
 }
 
-/// The IRI of a node that has one.
+/// Returns the IRI of a named node.
 pub(crate) fn iri_of(term: &Term) -> Option<&str> {
     match term {
         Term::NamedNode(node) => Some(node.as_str()),

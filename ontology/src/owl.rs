@@ -1,9 +1,9 @@
-//! Our own OWL 2 structures: what a knowledge base says, in the nouns of the OWL 2 structural specification [1] and
-//! the SWRL submission [2].
+//! Data structures of OWL 2 and SWRL, with the names of the OWL 2 structural specification [1] and the SWRL
+//! submission [2].
 //!
-//! An [`Ontology`] is the merge of one or more root documents and all that they import. It is plain data, in an order
-//! that depends on nothing but the documents: two reads of the same files give equal values and equal text. Anonymous
-//! individuals have names here (`urn:metaplan:anonymous:…`), so that every individual is an IRI.
+//! An [`Ontology`] is the merge of one or more root documents and their imports. It is plain data in an order
+//! that depends only on the documents: reading the same files twice gives equal values and equal text.
+//! Anonymous individuals get IRIs (`urn:metaplan:anonymous:…`), so that every individual has an IRI.
 //!
 //! - [1] OWL 2 Web Ontology Language, Structural Specification and Functional-Style Syntax, W3C 2012.
 //! - [2] SWRL: A Semantic Web Rule Language Combining OWL and RuleML, W3C Member Submission 2004.
@@ -14,21 +14,22 @@ use std::sync::Arc;
 use crate::error::Warning;
 use crate::read::syntax::Syntax;
 
-/// An IRI, absolute and not shortened.
+/// An absolute IRI, not abbreviated.
 pub type Iri = Arc<str>;
 
-/// What the IRIs of anonymous individuals start with.
+/// Prefix of the IRIs of anonymous individuals.
 pub const ANONYMOUS: &str = "urn:metaplan:anonymous:";
 
-/// What the name of a property starts with that stands for the inverse of another one, on the way through horned-owl.
+/// Prefix of the name of an auxiliary property that represents an inverse property while horned-owl reads a
+/// document.
 pub(crate) const INVERSE: &str = "urn:metaplan:inverse:";
 
-/// A literal as written; [`rules::Literal`] gives it a value.
+/// A literal as written. [`rules::Literal`] computes its value.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Literal {
     /// The lexical form, not canonicalised.
     pub lexical: Arc<str>,
-    /// The datatype; `None` for plain literals (which are `xsd:string`) and for those with a language.
+    /// The datatype; `None` for plain literals (`xsd:string`) and for literals with a language.
     pub datatype: Option<Iri>,
     /// The language tag, for `rdf:langString` literals.
     pub language: Option<Arc<str>>,
@@ -60,7 +61,7 @@ pub enum DataRange {
     Restriction(Iri, Vec<(Iri, Literal)>),
 }
 
-/// Which side of a cardinality restriction is bounded.
+/// Kind of a cardinality restriction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Bound {
     /// At least n.
@@ -88,7 +89,7 @@ pub enum ClassExpression {
     SomeValuesFrom(ObjectPropertyExpression, Box<ClassExpression>),
     /// Individuals whose property values are all in the class.
     AllValuesFrom(ObjectPropertyExpression, Box<ClassExpression>),
-    /// Individuals with this property value.
+    /// Individuals with the given property value.
     HasValue(ObjectPropertyExpression, Iri),
     /// Individuals that are their own property value.
     HasSelf(ObjectPropertyExpression),
@@ -98,18 +99,18 @@ pub enum ClassExpression {
     DataSomeValuesFrom(Iri, DataRange),
     /// Individuals whose data property values are all in the range.
     DataAllValuesFrom(Iri, DataRange),
-    /// Individuals with this data property value.
+    /// Individuals with the given data property value.
     DataHasValue(Iri, Literal),
     /// Individuals with a number of data property values in the range.
     DataCardinality(Bound, u32, Iri, DataRange),
 }
 
-/// What an object property is declared to be.
+/// A characteristic of an object property.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Characteristic {
-    /// At most one value a subject.
+    /// At most one value per subject.
     Functional,
-    /// At most one subject a value.
+    /// At most one subject per value.
     InverseFunctional,
     /// Every individual is its own value.
     Reflexive,
@@ -156,7 +157,7 @@ pub enum Axiom {
     NegativeDataPropertyAssertion(Iri, Iri, Literal),
 }
 
-/// What kind of entity an IRI names. An IRI may name several (punning).
+/// Kind of an entity. One IRI can name entities of several kinds (punning).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum EntityKind {
     /// A class.
@@ -187,16 +188,16 @@ pub enum AnnotationValue {
 pub struct Annotation {
     /// The annotation property.
     pub property: Iri,
-    /// Its value.
+    /// Value of the annotation.
     pub value: AnnotationValue,
 }
 
 /// An axiom with its annotations.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct AnnotatedAxiom {
-    /// What is said.
+    /// The axiom.
     pub axiom: Axiom,
-    /// What is said about saying it.
+    /// Annotations of the axiom.
     pub annotations: Vec<Annotation>,
 }
 
@@ -230,72 +231,73 @@ pub enum Atom {
     BuiltIn(Iri, Vec<Argument>),
 }
 
-/// A SWRL rule: if the body then the head, for all named individuals and data values (DL-safe).
+/// A SWRL rule: if the body holds, so does the head. Variables range over named individuals and data values
+/// (DL-safe).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Rule {
-    /// IRI of the ontology that states the rule (or the document's name where it has none).
+    /// IRI of the ontology that states the rule; the document's name if the ontology has no IRI.
     pub ontology: Iri,
-    /// Its place among the rules of that ontology, from 0.
+    /// Index of the rule in its ontology, from 0.
     pub position: u32,
     /// The rule's own IRI, if it has one.
     pub iri: Option<Iri>,
-    /// Its first `rdfs:label`. Labels repeat in real knowledge bases.
+    /// The first `rdfs:label`. Labels are not unique in real knowledge bases.
     pub label: Option<Arc<str>>,
-    /// `swrla:isRuleEnabled`, if stated. Reasoners, Pellet among them, ignore it.
+    /// Value of `swrla:isRuleEnabled`, if stated. Reasoners such as Pellet ignore it.
     pub enabled: Option<bool>,
-    /// All annotations, sorted, those above included.
+    /// All annotations, sorted, including label and `isRuleEnabled`.
     pub annotations: Vec<Annotation>,
-    /// Antecedent; all atoms must hold. May be empty.
+    /// Antecedent: the conjunction of these atoms. May be empty.
     pub body: Vec<Atom>,
-    /// Consequent; all atoms follow. Empty for an integrity constraint.
+    /// Consequent: the conjunction of these atoms. Empty for an integrity constraint.
     pub head: Vec<Atom>,
 }
 
 /// One document that was read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Source {
-    /// The file's path, or the name given for a text.
+    /// Path of the file, or the name given for a text.
     pub name: String,
-    /// The ontology IRI that it declares.
+    /// The ontology IRI that the document declares.
     pub iri: Option<Iri>,
-    /// Its `owl:versionIRI`.
+    /// Value of `owl:versionIRI`.
     pub version: Option<Iri>,
-    /// The concrete syntax found.
+    /// The detected syntax.
     pub syntax: Syntax,
 }
 
-/// One or more documents and all that they import, merged.
+/// One or more documents and their imports, merged.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Ontology {
-    /// The documents in the order in which they were read: each root, then what it imports.
+    /// Documents in reading order: each root, then its imports.
     pub sources: Vec<Source>,
-    /// Declared entities, and those whose kind was taken from their use; sorted.
+    /// Declared entities, and entities whose kind was inferred from their use; sorted.
     pub entities: Vec<(EntityKind, Iri)>,
     /// Logical axioms, sorted.
     pub axioms: Vec<AnnotatedAxiom>,
     /// Annotations of entities (subject, annotation), sorted.
     pub annotations: Vec<(Iri, Annotation)>,
-    /// Annotations of these annotations (subject, annotation, annotation of the annotation), sorted.
+    /// Annotations of annotations: subject, annotation, annotation of the annotation; sorted.
     pub annotation_annotations: Vec<(Iri, Annotation, Annotation)>,
     /// Rules in document order.
     pub rules: Vec<Rule>,
-    /// What was read differently from how it is written, or not at all.
+    /// Statements that were not read, or were read in another way than they are written.
     pub warnings: Vec<Warning>,
 }
 
 impl Ontology {
-    /// The IRI of the first document, if it declares one.
+    /// IRI of the first document, if it declares one.
     pub fn iri(&self) -> Option<&Iri> {
         self.sources.first().and_then(|source| source.iri.as_ref())
     }
 
-    /// The SWRL rules, each ontology's own once. Two ontologies that state the same rule count twice here;
-    /// [`crate::lower`] keeps one of them.
+    /// The SWRL rules. An equal rule of two ontologies is contained twice; [`crate::lower`] removes the
+    /// duplicate.
     pub fn rules(&self) -> &[Rule] {
         &self.rules
     }
 
-    /// The named individuals: those declared, and those with a type; sorted.
+    /// Named individuals: declared ones, and ones with a class assertion; sorted.
     pub fn individuals(&self) -> BTreeSet<&Iri> {
         let typed = self.axioms.iter().filter_map(|annotated| match &annotated.axiom {
             Axiom::ClassAssertion(_, individual) if !individual.starts_with(ANONYMOUS) => Some(individual),
@@ -306,6 +308,6 @@ impl Ontology {
 
     /// The IRIs of one kind, sorted.
     pub fn entities(&self, kind: EntityKind) -> impl Iterator<Item = &Iri> {
-        self.entities.iter().filter(move |(k, _)| *k == kind).map(|(_, iri)| iri)
+        self.entities.iter().filter(move |(entity_kind, _)| *entity_kind == kind).map(|(_, iri)| iri)
     }
 }

@@ -1,12 +1,13 @@
-//! Documents that are asserted and retracted, as one change of an engine: afterwards it holds what the one remaining
-//! document means.
+//! Computes the change of an engine for asserted and retracted documents. After the change, the engine holds
+//! the consequences of the remaining statements only.
 //!
-//! [`Stated`] keeps what is stated, as axioms and rules. A change of it is lowered by the same code as a knowledge base that
-//! is read for the first time ([`lower_together`]), before and after the change; the engine receives the rules and facts in
-//! which the two differ. Facts of named classes and properties that nothing else depends on skip the lowering.
+//! [`Stated`] keeps the stated axioms and rules. They are lowered before and after the change with the code
+//! that lowers a new knowledge base ([`lower_together`]), and the engine receives the differences between the
+//! two results. Assertions of named classes and properties on which no rule depends are not lowered that way,
+//! because their facts are known.
 //!
-//! Axioms are sets here: one that two documents state is stated once, and its retraction takes both away. Declarations
-//! stay, because documents repeat them.
+//! Axioms form a set: an axiom of two documents is stated once, and one retraction removes it. Declarations are
+//! never retracted, because many documents repeat them.
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::fmt::Debug;
@@ -24,44 +25,44 @@ use crate::owl::{
 use crate::read::{ReadOptions, read_files};
 use crate::vocab::{is_reserved, owl};
 
-/// What is stated: documents, and rules of other origin.
+/// The stated knowledge: documents, and rules of other origin.
 #[derive(Clone, Debug, Default)]
 pub struct Stated {
     ontology: Ontology,
-    /// Rules of other origin; their names are among the engine's symbols.
+    /// Rules of other origin. Their names are symbols of the engine.
     rules: Vec<EngineRule>,
     equality: Equality,
 }
 
-/// A change of what is stated, for an engine.
+/// A change of the stated knowledge, to be applied to an engine.
 #[derive(Clone, Debug)]
 pub struct Change {
-    /// What is stated afterwards.
+    /// The stated knowledge after the change.
     pub stated: Stated,
-    /// Facts that are stated from now on, or no more.
+    /// Facts to state and facts to withdraw.
     pub delta: Delta,
-    /// The rules, where they change.
+    /// The new rules; `None` if they do not change.
     pub program: Option<Program>,
-    /// What of the documents is not read, not used in full, or was not stated.
+    /// Warnings about statements that are not read, not used in full, or retracted without being stated.
     pub warnings: Vec<Warning>,
 }
 
 impl Stated {
-    /// The documents, with further rules, whose names are among the symbols of the engine.
+    /// Combines documents with additional rules. The names of the rules must be symbols of the engine.
     pub fn new(ontology: Ontology, rules: Vec<EngineRule>, equality: Equality) -> Self {
         Self { ontology, rules, equality }
     }
 
-    /// The documents.
+    /// The merged documents.
     pub fn ontology(&self) -> &Ontology {
         &self.ontology
     }
 
-    /// The change that states what the first documents say, and no more what the second ones say. What both say is stated.
-    /// Imports of these documents are not followed.
+    /// Computes the change that asserts the first documents and retracts the second ones. A statement in both
+    /// is asserted. Imports of these documents are not followed.
     ///
     /// # Errors
-    /// All that is wrong with the documents; or O114, where one retracts a statement about an individual without a name.
+    /// Returns all errors of the documents, and O114 for a retracted statement with an anonymous individual.
     pub fn change<P: AsRef<Path>>(
         &self,
         asserted: &[P],
@@ -80,120 +81,130 @@ impl Stated {
             [] => Ok(Ontology::default()),
             files => read_files(files, options),
         };
-        let come = read(asserted, &options)?;
-        options.documents_before += come.sources.len();
-        options.known.extend(come.entities.iter().filter(is_kind).cloned());
-        let go = read(retracted, &options)?;
-        self.change_by(&come, &go, engine)
+        let assertions = read(asserted, &options)?;
+        options.documents_before += assertions.sources.len();
+        options.known.extend(assertions.entities.iter().filter(is_kind).cloned());
+        let retractions = read(retracted, &options)?;
+        self.change_by(&assertions, &retractions, engine)
     }
 
-    /// As [`Stated::change`], for documents that have been read.
+    /// Computes the change for documents that have been read; see [`Stated::change`].
     ///
     /// # Errors
-    /// O114.
-    pub fn change_by(&self, come: &Ontology, go: &Ontology, engine: &mut Engine) -> Result<Change, Errors> {
-        let mut warnings: Vec<Warning> = come.warnings.iter().chain(&go.warnings).cloned().collect();
-        let known: HashSet<&Iri> =
+    /// Returns O114 for a retracted statement with an anonymous individual.
+    pub fn change_by(
+        &self,
+        assertions: &Ontology,
+        retractions: &Ontology,
+        engine: &mut Engine,
+    ) -> Result<Change, Errors> {
+        let mut warnings: Vec<Warning> =
+            assertions.warnings.iter().chain(&retractions.warnings).cloned().collect();
+        let loaded_iris: HashSet<&Iri> =
             self.ontology.sources.iter().filter_map(|source| source.iri.as_ref()).collect();
+        // The import of a document that the knowledge base contains is not missing.
         warnings.retain(|warning| match warning {
-            Warning::ImportOfUpdate { import, .. } => !known.contains(&Iri::from(import.as_str())),
+            Warning::ImportOfUpdate { import, .. } => !loaded_iris.contains(&Iri::from(import.as_str())),
             _ => true,
         });
-        nameless(go)?;
+        reject_anonymous(retractions)?;
         let mut stated = self.clone();
-        let removed = stated.remove(go, engine, &mut warnings);
-        stated.add(come);
-        let change = [&come.axioms[..], &removed].concat();
-        let is_plain = come.rules.is_empty()
-            && go.rules.is_empty()
+        let removed = stated.remove(retractions, engine, &mut warnings);
+        stated.add(assertions);
+        let change = [&assertions.axioms[..], &removed].concat();
+        let is_plain = assertions.rules.is_empty()
+            && retractions.rules.is_empty()
             && self.is_plain(&change, engine.program(), engine.symbols());
         let symbols = engine.symbols_mut();
-        let mut said = facts(&come.axioms, symbols);
-        let mut unsaid: FxHashSet<Fact> = facts(&go.axioms, symbols).into_iter().collect();
-        unsaid.extend(facts(&removed, symbols));
+        let mut inserted = facts(&assertions.axioms, symbols);
+        let mut deleted: FxHashSet<Fact> = facts(&retractions.axioms, symbols).into_iter().collect();
+        deleted.extend(facts(&removed, symbols));
         let mut program = None;
         if is_plain {
-            stated.keep_supported(&change, &mut unsaid, symbols);
+            stated.keep_supported(&change, &mut deleted, symbols);
         } else {
             let [before, after] = [self, &stated].map(|stated| stated.lower(symbols));
+            // Only differences reach the engine, so facts and rules that stay keep their derivations.
             let old: FxHashSet<Fact> = before.facts.into_iter().collect();
             let new: FxHashSet<Fact> = after.facts.into_iter().collect();
-            said.extend(new.difference(&old).cloned());
-            unsaid.extend(old.difference(&new).cloned());
-            unsaid.retain(|fact| !new.contains(fact));
-            let seen: BTreeSet<Warning> = before.warnings.into_iter().collect();
-            warnings.extend(after.warnings.into_iter().filter(|warning| !seen.contains(warning)));
-            program = exchanged(engine.program(), &before.program, &after.program);
+            inserted.extend(new.difference(&old).cloned());
+            deleted.extend(old.difference(&new).cloned());
+            deleted.retain(|fact| !new.contains(fact));
+            let old_warnings: BTreeSet<Warning> = before.warnings.into_iter().collect();
+            warnings.extend(after.warnings.into_iter().filter(|warning| !old_warnings.contains(warning)));
+            program = revised_program(engine.program(), &before.program, &after.program);
         }
-        said.sort_unstable();
-        said.dedup();
-        let mut delete: Vec<Fact> = unsaid.into_iter().collect();
+        inserted.sort_unstable();
+        inserted.dedup();
+        let mut delete: Vec<Fact> = deleted.into_iter().collect();
         delete.sort_unstable();
         warnings.sort();
         warnings.dedup();
-        Ok(Change { stated, delta: Delta { insert: said, delete }, program, warnings })
+        Ok(Change { stated, delta: Delta { insert: inserted, delete }, program, warnings })
     }
 
     fn lower(&self, symbols: &mut Symbols) -> Lowered {
         lower_together(&self.ontology, self.rules.clone(), self.equality, symbols)
     }
 
-    fn add(&mut self, come: &Ontology) {
-        fn merge<T: Ord + Clone>(into: &mut Vec<T>, more: &[T]) {
-            if !more.is_empty() {
-                into.extend_from_slice(more);
-                into.sort();
-                into.dedup();
+    fn add(&mut self, assertions: &Ontology) {
+        fn merge<T: Ord + Clone>(target: &mut Vec<T>, items: &[T]) {
+            if !items.is_empty() {
+                target.extend_from_slice(items);
+                target.sort();
+                target.dedup();
             }
         }
-        merge(&mut self.ontology.axioms, &come.axioms);
-        merge(&mut self.ontology.entities, &come.entities);
-        merge(&mut self.ontology.annotations, &come.annotations);
-        merge(&mut self.ontology.annotation_annotations, &come.annotation_annotations);
-        self.ontology.rules.extend_from_slice(&come.rules);
-        self.ontology.sources.extend_from_slice(&come.sources);
+        merge(&mut self.ontology.axioms, &assertions.axioms);
+        merge(&mut self.ontology.entities, &assertions.entities);
+        merge(&mut self.ontology.annotations, &assertions.annotations);
+        merge(&mut self.ontology.annotation_annotations, &assertions.annotation_annotations);
+        self.ontology.rules.extend_from_slice(&assertions.rules);
+        self.ontology.sources.extend_from_slice(&assertions.sources);
     }
 
-    /// Takes away what documents say; returns the axioms that were stated. Warns of what was not.
+    /// Removes the statements of documents, and warns about those that are not stated. Returns the removed
+    /// axioms.
     fn remove(
         &mut self,
-        go: &Ontology,
+        retractions: &Ontology,
         engine: &mut Engine,
         warnings: &mut Vec<Warning>,
     ) -> Vec<AnnotatedAxiom> {
-        let mut wanted: BTreeMap<Axiom, bool> =
-            go.axioms.iter().map(|annotated| (canonical(&annotated.axiom), false)).collect();
+        let mut is_found: BTreeMap<Axiom, bool> =
+            retractions.axioms.iter().map(|annotated| (canonical(&annotated.axiom), false)).collect();
         let mut removed = Vec::new();
-        if !wanted.is_empty() {
+        if !is_found.is_empty() {
             removed.extend(self.ontology.axioms.extract_if(.., |annotated| {
-                let found = wanted.get_mut(&canonical(&annotated.axiom));
-                found.map(|found| *found = true).is_some()
+                let flag = is_found.get_mut(&canonical(&annotated.axiom));
+                flag.map(|flag| *flag = true).is_some()
             }));
         }
         let missing: Vec<Axiom> =
-            wanted.into_iter().filter(|(_, found)| !found).map(|(axiom, _)| axiom).collect();
+            is_found.into_iter().filter(|(_, flag)| !flag).map(|(axiom, _)| axiom).collect();
         removed.extend(self.remove_by_value(missing, engine, warnings));
         let mut rules: Vec<(_, &Rule, bool)> =
-            go.rules.iter().map(|rule| (content(rule), rule, false)).collect();
+            retractions.rules.iter().map(|rule| (content(rule), rule, false)).collect();
         self.ontology.rules.retain(|rule| {
-            let own = content(rule);
-            let found = rules.iter_mut().find(|(content, ..)| *content == own);
-            found.map(|found| found.2 = true).is_none()
+            let rule_content = content(rule);
+            let entry = rules.iter_mut().find(|(content, ..)| *content == rule_content);
+            entry.map(|entry| entry.2 = true).is_none()
         });
-        let missing = rules.iter().filter(|(.., found)| !found);
+        let missing = rules.iter().filter(|(.., is_removed)| !is_removed);
         warnings
             .extend(missing.map(|(_, rule, _)| Warning::NotStated { statement: format!("the rule {rule}") }));
-        let gone: BTreeSet<_> = go.annotations.iter().collect();
-        self.ontology.annotations.retain(|annotation| !gone.contains(annotation));
-        let gone: BTreeSet<_> =
-            go.annotations.iter().map(|(subject, annotation)| (subject, annotation)).collect();
+        let retracted_annotations: BTreeSet<_> = retractions.annotations.iter().collect();
+        self.ontology.annotations.retain(|annotation| !retracted_annotations.contains(annotation));
+        let retracted_annotations: BTreeSet<_> =
+            retractions.annotations.iter().map(|(subject, annotation)| (subject, annotation)).collect();
         self.ontology
             .annotation_annotations
-            .retain(|(subject, annotation, _)| !gone.contains(&(subject, annotation)));
+            .retain(|(subject, annotation, _)| !retracted_annotations.contains(&(subject, annotation)));
         removed
     }
 
-    /// Takes away the assertions that state the same facts as these, in other words: literals are one by value.
+    /// Removes the assertions that state the same fact as a missing axiom with different literals: literals are
+    /// compared by value.
     fn remove_by_value(
         &mut self,
         missing: Vec<Axiom>,
@@ -202,27 +213,30 @@ impl Stated {
     ) -> Vec<AnnotatedAxiom> {
         let mut removed = Vec::new();
         for axiom in missing {
-            let one = [AnnotatedAxiom { axiom, annotations: Vec::new() }];
-            let wanted = facts(&one, engine.symbols_mut());
+            let retraction = [AnnotatedAxiom { axiom, annotations: Vec::new() }];
+            let retracted_facts = facts(&retraction, engine.symbols_mut());
             let before = removed.len();
-            if let [fact] = &wanted[..] {
+            if let [fact] = &retracted_facts[..] {
                 let symbols = engine.symbols_mut();
                 let states = |other: &mut AnnotatedAxiom| {
-                    resembles(&one[0].axiom, &other.axiom)
+                    resembles(&retraction[0].axiom, &other.axiom)
                         && facts(std::slice::from_ref(other), symbols) == std::slice::from_ref(fact)
                 };
                 removed.extend(self.ontology.axioms.extract_if(.., states));
             }
-            let is_stated = !wanted.is_empty() && wanted.iter().all(|fact| engine.is_asserted(fact));
+            let is_stated =
+                !retracted_facts.is_empty() && retracted_facts.iter().all(|fact| engine.is_asserted(fact));
             if removed.len() == before && !is_stated {
-                warnings.push(Warning::NotStated { statement: one[0].axiom.to_string() });
+                warnings.push(Warning::NotStated { statement: retraction[0].axiom.to_string() });
             }
         }
         removed
     }
 
-    /// Whether axioms state nothing but facts, and no rule of the program is there because of which facts are stated.
+    /// Returns `true` if the axioms state only facts, and no rule of the program depends on the set of stated
+    /// names.
     fn is_plain(&self, axioms: &[AnnotatedAxiom], program: &Program, symbols: &Symbols) -> bool {
+        // The rules and facts of `owl:Thing` depend on all names that are stated.
         let thing = symbols.find_name(owl::THING);
         let concludes_thing = |rule: &EngineRule| {
             rule.head.iter().any(
@@ -250,28 +264,33 @@ impl Stated {
         })
     }
 
-    /// Takes off the facts that another axiom states, too.
-    fn keep_supported(&self, change: &[AnnotatedAxiom], unsaid: &mut FxHashSet<Fact>, symbols: &mut Symbols) {
-        if unsaid.is_empty() {
+    /// Removes the facts that a remaining axiom states, too.
+    fn keep_supported(
+        &self,
+        change: &[AnnotatedAxiom],
+        deleted: &mut FxHashSet<Fact>,
+        symbols: &mut Symbols,
+    ) {
+        if deleted.is_empty() {
             return;
         }
-        let about: HashSet<&Iri> = change.iter().flat_map(|annotated| about(&annotated.axiom)).collect();
-        let others = self.ontology.axioms.iter().filter(|other| about_any(&other.axiom, &about));
-        for other in others {
-            for fact in facts(std::slice::from_ref(other), symbols) {
-                unsaid.remove(&fact);
+        let individuals: HashSet<&Iri> =
+            change.iter().flat_map(|annotated| individuals_of(&annotated.axiom)).collect();
+        let related =
+            self.ontology.axioms.iter().filter(|annotated| mentions_any(&annotated.axiom, &individuals));
+        for annotated in related {
+            for fact in facts(std::slice::from_ref(annotated), symbols) {
+                deleted.remove(&fact);
             }
         }
     }
 }
 
-/// The facts that axioms state, in no order.
 fn facts(axioms: &[AnnotatedAxiom], symbols: &mut Symbols) -> Vec<Fact> {
     lower_assertions(axioms, symbols)
 }
 
-/// The individuals of an assertion.
-fn about(axiom: &Axiom) -> Vec<&Iri> {
+fn individuals_of(axiom: &Axiom) -> Vec<&Iri> {
     match axiom {
         Axiom::ClassAssertion(_, individual) | Axiom::DataPropertyAssertion(_, individual, _) => {
             vec![individual]
@@ -284,94 +303,98 @@ fn about(axiom: &Axiom) -> Vec<&Iri> {
     }
 }
 
-fn about_any(axiom: &Axiom, individuals: &HashSet<&Iri>) -> bool {
-    about(axiom).into_iter().any(|individual| individuals.contains(individual))
+fn mentions_any(axiom: &Axiom, individuals: &HashSet<&Iri>) -> bool {
+    individuals_of(axiom).into_iter().any(|individual| individuals.contains(individual))
 }
 
-/// Whether two assertions are about one individual, and may state one fact.
-fn resembles(one: &Axiom, other: &Axiom) -> bool {
-    about(other).into_iter().any(|individual| about(one).contains(&individual))
+/// Returns `true` if two assertions share an individual, so that they may state the same fact.
+fn resembles(first: &Axiom, second: &Axiom) -> bool {
+    individuals_of(second).into_iter().any(|individual| individuals_of(first).contains(&individual))
 }
 
-/// No document can name an individual of another document that has no name.
-fn nameless(go: &Ontology) -> Result<(), Errors> {
-    let is_nameless = |statement: &dyn Debug| format!("{statement:?}").contains(ANONYMOUS);
-    let axioms = go.axioms.iter().map(|annotated| &annotated.axiom).filter(|axiom| is_nameless(axiom));
-    let rules = go.rules.iter().filter(|rule| is_nameless(&(&rule.body, &rule.head)));
+/// Rejects retracted statements with anonymous individuals: a blank node of one document never names an
+/// individual of another.
+fn reject_anonymous(retractions: &Ontology) -> Result<(), Errors> {
+    let is_anonymous = |statement: &dyn Debug| format!("{statement:?}").contains(ANONYMOUS);
+    let axioms =
+        retractions.axioms.iter().map(|annotated| &annotated.axiom).filter(|axiom| is_anonymous(axiom));
+    let rules = retractions.rules.iter().filter(|rule| is_anonymous(&(&rule.body, &rule.head)));
     let statements = axioms.map(ToString::to_string).chain(rules.map(ToString::to_string));
     Errors::unless_empty(statements.map(|statement| Error::Nameless { statement }))
 }
 
-/// The engine's rules after what is lowered has changed, or `None` where it has not. The place of an axiom among others
-/// does not matter, so that what stays keeps its derivations.
-fn exchanged(program: &Program, before: &Program, after: &Program) -> Option<Program> {
+/// Replaces the rules of `before` by the rules of `after`. Returns `None` if nothing changes. The position of
+/// an axiom is ignored, so that the rules of remaining axioms keep their derivations.
+fn revised_program(program: &Program, before: &Program, after: &Program) -> Option<Program> {
     let content = |rule: &EngineRule| {
-        let mut own = rule.clone();
-        if *own.identity.source == *AXIOM_SOURCE {
-            own.identity.position = 0;
+        let mut copy = rule.clone();
+        if *copy.identity.source == *AXIOM_SOURCE {
+            copy.identity.position = 0;
         }
-        own
+        copy
     };
     let old: HashSet<EngineRule> = before.rules.iter().map(content).collect();
     let new: HashSet<EngineRule> = after.rules.iter().map(content).collect();
-    let is_gone = |rule: &&EngineRule| old.contains(&content(rule)) && !new.contains(&content(rule));
-    let mut rules: Vec<EngineRule> = program.rules.iter().filter(|rule| !is_gone(rule)).cloned().collect();
-    let held: HashSet<EngineRule> = rules.iter().map(content).collect();
-    let come =
-        after.rules.iter().filter(|rule| !old.contains(&content(rule)) && !held.contains(&content(rule)));
-    rules.extend(come.cloned());
+    let is_removed = |rule: &&EngineRule| old.contains(&content(rule)) && !new.contains(&content(rule));
+    let mut rules: Vec<EngineRule> = program.rules.iter().filter(|rule| !is_removed(rule)).cloned().collect();
+    let kept: HashSet<EngineRule> = rules.iter().map(content).collect();
+    let added =
+        after.rules.iter().filter(|rule| !old.contains(&content(rule)) && !kept.contains(&content(rule)));
+    rules.extend(added.cloned());
     let equality = program.equality || after.equality;
     (rules != program.rules || equality != program.equality).then_some(Program { rules, equality })
 }
 
-/// Body and head with variables numbered from the first on.
+/// Returns body and head with variables numbered by their first occurrence.
 fn content(rule: &Rule) -> (Vec<Atom>, Vec<Atom>) {
-    let mut seen: Vec<Iri> = Vec::new();
-    let mut renamed = |argument: &Argument| match argument {
+    let mut variables: Vec<Iri> = Vec::new();
+    let mut renumbered = |argument: &Argument| match argument {
         Argument::Variable(iri) => {
-            let place = seen.iter().position(|known| known == iri).unwrap_or(seen.len());
-            if place == seen.len() {
-                seen.push(iri.clone());
+            let number = variables.iter().position(|variable| variable == iri).unwrap_or(variables.len());
+            if number == variables.len() {
+                variables.push(iri.clone());
             }
-            Argument::Variable(place.to_string().into())
+            Argument::Variable(number.to_string().into())
         }
         other => other.clone(),
     };
-    let mut all = |atoms: &[Atom]| atoms.iter().map(|atom| with_arguments(atom, &mut renamed)).collect();
-    (all(&rule.body), all(&rule.head))
+    let mut renumber_all =
+        |atoms: &[Atom]| atoms.iter().map(|atom| with_arguments(atom, &mut renumbered)).collect();
+    (renumber_all(&rule.body), renumber_all(&rule.head))
 }
 
-fn with_arguments(atom: &Atom, new: &mut impl FnMut(&Argument) -> Argument) -> Atom {
+fn with_arguments(atom: &Atom, map: &mut impl FnMut(&Argument) -> Argument) -> Atom {
     match atom {
-        Atom::Class(class, x) => Atom::Class(class.clone(), new(x)),
-        Atom::DataRange(range, x) => Atom::DataRange(range.clone(), new(x)),
-        Atom::ObjectProperty(property, x, y) => Atom::ObjectProperty(property.clone(), new(x), new(y)),
-        Atom::DataProperty(property, x, y) => Atom::DataProperty(property.clone(), new(x), new(y)),
-        Atom::SameIndividual(x, y) => Atom::SameIndividual(new(x), new(y)),
-        Atom::DifferentIndividuals(x, y) => Atom::DifferentIndividuals(new(x), new(y)),
+        Atom::Class(class, x) => Atom::Class(class.clone(), map(x)),
+        Atom::DataRange(range, x) => Atom::DataRange(range.clone(), map(x)),
+        Atom::ObjectProperty(property, x, y) => Atom::ObjectProperty(property.clone(), map(x), map(y)),
+        Atom::DataProperty(property, x, y) => Atom::DataProperty(property.clone(), map(x), map(y)),
+        Atom::SameIndividual(x, y) => Atom::SameIndividual(map(x), map(y)),
+        Atom::DifferentIndividuals(x, y) => Atom::DifferentIndividuals(map(x), map(y)),
         Atom::BuiltIn(built_in, arguments) => {
-            Atom::BuiltIn(built_in.clone(), arguments.iter().map(new).collect())
+            Atom::BuiltIn(built_in.clone(), arguments.iter().map(map).collect())
         }
     }
 }
 
-/// The axiom with the members of its sets in order.
+/// Returns the axiom in a canonical form: members of sets are sorted, and assertions of inverses are turned
+/// around.
 fn canonical(axiom: &Axiom) -> Axiom {
     fn ordered<T: Ord + Clone>(items: &[T]) -> Vec<T> {
         items.iter().cloned().collect::<BTreeSet<T>>().into_iter().collect()
     }
-    let all = |classes: &[ClassExpression]| ordered(&classes.iter().map(sorted).collect::<Vec<_>>());
+    let sorted_set = |classes: &[ClassExpression]| ordered(&classes.iter().map(sorted).collect::<Vec<_>>());
     match axiom {
         Axiom::SubClassOf(sub, sup) => Axiom::SubClassOf(sorted(sub), sorted(sup)),
-        Axiom::EquivalentClasses(classes) => Axiom::EquivalentClasses(all(classes)),
-        Axiom::DisjointClasses(classes) => Axiom::DisjointClasses(all(classes)),
-        Axiom::DisjointUnion(class, parts) => Axiom::DisjointUnion(class.clone(), all(parts)),
+        Axiom::EquivalentClasses(classes) => Axiom::EquivalentClasses(sorted_set(classes)),
+        Axiom::DisjointClasses(classes) => Axiom::DisjointClasses(sorted_set(classes)),
+        Axiom::DisjointUnion(class, parts) => Axiom::DisjointUnion(class.clone(), sorted_set(parts)),
         Axiom::EquivalentObjectProperties(properties) => {
             Axiom::EquivalentObjectProperties(ordered(properties))
         }
         Axiom::DisjointObjectProperties(properties) => Axiom::DisjointObjectProperties(ordered(properties)),
-        Axiom::InverseObjectProperties(one, other) => {
-            Axiom::InverseObjectProperties(one.min(other).clone(), one.max(other).clone())
+        Axiom::InverseObjectProperties(first, second) => {
+            Axiom::InverseObjectProperties(first.min(second).clone(), first.max(second).clone())
         }
         Axiom::ObjectPropertyDomain(property, class) => {
             Axiom::ObjectPropertyDomain(property.clone(), sorted(class))
@@ -402,13 +425,14 @@ fn canonical(axiom: &Axiom) -> Axiom {
     }
 }
 
-/// The expression with the members of its sets in order.
+/// Returns the expression with sorted members of its sets.
 fn sorted(class: &ClassExpression) -> ClassExpression {
     use ClassExpression as C;
-    let all = |classes: &[C]| classes.iter().map(sorted).collect::<BTreeSet<_>>().into_iter().collect();
+    let sorted_set =
+        |classes: &[C]| classes.iter().map(sorted).collect::<BTreeSet<_>>().into_iter().collect();
     match class {
-        C::IntersectionOf(classes) => C::IntersectionOf(all(classes)),
-        C::UnionOf(classes) => C::UnionOf(all(classes)),
+        C::IntersectionOf(classes) => C::IntersectionOf(sorted_set(classes)),
+        C::UnionOf(classes) => C::UnionOf(sorted_set(classes)),
         C::OneOf(individuals) => {
             C::OneOf(individuals.iter().cloned().collect::<BTreeSet<_>>().into_iter().collect())
         }

@@ -6,7 +6,7 @@ use super::Builder;
 use crate::owl::{ANONYMOUS, Annotation, AnnotationValue, Iri};
 
 impl Builder {
-    /// Adds an axiom about an annotation property, which an ontology keeps as an annotation.
+    /// Stores an axiom about an annotation property as an annotation of this property.
     pub(super) fn annotate_property(
         &mut self,
         property: &str,
@@ -18,10 +18,10 @@ impl Builder {
         self.annotate(subject, Annotation { property, value }, annotations);
     }
 
-    /// Adds an annotation with its own annotations.
+    /// Adds an annotation of `subject`; `annotations` are annotations of this annotation.
     pub(super) fn annotate(&mut self, subject: Iri, annotation: Annotation, annotations: Vec<Annotation>) {
-        let own = annotations.into_iter().map(|own| (subject.clone(), annotation.clone(), own));
-        self.parts.annotation_annotations.extend(own);
+        let nested = annotations.into_iter().map(|nested| (subject.clone(), annotation.clone(), nested));
+        self.parts.annotation_annotations.extend(nested);
         self.parts.annotations.push((subject, annotation));
     }
 
@@ -29,7 +29,7 @@ impl Builder {
         let value = match &annotation.av {
             ho::AnnotationValue::Literal(literal) => AnnotationValue::Literal(self.literal(literal)),
             ho::AnnotationValue::IRI(iri) => AnnotationValue::Iri(self.iri(iri)),
-            // Blank nodes that are only the value of an annotation have no identity of their own.
+            // A blank node that is only the value of an annotation needs no identity.
             ho::AnnotationValue::AnonymousIndividual(_) => AnnotationValue::Iri(self.iri(ANONYMOUS)),
         };
         Annotation { property: self.iri(&annotation.ap), value }

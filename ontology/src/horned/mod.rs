@@ -1,7 +1,8 @@
-//! The only module that knows horned-owl: normalised triples through its RDF reader into our own structures, and
-//! (`transcribe`) OWL/XML and functional-style documents through its readers into triples.
+//! The interface to horned-owl, which no other module uses: its RDF reader converts normalised triples to our
+//! own structures; its OWL/XML and functional-style readers convert documents to triples (`transcribe`).
 //!
-//! horned-owl returns sets in hash order; everything is sorted here. What it leaves over becomes warnings.
+//! horned-owl returns sets in hash order, so this module sorts them. Triples that it cannot place become
+//! warnings.
 
 mod annotations;
 mod sort;
@@ -27,11 +28,12 @@ use crate::owl::{
 };
 use crate::vocab::{rdfs, swrla};
 
-/// What a class expression is called of which no axiom says anything.
+/// Prefix of the warning about a class expression that no axiom uses.
 pub(crate) const UNUSED_CLASS: &str = "the class expression ";
 
-/// Reads a normalised N-Triples document about the ontology `about`, and adds what it says to `plain`, whose IRIs are
-/// `names`; `origins` says where each rule comes from.
+/// Reads the normalised N-Triples document of the ontology `about` and adds its axioms, annotations and rules
+/// to `plain`. `names` are the IRIs that `plain` uses. `origins` has the source of each rule, by the index in
+/// its `ORIGIN` annotation.
 pub(crate) fn build(
     ntriples: &[u8],
     about: &str,
@@ -60,12 +62,12 @@ fn build_here(
             )?;
         parser.parse()
     };
-    let (ontology, rest) = reading().map_err(|error| plain_text(&error.to_string()))?;
+    let (ontology, incomplete) = reading().map_err(|error| plain_text(&error.to_string()))?;
     let mut builder = Builder { ontology: about.into(), names, parts: plain, rules: Vec::new() };
     for annotated in ontology {
         builder.component(annotated.component, annotated.ann);
     }
-    let unread = builder.leftovers(&rest);
+    let unread = builder.leftovers(&incomplete);
     let Builder { mut parts, mut rules, names, .. } = builder;
     rules.sort_by_key(|(index, _)| *index);
     parts.rules =
@@ -85,13 +87,13 @@ fn located(rule: Rule, origin: &Origin) -> Rule {
     Rule { ontology: origin.ontology.clone(), position: origin.position, iri: origin.iri.clone(), ..rule }
 }
 
-/// Converts components, sharing the text of each IRI.
+/// Converts components of horned-owl. Equal IRIs share one text.
 struct Builder {
-    /// The IRI of the first document, or nothing.
+    /// IRI of the first document; empty if it declares none.
     ontology: Iri,
     names: Names,
     parts: Parts,
-    /// Rules with their index among the origins.
+    /// Rules with their indices in `origins`.
     rules: Vec<(usize, Rule)>,
 }
 
@@ -163,7 +165,7 @@ impl Builder {
         let head = rule.head.iter().filter_map(|atom| self.atom(atom)).collect();
         let ontology = self.iri("");
         let rule = Rule { ontology, position: 0, iri: None, label, enabled, annotations, body, head };
-        // Several origins where equal rules without variables were taken for one.
+        // horned-owl merges equal rules without variables; such a rule has several origins.
         let indices = origins.into_iter().filter_map(|origin| match origin.value {
             AnnotationValue::Literal(index) => index.lexical.parse().ok(),
             AnnotationValue::Iri(_) => None,
@@ -171,7 +173,7 @@ impl Builder {
         self.rules.extend(indices.map(|index| (index, rule.clone())));
     }
 
-    /// An atom, or `None` for the one that stands for an empty body or head.
+    /// Returns `None` for the marker atom that normalisation adds to an empty body or head.
     fn atom(&mut self, atom: &ho::Atom<RcStr>) -> Option<Atom> {
         Some(match atom {
             ho::Atom::BuiltInAtom { pred, args } => {
@@ -216,8 +218,8 @@ impl Builder {
         if let Some(individual) = name.strip_prefix(INDIVIDUAL) {
             return Argument::Individual(self.iri(individual));
         }
-        let numbered = name.strip_prefix(VARIABLE).and_then(|rest| rest.split_once(':'));
-        Argument::Variable(self.iri(numbered.map_or(name, |(_, own)| own)))
+        let numbered = name.strip_prefix(VARIABLE).and_then(|suffix| suffix.split_once(':'));
+        Argument::Variable(self.iri(numbered.map_or(name, |(_, original)| original)))
     }
 
     fn named(&mut self, individual: &ho::Individual<RcStr>) -> Iri {
@@ -338,7 +340,7 @@ impl Builder {
         }
     }
 
-    /// The axiom, or `None` for components that are none (ontology headers, annotation axioms).
+    /// Returns `None` if the component is not an axiom (ontology header, annotation axiom).
     fn axiom(&mut self, component: &Component<RcStr>) -> Option<Axiom> {
         use Characteristic as C;
         let characteristic =
@@ -409,20 +411,21 @@ impl Builder {
         })
     }
 
-    /// One warning for each thing that horned-owl could not place.
-    fn leftovers(&mut self, rest: &IncompleteParse<RcStr>) -> Vec<Warning> {
+    /// Returns one warning for each statement that horned-owl could not place.
+    fn leftovers(&mut self, incomplete: &IncompleteParse<RcStr>) -> Vec<Warning> {
         let triple = |[subject, predicate, object]: &[Term<RcStr>; 3]| {
             format!("{} {} {}", term(subject), term(predicate), term(object))
         };
-        let simple = rest.simple.iter().map(|found| triple(found.triple()));
-        let nodes = rest.bnode.iter().flat_map(|found| found.vec_triple().iter().map(triple));
-        let lists = rest.bnode_seq.iter().map(|items| {
+        let simple = incomplete.simple.iter().map(|entry| triple(entry.triple()));
+        let nodes = incomplete.bnode.iter().flat_map(|entry| entry.vec_triple().iter().map(triple));
+        let lists = incomplete.bnode_seq.iter().map(|items| {
             let items: Vec<_> = items.iter().map(term).collect();
             format!("the list ({})", items.join(" "))
         });
         let classes =
-            rest.class_expression.iter().map(|class| format!("{UNUSED_CLASS}{}", self.class(class)));
-        let annotations = rest.ann_map.keys().map(|about| format!("an annotation of {}", triple(about)));
+            incomplete.class_expression.iter().map(|class| format!("{UNUSED_CLASS}{}", self.class(class)));
+        let annotations =
+            incomplete.ann_map.keys().map(|about| format!("an annotation of {}", triple(about)));
         let statements = simple.chain(nodes).chain(lists).chain(classes).chain(annotations);
         let reason = || "part of no axiom or rule".to_owned();
         statements.map(|statement| Warning::Unread { statement, reason: reason() }).collect()
@@ -458,13 +461,14 @@ fn entity(component: &Component<RcStr>) -> Option<(EntityKind, &str)> {
     })
 }
 
-/// A message of horned-owl, in which debug forms show IRIs, with the IRIs alone.
+/// Reduces a message of horned-owl, which contains debug output, to its summary and the IRIs.
 fn plain_text(message: &str) -> String {
-    let Some((what, rest)) = message.split_once(": ").filter(|(_, rest)| rest.contains('"')) else {
+    let Some((summary, details)) = message.split_once(": ").filter(|(_, details)| details.contains('"'))
+    else {
         return message.to_owned();
     };
-    let names: Vec<_> = rest.split('"').skip(1).step_by(2).map(|name| format!("<{name}>")).collect();
-    format!("{what}: {}", names.join(" "))
+    let names: Vec<_> = details.split('"').skip(1).step_by(2).map(|name| format!("<{name}>")).collect();
+    format!("{summary}: {}", names.join(" "))
 }
 
 fn term(term: &Term<RcStr>) -> String {
@@ -475,9 +479,9 @@ fn term(term: &Term<RcStr>) -> String {
         Term::RDF(word) => format!("<{}>", &***word),
         Term::RDFS(word) => format!("<{}>", &***word),
         Term::SWRL(word) => format!("<{}>", &***word),
-        // The label of a blank node is private; its debug form shows it in quotes.
-        other => {
-            let text = format!("{other:?}");
+        // `Term` does not expose the label of a blank node, but its debug output quotes it.
+        blank => {
+            let text = format!("{blank:?}");
             text.split('"').nth(1).map_or_else(|| text.clone(), |label| format!("_:{label}"))
         }
     }

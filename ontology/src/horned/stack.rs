@@ -1,12 +1,12 @@
-//! Room for horned-owl, which recurses into lists and expressions.
+//! Runs horned-owl on a thread with a large stack: it recurses along lists and expressions.
 
-/// The stack on which horned-owl runs, in bytes of address space: it recurses into lists and expressions.
-const STACK: usize = 1 << 29;
+/// Stack size in bytes. Only address space is reserved; pages are committed on use.
+const STACK_BYTES: usize = 1 << 29;
 
-/// Runs a reader or writer where long lists do not overflow the stack.
+/// Runs a reader or writer on the large stack. Returns an error if it panics or the thread cannot be started.
 pub(super) fn with_stack<T: Send>(run: impl FnOnce() -> T + Send) -> Result<T, String> {
     std::thread::scope(|scope| {
-        let thread = std::thread::Builder::new().stack_size(STACK).spawn_scoped(scope, run);
+        let thread = std::thread::Builder::new().stack_size(STACK_BYTES).spawn_scoped(scope, run);
         let thread = thread.map_err(|error| format!("there is no room for the OWL reader: {error}"))?;
         thread.join().map_err(|_| "the OWL reader failed on it".to_owned())
     })

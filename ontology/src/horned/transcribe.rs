@@ -1,4 +1,5 @@
-//! OWL/XML and functional-style documents as N-Triples, and N-Triples as OWL/XML, by the readers and writers of horned-owl.
+//! Transcribes OWL/XML and functional-style documents to N-Triples, and functional-style documents to OWL/XML,
+//! with the readers and writers of horned-owl.
 
 use horned_owl::error::{HornedError, Location};
 use horned_owl::io::{ParserConfiguration, ofn, owx, rdf};
@@ -9,15 +10,15 @@ use horned_owl::ontology::set::SetOntology;
 use super::stack::with_stack;
 use crate::read::syntax::Syntax;
 
-/// Why a document cannot be transcribed.
+/// The reason why a document cannot be transcribed.
 #[derive(Debug)]
 pub(crate) struct Fault {
-    /// Bytes into the document, 0 where unknown.
+    /// Byte offset in the document; 0 if unknown.
     pub offset: usize,
     pub message: String,
 }
 
-/// What is wrong, without the place.
+/// Describes an error without its location.
 fn message(error: &HornedError) -> String {
     match error {
         HornedError::ValidityError(message, _) if message == "Unexpected EoF" => {
@@ -29,13 +30,13 @@ fn message(error: &HornedError) -> String {
     }
 }
 
-/// An OWL/XML or functional-style document as an N-Triples document.
+/// Converts an OWL/XML or functional-style document to N-Triples.
 pub(crate) fn transcribe(text: &[u8], syntax: Syntax) -> Result<Vec<u8>, Fault> {
     let fault = |error: HornedError| {
         let offset = match &error {
             HornedError::ParserError(_, location) | HornedError::ValidityError(_, location) => match location
             {
-                Location::BytePosition(at) => *at,
+                Location::BytePosition(position) => *position,
                 Location::ByteSpan(span) => span.start,
                 Location::Unknown => 0,
             },
@@ -57,7 +58,7 @@ pub(crate) fn transcribe(text: &[u8], syntax: Syntax) -> Result<Vec<u8>, Fault> 
     with_stack(|| transcription().map_err(fault)).map_err(panicked)?
 }
 
-/// A functional-style document as an OWL/XML document.
+/// Converts a functional-style document to OWL/XML.
 pub(crate) fn owl_xml(text: &[u8]) -> Result<String, String> {
     let transcription = || -> Result<Vec<u8>, HornedError> {
         let (mut text, build) = (text, ho::Build::new_rc());

@@ -1,4 +1,4 @@
-//! Axioms to rules (OWL 2 RL, table by table) and assertions to facts.
+//! Lowers axioms to rules, following the tables of OWL 2 RL, and assertions to facts.
 
 use rules::{Atom, RuleIdentity, Term};
 
@@ -13,10 +13,11 @@ use crate::owl::{
 };
 use crate::vocab::owl;
 
-/// What keeps (a part of) an axiom from becoming rules.
-type Outside = Result<(), &'static str>;
+/// Result of lowering an axiom. The error is the reason why the axiom, or a part of it, has no rule form.
+type LoweringResult = Result<(), &'static str>;
 
-/// Adds the rules of all axioms that are not plain assertions; a summary follows the warnings about what has none.
+/// Adds the rules of all axioms that are not plain assertions. Axioms without a complete rule form cause a
+/// warning each, and one summary.
 pub(crate) fn lower_rules(axioms: &[AnnotatedAxiom], context: &mut Context) {
     let mut outside = 0;
     for (position, annotated) in axioms.iter().enumerate() {
@@ -46,7 +47,8 @@ pub(crate) fn lower_assertions(axioms: &[AnnotatedAxiom], context: &mut Context)
     }
 }
 
-/// Whether an axiom states facts about named classes and properties (or only names a data range).
+/// Returns `true` if the axiom has no rules: it is an assertion of a named class or property, or a datatype
+/// definition.
 fn is_assertion(axiom: &Axiom) -> bool {
     matches!(
         axiom,
@@ -57,10 +59,11 @@ fn is_assertion(axiom: &Axiom) -> bool {
     )
 }
 
-/// Adds the facts of an assertion about named classes and properties; nothing for any other axiom.
+/// Adds the facts of an assertion about named classes and properties, `sameAs` or `differentFrom`. Ignores
+/// other axioms.
 fn assertion(context: &mut Context, axiom: &Axiom) {
     match axiom {
-        // That an individual is one need not be said, unless something asks.
+        // `vocabulary` adds the facts of `owl:Thing` if something depends on them.
         Axiom::ClassAssertion(ClassExpression::Class(class), individual) if &**class != owl::THING => {
             let (class, individual) = (context.iri(class), context.iri(individual));
             context.state(class, [individual]);
@@ -83,25 +86,25 @@ fn assertion(context: &mut Context, axiom: &Axiom) {
             context.state(property, [from, to]);
         }
         Axiom::SameIndividual(individuals) => {
-            let same = context.name(owl::SAME_AS);
+            let same_as = context.name(owl::SAME_AS);
             for pair in individuals.windows(2) {
                 let (first, second) = (context.name(&pair[0]), context.name(&pair[1]));
-                context.state(same, [first, second]);
+                context.state(same_as, [first, second]);
             }
         }
-        Axiom::DifferentIndividuals(individuals) if individuals.len() > groups::PAIRS => {
+        Axiom::DifferentIndividuals(individuals) if individuals.len() > groups::MAX_PAIRED_MEMBERS => {
             let member = groups::relation(context, &axiom.to_string());
-            for (place, individual) in individuals.iter().enumerate() {
-                let (individual, number) = (context.name(individual), groups::number(context, place));
+            for (index, individual) in individuals.iter().enumerate() {
+                let (individual, number) = (context.name(individual), groups::number(context, index));
                 context.state(member, [individual, number]);
             }
         }
         Axiom::DifferentIndividuals(individuals) => {
-            let different = context.name(owl::DIFFERENT_FROM);
-            for (place, first) in individuals.iter().enumerate() {
-                for second in &individuals[place + 1..] {
+            let different_from = context.name(owl::DIFFERENT_FROM);
+            for (index, first) in individuals.iter().enumerate() {
+                for second in &individuals[index + 1..] {
                     let (first, second) = (context.name(first), context.name(second));
-                    context.state(different, [first, second]);
+                    context.state(different_from, [first, second]);
                 }
             }
         }
@@ -109,7 +112,7 @@ fn assertion(context: &mut Context, axiom: &Axiom) {
     }
 }
 
-/// One axiom on its way.
+/// The lowering of one axiom.
 struct Lowering<'c, 'a> {
     identity: RuleIdentity,
     context: &'c mut Context<'a>,
@@ -120,7 +123,7 @@ impl Lowering<'_, '_> {
         self.context.rule(&self.identity, head, body, variables);
     }
 
-    fn axiom(&mut self, axiom: &Axiom) -> Outside {
+    fn axiom(&mut self, axiom: &Axiom) -> LoweringResult {
         match axiom {
             Axiom::SubClassOf(sub, sup) => {
                 self.sub_class(sub, sup);
@@ -139,7 +142,7 @@ impl Lowering<'_, '_> {
                 Ok(())
             }
             Axiom::DifferentIndividuals(individuals) => {
-                if individuals.len() > groups::PAIRS {
+                if individuals.len() > groups::MAX_PAIRED_MEMBERS {
                     let member = groups::relation(self.context, &axiom.to_string());
                     groups::forbid(self.context, &self.identity, member);
                 }
@@ -179,13 +182,13 @@ impl Lowering<'_, '_> {
         }
     }
 
-    /// Axioms about properties.
-    fn properties(&mut self, axiom: &Axiom) -> Outside {
+    /// Lowers axioms about properties.
+    fn properties(&mut self, axiom: &Axiom) -> LoweringResult {
         let data = |iris: &[Iri]| -> Vec<Property> { iris.iter().cloned().map(Property::Property).collect() };
-        let one = |iri: &Iri| Property::Property(iri.clone());
+        let named = |iri: &Iri| Property::Property(iri.clone());
         match axiom {
             Axiom::SubObjectPropertyOf(sub, sup) => self.sub_property(sub, sup),
-            Axiom::SubDataPropertyOf(sub, sup) => self.sub_property(&one(sub), &one(sup)),
+            Axiom::SubDataPropertyOf(sub, sup) => self.sub_property(&named(sub), &named(sup)),
             Axiom::SubPropertyChainOf(chain, sup) => self.chain(chain, sup),
             Axiom::EquivalentObjectProperties(properties) => self.equivalent_properties(properties),
             Axiom::EquivalentDataProperties(properties) => self.equivalent_properties(&data(properties)),
@@ -193,11 +196,11 @@ impl Lowering<'_, '_> {
             Axiom::DisjointDataProperties(properties) => self.disjoint_properties(&data(properties)),
             Axiom::InverseObjectProperties(first, second) => {
                 let inverse = Property::Inverse(second.clone());
-                self.equivalent_properties(&[one(first), inverse]);
+                self.equivalent_properties(&[named(first), inverse]);
             }
             Axiom::ObjectPropertyDomain(property, class) => self.end(property, class, true),
             Axiom::ObjectPropertyRange(property, class) => self.end(property, class, false),
-            Axiom::DataPropertyDomain(property, class) => self.end(&one(property), class, true),
+            Axiom::DataPropertyDomain(property, class) => self.end(&named(property), class, true),
             Axiom::DataPropertyRange(property, range) => return self.data_range(property, range),
             Axiom::FunctionalDataProperty(property) => {
                 let mut v = Variables::default();
@@ -217,9 +220,10 @@ impl Lowering<'_, '_> {
         let bodies = class::condition(self.context, sub, x, &mut variables);
         let conclusions = class::conclusions(self.context, sup, x, &mut variables);
         for body in &bodies {
-            for (more, head) in &conclusions {
-                let mut body: Conjunction = body.iter().chain(more).cloned().collect();
-                // Where nothing may be, nothing has to be named for a contradiction.
+            for (conditions, head) in &conclusions {
+                let mut body: Conjunction = body.iter().chain(conditions).cloned().collect();
+                // A contradiction without a condition (`Thing ⊑ Nothing`) needs no individual. Any other head
+                // has to bind `x`.
                 if body.is_empty() && !head.is_empty() {
                     body.push(self.context.thing(x));
                 }
@@ -228,7 +232,7 @@ impl Lowering<'_, '_> {
         }
     }
 
-    /// A circle of subclass axioms; the directions that have a rule form are kept.
+    /// Lowers a cycle of subclass axioms. Directions without a rule form are gaps.
     fn equivalent_classes(&mut self, classes: &[ClassExpression]) {
         for (sub, sup) in classes.iter().zip(classes.iter().cycle().skip(1)) {
             self.sub_class(sub, sup);
@@ -236,12 +240,13 @@ impl Lowering<'_, '_> {
     }
 
     fn disjoint_classes(&mut self, classes: &[ClassExpression], axiom: &str) {
-        if classes.len() > groups::PAIRS {
+        if classes.len() > groups::MAX_PAIRED_MEMBERS {
+            // Linear in the number of classes; pairs would be quadratic.
             let member = groups::relation(self.context, axiom);
             for (place, class) in classes.iter().enumerate() {
                 let mut variables = Variables::default();
                 let x = variables.fresh("x");
-                let number = Term::Constant(groups::number(self.context, place));
+                let number = Term::Constant(groups::number(self.context, index));
                 for body in class::condition(self.context, class, x, &mut variables) {
                     self.rule(body, vec![Atom::relation(member, [x, number])], &variables);
                 }
@@ -250,7 +255,7 @@ impl Lowering<'_, '_> {
             return;
         }
         for (place, first) in classes.iter().enumerate() {
-            for second in &classes[place + 1..] {
+            for second in &classes[index + 1..] {
                 let mut variables = Variables::default();
                 let x = variables.fresh("x");
                 let left = class::condition(self.context, first, x, &mut variables);
@@ -262,30 +267,33 @@ impl Lowering<'_, '_> {
         }
     }
 
-    /// Names of classes and properties that stand for one entity stand for one class or property (eq-rep).
+    /// Classes and properties that are stated to be the same individual have the same members (rule eq-rep of
+    /// OWL 2 RL).
     fn same_entities(&mut self, entities: &[Iri]) {
-        let any = |context: &Context, kind| entities.iter().any(|iri| context.is(kind, iri));
-        let one = |iri: &Iri| Property::Property(iri.clone());
-        if any(self.context, EntityKind::Class) {
+        let any_is = |context: &Context, kind| entities.iter().any(|iri| context.is(kind, iri));
+        let named = |iri: &Iri| Property::Property(iri.clone());
+        if any_is(self.context, EntityKind::Class) {
             let classes: Vec<_> = entities.iter().cloned().map(ClassExpression::Class).collect();
             self.equivalent_classes(&classes);
         }
-        if any(self.context, EntityKind::ObjectProperty) || any(self.context, EntityKind::DataProperty) {
-            self.equivalent_properties(&entities.iter().map(one).collect::<Vec<_>>());
+        if any_is(self.context, EntityKind::ObjectProperty) || any_is(self.context, EntityKind::DataProperty)
+        {
+            self.equivalent_properties(&entities.iter().map(named).collect::<Vec<_>>());
         }
     }
 
-    fn disjoint_union(&mut self, class: &Iri, parts: &[ClassExpression]) -> Outside {
+    fn disjoint_union(&mut self, class: &Iri, parts: &[ClassExpression]) -> LoweringResult {
         let text = Axiom::DisjointUnion(class.clone(), parts.to_vec()).to_string();
         let class = ClassExpression::Class(class.clone());
         for part in parts {
             self.sub_class(part, &class);
         }
+        // Disjointness and inclusion are lowered; covering would be a disjunctive conclusion.
         self.disjoint_classes(parts, &text);
         Err("that the parts cover the class")
     }
 
-    /// Two named members that agree on all key properties are one.
+    /// Merges two members of the class that agree on all key properties (prp-key).
     fn key(&mut self, class: &ClassExpression, objects: &[Property], data: &[Iri]) {
         let mut variables = Variables::default();
         let (x, y) = (variables.fresh("x"), variables.fresh("y"));
@@ -338,30 +346,30 @@ impl Lowering<'_, '_> {
     fn disjoint_properties(&mut self, properties: &[Property]) {
         let mut variables = Variables::default();
         let (x, y) = (variables.fresh("x"), variables.fresh("y"));
-        for (place, first) in properties.iter().enumerate() {
-            for second in &properties[place + 1..] {
+        for (index, first) in properties.iter().enumerate() {
+            for second in &properties[index + 1..] {
                 let body = vec![self.context.property(first, x, y), self.context.property(second, x, y)];
                 self.rule(body, Vec::new(), &variables);
             }
         }
     }
 
-    /// Domain (of the subject) or range (of the object).
+    /// Lowers the domain of a property (`subject` is true) or its range.
     fn end(&mut self, property: &Property, class: &ClassExpression, subject: bool) {
         let mut variables = Variables::default();
         let (x, y) = (variables.fresh("x"), variables.fresh("y"));
-        // The top properties relate every individual to every other, and to every value.
+        // A top property relates all individuals, so its domain or range applies to every individual.
         let (Property::Property(name) | Property::Inverse(name)) = property;
         let is_top = [owl::TOP_OBJECT_PROPERTY, owl::TOP_DATA_PROPERTY].contains(&&**name);
         let end = if subject { x } else { y };
         let edge = if is_top { self.context.thing(end) } else { self.context.property(property, x, y) };
-        for (more, head) in class::conclusions(self.context, class, end, &mut variables) {
-            let body = std::iter::once(edge.clone()).chain(more).collect();
+        for (conditions, head) in class::conclusions(self.context, class, end, &mut variables) {
+            let body = std::iter::once(edge.clone()).chain(conditions).collect();
             self.rule(body, head, &variables);
         }
     }
 
-    fn data_range(&mut self, property: &Iri, range: &DataRange) -> Outside {
+    fn data_range(&mut self, property: &Iri, range: &DataRange) -> LoweringResult {
         let mut variables = Variables::default();
         let (x, value) = (variables.fresh("x"), variables.fresh("v"));
         let edge = self.context.relation(property, [x, value]);

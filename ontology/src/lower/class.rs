@@ -1,4 +1,5 @@
-//! Class expressions as conditions (in bodies) and as conclusions (in heads), as far as OWL 2 RL allows each.
+//! Lowers class expressions as conditions (in bodies) and as conclusions (in heads), as far as OWL 2 RL admits
+//! them.
 
 use rules::{Atom, Term};
 
@@ -7,10 +8,12 @@ use super::range;
 use crate::owl::{Axiom, Bound, ClassExpression, DataRange, ObjectPropertyExpression};
 use crate::vocab::owl;
 
-/// What follows from being in a class: for each part, further conditions and then heads (none for a contradiction).
+/// Consequences of membership in a class: additional conditions and head atoms. An empty head is a
+/// contradiction.
 pub(crate) type Conclusions = Vec<(Conjunction, Vec<Atom>)>;
 
-/// The ways in which `x` can be seen to be in `class`: any of the conjunctions. What cannot be seen is a gap.
+/// Returns alternative conjunctions; `x` is in `class` if one of them holds. A part without a rule form is
+/// recorded as a gap.
 pub(crate) fn condition(
     context: &mut Context,
     class: &ClassExpression,
@@ -23,24 +26,26 @@ pub(crate) fn condition(
         C::Class(iri) if &**iri == owl::NOTHING => Vec::new(),
         C::Class(iri) => vec![vec![context.relation(iri, [x])]],
         C::IntersectionOf(classes) => {
-            let parts = classes.iter().map(|class| (class, condition(context, class, x, variables)));
-            let parts: Vec<_> = parts.collect();
-            let size = parts.iter().fold(1, |size: usize, (_, part)| size.saturating_mul(part.len()));
+            let factors = classes.iter().map(|class| (class, condition(context, class, x, variables)));
+            let factors: Vec<_> = factors.collect();
+            let size = factors
+                .iter()
+                .fold(1, |size: usize, (_, alternatives)| size.saturating_mul(alternatives.len()));
             let mut product = vec![Vec::new()];
-            for (class, mut part) in parts {
-                if size > ALTERNATIVES {
-                    part = abbreviated(context, class, part, x);
+            for (class, mut alternatives) in factors {
+                if size > MAX_ALTERNATIVES {
+                    alternatives = abbreviated(context, class, alternatives, x);
                 }
-                product = cross(&product, &part);
+                product = cross(&product, &alternatives);
             }
             product
         }
         C::UnionOf(classes) => {
-            let mut any = Vec::new();
+            let mut alternatives = Vec::new();
             for class in classes {
-                any.extend(condition(context, class, x, variables));
+                alternatives.extend(condition(context, class, x, variables));
             }
-            any
+            alternatives
         }
         C::OneOf(individuals) => {
             individuals.iter().map(|iri| vec![Atom::Same(x, context.constant(iri))]).collect()
@@ -50,10 +55,10 @@ pub(crate) fn condition(
                 let name = relation_of(&restriction);
                 if context.abbreviated.insert(name.clone()) {
                     let mut variables = Variables::default();
-                    let own = variables.fresh("x");
-                    let head = context.relation(&name, [own]);
+                    let member = variables.fresh("x");
+                    let head = context.relation(&name, [member]);
                     let identity = context.identity.clone();
-                    for body in some_value(context, property, filler, own, &mut variables) {
+                    for body in some_value(context, property, filler, member, &mut variables) {
                         context.rule(&identity, vec![head.clone()], body, &variables);
                     }
                 }
@@ -86,7 +91,7 @@ pub(crate) fn condition(
     }
 }
 
-/// The ways in which `x` can be seen to have a value in a class.
+/// Returns alternative conjunctions for: `x` has a value in the class `filler`.
 fn some_value(
     context: &mut Context,
     property: &ObjectPropertyExpression,
@@ -99,10 +104,11 @@ fn some_value(
     cross(&edge, &condition(context, filler, y, variables))
 }
 
-/// A conjunction of unions is multiplied out up to so many alternatives.
-pub(crate) const ALTERNATIVES: usize = 16;
+/// Limit on the alternatives of a conjunction of unions that is expanded; larger ones use auxiliary relations.
+pub(crate) const MAX_ALTERNATIVES: usize = 16;
 
-/// The alternatives of being in a class as one, by an auxiliary relation that each of them concludes.
+/// Replaces several alternatives by one atom of an auxiliary relation, which a rule concludes from each
+/// alternative.
 pub(crate) fn abbreviated(
     context: &mut Context,
     class: &ClassExpression,
@@ -112,29 +118,30 @@ pub(crate) fn abbreviated(
     if alternatives.len() < 2 {
         return alternatives;
     }
-    // One is everything.
+    // An empty conjunction always holds.
     if alternatives.iter().any(Vec::is_empty) {
         return vec![Vec::new()];
     }
     let name = format!("{INTERNAL}class:{class}");
     if context.abbreviated.insert(name.clone()) {
         let mut variables = Variables::default();
-        let own = variables.fresh("x");
+        let member = variables.fresh("x");
         let identity = context.identity.clone();
-        for body in condition(context, class, own, &mut variables) {
-            let head = vec![context.relation(&name, [own])];
+        for body in condition(context, class, member, &mut variables) {
+            let head = vec![context.relation(&name, [member])];
             context.rule(&identity, head, body, &variables);
         }
     }
     vec![vec![context.relation(&name, [x])]]
 }
 
-/// As [`condition`], for a data range.
+/// Calls [`range::condition`]; a range without a rule form is recorded as a gap.
 fn range_condition(context: &mut Context, range: &DataRange, value: Term) -> Vec<Conjunction> {
     range::condition(context, range, value).unwrap_or_else(|reason| context.gap(reason))
 }
 
-/// What follows from `x` being in `class`. What cannot be concluded by rules is a gap.
+/// Returns the consequences of `x` being in `class`. Consequences that rules cannot express are recorded as
+/// gaps.
 pub(crate) fn conclusions(
     context: &mut Context,
     class: &ClassExpression,
@@ -148,11 +155,11 @@ pub(crate) fn conclusions(
         C::Class(iri) if &**iri == owl::NOTHING => vec![(Vec::new(), Vec::new())],
         C::Class(iri) => heads(context.relation(iri, [x])),
         C::IntersectionOf(classes) => {
-            let mut all = Vec::new();
+            let mut consequences = Vec::new();
             for class in classes {
-                all.extend(conclusions(context, class, x, variables));
+                consequences.extend(conclusions(context, class, x, variables));
             }
-            all
+            consequences
         }
         C::OneOf(individuals) if individuals.len() == 1 => {
             heads(Atom::Same(x, context.constant(&individuals[0])))
@@ -171,9 +178,9 @@ pub(crate) fn conclusions(
             forbidden.into_iter().map(|body| (body, Vec::new())).collect()
         }
         C::AllValuesFrom(property, filler) => {
-            let mut all = all_values(context, property, filler, x, variables);
-            all.extend(included(context, class, x));
-            all
+            let mut consequences = all_values(context, property, filler, x, variables);
+            consequences.extend(included(context, class, x));
+            consequences
         }
         C::DataAllValuesFrom(property, range) => {
             let value = variables.fresh("v");
@@ -195,24 +202,24 @@ pub(crate) fn conclusions(
             let bodies = cross(&bodies, &condition(context, filler, z, variables));
             bodies.into_iter().map(|body| (body, vec![Atom::Same(y, z)])).collect()
         }
-        C::DataCardinality(Bound::Max, most @ (0 | 1), property, range) => {
-            at_most(context, *most, property, range, x, variables)
+        C::DataCardinality(Bound::Max, limit @ (0 | 1), property, range) => {
+            at_most(context, *limit, property, range, x, variables)
         }
         C::Cardinality(Bound::Exact, n @ (0 | 1), property, filler) => {
-            let most = C::Cardinality(Bound::Max, *n, property.clone(), filler.clone());
-            let mut all = conclusions(context, &most, x, variables);
+            let at_most_n = C::Cardinality(Bound::Max, *n, property.clone(), filler.clone());
+            let mut consequences = conclusions(context, &at_most_n, x, variables);
             if *n == 1 {
                 context.gap::<()>(EXISTS);
-                all.extend(included(context, class, x));
+                consequences.extend(included(context, class, x));
             }
-            all
+            consequences
         }
         C::DataCardinality(Bound::Exact, n @ (0 | 1), property, range) => {
-            let all = at_most(context, *n, property, range, x, variables);
+            let consequences = at_most(context, *n, property, range, x, variables);
             if *n == 1 {
                 context.gap::<()>(EXISTS);
             }
-            all
+            consequences
         }
         C::Cardinality(Bound::Min, 0, ..) | C::DataCardinality(Bound::Min, 0, ..) => Vec::new(),
         C::SomeValuesFrom(property, filler) | C::Cardinality(Bound::Min, 1, property, filler) => {
@@ -236,7 +243,7 @@ pub(crate) fn conclusions(
     }
 }
 
-/// What follows from all values of `x` being in a class.
+/// Returns the consequences of all values of `x` being in the class `filler`.
 fn all_values(
     context: &mut Context,
     property: &ObjectPropertyExpression,
@@ -250,14 +257,14 @@ fn all_values(
     inner.into_iter().map(|(body, head)| (with(edge.clone(), body), head)).collect()
 }
 
-/// That `x` is in a restriction, where another restriction that is a condition includes it.
+/// Concludes the auxiliary relation of a restriction, if a condition includes the restriction.
 fn included(context: &mut Context, class: &ClassExpression, x: Term) -> Conclusions {
     let restriction = context.inclusions.conclusion(class);
     let atom = restriction.map(|restriction| context.relation(&relation_of(&restriction), [x]));
     atom.map(|atom| (Vec::new(), vec![atom])).into_iter().collect()
 }
 
-/// As [`included`], where nothing else of the class has a rule form.
+/// Calls [`included`] for a class without any other rule form, which is recorded as a gap.
 fn only_included(
     context: &mut Context,
     class: &ClassExpression,
@@ -279,17 +286,17 @@ pub(crate) fn lower_inclusions(context: &mut Context, position: usize) {
     }
 }
 
-/// The auxiliary relation of a restriction.
+/// Returns the name of a restriction's auxiliary relation.
 fn relation_of(restriction: &ClassExpression) -> String {
     format!("{INTERNAL}restriction:{restriction}")
 }
 
 const EXISTS: &str = "an existential restriction as a conclusion";
 
-/// A contradiction where `x` has more than `most` (0 or 1) values in a range.
+/// Returns a contradiction for `x` with more than `limit` (0 or 1) values in a range.
 fn at_most(
     context: &mut Context,
-    most: u32,
+    limit: u32,
     property: &str,
     range: &DataRange,
     x: Term,
@@ -298,10 +305,11 @@ fn at_most(
     let value = variables.fresh("v");
     let edge = vec![vec![context.relation(property, [x, value])]];
     let mut bodies = cross(&edge, &range_condition(context, range, value));
-    if most == 1 {
-        let other = variables.fresh("w");
-        let second = vec![vec![context.relation(property, [x, other]), Atom::Different(value, other)]];
-        bodies = cross(&bodies, &cross(&second, &range_condition(context, range, other)));
+    if limit == 1 {
+        let second_value = variables.fresh("w");
+        let second =
+            vec![vec![context.relation(property, [x, second_value]), Atom::Different(value, second_value)]];
+        bodies = cross(&bodies, &cross(&second, &range_condition(context, range, second_value)));
     }
     bodies.into_iter().map(|body| (body, Vec::new())).collect()
 }

@@ -1,4 +1,4 @@
-//! What lowering collects, and the small vocabulary in which the other files of this folder write rules.
+//! State of the lowering, and constructors for rules that the other files of this folder use.
 
 use std::collections::{HashMap, HashSet};
 
@@ -10,26 +10,27 @@ use crate::error::Warning;
 use crate::owl::{Axiom, DataRange, EntityKind, Iri, Literal, ObjectPropertyExpression, Ontology};
 use crate::vocab::{local_name, owl};
 
-/// What the names of relations start with that serve this crate only; they are not part of the knowledge base.
+/// Namespace of auxiliary relations. They are not part of the knowledge base.
 pub const INTERNAL: &str = "urn:metaplan:";
 
-/// The identity's source of rules that stand for axioms; the label is then the axiom in functional-style syntax.
+/// Source in the identity of a rule that is lowered from an axiom. The label of such a rule is the axiom in
+/// functional-style syntax.
 pub const AXIOM_SOURCE: &str = "http://www.w3.org/2002/07/owl";
 
-/// Whether two names can stand for one individual.
+/// Decides if two names can denote the same individual.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Equality {
-    /// They can: the semantics of OWL.
+    /// Names can denote the same individual: the semantics of OWL.
     #[default]
     Owl,
-    /// They cannot: the semantics of databases and of PDDL.
+    /// Every name denotes another individual: the semantics of databases and of PDDL.
     UniqueNames,
 }
 
 /// Atoms that must all hold.
 pub(crate) type Conjunction = Vec<Atom>;
 
-/// Every conjunction of the first with every one of the second.
+/// Combines every conjunction of the first list with every conjunction of the second.
 pub(crate) fn cross(left: &[Conjunction], right: &[Conjunction]) -> Vec<Conjunction> {
     left.iter().flat_map(|l| right.iter().map(move |r| l.iter().chain(r).cloned().collect())).collect()
 }
@@ -41,37 +42,37 @@ pub(crate) struct Context<'a> {
     pub facts: Vec<Fact>,
     pub warnings: Vec<Warning>,
     pub equality: Equality,
-    /// Named data ranges.
+    /// Data ranges of the datatype definitions.
     pub definitions: HashMap<Iri, DataRange>,
     /// The IRIs of classes and of properties.
     entities: HashSet<(EntityKind, Iri)>,
-    /// What is lowered now.
+    /// Identity of the axiom or rule that is being lowered.
     pub identity: RuleIdentity,
-    /// Why parts of it have no rule form.
+    /// Reasons why parts of the current axiom or rule have no rule form.
     gaps: Vec<&'static str>,
-    /// Restrictions that include others, or that others include.
+    /// Inclusions between restrictions.
     pub inclusions: Inclusions,
-    /// Classes that have an auxiliary relation.
+    /// Names of the auxiliary relations whose rules exist.
     pub abbreviated: HashSet<String>,
-    /// The symbols of IRIs by where their texts lie: an ontology keeps each text once.
+    /// Symbols of IRIs by the address of their text. An ontology keeps each text once, so the lookup does not
+    /// read it.
     shared: FxHashMap<*const u8, Symbol>,
 }
 
 /// The variables of one rule.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Variables {
-    /// By number; an IRI where the rule has one.
+    /// Names by variable number; IRIs for variables of SWRL rules.
     keys: Vec<Iri>,
 }
 
 impl Variables {
-    /// A new variable.
     pub(crate) fn fresh(&mut self, name: &str) -> Term {
         self.keys.push(name.into());
         Term::Variable(Variable((self.keys.len() - 1) as u16))
     }
 
-    /// The variable of that IRI, new if there is none.
+    /// Returns the variable with this IRI, which is added if it is new.
     pub(crate) fn of_iri(&mut self, iri: &Iri) -> Term {
         match self.keys.iter().position(|key| key == iri) {
             Some(index) => Term::Variable(Variable(index as u16)),
@@ -79,19 +80,19 @@ impl Variables {
         }
     }
 
-    /// What to print for each.
+    /// Names for output, by variable number.
     fn names(&self) -> Vec<Box<str>> {
         self.keys.iter().map(|key| local_name(key).into()).collect()
     }
 }
 
-/// The labels of rules are cut after so many characters: an axiom can have thousands of members.
-const LONGEST_LABEL: usize = 2_000;
+/// Limit on the length of a rule's label, in characters: an axiom can have thousands of members.
+const MAX_LABEL_CHARS: usize = 2_000;
 
-/// The identity of the rules of an axiom.
+/// Identity of the rules of an axiom.
 pub(crate) fn identity(axiom: &Axiom, position: usize) -> RuleIdentity {
     let mut label = axiom.to_string();
-    if let Some((end, _)) = label.char_indices().nth(LONGEST_LABEL) {
+    if let Some((end, _)) = label.char_indices().nth(MAX_LABEL_CHARS) {
         label.truncate(end);
         label.push('…');
     }
@@ -120,31 +121,32 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// Whether an IRI names an entity of a kind.
+    /// Returns `true` if an IRI names an entity of this kind.
     pub(crate) fn is(&self, kind: EntityKind, iri: &Iri) -> bool {
         self.entities.contains(&(kind, iri.clone()))
     }
 
     /// The entities of a kind, sorted.
-    pub(crate) fn all(&self, kind: EntityKind) -> Vec<Iri> {
-        let mut all: Vec<Iri> =
+    pub(crate) fn entities_of_kind(&self, kind: EntityKind) -> Vec<Iri> {
+        let mut iris: Vec<Iri> =
             self.entities.iter().filter(|(other, _)| *other == kind).map(|(_, iri)| iri.clone()).collect();
-        all.sort();
-        all
+        iris.sort();
+        iris
     }
 
-    /// That a term is an individual.
+    /// Builds the atom `owl:Thing(term)`.
     pub(crate) fn thing(&mut self, term: Term) -> Atom {
         self.relation(owl::THING, [term])
     }
 
-    /// Notes that a part of what is lowered now has no rule form; what is returned for it concludes nothing.
+    /// Records that a part of the current axiom or rule has no rule form. Returns the empty value, which has no
+    /// consequences.
     pub(crate) fn gap<T: Default>(&mut self, reason: &'static str) -> T {
         self.gaps.push(reason);
         T::default()
     }
 
-    /// What had no rule form since the last call, if anything: the first reason.
+    /// Returns the reason of the first gap since the last call as an error.
     pub(crate) fn take_gaps(&mut self) -> Result<(), &'static str> {
         let first = self.gaps.first().copied();
         self.gaps.clear();
@@ -155,7 +157,7 @@ impl<'a> Context<'a> {
         self.symbols.name(iri)
     }
 
-    /// The symbol of an IRI of the ontology, which is found without looking at its text.
+    /// Returns the symbol of an IRI of the ontology, without reading its text if it occurred before.
     pub(crate) fn iri(&mut self, iri: &Iri) -> Symbol {
         let symbols = &mut *self.symbols;
         *self.shared.entry(iri.as_ptr()).or_insert_with(|| symbols.name(iri))
@@ -171,12 +173,12 @@ impl<'a> Context<'a> {
         self.symbols.literal(value)
     }
 
-    /// `name(arguments)`.
+    /// Builds the atom `name(arguments)`.
     pub(crate) fn relation<const N: usize>(&mut self, name: &str, arguments: [Term; N]) -> Atom {
         Atom::relation(self.symbols.name(name), arguments)
     }
 
-    /// `property(first, second)`, or the other way round for an inverse.
+    /// Builds the atom `property(first, second)`, with exchanged arguments for an inverse.
     pub(crate) fn property(
         &mut self,
         property: &ObjectPropertyExpression,
@@ -189,7 +191,7 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// Adds that two individuals are one where `body` holds, unless every name is an individual of its own.
+    /// Adds the rule `body → pair[0] owl:sameAs pair[1]`; does nothing under the unique name assumption.
     pub(crate) fn merge(
         &mut self,
         identity: &RuleIdentity,
@@ -198,13 +200,15 @@ impl<'a> Context<'a> {
         variables: &Variables,
     ) {
         if self.equality == Equality::Owl {
-            // The engine compares symbols here: an individual is not concluded to be the same as itself.
+            // `Different` compares symbols here: the rule must not conclude that an individual is the same as
+            // itself.
             let body = body.into_iter().chain([Atom::Different(pair[0], pair[1])]).collect();
             self.rule(identity, vec![Atom::Same(pair[0], pair[1])], body, variables);
         }
     }
 
-    /// The condition that two individuals differ.
+    /// Builds the condition that two individuals differ: stated or derived difference in OWL, else different
+    /// names.
     pub(crate) fn different(&mut self, first: Term, second: Term) -> Atom {
         match self.equality {
             Equality::Owl => self.relation(owl::DIFFERENT_FROM, [first, second]),
@@ -212,8 +216,8 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// The relation that holds the members of a data range. It goes by the text of the range, so that two ontologies
-    /// lowered into the same symbols share it where they should, and only there.
+    /// Returns the relation that contains the members of a data range. Its name contains the range, so two
+    /// ontologies that are lowered with the same symbols share the relation only if they have equal ranges.
     pub(crate) fn members_of(&mut self, range: &DataRange) -> Symbol {
         self.symbols.name(&format!("{INTERNAL}range:{range}"))
     }
@@ -235,7 +239,7 @@ impl<'a> Context<'a> {
         self.rules.push(Rule { identity: identity.clone(), head, body, variables });
     }
 
-    /// Reports an axiom, or a part of one, that is left out.
+    /// Reports that an axiom is omitted (or used in part, if `partly`) with the reason.
     pub(crate) fn outside(&mut self, axiom: &Axiom, partly: bool, reason: &str) {
         let (axiom, reason) = (axiom.to_string(), reason.to_owned());
         self.warnings.push(Warning::OutsideProfile { axiom, partly, reason });

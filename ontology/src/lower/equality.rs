@@ -1,12 +1,12 @@
 //! Equality and difference of individuals: table 4 of OWL 2 RL.
 //!
-//! OWL makes no unique-name assumption: two names may stand for one individual, and a functional property with two
-//! values says that they do. The engine then treats `sameAs` as equality. `differentFrom` is what is stated, and what
-//! follows from disjoint classes and from different values of functional properties; it is derived only where some rule
-//! asks for it.
+//! OWL makes no unique name assumption: two names can denote the same individual, and two values of a
+//! functional property imply that they do. The engine then treats `sameAs` as equality. `differentFrom` holds
+//! if it is stated, or follows from disjoint classes or from different values of functional properties. It is
+//! derived only if a rule depends on it.
 //!
-//! Under the unique-name assumption of [`UniqueNames`](super::Equality::UniqueNames) no rule of this file is needed: a functional object
-//! property then concludes nothing, and any two names differ.
+//! Under the unique name assumption ([`UniqueNames`](super::Equality::UniqueNames)) the rules of this file are
+//! not added: a functional object property has no consequences, and any two names differ.
 
 use std::collections::HashSet;
 
@@ -18,18 +18,20 @@ use crate::error::Warning;
 use crate::owl::{AnnotatedAxiom, Axiom, Characteristic, ClassExpression, EntityKind};
 use crate::vocab::owl;
 
-/// Whether anything concludes or states that two names are one; adds the rules for difference, if anything but the
-/// constraint that forbids to differ from oneself asks.
+/// Adds the rules of difference, if a rule depends on `differentFrom`, and rule eq-rep for punned entities.
+/// Returns `true` if a rule or fact can make two names equal.
 pub(crate) fn lower(axioms: &[AnnotatedAxiom], context: &mut Context) -> bool {
-    let (same, different) = (context.name(owl::SAME_AS), context.name(owl::DIFFERENT_FROM));
-    let heads = |rule: &Rule| rule.head.iter().any(|atom| matches!(atom, Atom::Same(..)));
-    let asks = |rule: &Rule| {
+    let (same_as, different) = (context.name(owl::SAME_AS), context.name(owl::DIFFERENT_FROM));
+    let merges_names = |rule: &Rule| rule.head.iter().any(|atom| matches!(atom, Atom::Same(..)));
+    let depends = |rule: &Rule| {
+        // The constraint against `differentFrom(x, x)` alone does not require derived differences.
         let is_difference =
             |atom: &Atom| matches!(atom, Atom::Relation { predicate, .. } if *predicate == different);
         !(rule.head.is_empty() && rule.body.len() == 1) && rule.body.iter().any(is_difference)
     };
-    let merges = context.rules.iter().any(heads) || context.facts.iter().any(|fact| fact.predicate == same);
-    if context.rules.iter().any(asks) {
+    let merges =
+        context.rules.iter().any(merges_names) || context.facts.iter().any(|fact| fact.predicate == same_as);
+    if context.rules.iter().any(depends) {
         difference(axioms, context);
     }
     if merges {
@@ -38,45 +40,50 @@ pub(crate) fn lower(axioms: &[AnnotatedAxiom], context: &mut Context) -> bool {
     merges
 }
 
-/// Classes and properties that are individuals, too, and may turn out to be one individual, have the same members then (eq-rep
-/// of OWL 2 RL; those that are stated to be one have the same members anyway).
+/// Adds rule eq-rep of OWL 2 RL for classes and properties that are individuals, too: names that become equal
+/// have the same members. For names that are stated to be equal, the lowering of `SameIndividual` adds the
+/// rules.
 fn entities(context: &mut Context) {
     let identity = RuleIdentity { source: AXIOM_SOURCE.into(), label: Some("eq-rep".into()), position: 0 };
     let mut variables = Variables::default();
     let (x, y) = (variables.fresh("x"), variables.fresh("y"));
-    let named: HashSet<Symbol> = context.facts.iter().flat_map(|fact| fact.arguments.to_vec()).collect();
+    let individuals: HashSet<Symbol> =
+        context.facts.iter().flat_map(|fact| fact.arguments.to_vec()).collect();
     for (kind, kinds, arguments) in [
         (EntityKind::Class, "classes", vec![x]),
         (EntityKind::ObjectProperty, "object properties", vec![x, y]),
         (EntityKind::DataProperty, "data properties", vec![x, y]),
     ] {
-        let all: Vec<Symbol> = context.all(kind).iter().map(|iri| context.name(iri)).collect();
-        let punned: Vec<Symbol> = all.into_iter().filter(|symbol| named.contains(symbol)).collect();
-        if punned.len() > MOST_PUNNED {
-            let what = format!("{} names of {kinds} are individuals, too", punned.len());
+        let symbols: Vec<Symbol> =
+            context.entities_of_kind(kind).iter().map(|iri| context.name(iri)).collect();
+        let punned: Vec<Symbol> = symbols.into_iter().filter(|symbol| individuals.contains(symbol)).collect();
+        if punned.len() > MAX_PUNNED_NAMES {
+            let subject = format!("{} names of {kinds} are individuals, too", punned.len());
             let reason = "too many to ask of each pair whether it is one".to_owned();
-            context.warnings.push(Warning::OutsideProfile { axiom: what, partly: true, reason });
+            context.warnings.push(Warning::OutsideProfile { axiom: subject, partly: true, reason });
             continue;
         }
-        for (one, other) in punned.iter().flat_map(|one| punned.iter().map(move |other| (*one, *other))) {
-            if one != other {
-                let same = Atom::Same(Term::Constant(one), Term::Constant(other));
-                let body = vec![Atom::relation(one, arguments.clone()), same];
-                let head = vec![Atom::relation(other, arguments.clone())];
+        for (name, second_name) in
+            punned.iter().flat_map(|name| punned.iter().map(move |second_name| (*name, *second_name)))
+        {
+            if name != second_name {
+                let same = Atom::Same(Term::Constant(name), Term::Constant(second_name));
+                let body = vec![Atom::relation(name, arguments.clone()), same];
+                let head = vec![Atom::relation(second_name, arguments.clone())];
                 context.rule(&identity, head, body, &variables);
             }
         }
     }
 }
 
-/// Of so many names that stand for an individual and a class at once, each pair has a rule.
-const MOST_PUNNED: usize = 32;
+/// Limit on the number of names of one kind that are individuals, too: each pair of them has a rule.
+const MAX_PUNNED_NAMES: usize = 32;
 
 fn identity(label: &str, position: usize) -> RuleIdentity {
     RuleIdentity { source: AXIOM_SOURCE.into(), label: Some(label.into()), position: position as u32 }
 }
 
-/// What makes two individuals different without saying so.
+/// Adds the rules that derive `differentFrom`.
 fn difference(axioms: &[AnnotatedAxiom], context: &mut Context) {
     let mut variables = Variables::default();
     let (x, y, p, q) =
@@ -103,8 +110,8 @@ fn difference(axioms: &[AnnotatedAxiom], context: &mut Context) {
                 groups::differ(context, &identity, member);
             }
             Axiom::DisjointClasses(classes) => {
-                for (place, first) in classes.iter().enumerate() {
-                    for second in &classes[place + 1..] {
+                for (index, first) in classes.iter().enumerate() {
+                    for second in &classes[index + 1..] {
                         if let (ClassExpression::Class(first), ClassExpression::Class(second)) =
                             (first, second)
                         {

@@ -1,9 +1,10 @@
-//! Restrictions that include others: rules scm-svf1, scm-svf2, scm-avf1 and scm-avf2 of OWL 2 RL ([1], table 9).
+//! Inclusions between restrictions: rules scm-svf1, scm-svf2, scm-avf1 and scm-avf2 of OWL 2 RL ([1], table 9).
 //!
-//! An individual of `∃p.C` has a value that no rule can name, but it is in `∃q.D` where `p ⊑ q` and `C ⊑ D`. Where an axiom
-//! concludes the first restriction and another has the second as a condition, both get an auxiliary relation, and a rule leads
-//! from one to the other. Universal restrictions are treated alike, with `q ⊑ p`. Inclusions of classes and properties are
-//! those that axioms state, closed under transitivity, with `C ⊓ D ⊑ C`, `C ⊑ C ⊔ D`, and what this file finds itself.
+//! An individual of `∃p.C` has a value that rules cannot name, but the individual is in `∃q.D` if `p ⊑ q` and
+//! `C ⊑ D`. If an axiom concludes the first restriction and another one has the second as a condition, both
+//! restrictions get an auxiliary relation, and a rule derives the second from the first. Universal restrictions
+//! are analogous, with `q ⊑ p`. The inclusions of classes and properties are the transitive closure of the
+//! stated ones, of `C ⊓ D ⊑ C` and `C ⊑ C ⊔ D`, and of inclusions between restrictions that are found here.
 //!
 //! [1] OWL 2 Web Ontology Language Profiles, W3C 2012, section 4.3.
 
@@ -12,29 +13,29 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use crate::owl::{Atom, Axiom, Bound, ClassExpression, Iri, ObjectPropertyExpression as Property, Ontology};
 use crate::vocab::owl;
 
-/// Restrictions with an auxiliary relation.
+/// Restrictions that get an auxiliary relation.
 #[derive(Default)]
 pub(crate) struct Inclusions {
-    /// By restriction that an axiom concludes: the conditions that include it.
+    /// For each restriction that an axiom concludes, the conditions that include it.
     concluded: BTreeMap<ClassExpression, BTreeSet<ClassExpression>>,
-    /// These conditions.
+    /// All conditions in the values of `concluded`.
     conditions: HashSet<ClassExpression>,
 }
 
 impl Inclusions {
-    /// The inclusions between the restrictions of an ontology.
+    /// Computes the inclusions between the restrictions of an ontology.
     pub(crate) fn new(ontology: &Ontology) -> Self {
         let mut uses = Uses::default();
         uses.collect(ontology);
         if uses.conditions.is_empty() || uses.concluded.is_empty() {
             return Self::default();
         }
-        let stated = Stated::new(ontology, uses.conditions);
-        let mut known = Known::default();
+        let graph = InclusionGraph::new(ontology, uses.conditions);
+        let mut memo = Memo::default();
         let mut inclusions = Self::default();
         for restriction in uses.concluded {
-            let mut including = stated.including(&restriction, stated.depth, &mut known);
-            // A definition by a restriction need not be told that the restriction includes itself.
+            let mut including = graph.including(&restriction, graph.depth, &mut memo);
+            // Condition and conclusion of one definition need no relation between each other.
             if !uses.shared.contains(&restriction) {
                 including.remove(&restriction);
             }
@@ -46,17 +47,17 @@ impl Inclusions {
         inclusions
     }
 
-    /// The restriction that a condition is, where a conclusion is included in it.
+    /// Returns the class as a restriction if the class is a condition that includes a conclusion.
     pub(crate) fn condition(&self, class: &ClassExpression) -> Option<ClassExpression> {
         restriction(class, false).filter(|restriction| self.conditions.contains(restriction))
     }
 
-    /// The restriction that includes a conclusion, where a condition includes the restriction.
+    /// Returns the class as a restriction if the class is a conclusion that is included in a condition.
     pub(crate) fn conclusion(&self, class: &ClassExpression) -> Option<ClassExpression> {
         restriction(class, true).filter(|restriction| self.concluded.contains_key(restriction))
     }
 
-    /// Two different restrictions each, of which the second includes the first.
+    /// Pairs of different restrictions; the second includes the first.
     pub(crate) fn pairs(&self) -> Vec<[ClassExpression; 2]> {
         let pairs =
             self.concluded.iter().flat_map(|(sub, including)| including.iter().map(move |sup| (sub, sup)));
@@ -64,7 +65,8 @@ impl Inclusions {
     }
 }
 
-/// The existential or universal restriction that a class is, or of which the class is part if it is concluded.
+/// Returns the existential or universal restriction that is equivalent to a class, or follows from it if
+/// `is_concluded`.
 fn restriction(class: &ClassExpression, is_concluded: bool) -> Option<ClassExpression> {
     use ClassExpression as C;
     match class {
@@ -79,23 +81,23 @@ fn restriction(class: &ClassExpression, is_concluded: bool) -> Option<ClassExpre
     }
 }
 
-/// The restrictions that axioms and rules conclude, and that they have as conditions.
+/// The restrictions that axioms and rules conclude, and the restrictions that are their conditions.
 #[derive(Default)]
 struct Uses {
     concluded: BTreeSet<ClassExpression>,
     conditions: HashSet<ClassExpression>,
-    /// By restriction: the place of the axiom or rule that has it, the first of several.
-    places: HashMap<ClassExpression, usize>,
-    /// Restrictions that several axioms or rules have.
+    /// For each restriction, the position of the first axiom or rule that contains it.
+    positions: HashMap<ClassExpression, usize>,
+    /// Restrictions that occur in several axioms or rules.
     shared: HashSet<ClassExpression>,
-    /// The place of the axiom or rule that is visited.
-    place: usize,
+    /// Position of the current axiom or rule.
+    position: usize,
 }
 
 impl Uses {
     fn collect(&mut self, ontology: &Ontology) {
         for annotated in &ontology.axioms {
-            self.place += 1;
+            self.position += 1;
             match &annotated.axiom {
                 Axiom::SubClassOf(sub, sup) => {
                     self.condition(sub);
@@ -121,7 +123,7 @@ impl Uses {
             }
         }
         for rule in &ontology.rules {
-            self.place += 1;
+            self.position += 1;
             for (atoms, is_condition) in [(&rule.body, true), (&rule.head, false)] {
                 for atom in atoms {
                     match atom {
@@ -135,7 +137,7 @@ impl Uses {
     }
 
     fn note(&mut self, restriction: &ClassExpression) {
-        if *self.places.entry(restriction.clone()).or_insert(self.place) != self.place {
+        if *self.positions.entry(restriction.clone()).or_insert(self.position) != self.position {
             self.shared.insert(restriction.clone());
         }
     }
@@ -177,68 +179,71 @@ impl Uses {
     }
 }
 
-/// Limit on restrictions within restrictions that are compared; what lies deeper is not concluded.
+/// Limit on the nesting of restrictions that are compared. Inclusions that depend on deeper nesting are not
+/// concluded.
 const MAX_DEPTH: usize = 3;
 
-/// Classes and conditions by what they include and the depth to which restrictions are compared.
+/// Memo tables; keys are a class or restriction and the depth to which nested restrictions are compared.
 #[derive(Default)]
-struct Known {
+struct Memo {
     supers: HashMap<(ClassExpression, usize), BTreeSet<ClassExpression>>,
     including: HashMap<(ClassExpression, usize), BTreeSet<ClassExpression>>,
 }
 
-/// Inclusions that axioms state, and the conditions that are compared.
-struct Stated {
+/// The inclusions that axioms state, as graphs, and the conditions to compare.
+struct InclusionGraph {
     classes: HashMap<ClassExpression, Vec<ClassExpression>>,
     properties: HashMap<Property, Vec<Property>>,
     subproperties: HashMap<Property, Vec<Property>>,
     conditions: HashSet<ClassExpression>,
-    /// Number of restrictions within restrictions that are compared: none where no condition contains another.
+    /// Nesting depth to which restrictions are compared; 0 if no condition contains another restriction.
     depth: usize,
-    /// The properties of the conditions.
-    used: HashSet<Property>,
+    /// Properties of the conditions.
+    condition_properties: HashSet<Property>,
     thing: ClassExpression,
 }
 
-impl Stated {
+impl InclusionGraph {
     fn new(ontology: &Ontology, conditions: HashSet<ClassExpression>) -> Self {
-        let used = conditions.iter().filter_map(parts).map(|(property, _)| property.clone()).collect();
+        let condition_properties =
+            conditions.iter().filter_map(parts).map(|(property, _)| property.clone()).collect();
         let (classes, properties, subproperties) = (HashMap::new(), HashMap::new(), HashMap::new());
         let thing = ClassExpression::Class(Iri::from(owl::THING));
         let is_nested = |condition: &ClassExpression| {
             parts(condition).is_some_and(|(_, filler)| !matches!(filler, ClassExpression::Class(_)))
         };
         let depth = if conditions.iter().any(is_nested) { MAX_DEPTH } else { 0 };
-        let mut stated = Self { classes, properties, subproperties, conditions, depth, used, thing };
+        let mut graph =
+            Self { classes, properties, subproperties, conditions, depth, condition_properties, thing };
         let fillers: Vec<ClassExpression> =
-            stated.conditions.iter().filter_map(parts).map(|(_, filler)| filler.clone()).collect();
+            graph.conditions.iter().filter_map(parts).map(|(_, filler)| filler.clone()).collect();
         for filler in &fillers {
-            stated.members(filler);
+            graph.members(filler);
         }
         for annotated in &ontology.axioms {
             match &annotated.axiom {
-                Axiom::SubClassOf(sub, sup) => stated.class(sub, sup),
+                Axiom::SubClassOf(sub, sup) => graph.class(sub, sup),
                 Axiom::EquivalentClasses(classes) => {
                     for (sub, sup) in classes.iter().zip(classes.iter().cycle().skip(1)) {
-                        stated.class(sub, sup);
+                        graph.class(sub, sup);
                     }
                 }
-                Axiom::SubObjectPropertyOf(sub, sup) => stated.property(sub, sup),
+                Axiom::SubObjectPropertyOf(sub, sup) => graph.property(sub, sup),
                 Axiom::EquivalentObjectProperties(properties) => {
                     for (sub, sup) in properties.iter().zip(properties.iter().cycle().skip(1)) {
-                        stated.property(sub, sup);
+                        graph.property(sub, sup);
                     }
                 }
                 Axiom::InverseObjectProperties(first, second) => {
                     let (first, second) = (first.clone(), second.clone());
-                    let (one, other) = (Property::Property(first), Property::Inverse(second));
-                    stated.property(&one, &other);
-                    stated.property(&other, &one);
+                    let (direct, inverted) = (Property::Property(first), Property::Inverse(second));
+                    graph.property(&direct, &inverted);
+                    graph.property(&inverted, &direct);
                 }
                 _ => {}
             }
         }
-        stated
+        graph
     }
 
     fn class(&mut self, sub: &ClassExpression, sup: &ClassExpression) {
@@ -247,7 +252,7 @@ impl Stated {
         self.members(sup);
     }
 
-    /// Adds that a union includes its members.
+    /// Adds the inclusions of the members of a union in the union.
     fn members(&mut self, class: &ClassExpression) {
         if let ClassExpression::UnionOf(members) = class {
             for member in members {
@@ -263,26 +268,26 @@ impl Stated {
         }
     }
 
-    /// The conditions that include a restriction.
+    /// Returns the conditions that include a restriction.
     fn including(
         &self,
         restriction: &ClassExpression,
         depth: usize,
-        known: &mut Known,
+        memo: &mut Memo,
     ) -> BTreeSet<ClassExpression> {
         let Some((property, filler)) = parts(restriction) else { return BTreeSet::new() };
         let key = (restriction.clone(), depth);
-        if let Some(including) = known.including.get(&key) {
+        if let Some(including) = memo.including.get(&key) {
             return including.clone();
         }
         let is_universal = matches!(restriction, ClassExpression::AllValuesFrom(..));
         let related = if is_universal { &self.subproperties } else { &self.properties };
         let mut properties = reachable(property, related);
-        properties.retain(|property| self.used.contains(property));
+        properties.retain(|property| self.condition_properties.contains(property));
         if properties.is_empty() {
             return BTreeSet::new();
         }
-        let fillers = self.supers(filler, depth, known);
+        let fillers = self.supers(filler, depth, memo);
         let mut including = BTreeSet::new();
         for property in properties {
             for filler in &fillers {
@@ -295,17 +300,17 @@ impl Stated {
                 including.extend(self.conditions.get(&candidate).cloned());
             }
         }
-        known.including.insert(key, including.clone());
+        memo.including.insert(key, including.clone());
         including
     }
 
-    /// The classes that include a class, itself among them.
-    fn supers(&self, class: &ClassExpression, depth: usize, known: &mut Known) -> BTreeSet<ClassExpression> {
+    /// Returns the classes that include a class, the class itself among them.
+    fn supers(&self, class: &ClassExpression, depth: usize, memo: &mut Memo) -> BTreeSet<ClassExpression> {
         let key = (class.clone(), depth);
-        if let Some(supers) = known.supers.get(&key) {
+        if let Some(supers) = memo.supers.get(&key) {
             return supers.clone();
         }
-        let mut found = BTreeSet::from([class.clone(), self.thing.clone()]);
+        let mut supers = BTreeSet::from([class.clone(), self.thing.clone()]);
         let mut open = vec![class.clone()];
         while let Some(class) = open.pop() {
             let mut next: Vec<ClassExpression> =
@@ -314,16 +319,16 @@ impl Stated {
                 next.extend(members.iter().cloned());
             }
             if let Some(restriction) = restriction(&class, true).filter(|_| depth > 0) {
-                next.extend(self.including(&restriction, depth - 1, known));
+                next.extend(self.including(&restriction, depth - 1, memo));
             }
-            open.extend(next.into_iter().filter(|sup| found.insert(sup.clone())));
+            open.extend(next.into_iter().filter(|sup| supers.insert(sup.clone())));
         }
-        known.supers.insert(key, found.clone());
-        found
+        memo.supers.insert(key, supers.clone());
+        supers
     }
 }
 
-/// The property and the filler of a restriction.
+/// Returns property and filler of a restriction.
 fn parts(restriction: &ClassExpression) -> Option<(&Property, &ClassExpression)> {
     match restriction {
         ClassExpression::SomeValuesFrom(property, filler)
@@ -339,13 +344,13 @@ fn inverse(property: &Property) -> Property {
     }
 }
 
-/// A property and all properties that edges lead to from there.
+/// Returns the properties that are reachable in a graph, the start included.
 fn reachable(from: &Property, edges: &HashMap<Property, Vec<Property>>) -> BTreeSet<Property> {
-    let mut found = BTreeSet::from([from.clone()]);
+    let mut visited = BTreeSet::from([from.clone()]);
     let mut open = vec![from];
     while let Some(property) = open.pop() {
         let next = edges.get(property).into_iter().flatten();
-        open.extend(next.filter(|next| found.insert((*next).clone())));
+        open.extend(next.filter(|next| visited.insert((*next).clone())));
     }
-    found
+    visited
 }

@@ -1,14 +1,14 @@
-//! An [`Ontology`] to what the engine evaluates: assertions become facts, axioms of OWL 2 RL and SWRL rules become
-//! rules, and every axiom that has no rule form is reported.
+//! Lowers an [`Ontology`] to the input of the rule engine: assertions become facts, axioms of OWL 2 RL and SWRL
+//! rules become rules, and every axiom without a rule form is reported.
 //!
-//! A class is a relation with one argument and a property one with two, both named by their IRI. The rules for axioms
-//! are those of the OWL 2 RL profile [1], instantiated with each axiom's own classes and properties (so that the engine
-//! indexes by class and property instead of joining with a schema). `sameAs` and `differentFrom` are relations of that
-//! name; functional and inverse functional properties conclude equality. Where an axiom forbids something, the rule has
-//! an empty head and is an integrity constraint.
+//! A class is a unary relation and a property a binary one, both named by their IRI. The rules for axioms are
+//! the rules of the OWL 2 RL profile [1], instantiated with the classes and properties of each axiom. Thus the
+//! engine indexes by class and property instead of joining with a schema. `sameAs` and `differentFrom` are
+//! relations; functional and inverse functional properties conclude equality. An axiom that forbids something
+//! becomes a rule with an empty head, an integrity constraint.
 //!
-//! Not every axiom that OWL 2 RL lists outside its profile is useless: what can be had of it (one direction of an
-//! equivalence, say) is lowered, and the rest reported, so conclusions are always sound and possibly incomplete.
+//! Axioms outside of OWL 2 RL are lowered in part if possible (for example one direction of an equivalence),
+//! and the remaining part is reported. Conclusions are therefore always sound and possibly incomplete.
 //!
 //! - [1] OWL 2 Web Ontology Language Profiles, W3C 2012, section 4.3.
 
@@ -35,13 +35,14 @@ pub use context::{AXIOM_SOURCE, Equality, INTERNAL};
 /// An ontology as rules and facts.
 #[derive(Clone, Debug)]
 pub struct Lowered {
-    /// The rules of the knowledge base, then those that stand for axioms.
+    /// Rules of the knowledge base, then rules lowered from axioms, then additional rules.
     pub program: Program,
     /// The assertions.
     pub facts: Vec<Fact>,
-    /// How many SWRL rules were left out because another ontology states the same rule.
+    /// Number of SWRL rules omitted because another ontology states an equal rule.
     pub duplicates: usize,
-    /// Axioms and rules that were left out, or kept against their annotation.
+    /// Warnings about omitted axioms and rules, and about rules that are used although their annotation
+    /// disables them.
     pub warnings: Vec<Warning>,
 }
 
@@ -50,16 +51,17 @@ pub fn lower(ontology: &Ontology, symbols: &mut Symbols) -> Lowered {
     lower_with(ontology, Equality::Owl, symbols)
 }
 
-/// As [`lower()`], under the given semantics of names.
+/// Lowers an ontology under the given semantics of names; see [`lower()`].
 pub fn lower_with(ontology: &Ontology, equality: Equality, symbols: &mut Symbols) -> Lowered {
     lower_together(ontology, Vec::new(), equality, symbols)
 }
 
-/// As [`lower_with`], together with rules that somebody else has made, whose names are among the symbols: they mean by
-/// `owl:Thing`, `owl:Nothing`, `sameAs` and `differentFrom` what the ontology means. They come last.
+/// Lowers an ontology together with additional rules, whose names are in `symbols`; see [`lower_with`]. In
+/// these rules, `owl:Thing`, `owl:Nothing`, `sameAs` and `differentFrom` have the semantics of OWL. They come
+/// last in the program.
 pub fn lower_together(
     ontology: &Ontology,
-    own: Vec<Rule>,
+    additional: Vec<Rule>,
     equality: Equality,
     symbols: &mut Symbols,
 ) -> Lowered {
@@ -70,13 +72,13 @@ pub fn lower_together(
     class::lower_inclusions(&mut context, ontology.axioms.len());
     context.drop_unusable();
     axiom::lower_assertions(&ontology.axioms, &mut context);
-    let stated = context.rules.len();
-    context.take_in(own);
-    let taken = context.rules.len();
+    let before_additional = context.rules.len();
+    context.add_rules(additional);
+    let after_additional = context.rules.len();
     vocabulary::lower(ontology, &mut context);
     let equality = equality == Equality::Owl && equality::lower(&ontology.axioms, &mut context);
-    // Rules of others stay last.
-    context.rules[stated..].rotate_left(taken - stated);
+    // The rules of `vocabulary` and `equality` move in front of the additional rules.
+    context.rules[before_additional..].rotate_left(after_additional - before_additional);
     let Context { rules, facts, mut warnings, .. } = context;
     span.record("rules", rules.len()).record("facts", facts.len());
     warnings.sort();
@@ -84,7 +86,7 @@ pub fn lower_together(
     Lowered { program: Program { rules, equality }, facts, duplicates, warnings }
 }
 
-/// The facts that axioms state, in the order of the axioms; rules for axioms are not among them.
+/// Lowers the plain assertions to facts, in the order of the axioms. Adds no rules.
 pub(crate) fn lower_assertions(axioms: &[AnnotatedAxiom], symbols: &mut Symbols) -> Vec<Fact> {
     let mut context = Context::new(symbols, Equality::Owl, &Ontology::default());
     axiom::lower_assertions(axioms, &mut context);
@@ -92,11 +94,11 @@ pub(crate) fn lower_assertions(axioms: &[AnnotatedAxiom], symbols: &mut Symbols)
 }
 
 impl Context<'_> {
-    /// Takes in rules of others. Two names that differ may stand for one individual, so that their `differentFrom` asks for
-    /// what is entailed.
-    fn take_in(&mut self, own: Vec<Rule>) {
+    /// Adds rules of other origin. Under the semantics of OWL, two different names can denote the same
+    /// individual, so a comparison of names becomes the relation `differentFrom`.
+    fn add_rules(&mut self, additional: Vec<Rule>) {
         let owl = self.equality == Equality::Owl;
-        for mut rule in own {
+        for mut rule in additional {
             for atom in &mut rule.body {
                 if let (true, Atom::Different(left, right)) = (owl, &*atom) {
                     *atom = self.different(*left, *right);
@@ -106,8 +108,9 @@ impl Context<'_> {
         }
     }
 
-    /// Takes out the rules that the engine rejects (unsafe variables, for one): it would reject the whole program. A
-    /// rule for an axiom binds its variables by the relations of its body, or by names that they stand for.
+    /// Removes the rules that the engine rejects (because of unsafe variables, for example); it would reject
+    /// the whole program. A rule lowered from an axiom is safe if a relation or a constant binds its variables,
+    /// and is not tested.
     fn drop_unusable(&mut self) {
         let binds = |atom: &Atom| match atom {
             Atom::Relation { .. } => true,
@@ -119,7 +122,7 @@ impl Context<'_> {
         let program = Program { rules, ..Program::default() };
         let Err(errors) = rules::Engine::new(self.symbols.clone(), program, []) else { return };
         for error in errors {
-            let Some(identity) = culprit(&error) else { continue };
+            let Some(identity) = rejected_rule(&error) else { continue };
             let identity = identity.clone();
             self.rules.retain(|rule: &Rule| rule.identity != identity);
             self.warnings.push(Warning::UnusableRule {
@@ -132,8 +135,8 @@ impl Context<'_> {
     }
 }
 
-/// The rule that an error is about.
-fn culprit(error: &Error) -> Option<&RuleIdentity> {
+/// Returns the rule that an error refers to.
+fn rejected_rule(error: &Error) -> Option<&RuleIdentity> {
     match error {
         Error::UnsafeHead { rule, .. }
         | Error::UnsafeBody { rule, .. }

@@ -1,7 +1,8 @@
-//! Data ranges as conditions on a value, and as constraints on the values of a property.
+//! Lowers data ranges as conditions on a value, and as constraints on the values of a property.
 //!
-//! The engine tests whether a literal lies in the value space of a datatype, and compares values; enumerations are
-//! relations that hold their members as facts. A complement is moved inwards until it is one of these tests.
+//! The engine tests if a literal is in the value space of a datatype, and compares values. An enumeration
+//! becomes a relation with a fact for each member. Complements are pushed inwards until they reach one of these
+//! tests.
 
 use rules::{Atom, BuiltIn, Literal, Term};
 
@@ -9,29 +10,29 @@ use super::context::{Conjunction, Context, cross};
 use crate::owl::DataRange;
 use crate::vocab::{owl, rdf, rdfs, xsd};
 
-/// Datatypes may be defined by each other so deep; deeper, or in a circle, they are not tested.
-const DEPTH: usize = 16;
+/// Limit on the nesting of datatype definitions. Deeper and cyclic definitions are rejected.
+const MAX_DEFINITION_DEPTH: usize = 16;
 
-/// An intersection of unions of data ranges is multiplied out up to so many alternatives.
-const MOST_ALTERNATIVES: usize = 1_024;
+/// Limit on the alternatives of an intersection of unions that is expanded.
+const MAX_RANGE_ALTERNATIVES: usize = 1_024;
 
-/// The datatypes whose value spaces the engine knows, by local name in the XML Schema namespace. Of others nothing is
-/// known but that they have values.
+/// Local names of the XML Schema datatypes whose value spaces the engine implements, each between spaces.
 const DATATYPES: &str = " string normalizedString token language Name NCName NMTOKEN boolean decimal integer \
     nonNegativeInteger positiveInteger nonPositiveInteger negativeInteger long int short byte unsignedLong unsignedInt \
     unsignedShort unsignedByte float double dateTime dateTimeStamp date time duration dayTimeDuration \
     yearMonthDuration anyURI hexBinary base64Binary gYear gYearMonth gMonth gMonthDay gDay ";
 
+/// Alternative conjunctions of tests, or the reason why the range cannot be tested.
 type Tests = Result<Vec<Conjunction>, &'static str>;
 
-/// The ways in which `value` can be seen to be in `range`. `Err` says what cannot be tested.
+/// Returns alternatives; `value` is in `range` if one of them holds.
 pub(crate) fn condition(context: &mut Context, range: &DataRange, value: Term) -> Tests {
-    Lowering { context, value }.tests(range, true, DEPTH)
+    Lowering { context, value }.tests(range, true, MAX_DEFINITION_DEPTH)
 }
 
-/// The bodies that hold where `edges` do and `value` is outside `range`.
+/// Returns the bodies that hold if all `edges` hold and `value` is outside `range`.
 pub(crate) fn violations(context: &mut Context, range: &DataRange, edges: &[Atom], value: Term) -> Tests {
-    let outside = Lowering { context, value }.tests(range, false, DEPTH)?;
+    let outside = Lowering { context, value }.tests(range, false, MAX_DEFINITION_DEPTH)?;
     Ok(outside.into_iter().map(|tests| edges.iter().cloned().chain(tests).collect()).collect())
 }
 
@@ -41,7 +42,7 @@ struct Lowering<'c, 'a> {
 }
 
 impl Lowering<'_, '_> {
-    /// The conjunctions of tests of which one holds where the value is in `range` (or is outside it).
+    /// Returns alternatives; the value is in `range` (`inside`) or outside it if one of them holds.
     fn tests(&mut self, range: &DataRange, inside: bool, depth: usize) -> Tests {
         if depth == 0 {
             return Err("datatypes that are defined by each other");
@@ -51,7 +52,7 @@ impl Lowering<'_, '_> {
                 Some(definition) => self.tests(&definition, inside, depth - 1),
                 None => self.datatype(iri, inside),
             },
-            // A value is outside where it certainly is none of the members.
+            // A value is outside an enumeration if it certainly differs from every member.
             DataRange::OneOf(literals) if !inside => {
                 let differs = |member| Atom::Different(self.value, Term::Constant(member));
                 let members: Vec<_> = literals.iter().map(|literal| self.context.literal(literal)).collect();
@@ -65,6 +66,7 @@ impl Lowering<'_, '_> {
                 }
                 Ok(vec![vec![Atom::relation(predicate, [self.value])]])
             }
+            // De Morgan: outside an intersection means outside one of the ranges.
             DataRange::IntersectionOf(ranges) if inside => self.all(ranges, inside, depth),
             DataRange::IntersectionOf(ranges) => self.any(ranges, inside, depth),
             DataRange::UnionOf(ranges) if inside => self.any(ranges, inside, depth),
@@ -74,8 +76,8 @@ impl Lowering<'_, '_> {
                 let mut within = self.datatype(iri, true)?;
                 let mut outside = self.datatype(iri, false)?;
                 for (facet, bound) in facets {
-                    let outer = self.facet(facet, bound, false)?;
-                    outside.extend(cross(&within, &[vec![outer]]));
+                    let breaks_facet = self.facet(facet, bound, false)?;
+                    outside.extend(cross(&within, &[vec![breaks_facet]]));
                     within = cross(&within, &[vec![self.facet(facet, bound, true)?]]);
                 }
                 Ok(if inside { within } else { outside })
@@ -87,30 +89,30 @@ impl Lowering<'_, '_> {
         let mut product = vec![Vec::new()];
         for range in ranges {
             product = cross(&product, &self.tests(range, inside, depth - 1)?);
-            if product.len() > MOST_ALTERNATIVES {
+            if product.len() > MAX_RANGE_ALTERNATIVES {
                 return Err("a data range of too many alternatives");
             }
         }
         Ok(product)
     }
 
-    fn any(&mut self, ranges: &[DataRange], inside: bool, depth: usize) -> Tests {
-        let mut any = Vec::new();
+    fn alternatives(&mut self, ranges: &[DataRange], inside: bool, depth: usize) -> Tests {
+        let mut alternatives = Vec::new();
         for range in ranges {
-            any.extend(self.tests(range, inside, depth - 1)?);
+            alternatives.extend(self.tests(range, inside, depth - 1)?);
         }
-        Ok(any)
+        Ok(alternatives)
     }
 
     fn datatype(&mut self, iri: &str, inside: bool) -> Tests {
         if iri == rdfs::LITERAL {
             return Ok(if inside { vec![Vec::new()] } else { Vec::new() });
         }
-        let known = match iri.strip_prefix(xsd::NS) {
+        let is_supported = match iri.strip_prefix(xsd::NS) {
             Some(local) => DATATYPES.contains(&format!(" {local} ")),
             None => [owl::REAL, owl::RATIONAL, rdf::PLAIN_LITERAL].contains(&iri),
         };
-        if !known {
+        if !is_supported {
             return Err("a datatype whose values are not known");
         }
         let datatype = Term::Constant(self.context.symbols.literal(Literal::Uri(iri.into())));
@@ -118,7 +120,7 @@ impl Lowering<'_, '_> {
         Ok(vec![vec![Atom::BuiltIn { built_in, arguments: vec![self.value, datatype] }]])
     }
 
-    /// The test that a value of the restricted datatype keeps a facet, or breaks it.
+    /// Returns the test that a value of the restricted datatype satisfies the facet (`keeps`) or violates it.
     fn facet(&mut self, facet: &str, bound: &crate::owl::Literal, keeps: bool) -> Result<Atom, &'static str> {
         let built_in = match (facet.strip_prefix(xsd::NS), keeps) {
             (Some("minInclusive"), true) | (Some("maxExclusive"), false) => BuiltIn::GreaterThanOrEqual,

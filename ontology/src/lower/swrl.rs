@@ -1,4 +1,4 @@
-//! SWRL rules to the engine's rules, each once.
+//! Lowers SWRL rules to rules of the engine, without duplicates.
 
 use std::collections::{HashMap, HashSet};
 
@@ -11,9 +11,10 @@ use crate::error::Warning;
 use crate::owl::{Argument, Atom, ClassExpression, Rule};
 use crate::vocab::owl;
 
-/// Lowers the rules; returns how many repeat another one (but for the names of variables).
+/// Lowers the rules. Returns the number of duplicates, which differ from another rule at most in the names of
+/// variables.
 pub(crate) fn lower(rules: &[Rule], context: &mut Context) -> usize {
-    let mut seen = HashSet::new();
+    let mut contents = HashSet::new();
     let mut duplicates = 0;
     for rule in rules {
         let identity = RuleIdentity {
@@ -31,7 +32,8 @@ pub(crate) fn lower(rules: &[Rule], context: &mut Context) -> usize {
             continue;
         }
         let content: Vec<_> = context.rules[position..].iter().map(canonical).collect();
-        if !seen.insert(content) {
+        // A rule can be lowered to several rules of the engine; all of them are removed.
+        if !contents.insert(content) {
             context.rules.truncate(position);
             duplicates += 1;
         } else if rule.enabled == Some(false) {
@@ -41,12 +43,14 @@ pub(crate) fn lower(rules: &[Rule], context: &mut Context) -> usize {
     duplicates
 }
 
-/// Body and head with the atoms of the body sorted and variables numbered from there. Equal for rules that differ in
-/// the names of variables or the order of atoms, unless a body has several atoms of one predicate.
+/// Returns body and head with the atoms of the body sorted, and with variables numbered in this order. The
+/// result is equal for rules that differ in the names of variables or in the order of atoms, unless a body has
+/// several atoms with one predicate.
 fn canonical(rule: &rules::Rule) -> (Vec<rules::Atom>, Vec<rules::Atom>) {
-    let blind = |_: Variable| Term::Variable(Variable(0));
+    // Sorting must not depend on the numbers of variables.
+    let anonymous = |_: Variable| Term::Variable(Variable(0));
     let mut body = rule.body.clone();
-    body.sort_by_cached_key(|atom| format!("{:?}", renamed(atom, &mut { blind })));
+    body.sort_by_cached_key(|atom| format!("{:?}", renamed(atom, &mut { anonymous })));
     let mut numbers = HashMap::new();
     let mut number = |variable: Variable| {
         let next = Variable(numbers.len() as u16);
@@ -56,7 +60,7 @@ fn canonical(rule: &rules::Rule) -> (Vec<rules::Atom>, Vec<rules::Atom>) {
     (body, rule.head.iter().map(|atom| renamed(atom, &mut number)).collect())
 }
 
-/// The atom with other variables.
+/// Replaces the variables of an atom.
 fn renamed(atom: &rules::Atom, name: &mut dyn FnMut(Variable) -> Term) -> rules::Atom {
     use rules::Atom as A;
     let mut term = |term: Term| match term {
@@ -83,25 +87,26 @@ fn lower_rule(rule: &Rule, identity: &RuleIdentity, context: &mut Context) -> Re
     let mut variables = Variables::default();
     let mut bodies: Vec<Conjunction> = vec![Vec::new()];
     for atom in &rule.body {
-        let mut ways = condition(context, atom, &mut variables)?;
+        let mut alternatives = condition(context, atom, &mut variables)?;
         if let Atom::Class(class, argument) = atom
-            && bodies.len() * ways.len() > class::ALTERNATIVES
+            && bodies.len() * alternatives.len() > class::ALTERNATIVES
         {
             let x = term(context, argument, &mut variables);
-            ways = class::abbreviated(context, class, ways, x);
+            alternatives = class::abbreviated(context, class, alternatives, x);
         }
-        bodies = cross(&bodies, &ways);
+        bodies = cross(&bodies, &alternatives);
     }
     for body in &mut bodies {
         individuals(context, rule, body, &mut variables);
     }
-    let (mut heads, mut further) = (Vec::new(), Vec::new());
+    // Head atoms with a condition of their own need a separate rule.
+    let (mut heads, mut conditional) = (Vec::new(), Vec::new());
     for atom in &rule.head {
         for (body, head) in conclusions(context, atom, &mut variables)? {
             if body.is_empty() && !head.is_empty() {
                 heads.extend(head);
             } else {
-                further.push((body, head));
+                conditional.push((body, head));
             }
         }
     }
@@ -109,16 +114,15 @@ fn lower_rule(rule: &Rule, identity: &RuleIdentity, context: &mut Context) -> Re
         if !heads.is_empty() || rule.head.is_empty() {
             context.rule(identity, heads.clone(), body.clone(), &variables);
         }
-        for (more, head) in &further {
-            let body = body.iter().chain(more).cloned().collect();
+        for (conditions, head) in &conditional {
+            let body = body.iter().chain(conditions).cloned().collect();
             context.rule(identity, head.clone(), body, &variables);
         }
     }
     Ok(())
 }
 
-/// Lets variables range over all individuals that a body asks to be in `owl:Thing`, or to be the same, and says nothing else
-/// about.
+/// Binds variables that occur only in `owl:Thing` or in an equality: they range over all individuals.
 fn individuals(context: &mut Context, rule: &Rule, body: &mut Conjunction, variables: &mut Variables) {
     for atom in &rule.body {
         let argument = match atom {
@@ -134,7 +138,7 @@ fn individuals(context: &mut Context, rule: &Rule, body: &mut Conjunction, varia
     }
 }
 
-/// Whether a relation, or equality with what one binds, gives a variable its values.
+/// Returns `true` if a relation binds the variable, directly or through an equality.
 fn is_bound(body: &Conjunction, x: Term) -> bool {
     let binds = |atom: &rules::Atom| matches!(atom, rules::Atom::Relation { arguments, .. } if arguments.contains(&x));
     body.iter().any(|atom| match atom {
@@ -156,7 +160,7 @@ fn term(context: &mut Context, argument: &Argument, variables: &mut Variables) -
     }
 }
 
-/// An atom of a body.
+/// Lowers an atom of a body to alternative conjunctions.
 fn condition(
     context: &mut Context,
     atom: &Atom,
@@ -189,8 +193,8 @@ fn condition(
         }
         Atom::BuiltIn(iri, arguments) => {
             let unknown = || {
-                let meant = BuiltIn::similar(iri).map(|name| format!("; did you mean `{name}`?"));
-                format!("the built-in <{iri}> is not known{}", meant.unwrap_or_default())
+                let suggestion = BuiltIn::similar(iri).map(|name| format!("; did you mean `{name}`?"));
+                format!("the built-in <{iri}> is not known{}", suggestion.unwrap_or_default())
             };
             let built_in = BuiltIn::from_iri(iri).ok_or_else(unknown)?;
             let arguments = with_names(built_in, arguments.clone());
@@ -200,7 +204,8 @@ fn condition(
     })
 }
 
-/// The arguments of a built-in; an expression among them is told the names of its variables.
+/// Returns the arguments of a built-in. In `swrlm:eval`, the names of the rule's variables are prepended to the
+/// expression.
 fn with_names(built_in: BuiltIn, mut arguments: Vec<Argument>) -> Vec<Argument> {
     if let [_, Argument::Literal(text), values @ ..] = arguments.as_mut_slice() {
         let name = |argument: &Argument| match argument {
@@ -209,14 +214,14 @@ fn with_names(built_in: BuiltIn, mut arguments: Vec<Argument>) -> Vec<Argument> 
         };
         let names: Vec<Option<String>> = values.iter().map(name).collect();
         let names: Vec<Option<&str>> = names.iter().map(Option::as_deref).collect();
-        if let Some(named) = built_in.with_names(&text.lexical, &names) {
-            text.lexical = named.into();
+        if let Some(expression) = built_in.with_names(&text.lexical, &names) {
+            text.lexical = expression.into();
         }
     }
     arguments
 }
 
-/// An atom of a head.
+/// Lowers an atom of a head.
 fn conclusions(
     context: &mut Context,
     atom: &Atom,

@@ -1,9 +1,9 @@
-//! What the classes and properties of OWL itself mean: `owl:Thing`, `owl:Nothing`, the top and the bottom properties, and
-//! that nothing differs from itself.
+//! Semantics of OWL's own classes and properties: `owl:Thing`, `owl:Nothing`, the top and bottom properties,
+//! and `differentFrom`.
 //!
-//! What is empty by definition is forbidden in every knowledge base. `owl:Thing` holds of every individual that the
-//! knowledge base names or says anything about; it is derived only where something asks for it, because no conclusion
-//! about it is worth knowing.
+//! Constraints forbid members of `owl:Nothing` and of the bottom properties in every knowledge base.
+//! `owl:Thing` contains every individual that the knowledge base names or describes. Its facts are derived only
+//! if a rule or fact depends on them.
 
 use std::collections::BTreeSet;
 
@@ -17,7 +17,8 @@ fn identity(label: &str) -> RuleIdentity {
     RuleIdentity { source: AXIOM_SOURCE.into(), label: Some(label.into()), position: 0 }
 }
 
-/// Adds the constraints, and the rules and facts of `owl:Thing` if a rule or a fact mentions it.
+/// Adds the constraints, and the rules and facts of `owl:Thing` and of the top object property if a rule or
+/// fact mentions them.
 pub(crate) fn lower(ontology: &Ontology, context: &mut Context) {
     let mut variables = Variables::default();
     let (x, y) = (variables.fresh("x"), variables.fresh("y"));
@@ -31,19 +32,19 @@ pub(crate) fn lower(ontology: &Ontology, context: &mut Context) {
         let atom = Atom::relation(context.name(name), arguments);
         context.rule(&identity(label), Vec::new(), vec![atom], &variables);
     }
-    if asked_for(context, owl::TOP_OBJECT_PROPERTY).is_some() {
+    if mentioned_symbol(context, owl::TOP_OBJECT_PROPERTY).is_some() {
         let body = vec![context.relation(owl::THING, [x]), context.relation(owl::THING, [y])];
         let head = vec![context.relation(owl::TOP_OBJECT_PROPERTY, [x, y])];
         context.rule(&identity("owl:topObjectProperty"), head, body, &variables);
     }
-    if let Some(thing) = asked_for(context, owl::THING) {
+    if let Some(thing) = mentioned_symbol(context, owl::THING) {
         things(ontology, thing, context);
     }
 }
 
-/// The symbol of a name that a rule or a fact mentions. That it is among the symbols is not enough: they outlive the rules
-/// and facts of documents that have been retracted.
-fn asked_for(context: &Context, name: &str) -> Option<Symbol> {
+/// Returns the symbol of a name that a rule or fact mentions. The symbol table alone is not sufficient: it
+/// keeps the names of documents that have been retracted.
+fn mentioned_symbol(context: &Context, name: &str) -> Option<Symbol> {
     let symbol = context.symbols.find_name(name)?;
     let mentions = |atom: &Atom| {
         let predicate = match atom {
@@ -59,24 +60,25 @@ fn asked_for(context: &Context, name: &str) -> Option<Symbol> {
     (in_rules || in_facts()).then_some(symbol)
 }
 
+/// Adds the facts and rules that make `owl:Thing` contain all individuals.
 fn things(ontology: &Ontology, thing: Symbol, context: &mut Context) {
     let mut variables = Variables::default();
     let (x, y) = (variables.fresh("x"), variables.fresh("y"));
     let (label, mut names): (_, BTreeSet<Symbol>) = (identity("owl:Thing"), BTreeSet::new());
-    let of = |context: &mut Context, iri: &str, arguments: Vec<Term>, whose: Term| {
+    let add_member_rule = |context: &mut Context, iri: &str, arguments: Vec<Term>, member: Term| {
         let atom = Atom::relation(context.name(iri), arguments);
-        context.rule(&label, vec![Atom::relation(thing, [whose])], vec![atom], &variables);
+        context.rule(&label, vec![Atom::relation(thing, [member])], vec![atom], &variables);
     };
-    let own = [owl::THING, owl::NOTHING, owl::TOP_OBJECT_PROPERTY, owl::BOTTOM_OBJECT_PROPERTY];
+    let built_in = [owl::THING, owl::NOTHING, owl::TOP_OBJECT_PROPERTY, owl::BOTTOM_OBJECT_PROPERTY];
     let entities: Vec<&(EntityKind, Iri)> =
-        ontology.entities.iter().filter(|(_, iri)| !own.contains(&&**iri)).collect();
+        ontology.entities.iter().filter(|(_, iri)| !built_in.contains(&&**iri)).collect();
     for (kind, iri) in entities {
         match kind {
-            EntityKind::Class => of(context, iri, vec![x], x),
-            EntityKind::DataProperty => of(context, iri, vec![x, y], x),
+            EntityKind::Class => add_member_rule(context, iri, vec![x], x),
+            EntityKind::DataProperty => add_member_rule(context, iri, vec![x, y], x),
             EntityKind::ObjectProperty => {
-                of(context, iri, vec![x, y], x);
-                of(context, iri, vec![x, y], y);
+                add_member_rule(context, iri, vec![x, y], x);
+                add_member_rule(context, iri, vec![x, y], y);
             }
             EntityKind::NamedIndividual => {
                 names.insert(context.name(iri));
@@ -84,8 +86,8 @@ fn things(ontology: &Ontology, thing: Symbol, context: &mut Context) {
             EntityKind::AnnotationProperty | EntityKind::Datatype => {}
         }
     }
-    of(context, owl::DIFFERENT_FROM, vec![x, y], x);
-    of(context, owl::DIFFERENT_FROM, vec![x, y], y);
+    add_member_rule(context, owl::DIFFERENT_FROM, vec![x, y], x);
+    add_member_rule(context, owl::DIFFERENT_FROM, vec![x, y], y);
     for annotated in &ontology.axioms {
         match &annotated.axiom {
             Axiom::SameIndividual(individuals) => {
