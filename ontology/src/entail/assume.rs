@@ -1,17 +1,20 @@
-//! Individuals of which a class expression is assumed, or asked for.
+//! Class expressions as assumptions about an individual, and as goals.
 
 use rules::{Delta, Engine, Error, Fact, Literal};
 
-use super::prover::{Prover, Shown, contradiction, edge, literal, member, same, shown, value, with};
+use super::prover::{
+    ProofResult, Prover, contradiction, edge, explain, literal, member, same, value, with_facts,
+};
 use crate::lower::lower;
 use crate::owl::{AnnotatedAxiom, Axiom, Bound, ClassExpression, Iri, ObjectPropertyExpression, Ontology};
 use crate::vocab::owl;
 
-/// So many cases are told apart for one question.
-const CASES: usize = 64;
+/// Limit on the members of a union or enumeration that are assumed case by case.
+const MAX_CASES: usize = 64;
 
 impl Prover {
-    /// What is known if an individual is in a class, in each case that the class leaves open.
+    /// Assumes that an individual is in a class. Returns an engine for each case: a disjunction gives several
+    /// cases. `next` is the number of the last fresh name.
     pub(super) fn assume(
         engine: &Engine,
         class: &ClassExpression,
@@ -28,28 +31,28 @@ impl Prover {
             C::IntersectionOf(classes) => {
                 let mut cases = vec![copy];
                 for class in classes {
-                    let mut more = Vec::new();
+                    let mut extended = Vec::new();
                     for case in &cases {
-                        more.extend(Self::assume(case, class, individual, next)?);
+                        extended.extend(Self::assume(case, class, individual, next)?);
                     }
-                    cases = more;
+                    cases = extended;
                 }
                 return Ok(cases);
             }
-            C::UnionOf(classes) if classes.len() <= CASES => {
+            C::UnionOf(classes) if classes.len() <= MAX_CASES => {
                 let mut cases = Vec::new();
                 for class in classes {
                     cases.extend(Self::assume(&copy, class, individual, next)?);
                 }
                 return Ok(cases);
             }
-            C::OneOf(names) if names.len() <= CASES => {
-                let one = |name: &Iri| {
+            C::OneOf(names) if names.len() <= MAX_CASES => {
+                let assume_equal = |name: &Iri| {
                     let mut copy = copy.clone();
                     let fact = same(&mut copy, individual, name);
-                    with(&copy, [fact])
+                    with_facts(&copy, [fact])
                 };
-                return names.iter().map(one).collect();
+                return names.iter().map(assume_equal).collect();
             }
             C::SomeValuesFrom(property, filler) => {
                 return Self::witnesses(&copy, property, 1, filler, individual, next);
@@ -58,8 +61,8 @@ impl Prover {
                 return Self::witnesses(&copy, property, *n, filler, individual, next);
             }
             C::Cardinality(Bound::Exact, n @ 1..=8, property, filler) => {
-                let most = C::Cardinality(Bound::Max, *n, property.clone(), filler.clone());
-                let copy = by_rules(copy, &most, individual)?;
+                let at_most = C::Cardinality(Bound::Max, *n, property.clone(), filler.clone());
+                let copy = by_rules(copy, &at_most, individual)?;
                 return Self::witnesses(&copy, property, *n, filler, individual, next);
             }
             C::DataSomeValuesFrom(property, _) | C::DataCardinality(Bound::Min, 1, property, _) => {
@@ -68,10 +71,10 @@ impl Prover {
             }
             other => return Ok(vec![by_rules(copy, other, individual)?]),
         };
-        Ok(vec![with(&copy, [fact])?])
+        Ok(vec![with_facts(&copy, [fact])?])
     }
 
-    /// So many values in a class, which differ.
+    /// Assumes `count` pairwise different fresh values of a property, all of them in the class `filler`.
     fn witnesses(
         engine: &Engine,
         property: &ObjectPropertyExpression,
@@ -90,24 +93,24 @@ impl Prover {
         let mut facts: Vec<Fact> =
             names.iter().map(|name| edge(&mut copy, property, individual, name)).collect();
         facts.extend(pairwise_different(&mut copy, &names));
-        let mut cases = vec![with(&copy, facts)?];
+        let mut cases = vec![with_facts(&copy, facts)?];
         for name in &names {
-            let mut more = Vec::new();
+            let mut extended = Vec::new();
             for case in &cases {
-                more.extend(Self::assume(case, filler, name, next)?);
+                extended.extend(Self::assume(case, filler, name, next)?);
             }
-            cases = more;
+            cases = extended;
         }
         Ok(cases)
     }
 
-    /// What shows that an individual is in a class.
+    /// Proves that an individual is in a class. Returns the explanation, or `None` if the proof fails.
     pub(super) fn is_in(
         engine: &Engine,
         class: &ClassExpression,
         individual: &Iri,
         next: &mut usize,
-    ) -> Shown {
+    ) -> ProofResult {
         use ClassExpression as C;
         if let Some(reason) = contradiction(engine) {
             return Ok(Some(format!("the assumption contradicts itself: {reason}\n")));
@@ -132,37 +135,40 @@ impl Prover {
                 return Ok(Some(reasons));
             }
             C::UnionOf(classes) => {
-                return first(classes, |class| Self::is_in(&copy, class, individual, next));
+                return first_proof(classes, |class| Self::is_in(&copy, class, individual, next));
             }
             C::OneOf(names) => {
-                return first(names, |name| {
+                return first_proof(names, |name| {
                     let goal = same(&mut copy, individual, name);
-                    Ok(shown(&copy, &goal))
+                    Ok(explain(&copy, &goal))
                 });
             }
             C::ComplementOf(class) => {
+                // Refutation: the individual is in the complement if membership in the class is contradictory.
                 let cases = Self::assume(&copy, class, individual, next)?;
                 return Ok(refuted(&cases));
             }
             C::AllValuesFrom(property, filler) => {
+                // A fresh value represents all values.
                 *next += 1;
                 let name = Self::fresh(*next);
                 let fact = edge(&mut copy, property, individual, &name);
-                return Self::is_in(&with(&copy, [fact])?, filler, &name, next);
+                return Self::is_in(&with_facts(&copy, [fact])?, filler, &name, next);
             }
             C::SomeValuesFrom(property, filler) | C::Cardinality(Bound::Min, 1, property, filler) => {
                 let values = values(&mut copy, property, individual);
-                return first(&values, |value| Self::is_in(&copy, filler, value, next));
+                return first_proof(&values, |value| Self::is_in(&copy, filler, value, next));
             }
             C::Cardinality(Bound::Min, 0, ..) => return Ok(Some("nothing has fewer than none\n".to_owned())),
+            // Refutation: `n` + 1 different values are contradictory.
             C::Cardinality(Bound::Max, n @ 0..=8, property, filler) => {
                 let cases = Self::witnesses(&copy, property, n + 1, filler, individual, next)?;
                 return Ok(refuted(&cases));
             }
             C::Cardinality(Bound::Exact, n, property, filler) => {
-                let [least, most] = [Bound::Min, Bound::Max]
+                let [at_least, at_most] = [Bound::Min, Bound::Max]
                     .map(|bound| C::Cardinality(bound, *n, property.clone(), filler.clone()));
-                return Self::is_in(&copy, &C::IntersectionOf(vec![least, most]), individual, next);
+                return Self::is_in(&copy, &C::IntersectionOf(vec![at_least, at_most]), individual, next);
             }
             C::DataCardinality(Bound::Max, n @ 0..=8, property, _) => {
                 let facts = (0..=*n).map(|_| {
@@ -170,42 +176,42 @@ impl Prover {
                     value(&mut copy, property, individual, Literal::fresh(*next))
                 });
                 let facts: Vec<Fact> = facts.collect();
-                return Ok(refuted(&[with(&copy, facts)?]));
+                return Ok(refuted(&[with_facts(&copy, facts)?]));
             }
             _ => return Ok(None),
         };
-        Ok(shown(&copy, &goal))
+        Ok(explain(&copy, &goal))
     }
 }
 
-/// The individuals that a property relates to one.
+/// Returns the named values of a property for an individual.
 pub(super) fn values(engine: &mut Engine, property: &ObjectPropertyExpression, individual: &Iri) -> Vec<Iri> {
-    let one = engine.symbols_mut().name(individual);
+    let subject = engine.symbols_mut().name(individual);
     let (ObjectPropertyExpression::Property(iri) | ObjectPropertyExpression::Inverse(iri)) = property;
     let predicate = engine.symbols_mut().name(iri);
     let forward = matches!(property, ObjectPropertyExpression::Property(_));
-    let pattern = if forward { [Some(one), None] } else { [None, Some(one)] };
+    let pattern = if forward { [Some(subject), None] } else { [None, Some(subject)] };
     let name = |symbol| engine.symbols().value(symbol).as_name().map(Iri::from);
     engine.matching(predicate, &pattern).filter_map(|row| name(row[usize::from(forward)])).collect()
 }
 
-/// The first of some ways that shows it.
-pub(super) fn first<T>(ways: &[T], mut show: impl FnMut(&T) -> Shown) -> Shown {
-    for way in ways {
-        if let Some(reason) = show(way)? {
+/// Returns the first proof that an attempt finds.
+pub(super) fn first_proof<T>(attempts: &[T], mut prove: impl FnMut(&T) -> ProofResult) -> ProofResult {
+    for attempt in attempts {
+        if let Some(reason) = prove(attempt)? {
             return Ok(Some(reason));
         }
     }
     Ok(None)
 }
 
-/// Why no case is possible, if none is.
+/// Explains why all cases are contradictory; `None` if one of them is consistent.
 pub(super) fn refuted(cases: &[Engine]) -> Option<String> {
     let reasons: Option<Vec<String>> = cases.iter().map(contradiction).collect();
     Some(format!("the opposite is impossible: {}\n", reasons?.join("; and ")))
 }
 
-/// That names stand for different individuals.
+/// The facts that names denote pairwise different individuals.
 pub(super) fn pairwise_different(engine: &mut Engine, names: &[Iri]) -> Vec<Fact> {
     let symbols = engine.symbols_mut();
     let different = symbols.name(owl::DIFFERENT_FROM);
@@ -213,21 +219,21 @@ pub(super) fn pairwise_different(engine: &mut Engine, names: &[Iri]) -> Vec<Fact
     let pairs = names
         .iter()
         .enumerate()
-        .flat_map(|(at, left)| names[at + 1..].iter().map(move |right| [*left, *right]));
+        .flat_map(|(index, first)| names[index + 1..].iter().map(move |second| [*first, *second]));
     pairs.map(|pair| Fact::new(different, pair)).collect()
 }
 
-/// Adds the rules of an assertion about a class that no facts say.
+/// Adds the rules and facts of a class assertion to an engine.
 fn by_rules(mut engine: Engine, class: &ClassExpression, individual: &Iri) -> Result<Engine, Error> {
     let axiom = Axiom::ClassAssertion(class.clone(), individual.clone());
     let axioms = vec![AnnotatedAxiom { axiom, annotations: Vec::new() }];
     let lowered = lower(&Ontology { axioms, ..Ontology::default() }, engine.symbols_mut());
-    let known = engine.program().rules.clone();
+    let old = engine.program().rules.clone();
     let is_new =
-        |rule: &rules::Rule| !known.iter().any(|other| other.head == rule.head && other.body == rule.body);
+        |rule: &rules::Rule| !old.iter().any(|other| other.head == rule.head && other.body == rule.body);
     let mut new: Vec<rules::Rule> = lowered.program.rules.into_iter().filter(is_new).collect();
     for rule in &mut new {
-        // Nothing else has this identity.
+        // No other rule has this identity.
         rule.identity.source = "urn:metaplan:assumed".into();
     }
     if !new.is_empty() {

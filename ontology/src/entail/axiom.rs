@@ -1,14 +1,14 @@
-//! Axioms, kind by kind, as assumptions and goals.
+//! Proves axioms: their conditions become assumptions, their conclusions become goals.
 
 use rules::{Engine, Error, Fact, Literal};
 
 use super::assume::{pairwise_different, refuted};
-use super::prover::{Answer, Prover, Shown, edge, literal, same, shown, value, with};
+use super::prover::{Answer, ProofResult, Prover, edge, explain, literal, same, value, with_facts};
 use crate::owl::{Axiom, Characteristic, ClassExpression, Iri, ObjectPropertyExpression as Property};
 use crate::vocab::owl;
 
 impl Prover {
-    /// Whether an axiom follows.
+    /// Decides if the rules prove an axiom.
     pub(super) fn axiom(&self, axiom: &Axiom) -> Result<Answer, Error> {
         if let Axiom::DatatypeDefinition(..) = axiom {
             return Ok(Answer::Open("what a datatype is defined to be is not asked for"));
@@ -23,22 +23,25 @@ impl Prover {
         Ok(reason.map_or(Answer::Open("the rules do not conclude it"), Answer::Follows))
     }
 
-    fn classes(&self, axiom: &Axiom) -> Shown {
+    fn classes(&self, axiom: &Axiom) -> ProofResult {
         match axiom {
             Axiom::SubClassOf(sub, sup) => self.sub_class(sub, sup),
             Axiom::EquivalentClasses(classes) => {
                 let next = classes.iter().cycle().skip(1);
-                all(classes.iter().zip(next), |(sub, sup)| self.sub_class(sub, sup))
+                prove_all(classes.iter().zip(next), |(sub, sup)| self.sub_class(sub, sup))
             }
             Axiom::DisjointClasses(classes) => self.disjoint(classes),
             Axiom::DisjointUnion(class, parts) => {
                 let (class, union) =
                     (ClassExpression::Class(class.clone()), ClassExpression::UnionOf(parts.clone()));
                 let pairs = [(&class, &union), (&union, &class)];
-                let both = all(pairs.into_iter(), |(sub, sup)| self.sub_class(sub, sup))?;
-                Ok(both.zip(self.disjoint(parts)?).map(|(both, disjoint)| both + &disjoint))
+                let equivalence = prove_all(pairs.into_iter(), |(sub, sup)| self.sub_class(sub, sup))?;
+                Ok(equivalence
+                    .zip(self.disjoint(parts)?)
+                    .map(|(equivalence, disjoint)| equivalence + &disjoint))
             }
             Axiom::HasKey(class, objects, data) => {
+                // Two fresh members with equal values of all keys must be the same individual.
                 let (x, y, mut next) = (Self::fresh(0), Self::fresh(1), 2);
                 let mut copy = self.base.clone();
                 let mut facts = Vec::new();
@@ -52,10 +55,10 @@ impl Prover {
                     facts.extend([&x, &y].map(|end| value(&mut copy, property, end, Literal::fresh(next))));
                 }
                 let mut reasons = String::new();
-                for case in Self::assume(&with(&copy, facts)?, class, &x, &mut next)? {
+                for case in Self::assume(&with_facts(&copy, facts)?, class, &x, &mut next)? {
                     for mut case in Self::assume(&case, class, &y, &mut next)? {
                         let goal = same(&mut case, &x, &y);
-                        match shown(&case, &goal) {
+                        match explain(&case, &goal) {
                             Some(reason) => reasons += &reason,
                             None => return Ok(None),
                         }
@@ -67,7 +70,7 @@ impl Prover {
         }
     }
 
-    fn sub_class(&self, sub: &ClassExpression, sup: &ClassExpression) -> Shown {
+    fn sub_class(&self, sub: &ClassExpression, sup: &ClassExpression) -> ProofResult {
         let (x, mut next) = (Self::fresh(0), 0);
         let mut reasons = String::new();
         for case in Self::assume(&self.base, sub, &x, &mut next)? {
@@ -79,59 +82,64 @@ impl Prover {
         Ok(Some(reasons))
     }
 
-    fn disjoint(&self, classes: &[ClassExpression]) -> Shown {
+    fn disjoint(&self, classes: &[ClassExpression]) -> ProofResult {
         let pairs = classes.iter().enumerate();
-        let pairs = pairs.flat_map(|(at, first)| classes[at + 1..].iter().map(move |second| (first, second)));
-        all(pairs, |(first, second)| {
-            let both = ClassExpression::IntersectionOf(vec![first.clone(), second.clone()]);
-            let cases = Self::assume(&self.base, &both, &Self::fresh(0), &mut 0)?;
+        let pairs =
+            pairs.flat_map(|(index, first)| classes[index + 1..].iter().map(move |second| (first, second)));
+        prove_all(pairs, |(first, second)| {
+            let intersection = ClassExpression::IntersectionOf(vec![first.clone(), second.clone()]);
+            let cases = Self::assume(&self.base, &intersection, &Self::fresh(0), &mut 0)?;
             Ok(refuted(&cases))
         })
     }
 
-    /// Assumes edges between fresh individuals and asks for one more.
-    fn implies(&self, body: &[(&Property, usize, usize)], head: (&Property, usize, usize)) -> Shown {
+    /// Proves a property axiom: assumes the edges of `body` between fresh individuals, then proves the edge
+    /// `head`. Individuals are given by number.
+    fn implies(&self, body: &[(&Property, usize, usize)], head: (&Property, usize, usize)) -> ProofResult {
         let mut copy = self.assumed(body)?;
         let (property, from, to) = head;
         let goal = edge(&mut copy, property, &Self::fresh(from), &Self::fresh(to));
-        Ok(shown_or_refuted(&copy, &goal))
+        Ok(explain_or_refute(&copy, &goal))
     }
 
+    /// Assumes edges between fresh individuals.
     fn assumed(&self, body: &[(&Property, usize, usize)]) -> Result<Engine, Error> {
         let mut copy = self.base.clone();
         let facts: Vec<Fact> = body
             .iter()
             .map(|(property, from, to)| edge(&mut copy, property, &Self::fresh(*from), &Self::fresh(*to)))
             .collect();
-        with(&copy, facts)
+        with_facts(&copy, facts)
     }
 
-    fn merges(&self, body: &[(&Property, usize, usize)], left: usize, right: usize) -> Shown {
+    /// Proves that the edges of `body` imply that two of the fresh individuals are the same.
+    fn merges(&self, body: &[(&Property, usize, usize)], left: usize, right: usize) -> ProofResult {
         let mut copy = self.assumed(body)?;
         let goal = same(&mut copy, &Self::fresh(left), &Self::fresh(right));
-        Ok(shown_or_refuted(&copy, &goal))
+        Ok(explain_or_refute(&copy, &goal))
     }
 
-    fn properties(&self, axiom: &Axiom) -> Shown {
+    fn properties(&self, axiom: &Axiom) -> ProofResult {
         match axiom {
             Axiom::SubObjectPropertyOf(sub, sup) => self.implies(&[(sub, 0, 1)], (sup, 0, 1)),
             Axiom::SubPropertyChainOf(chain, sup) => {
-                let body: Vec<_> = chain.iter().enumerate().map(|(at, link)| (link, at, at + 1)).collect();
+                let body: Vec<_> =
+                    chain.iter().enumerate().map(|(index, link)| (link, index, index + 1)).collect();
                 self.implies(&body, (sup, 0, chain.len()))
             }
             Axiom::EquivalentObjectProperties(properties) => {
                 let next = properties.iter().cycle().skip(1);
-                all(properties.iter().zip(next), |(sub, sup)| self.implies(&[(sub, 0, 1)], (sup, 0, 1)))
+                prove_all(properties.iter().zip(next), |(sub, sup)| self.implies(&[(sub, 0, 1)], (sup, 0, 1)))
             }
             Axiom::InverseObjectProperties(first, second) => {
                 let [first, second] = [first, second].map(|iri| Property::Property(iri.clone()));
                 let pairs = [(&first, &second), (&second, &first)];
-                all(pairs.into_iter(), |(sub, sup)| self.implies(&[(sub, 0, 1)], (sup, 1, 0)))
+                prove_all(pairs.into_iter(), |(sub, sup)| self.implies(&[(sub, 0, 1)], (sup, 1, 0)))
             }
             Axiom::DisjointObjectProperties(properties) => {
                 let pairs = properties.iter().enumerate();
-                let pairs = pairs.flat_map(|(at, p)| properties[at + 1..].iter().map(move |q| (p, q)));
-                all(pairs, |(p, q)| Ok(refuted(&[self.assumed(&[(p, 0, 1), (q, 0, 1)])?])))
+                let pairs = pairs.flat_map(|(index, p)| properties[index + 1..].iter().map(move |q| (p, q)));
+                prove_all(pairs, |(p, q)| Ok(refuted(&[self.assumed(&[(p, 0, 1), (q, 0, 1)])?])))
             }
             Axiom::ObjectPropertyDomain(property, class) => {
                 Self::is_in(&self.assumed(&[(property, 0, 1)])?, class, &Self::fresh(0), &mut 1)
@@ -149,17 +157,17 @@ impl Prover {
                 Characteristic::Reflexive => {
                     let mut copy = self.base.clone();
                     let symbols = copy.symbols_mut();
-                    let thing = Fact::new(symbols.name(owl::THING), [symbols.name(&Self::fresh(0))]);
-                    let mut copy = with(&copy, [thing])?;
+                    let is_thing = Fact::new(symbols.name(owl::THING), [symbols.name(&Self::fresh(0))]);
+                    let mut copy = with_facts(&copy, [is_thing])?;
                     let goal = edge(&mut copy, p, &Self::fresh(0), &Self::fresh(0));
-                    Ok(shown(&copy, &goal))
+                    Ok(explain(&copy, &goal))
                 }
             },
             _ => self.data_properties(axiom),
         }
     }
 
-    fn data_properties(&self, axiom: &Axiom) -> Shown {
+    fn data_properties(&self, axiom: &Axiom) -> ProofResult {
         let assumed = |properties: &[(&Iri, usize)]| -> Result<Engine, Error> {
             let mut copy = self.base.clone();
             let facts: Vec<Fact> = properties
@@ -168,22 +176,22 @@ impl Prover {
                     value(&mut copy, property, &Self::fresh(0), Literal::fresh(*number))
                 })
                 .collect();
-            with(&copy, facts)
+            with_facts(&copy, facts)
         };
-        let implies = |(sub, sup): (&Iri, &Iri)| -> Shown {
+        let implies = |(sub, sup): (&Iri, &Iri)| -> ProofResult {
             let mut copy = assumed(&[(sub, 1)])?;
             let goal = value(&mut copy, sup, &Self::fresh(0), Literal::fresh(1));
-            Ok(shown_or_refuted(&copy, &goal))
+            Ok(explain_or_refute(&copy, &goal))
         };
         match axiom {
             Axiom::SubDataPropertyOf(sub, sup) => implies((sub, sup)),
-            Axiom::EquivalentDataProperties(all_of) => {
-                all(all_of.iter().zip(all_of.iter().cycle().skip(1)), implies)
+            Axiom::EquivalentDataProperties(properties) => {
+                prove_all(properties.iter().zip(properties.iter().cycle().skip(1)), implies)
             }
             Axiom::DisjointDataProperties(properties) => {
                 let pairs = properties.iter().enumerate();
-                let pairs = pairs.flat_map(|(at, p)| properties[at + 1..].iter().map(move |q| (p, q)));
-                all(pairs, |(p, q)| Ok(refuted(&[assumed(&[(p, 1), (q, 1)])?])))
+                let pairs = pairs.flat_map(|(index, p)| properties[index + 1..].iter().map(move |q| (p, q)));
+                prove_all(pairs, |(p, q)| Ok(refuted(&[assumed(&[(p, 1), (q, 1)])?])))
             }
             Axiom::FunctionalDataProperty(property) => {
                 Ok(refuted(&[assumed(&[(property, 1), (property, 2)])?]))
@@ -196,40 +204,40 @@ impl Prover {
         }
     }
 
-    fn individuals(&self, axiom: &Axiom) -> Shown {
+    fn individuals(&self, axiom: &Axiom) -> ProofResult {
         let mut copy = self.base.clone();
         match axiom {
             Axiom::ClassAssertion(class, individual) => Self::is_in(&copy, class, individual, &mut 0),
             Axiom::ObjectPropertyAssertion(property, from, to) => {
                 let goal = edge(&mut copy, property, from, to);
-                Ok(shown(&copy, &goal))
+                Ok(explain(&copy, &goal))
             }
             Axiom::DataPropertyAssertion(property, from, to) => {
                 let goal = value(&mut copy, property, from, literal(to));
-                Ok(shown(&copy, &goal))
+                Ok(explain(&copy, &goal))
             }
             Axiom::NegativeObjectPropertyAssertion(property, from, to) => {
                 let opposite = edge(&mut copy, property, from, to);
-                Ok(refuted(&[with(&copy, [opposite])?]))
+                Ok(refuted(&[with_facts(&copy, [opposite])?]))
             }
             Axiom::NegativeDataPropertyAssertion(property, from, to) => {
                 let opposite = value(&mut copy, property, from, literal(to));
-                Ok(refuted(&[with(&copy, [opposite])?]))
+                Ok(refuted(&[with_facts(&copy, [opposite])?]))
             }
-            Axiom::SameIndividual(names) => all(names.windows(2), |pair| {
+            Axiom::SameIndividual(names) => prove_all(names.windows(2), |pair| {
                 let goal = same(&mut copy, &pair[0], &pair[1]);
-                Ok(shown(&copy, &goal))
+                Ok(explain(&copy, &goal))
             }),
             Axiom::DifferentIndividuals(names) => {
                 let pairs = names.iter().enumerate();
-                let pairs = pairs.flat_map(|(at, x)| names[at + 1..].iter().map(move |y| (x, y)));
-                all(pairs, |(x, y)| {
+                let pairs = pairs.flat_map(|(index, x)| names[index + 1..].iter().map(move |y| (x, y)));
+                prove_all(pairs, |(x, y)| {
                     let goal = pairwise_different(&mut copy, &[x.clone(), y.clone()]).remove(0);
-                    if let Some(reason) = shown(&copy, &goal) {
+                    if let Some(reason) = explain(&copy, &goal) {
                         return Ok(Some(reason));
                     }
                     let opposite = same(&mut copy, x, y);
-                    Ok(refuted(&[with(&copy, [opposite])?]))
+                    Ok(refuted(&[with_facts(&copy, [opposite])?]))
                 })
             }
             _ => Ok(None),
@@ -237,16 +245,16 @@ impl Prover {
     }
 }
 
-/// The derivation of a goal, or why what was assumed for it is impossible.
-fn shown_or_refuted(engine: &Engine, goal: &Fact) -> Option<String> {
-    shown(engine, goal).or_else(|| refuted(std::slice::from_ref(engine)))
+/// Explains a goal by its derivation, or by a contradiction of the assumptions.
+fn explain_or_refute(engine: &Engine, goal: &Fact) -> Option<String> {
+    explain(engine, goal).or_else(|| refuted(std::slice::from_ref(engine)))
 }
 
-/// The reasons of all of some goals.
-fn all<T>(goals: impl Iterator<Item = T>, mut show: impl FnMut(T) -> Shown) -> Shown {
+/// Proves all goals; returns the concatenated explanations.
+fn prove_all<T>(goals: impl Iterator<Item = T>, mut prove: impl FnMut(T) -> ProofResult) -> ProofResult {
     let mut reasons = String::new();
     for goal in goals {
-        match show(goal)? {
+        match prove(goal)? {
             Some(reason) => reasons += &reason,
             None => return Ok(None),
         }

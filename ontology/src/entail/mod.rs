@@ -1,9 +1,9 @@
-//! Whether statements follow from what an engine holds: assertions by look-up; axioms about classes and properties by
-//! *fresh individuals*, of which no more is said than the axiom's condition, and by *refutation*, where the opposite is
-//! assumed until it contradicts.
+//! Decides if statements are entailed by the facts and rules of an engine. Assertions are looked up. Axioms
+//! about classes and properties are proved with *fresh individuals*, about which only the axiom's condition is
+//! assumed, or by *refutation*: the negation is assumed and contradicts the knowledge.
 //!
-//! What is shown follows, because each conclusion of the rules is sound for the individuals that were assumed. What is not
-//! shown may follow nevertheless: the rules are those of OWL 2 RL.
+//! The procedure is sound, because the rules are sound for the assumed individuals. It is incomplete, because
+//! the rules are those of OWL 2 RL.
 
 mod assume;
 mod axiom;
@@ -23,60 +23,65 @@ use prover::{Prover, contradiction};
 pub use prover::Answer;
 pub use schema::{Schema, SchemaEntity, schema};
 
-/// A statement and whether it follows.
+/// A statement and the result of its proof.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Entailment {
     /// The statement in functional-style syntax.
     pub statement: String,
-    /// Whether it follows.
+    /// Result of the proof.
     pub answer: Answer,
 }
 
-/// Asks for every axiom of `conclusions`. Its anonymous individuals stand for any individual. What could not be read of it was
-/// not shown; for its annotations see [`annotations`].
+/// Tries to prove every axiom of `conclusions`. Its anonymous individuals are existential variables. Statements
+/// that could not be read are reported as not entailed. For annotations see [`annotations`].
 ///
 /// # Errors
-/// A rule does not come to an end.
+/// Returns an error if a rule exceeds its budget.
 pub fn entailments(engine: &Engine, conclusions: &Ontology) -> Result<Vec<Entailment>, Error> {
     let prover = Prover::new(engine)?;
-    let everything = contradiction(&prover.base);
-    let mut found = Vec::new();
+    let inconsistency = contradiction(&prover.base);
+    let mut entailments = Vec::new();
     let (open, closed): (Vec<_>, Vec<_>) =
-        conclusions.axioms.iter().map(|annotated| &annotated.axiom).partition(|axiom| is_open(axiom));
+        conclusions.axioms.iter().map(|annotated| &annotated.axiom).partition(|axiom| has_anonymous(axiom));
     for axiom in closed {
-        let answer = match &everything {
+        // Inconsistent knowledge entails every statement.
+        let answer = match &inconsistency {
             Some(reason) => Answer::Follows(format!("everything does, because {reason}\n")),
             None => prover.axiom(axiom)?,
         };
-        found.push(Entailment { statement: axiom.to_string(), answer });
+        entailments.push(Entailment { statement: axiom.to_string(), answer });
     }
     if !open.is_empty() {
-        let answer = match &everything {
+        let answer = match &inconsistency {
             Some(reason) => Answer::Follows(format!("everything does, because {reason}\n")),
             None => prover.pattern(&open)?,
         };
         let statement = open.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
-        found.push(Entailment { statement, answer });
+        entailments.push(Entailment { statement, answer });
     }
     for rule in &conclusions.rules {
-        found.push(Entailment {
+        entailments.push(Entailment {
             statement: rule.to_string(),
             answer: Answer::Open("rules are not asked for"),
         });
     }
-    found.extend(conclusions.warnings.iter().filter_map(unread));
-    Ok(found)
+    entailments.extend(conclusions.warnings.iter().filter_map(unread));
+    Ok(entailments)
 }
 
-/// Asks for every annotation of `conclusions` whether it is among those that are `stated`, of its subject or of something that
-/// is the same, because nothing else follows from annotations.
+/// Decides for every annotation of `conclusions` if it is `stated` about its subject, or about an individual
+/// that is the same. No other annotation is entailed.
 pub fn annotations(engine: &Engine, stated: &[(Iri, Annotation)], conclusions: &Ontology) -> Vec<Entailment> {
-    conclusions.annotations.iter().map(|annotation| annotated(engine, annotation, stated)).collect()
+    conclusions
+        .annotations
+        .iter()
+        .map(|annotation| annotation_entailment(engine, annotation, stated))
+        .collect()
 }
 
-fn annotated(
+fn annotation_entailment(
     engine: &Engine,
-    (subject, wanted): &(Iri, Annotation),
+    (subject, conclusion): &(Iri, Annotation),
     stated: &[(Iri, Annotation)],
 ) -> Entailment {
     let is_same = |other: &Iri| {
@@ -84,13 +89,15 @@ fn annotated(
         let [Some(predicate), Some(other), Some(subject)] = names else { return false };
         engine.holds(&Fact::new(predicate, [other, subject]))
     };
-    let found = stated.iter().find(|(other, own)| own == wanted && (other == subject || is_same(other)));
-    let answer = match found {
+    let witness = stated
+        .iter()
+        .find(|(other, annotation)| annotation == conclusion && (other == subject || is_same(other)));
+    let answer = match witness {
         Some((other, _)) if other == subject => Answer::Follows("it is stated\n".to_owned()),
         Some((other, _)) => Answer::Follows(format!("it is stated of <{other}>, which is the same\n")),
         None => Answer::Open("it is an annotation that is not stated"),
     };
-    let Annotation { property, value } = wanted;
+    let Annotation { property, value } = conclusion;
     let value = match value {
         AnnotationValue::Literal(literal) => literal.to_string(),
         AnnotationValue::Iri(iri) => format!("<{iri}>"),
@@ -98,7 +105,8 @@ fn annotated(
     Entailment { statement: format!("AnnotationAssertion(<{property}> <{subject}> {value})"), answer }
 }
 
-/// What was not read of the conclusions. A class expression that nothing is said of claims nothing.
+/// Reports a statement of the conclusions that could not be read as not entailed. An unused class expression
+/// claims nothing.
 fn unread(warning: &Warning) -> Option<Entailment> {
     let statement = match warning {
         Warning::Unread { statement, .. } if statement.starts_with(UNUSED_CLASS) => return None,
@@ -109,15 +117,15 @@ fn unread(warning: &Warning) -> Option<Entailment> {
     Some(Entailment { statement, answer: Answer::Open("it could not be read") })
 }
 
-/// Whether a statement is about somebody, whoever that is.
-fn is_open(axiom: &Axiom) -> bool {
+/// Returns `true` if an assertion has an anonymous individual.
+fn has_anonymous(axiom: &Axiom) -> bool {
     let is_anonymous = |iri: &Iri| iri.starts_with(ANONYMOUS);
     match axiom {
         Axiom::ClassAssertion(_, individual) | Axiom::DataPropertyAssertion(_, individual, _) => {
             is_anonymous(individual)
         }
         Axiom::ObjectPropertyAssertion(_, from, to) => is_anonymous(from) || is_anonymous(to),
-        Axiom::SameIndividual(all) | Axiom::DifferentIndividuals(all) => all.iter().any(is_anonymous),
+        Axiom::SameIndividual(names) | Axiom::DifferentIndividuals(names) => names.iter().any(is_anonymous),
         _ => false,
     }
 }

@@ -1,42 +1,42 @@
-//! Knowledge under assumptions, and the facts that are assumed or asked for.
+//! The prover's knowledge base, and constructors for facts that are assumed or proved.
 
 use rules::{Engine, Error, Fact, Literal, Program, Symbol};
 
 use crate::owl::{Iri, ObjectPropertyExpression};
 use crate::vocab::owl;
 
-/// What is known of a statement.
+/// Result of the proof of a statement.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Answer {
-    /// It follows; the text says from what.
+    /// The statement is entailed; the text is the explanation.
     Follows(String),
-    /// It was not shown to follow; the text says why not.
+    /// The statement was not proved; the text is the reason.
     Open(&'static str),
 }
 
-/// Why an engine's knowledge is inconsistent, if it is.
+/// Explains the first violation if the knowledge is inconsistent.
 pub(super) fn contradiction(engine: &Engine) -> Option<String> {
     let violation = engine.violations().into_iter().next()?;
     let facts: Vec<_> =
         violation.supports.iter().map(|fact| fact.display(engine.symbols()).to_string()).collect();
-    let what = match &violation.cause {
+    let violated = match &violation.cause {
         rules::Cause::Constraint(identity) => {
             identity.label.as_deref().map_or_else(|| identity.to_string(), ToOwned::to_owned)
         }
         rules::Cause::IllTyped(literal) => format!("the value {}", engine.symbols().value(*literal)),
         _ => "two values that would be one".to_owned(),
     };
-    Some(format!("{what} is violated by {}", facts.join(", ")))
+    Some(format!("{violated} is violated by {}", facts.join(", ")))
 }
 
-/// Knowledge under assumptions.
+/// Proves statements from the knowledge of an engine.
 pub(super) struct Prover {
-    /// The knowledge, with equality.
+    /// The knowledge, with equality reasoning.
     pub(super) base: Engine,
 }
 
-/// What shows a goal, or nothing.
-pub(super) type Shown = Result<Option<String>, Error>;
+/// The explanation of a proved goal; `None` if it is not proved.
+pub(super) type ProofResult = Result<Option<String>, Error>;
 
 impl Prover {
     pub(super) fn new(engine: &Engine) -> Result<Self, Error> {
@@ -48,19 +48,19 @@ impl Prover {
         Ok(Self { base })
     }
 
-    /// A name that nothing else has; `number` tells those of one question apart.
+    /// Returns a name that occurs nowhere else. `number` distinguishes the names of one proof.
     pub(super) fn fresh(number: usize) -> Iri {
         format!("urn:metaplan:any:{number}").into()
     }
 }
 
-/// The fact that an individual is in a named class.
+/// Fact: an individual is in a named class.
 pub(super) fn member(engine: &mut Engine, class: &str, individual: &str) -> Fact {
     let symbols = engine.symbols_mut();
     Fact::new(symbols.name(class), [symbols.name(individual)])
 }
 
-/// The fact that a property, or its inverse, relates two individuals.
+/// Fact: a property, or its inverse, relates two individuals.
 pub(super) fn edge(engine: &mut Engine, property: &ObjectPropertyExpression, from: &str, to: &str) -> Fact {
     let symbols = engine.symbols_mut();
     let (from, to) = (symbols.name(from), symbols.name(to));
@@ -70,40 +70,43 @@ pub(super) fn edge(engine: &mut Engine, property: &ObjectPropertyExpression, fro
     }
 }
 
-/// The fact that a data property has a value.
+/// Fact: a data property has a value.
 pub(super) fn value(engine: &mut Engine, property: &str, from: &str, value: Literal) -> Fact {
     let symbols = engine.symbols_mut();
     Fact::new(symbols.name(property), [symbols.name(from), symbols.literal(value)])
 }
 
-/// The fact that two names stand for one individual.
+/// Fact: two names denote the same individual.
 pub(super) fn same(engine: &mut Engine, left: &str, right: &str) -> Fact {
     let symbols = engine.symbols_mut();
     Fact::new(symbols.name(owl::SAME_AS), [symbols.name(left), symbols.name(right)])
 }
 
-/// The value of a literal as written.
+/// Computes the value of a literal.
 pub(super) fn literal(literal: &crate::owl::Literal) -> Literal {
     Literal::parse(&literal.lexical, literal.datatype.as_deref(), literal.language.as_deref())
 }
 
-/// Adds facts to a copy of what is known.
-pub(super) fn with(engine: &Engine, facts: impl IntoIterator<Item = Fact>) -> Result<Engine, Error> {
+/// Adds facts to a copy of an engine.
+pub(super) fn with_facts(engine: &Engine, facts: impl IntoIterator<Item = Fact>) -> Result<Engine, Error> {
     let mut copy = engine.clone();
     let insert = facts.into_iter().collect();
     copy.apply(rules::Delta { insert, delete: Vec::new() })?;
     Ok(copy)
 }
 
-/// The derivation of a fact that holds.
-pub(super) fn shown(engine: &Engine, fact: &Fact) -> Option<String> {
-    if fact.arguments.len() == 2 && fact.arguments[0] == fact.arguments[1] && is_same(engine, fact.predicate)
+/// Returns the derivation of a fact; `None` if the fact does not hold.
+pub(super) fn explain(engine: &Engine, fact: &Fact) -> Option<String> {
+    // The engine does not store that an individual is the same as itself.
+    if fact.arguments.len() == 2
+        && fact.arguments[0] == fact.arguments[1]
+        && is_same_as(engine, fact.predicate)
     {
         return Some("everything is the same as itself\n".to_owned());
     }
     engine.why(fact).map(|derivation| derivation.display(engine.symbols()).to_string())
 }
 
-fn is_same(engine: &Engine, predicate: Symbol) -> bool {
+fn is_same_as(engine: &Engine, predicate: Symbol) -> bool {
     engine.symbols().value(predicate).as_name() == Some(owl::SAME_AS)
 }

@@ -1,85 +1,88 @@
-//! Statements about anonymous individuals: somebody has to be found of whom all of them hold.
+//! Conjunctive queries: anonymous individuals of a conclusion are existential variables.
 
 use std::collections::BTreeMap;
 
 use rules::{Error, Symbol};
 
-use super::prover::{Answer, Prover, edge, literal, same, shown, value};
+use super::prover::{Answer, Prover, edge, explain, literal, same, value};
 use crate::owl::{ANONYMOUS, Axiom, ClassExpression, Iri, ObjectPropertyExpression as Property};
 
-/// So many partial answers are looked at.
-const LIMIT: usize = 100_000;
+/// Limit on the partial answers that the search visits.
+const MAX_PARTIAL_ANSWERS: usize = 100_000;
 
-/// Who the anonymous individuals are.
-type Found = BTreeMap<Iri, Iri>;
+/// Maps anonymous individuals to named ones.
+type Assignment = BTreeMap<Iri, Iri>;
 
 impl Prover {
-    /// Whether somebody is as the statements say.
-    pub(super) fn pattern(&self, statements: &[&Axiom]) -> Result<Answer, Error> {
-        let mut left = LIMIT;
-        let found = self.extend(&Found::new(), statements.to_vec(), &mut left)?;
-        Ok(match found {
+    /// Decides if the conjunctive query `statements` has an answer.
+    pub(super) fn conjunctive_query(&self, statements: &[&Axiom]) -> Result<Answer, Error> {
+        let mut budget = MAX_PARTIAL_ANSWERS;
+        let explanation = self.extend(&Assignment::new(), statements.to_vec(), &mut budget)?;
+        Ok(match explanation {
             Some(reason) => Answer::Follows(reason),
-            None if left == 0 => Answer::Open("too many individuals come into question"),
+            None if budget == 0 => Answer::Open("too many individuals come into question"),
             None => Answer::Open("the rules do not conclude it of anybody"),
         })
     }
 
-    /// Finds individuals for the statements that are left.
+    /// Extends an assignment to all statements by backtracking; the statement with the fewest unassigned
+    /// individuals comes first. Returns the explanation of the first answer.
     fn extend(
         &self,
-        found: &Found,
-        mut left: Vec<&Axiom>,
-        limit: &mut usize,
+        assignment: &Assignment,
+        mut statements: Vec<&Axiom>,
+        budget: &mut usize,
     ) -> Result<Option<String>, Error> {
-        if *limit == 0 {
+        if *budget == 0 {
             return Ok(None);
         }
-        *limit -= 1;
-        let unknown = |axiom: &Axiom| names(axiom).into_iter().filter(|name| is_open(found, name)).count();
-        let Some(at) = (0..left.len()).min_by_key(|at| {
-            let complex = matches!(left[*at], Axiom::ClassAssertion(class, _) if !matches!(class, ClassExpression::Class(_)));
-            (unknown(left[*at]), complex)
+        *budget -= 1;
+        let unknown =
+            |axiom: &Axiom| names(axiom).into_iter().filter(|name| is_open(assignment, name)).count();
+        let Some(index) = (0..statements.len()).min_by_key(|index| {
+            let complex = matches!(statements[*index], Axiom::ClassAssertion(class, _) if !matches!(class, ClassExpression::Class(_)));
+            (unknown(statements[*index]), complex)
         }) else {
             return Ok(Some(String::new()));
         };
-        let axiom = left.remove(at);
+        let axiom = statements.remove(index);
         if unknown(axiom) == 0 {
-            let Some(reason) = self.holds(found, axiom)? else { return Ok(None) };
-            return Ok(self.extend(found, left, limit)?.map(|rest| reason + &rest));
+            let Some(reason) = self.holds(assignment, axiom)? else { return Ok(None) };
+            return Ok(self.extend(assignment, statements, budget)?.map(|tail| reason + &tail));
         }
-        let open: Vec<Iri> = names(axiom).into_iter().filter(|name| is_open(found, name)).collect();
-        for candidate in self.candidates(found, axiom, &open[0]) {
-            let mut longer = found.clone();
-            longer.insert(open[0].clone(), candidate);
-            let mut again = left.clone();
-            again.push(axiom);
-            if let Some(reason) = self.extend(&longer, again, limit)? {
+        let open: Vec<Iri> = names(axiom).into_iter().filter(|name| is_open(assignment, name)).collect();
+        for candidate in self.candidates(assignment, axiom, &open[0]) {
+            // Recursion visits the statement again, with one variable less.
+            let mut extended = assignment.clone();
+            extended.insert(open[0].clone(), candidate);
+            let mut pending = statements.clone();
+            pending.push(axiom);
+            if let Some(reason) = self.extend(&extended, pending, budget)? {
                 return Ok(Some(reason));
             }
         }
         Ok(None)
     }
 
-    /// Who may stand for a name, as far as one statement says.
-    fn candidates(&self, found: &Found, axiom: &Axiom, name: &Iri) -> Vec<Iri> {
+    /// Returns the individuals that one statement admits for `name`.
+    fn candidates(&self, assignment: &Assignment, axiom: &Axiom, name: &Iri) -> Vec<Iri> {
         let engine = &self.base;
         let symbol = |iri: &str| engine.symbols().find_name(iri);
-        let known = |iri: &Iri| -> Option<Option<Symbol>> {
-            match found.get(iri) {
+        let constant = |iri: &Iri| -> Option<Option<Symbol>> {
+            match assignment.get(iri) {
                 Some(iri) => symbol(iri).map(Some),
                 None if iri.starts_with(ANONYMOUS) => Some(None),
                 None => symbol(iri).map(Some),
             }
         };
-        let rows = |predicate: &str, pattern: Vec<Option<Symbol>>, place: usize| -> Vec<Iri> {
+        let rows = |predicate: &str, pattern: Vec<Option<Symbol>>, column: usize| -> Vec<Iri> {
             let Some(predicate) = symbol(predicate) else { return Vec::new() };
             let rows = engine.matching(predicate, &pattern);
             let iri = |symbol| engine.symbols().value(symbol).as_name().map(Iri::from);
-            let mut all: Vec<Iri> = rows.filter_map(|row| iri(row[place])).collect();
-            all.sort();
-            all.dedup();
-            all
+            let mut iris: Vec<Iri> = rows.filter_map(|row| iri(row[column])).collect();
+            iris.sort();
+            iris.dedup();
+            iris
         };
         match axiom {
             Axiom::ClassAssertion(ClassExpression::Class(class), _) => rows(class, vec![None], 0),
@@ -87,9 +90,9 @@ impl Prover {
                 let (Property::Property(iri) | Property::Inverse(iri)) = property;
                 let (from, to) =
                     if matches!(property, Property::Property(_)) { (from, to) } else { (to, from) };
-                let (Some(first), Some(second)) = (known(from), known(to)) else { return Vec::new() };
-                let place = usize::from(from != name);
-                rows(iri, vec![first, second], place)
+                let (Some(first), Some(second)) = (constant(from), constant(to)) else { return Vec::new() };
+                let column = usize::from(from != name);
+                rows(iri, vec![first, second], column)
             }
             Axiom::DataPropertyAssertion(property, _, object) => {
                 let Some(object) = engine.symbols().find_literal(&literal(object)) else { return Vec::new() };
@@ -104,29 +107,29 @@ impl Prover {
         }
     }
 
-    /// What shows a statement whose individuals are found.
-    fn holds(&self, found: &Found, axiom: &Axiom) -> Result<Option<String>, Error> {
+    /// Explains a statement without unassigned individuals; `None` if it is not proved.
+    fn holds(&self, assignment: &Assignment, axiom: &Axiom) -> Result<Option<String>, Error> {
         let mut copy = self.base.clone();
-        let name = |iri: &Iri| found.get(iri).cloned().unwrap_or_else(|| iri.clone());
+        let name = |iri: &Iri| assignment.get(iri).cloned().unwrap_or_else(|| iri.clone());
         Ok(match axiom {
             Axiom::ClassAssertion(class, individual) => {
                 return Self::is_in(&copy, class, &name(individual), &mut 0);
             }
             Axiom::ObjectPropertyAssertion(property, from, to) => {
                 let goal = edge(&mut copy, property, &name(from), &name(to));
-                shown(&copy, &goal)
+                explain(&copy, &goal)
             }
             Axiom::DataPropertyAssertion(property, from, to) => {
                 let goal = value(&mut copy, property, &name(from), literal(to));
-                shown(&copy, &goal)
+                explain(&copy, &goal)
             }
-            Axiom::SameIndividual(all) => {
-                let goal = same(&mut copy, &name(&all[0]), &name(&all[1]));
-                shown(&copy, &goal)
+            Axiom::SameIndividual(individuals) => {
+                let goal = same(&mut copy, &name(&individuals[0]), &name(&individuals[1]));
+                explain(&copy, &goal)
             }
-            Axiom::DifferentIndividuals(all) => {
-                let all: Vec<Iri> = all.iter().map(name).collect();
-                match self.axiom(&Axiom::DifferentIndividuals(all))? {
+            Axiom::DifferentIndividuals(individuals) => {
+                let individuals: Vec<Iri> = individuals.iter().map(name).collect();
+                match self.axiom(&Axiom::DifferentIndividuals(individuals))? {
                     Answer::Follows(reason) => Some(reason),
                     Answer::Open(_) => None,
                 }
@@ -136,18 +139,19 @@ impl Prover {
     }
 }
 
-fn is_open(found: &Found, name: &Iri) -> bool {
-    name.starts_with(ANONYMOUS) && !found.contains_key(name)
+/// Returns `true` for an anonymous individual without an assigned value.
+fn is_open(assignment: &Assignment, name: &Iri) -> bool {
+    name.starts_with(ANONYMOUS) && !assignment.contains_key(name)
 }
 
-/// The individuals of a statement.
+/// The individuals of an assertion.
 fn names(axiom: &Axiom) -> Vec<Iri> {
     match axiom {
         Axiom::ClassAssertion(_, individual) | Axiom::DataPropertyAssertion(_, individual, _) => {
             vec![individual.clone()]
         }
         Axiom::ObjectPropertyAssertion(_, from, to) => vec![from.clone(), to.clone()],
-        Axiom::SameIndividual(all) | Axiom::DifferentIndividuals(all) => all.clone(),
+        Axiom::SameIndividual(individuals) | Axiom::DifferentIndividuals(individuals) => individuals.clone(),
         _ => Vec::new(),
     }
 }

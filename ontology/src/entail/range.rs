@@ -1,38 +1,38 @@
-//! What data ranges the values of a data property lie in: the datatypes that constraints ask of any value, and what they have
-//! in common.
+//! Proves data property ranges: a fresh value must violate only the datatype constraints of its property, and
+//! the intersection of these datatypes must be contained in the range.
 
 use rules::{Atom, BuiltIn, Literal, Rule, Symbol, Term, is_subsumed};
 
 use super::assume::refuted;
-use super::prover::{Prover, Shown, value, with};
+use super::prover::{ProofResult, Prover, value, with_facts};
 use crate::owl::{DataRange, Iri};
 
 impl Prover {
-    /// Whether all values of a property lie in a range.
-    pub(super) fn range(&self, property: &Iri, range: &DataRange) -> Shown {
+    /// Proves that all values of a property are in a data range.
+    pub(super) fn range(&self, property: &Iri, range: &DataRange) -> ProofResult {
         let mut copy = self.base.clone();
-        let any = value(&mut copy, property, &Self::fresh(0), Literal::fresh(1));
-        let object = any.arguments[1];
-        let copy = with(&copy, [any])?;
+        let assumed = value(&mut copy, property, &Self::fresh(0), Literal::fresh(1));
+        let object = assumed.arguments[1];
+        let copy = with_facts(&copy, [assumed])?;
         if let Some(reason) = refuted(std::slice::from_ref(&copy)) {
             return Ok(Some(reason));
         }
         let has_value = |predicate: Symbol| copy.matching(predicate, &[None, Some(object)]).next().is_some();
         let constraints = copy.program().rules.iter().filter_map(datatype_constraint);
-        let asked = constraints.filter(|(predicate, _)| has_value(*predicate));
-        let datatypes: Vec<&str> = asked
+        let applicable = constraints.filter(|(predicate, _)| has_value(*predicate));
+        let datatypes: Vec<&str> = applicable
             .filter_map(|(_, datatype)| match copy.symbols().value(datatype).as_literal() {
                 Some(Literal::Uri(iri)) => Some(&**iri),
                 _ => None,
             })
             .collect();
-        let all: Vec<String> = datatypes.iter().map(|iri| format!("<{iri}>")).collect();
-        let reason = || format!("each of its values lies in {}\n", all.join(" and "));
+        let names: Vec<String> = datatypes.iter().map(|iri| format!("<{iri}>")).collect();
+        let reason = || format!("each of its values lies in {}\n", names.join(" and "));
         Ok(contains(&datatypes, range).then(reason))
     }
 }
 
-/// Whether what lies in all of some datatypes lies in a range.
+/// Returns `true` if the intersection of the datatypes is contained in the range.
 fn contains(datatypes: &[&str], range: &DataRange) -> bool {
     match range {
         DataRange::Datatype(iri) => is_subsumed(datatypes, iri),
@@ -42,7 +42,7 @@ fn contains(datatypes: &[&str], range: &DataRange) -> bool {
     }
 }
 
-/// The property and the datatype of a rule that says no more than that values of the property lie in the datatype.
+/// Returns property and datatype of a rule that only constrains the values of the property to the datatype.
 fn datatype_constraint(rule: &Rule) -> Option<(Symbol, Symbol)> {
     let (predicate, object, arguments) = match &rule.body[..] {
         [
@@ -51,9 +51,9 @@ fn datatype_constraint(rule: &Rule) -> Option<(Symbol, Symbol)> {
         ] => (*predicate, edge.get(1).copied()?, arguments),
         _ => return None,
     };
-    let is_any = |term: Term| term.as_variable().is_some();
+    let is_variable = |term: Term| term.as_variable().is_some();
     match (arguments[..].as_ref(), rule.head.is_empty()) {
-        ([tested, Term::Constant(datatype)], true) if *tested == object && is_any(object) => {
+        ([tested, Term::Constant(datatype)], true) if *tested == object && is_variable(object) => {
             Some((predicate, *datatype))
         }
         _ => None,

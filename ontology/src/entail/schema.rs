@@ -1,4 +1,5 @@
-//! What follows about classes and properties: above which others each is, and which can have no instance.
+//! The class and property hierarchy: superclasses and superproperties of each entity, and unsatisfiable
+//! entities.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,20 +9,20 @@ use super::prover::{Prover, contradiction, edge, member, value};
 use crate::owl::{EntityKind, Iri, ObjectPropertyExpression};
 use crate::vocab::owl;
 
-/// A class or property and what is above it.
+/// A class or property with its superclasses or superproperties.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SchemaEntity {
-    /// Its IRI.
+    /// IRI of the class or property.
     pub iri: String,
-    /// The named classes or properties that contain it, without itself; sorted.
+    /// Named classes or properties that contain it, without itself; sorted.
     pub above: Vec<String>,
-    /// Those of them that are above no other one of them, unless both are equivalent.
+    /// Direct ones: no other member of `above` is strictly between; sorted.
     pub direct: Vec<String>,
-    /// Why it can have no instance, if so.
+    /// Explanation if it is unsatisfiable (has no instance in any model).
     pub empty: Option<String>,
 }
 
-/// The classes, object properties and data properties among some entities, in their order.
+/// The classes, object properties and data properties of some entities, in the given order.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Schema {
     /// Classes.
@@ -32,64 +33,66 @@ pub struct Schema {
     pub data_properties: Vec<SchemaEntity>,
 }
 
-/// What the rules conclude about any instance of each class, and any pair that a property relates. Nothing follows from
-/// knowledge that contradicts itself.
+/// Computes the hierarchy from the consequences for a fresh instance of each class, and for a fresh pair of
+/// each property. If the knowledge is inconsistent, `empty` is always `None`.
 ///
 /// # Errors
-/// A rule does not come to an end.
+/// Returns an error if a rule exceeds its budget.
 pub fn schema(engine: &Engine, named: &[(EntityKind, Iri)]) -> Result<Schema, Error> {
-    let mut work = Prover::new(engine)?.base;
+    let mut base = Prover::new(engine)?.base;
     Ok(Schema {
-        classes: entities(&mut work, named, EntityKind::Class)?,
-        object_properties: entities(&mut work, named, EntityKind::ObjectProperty)?,
-        data_properties: entities(&mut work, named, EntityKind::DataProperty)?,
+        classes: entities(&mut base, named, EntityKind::Class)?,
+        object_properties: entities(&mut base, named, EntityKind::ObjectProperty)?,
+        data_properties: entities(&mut base, named, EntityKind::DataProperty)?,
     })
 }
 
 fn entities(
-    work: &mut Engine,
+    engine: &mut Engine,
     named: &[(EntityKind, Iri)],
     kind: EntityKind,
 ) -> Result<Vec<SchemaEntity>, Error> {
-    let named = named.iter().filter(|(other, iri)| *other == kind && !iri.starts_with(owl::NS));
+    let named = named.iter().filter(|(candidate, iri)| *candidate == kind && !iri.starts_with(owl::NS));
     let names: Vec<&Iri> = named.map(|(_, iri)| iri).collect();
-    let symbols = names.iter().map(|iri| work.symbols_mut().name(iri)).collect::<BTreeSet<Symbol>>();
-    let consistent = contradiction(work).is_none();
-    let (mut found, mut above) = (Vec::new(), BTreeMap::new());
+    let symbols = names.iter().map(|iri| engine.symbols_mut().name(iri)).collect::<BTreeSet<Symbol>>();
+    let consistent = contradiction(engine).is_none();
+    let (mut results, mut above) = (Vec::new(), BTreeMap::new());
     for iri in names {
         let (x, y) = (Prover::fresh(0), Prover::fresh(1));
         let fact = match kind {
-            EntityKind::Class => member(work, iri, &x),
-            EntityKind::DataProperty => value(work, iri, &x, rules::Literal::fresh(1)),
-            _ => edge(work, &ObjectPropertyExpression::Property(iri.clone()), &x, &y),
+            EntityKind::Class => member(engine, iri, &x),
+            EntityKind::DataProperty => value(engine, iri, &x, rules::Literal::fresh(1)),
+            _ => edge(engine, &ObjectPropertyExpression::Property(iri.clone()), &x, &y),
         };
-        let change = work.apply(Delta { insert: vec![fact.clone()], delete: Vec::new() })?;
-        let is_above = |other: &&Fact| {
-            other.arguments == fact.arguments
-                && symbols.contains(&other.predicate)
-                && other.predicate != fact.predicate
+        // The fact is withdrawn afterwards: incremental maintenance is cheaper than a copy of the engine.
+        let change = engine.apply(Delta { insert: vec![fact.clone()], delete: Vec::new() })?;
+        let is_above = |candidate: &&Fact| {
+            candidate.arguments == fact.arguments
+                && symbols.contains(&candidate.predicate)
+                && candidate.predicate != fact.predicate
         };
-        let own: BTreeSet<Symbol> =
-            change.insert.iter().filter(is_above).map(|other| other.predicate).collect();
-        let empty = if consistent { contradiction(work) } else { None };
-        work.apply(Delta { insert: Vec::new(), delete: vec![fact.clone()] })?;
-        above.insert(fact.predicate, own);
-        found.push((iri.to_string(), fact.predicate, empty));
+        let supers: BTreeSet<Symbol> =
+            change.insert.iter().filter(is_above).map(|candidate| candidate.predicate).collect();
+        let empty = if consistent { contradiction(engine) } else { None };
+        engine.apply(Delta { insert: Vec::new(), delete: vec![fact.clone()] })?;
+        above.insert(fact.predicate, supers);
+        results.push((iri.to_string(), fact.predicate, empty));
     }
-    let name = |symbol: &Symbol| work.symbols().value(*symbol).as_name().unwrap_or_default().to_owned();
+    let name = |symbol: &Symbol| engine.symbols().value(*symbol).as_name().unwrap_or_default().to_owned();
     let entity = |(iri, symbol, empty): (String, Symbol, Option<String>)| {
-        let own = &above[&symbol];
-        // Something between, which is not equivalent to what is above it.
-        let between = |other: &Symbol| {
-            own.iter().any(|middle| {
-                middle != other && above[middle].contains(other) && !above[other].contains(middle)
+        let supers = &above[&symbol];
+        // Returns `true` if an entity lies strictly between this one and `candidate`.
+        let between = |candidate: &Symbol| {
+            supers.iter().any(|middle| {
+                middle != candidate && above[middle].contains(candidate) && !above[candidate].contains(middle)
             })
         };
-        let mut direct: Vec<String> = own.iter().filter(|other| !between(other)).map(name).collect();
-        let mut all: Vec<String> = own.iter().map(name).collect();
+        let mut direct: Vec<String> =
+            supers.iter().filter(|candidate| !between(candidate)).map(name).collect();
+        let mut above_names: Vec<String> = supers.iter().map(name).collect();
         direct.sort();
-        all.sort();
-        SchemaEntity { iri, above: all, direct, empty }
+        above_names.sort();
+        SchemaEntity { iri, above: above_names, direct, empty }
     };
-    Ok(found.into_iter().map(entity).collect())
+    Ok(results.into_iter().map(entity).collect())
 }
