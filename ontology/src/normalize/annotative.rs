@@ -1,8 +1,9 @@
-//! Axioms that treat an annotation property as another kind of property: taken away, each with a warning. OWL 2 DL forbids
-//! them, and horned-owl refuses the whole document because of one.
+//! Removes axioms that use an annotation property as another kind of property, each with a warning. OWL 2 DL
+//! forbids such axioms, and horned-owl rejects a document that contains one.
 //!
-//! Two forms occur in practice: `owl:equivalentProperty` between annotation properties, and restrictions on them. A class
-//! expression that contains such a restriction goes with every axiom that contains the expression.
+//! Two forms occur in practice: `owl:equivalentProperty` between annotation properties, and restrictions on
+//! annotation properties. If a class expression contains such a restriction, every axiom with this expression
+//! is removed.
 
 use oxrdf::{BlankNode, NamedOrBlankNode, Term};
 use rustc_hash::FxHashSet as HashSet;
@@ -25,27 +26,27 @@ pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) {
     };
     let mut annotative = named(owl::ANNOTATION_PROPERTY);
     for kind in [owl::OBJECT_PROPERTY, owl::DATATYPE_PROPERTY] {
-        let others = named(kind);
-        annotative.retain(|iri| !others.contains(iri));
+        let logical = named(kind);
+        annotative.retain(|iri| !logical.contains(iri));
     }
     if annotative.is_empty() {
         return;
     }
     let is_annotative = |term: &Term| iri_of(term).is_some_and(|iri| annotative.contains(iri));
-    let (mut gone, mut expressions): (Vec<usize>, HashSet<BlankNode>) = (Vec::new(), HashSet::default());
+    let (mut removed, mut expressions): (Vec<usize>, HashSet<BlankNode>) = (Vec::new(), HashSet::default());
     for (index, triple) in graph.iter() {
         let predicate = triple.predicate.as_str();
         let subject = Term::from(triple.subject.clone());
         if predicate == owl::EQUIVALENT_PROPERTY && (is_annotative(&subject) || is_annotative(&triple.object))
         {
-            gone.push(index);
+            removed.push(index);
         } else if let (owl::ON_PROPERTY, true, NamedOrBlankNode::BlankNode(node)) =
             (predicate, is_annotative(&triple.object), &triple.subject)
         {
             expressions.insert(node.clone());
         }
     }
-    // Upwards, from an expression to what contains it, up to axioms about names.
+    // Propagate from expressions to the expressions that contain them, up to axioms about named entities.
     loop {
         let containing = graph.iter().filter_map(|(_, triple)| match (&triple.subject, &triple.object) {
             (NamedOrBlankNode::BlankNode(outer), Term::BlankNode(inner)) if expressions.contains(inner) => {
@@ -53,22 +54,22 @@ pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) {
             }
             _ => None,
         });
-        let more: Vec<BlankNode> = containing.filter(|node| !expressions.contains(node)).collect();
-        if more.is_empty() {
+        let added: Vec<BlankNode> = containing.filter(|node| !expressions.contains(node)).collect();
+        if added.is_empty() {
             break;
         }
-        expressions.extend(more);
+        expressions.extend(added);
     }
     let mut parts = Vec::new();
     for (index, triple) in graph.iter() {
         let is_part = |node: &BlankNode| expressions.contains(node);
         match (&triple.subject, &triple.object) {
             (NamedOrBlankNode::BlankNode(node), _) if is_part(node) => parts.push(index),
-            (NamedOrBlankNode::NamedNode(_), Term::BlankNode(node)) if is_part(node) => gone.push(index),
+            (NamedOrBlankNode::NamedNode(_), Term::BlankNode(node)) if is_part(node) => removed.push(index),
             _ => {}
         }
     }
-    for index in gone {
+    for index in removed {
         if let Some(triple) = graph.take(index) {
             let object = match &triple.object {
                 Term::BlankNode(_) => "a restriction of an annotation property".to_owned(),

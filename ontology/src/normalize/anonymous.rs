@@ -1,7 +1,7 @@
-//! Blank nodes that are individuals into IRIs, with names that depend on the documents alone.
+//! Replaces blank nodes that are individuals by IRIs, which depend only on the documents.
 //!
-//! A blank node is an individual if it has a type or a property value, or is one, and no part of it belongs to the
-//! structure of axioms. A blank node with annotations only describes nothing, and is reported.
+//! A blank node is an individual if it has a type or a property value, or is a property value, and is not part
+//! of an axiom, class expression, rule or list. A blank node that only has annotations is reported and removed.
 
 use std::collections::BTreeMap;
 
@@ -16,7 +16,7 @@ use crate::vocab::{is_reserved, owl, rdf, rdfs, swrla};
 pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) {
     let structural = structural(graph);
     let individuals = individuals(graph, &structural);
-    let mut rubbish = Vec::new();
+    let mut removed = Vec::new();
     let mut stray: BTreeMap<String, usize> = BTreeMap::new();
     for index in 0..graph.len() {
         let Some(triple) = graph.get_mut(index) else { continue };
@@ -25,7 +25,7 @@ pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) {
                 triple.subject = name(node).into();
             } else if !structural.contains(node) {
                 *stray.entry(triple.predicate.to_string()).or_default() += 1;
-                rubbish.push(index);
+                removed.push(index);
             }
         }
         if let Term::BlankNode(node) = &triple.object
@@ -34,7 +34,7 @@ pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) {
             triple.object = name(node).into();
         }
     }
-    for index in rubbish {
+    for index in removed {
         graph.take(index);
     }
     warnings.extend(stray.into_iter().map(|(predicate, count)| Warning::Unread {
@@ -47,7 +47,7 @@ fn name(node: &BlankNode) -> NamedNode {
     NamedNode::new_unchecked(format!("{ANONYMOUS}{}", node.as_str()))
 }
 
-/// Blank nodes that carry part of an axiom, a class expression, a rule or a list.
+/// Returns the blank nodes that are part of an axiom, a class expression, a rule or a list.
 fn structural(graph: &Graph) -> HashSet<BlankNode> {
     let mut nodes = HashSet::default();
     for (_, triple) in graph.iter() {
@@ -72,7 +72,6 @@ fn is_structure(triple: &Triple) -> bool {
     is_reserved(predicate) && !about_individuals.contains(&predicate)
 }
 
-/// Blank nodes that are individuals.
 fn individuals(graph: &Graph, structural: &HashSet<BlankNode>) -> HashSet<BlankNode> {
     let annotations: HashSet<_> =
         graph.instances(owl::ANNOTATION_PROPERTY).into_iter().map(|(_, node)| node).collect();

@@ -1,5 +1,5 @@
-//! How deep class expressions are nested: what reads and lowers them is recursive, and horned-owl takes time that grows with
-//! the cube of the depth.
+//! Rejects deeply nested class expressions: reading and lowering are recursive, and the time of horned-owl
+//! grows with the cube of the depth.
 
 use oxrdf::{NamedOrBlankNode, Term};
 use rustc_hash::FxHashMap;
@@ -7,10 +7,11 @@ use rustc_hash::FxHashMap;
 use crate::graph::{Graph, subject_of};
 use crate::vocab::{owl, rdf};
 
-/// Deeper expressions are refused. Real ones are nested less than 20 deep.
-pub(crate) const DEEPEST: usize = 128;
+/// Maximum nesting depth. Expressions of real ontologies are nested less than 20 levels deep.
+pub(crate) const MAX_NESTING: usize = 128;
 
-const NESTS: [&str; 10] = [
+/// Properties from an expression to its parts. The last two are the links of lists and do not count as a level.
+const NESTING_PROPERTIES: [&str; 10] = [
     owl::SOME_VALUES_FROM,
     owl::ALL_VALUES_FROM,
     owl::ON_CLASS,
@@ -23,25 +24,26 @@ const NESTS: [&str; 10] = [
     rdf::REST,
 ];
 
-/// The index of a triple at which an expression begins that is nested deeper than [`DEEPEST`], and the IRI of which it is said.
+/// Returns the index of the first triple whose object is nested deeper than [`MAX_NESTING`], and an IRI that it
+/// describes.
 pub(crate) fn too_deep(graph: &Graph) -> Option<(usize, Option<String>)> {
     let mut depths: FxHashMap<NamedOrBlankNode, usize> = FxHashMap::default();
     for (index, triple) in graph.iter() {
         let Some(root) = nested(&triple.object) else { continue };
-        if !NESTS[..8].contains(&triple.predicate.as_str()) {
+        if !NESTING_PROPERTIES[..8].contains(&triple.predicate.as_str()) {
             continue;
         }
-        if depth(graph, &root, &mut depths) >= DEEPEST {
-            return Some((index, said_of(graph, &mut depths)));
+        if depth(graph, &root, &mut depths) >= MAX_NESTING {
+            return Some((index, described_iri(graph, &mut depths)));
         }
     }
     None
 }
 
-/// The first IRI of which an expression is said that is nested too deep.
-fn said_of(graph: &Graph, depths: &mut FxHashMap<NamedOrBlankNode, usize>) -> Option<String> {
+/// Returns the first IRI with an expression that is nested too deeply.
+fn described_iri(graph: &Graph, depths: &mut FxHashMap<NamedOrBlankNode, usize>) -> Option<String> {
     graph.iter().find_map(|(_, triple)| match (&triple.subject, nested(&triple.object)) {
-        (NamedOrBlankNode::NamedNode(iri), Some(root)) if depth(graph, &root, depths) >= DEEPEST => {
+        (NamedOrBlankNode::NamedNode(iri), Some(root)) if depth(graph, &root, depths) >= MAX_NESTING => {
             Some(iri.as_str().to_owned())
         }
         _ => None,
@@ -52,25 +54,27 @@ fn nested(object: &Term) -> Option<NamedOrBlankNode> {
     matches!(object, Term::BlankNode(_)).then(|| subject_of(object)).flatten()
 }
 
-/// The depth of the expression at a node; lists add nothing. A circle counts once round.
+/// Computes the depth of the expression at a node. Lists do not count. A cycle is followed once.
 fn depth(graph: &Graph, root: &NamedOrBlankNode, depths: &mut FxHashMap<NamedOrBlankNode, usize>) -> usize {
-    let mut open = vec![(root.clone(), false)];
-    while let Some((node, is_done)) = open.pop() {
+    // Iterative depth-first search; recursion could overflow the stack.
+    let mut stack = vec![(root.clone(), false)];
+    while let Some((node, is_done)) = stack.pop() {
         let parts = || {
-            let said = graph.of(&node).filter(|(_, triple)| NESTS.contains(&triple.predicate.as_str()));
-            said.filter_map(|(_, triple)| Some((triple.predicate.as_str(), nested(&triple.object)?)))
+            let triples =
+                graph.of(&node).filter(|(_, triple)| NESTING_PROPERTIES.contains(&triple.predicate.as_str()));
+            triples.filter_map(|(_, triple)| Some((triple.predicate.as_str(), nested(&triple.object)?)))
         };
         if is_done {
             let part = |(predicate, part): (&str, NamedOrBlankNode)| {
-                let own = usize::from(!predicate.starts_with(rdf::NS));
-                depths.get(&part).copied().unwrap_or(0) + own
+                let level = usize::from(!predicate.starts_with(rdf::NS));
+                depths.get(&part).copied().unwrap_or(0) + level
             };
             let depth = parts().map(part).max().unwrap_or(0);
             depths.insert(node, depth);
         } else if !depths.contains_key(&node) {
             depths.insert(node.clone(), 0);
-            open.push((node.clone(), true));
-            open.extend(parts().map(|(_, part)| (part, false)));
+            stack.push((node.clone(), true));
+            stack.extend(parts().map(|(_, part)| (part, false)));
         }
     }
     depths.get(root).copied().unwrap_or(0)
@@ -96,10 +100,10 @@ mod tests {
     }
 
     #[test]
-    fn depth_is_counted_in_any_order() {
+    fn depth_does_not_depend_on_the_order_of_triples() {
         for order in [true, false] {
-            assert_eq!(too_deep(&nested(DEEPEST, order)), None);
-            assert!(too_deep(&nested(DEEPEST + 1, order)).is_some());
+            assert_eq!(too_deep(&nested(MAX_NESTING, order)), None);
+            assert!(too_deep(&nested(MAX_NESTING + 1, order)).is_some());
             assert!(too_deep(&nested(20_000, order)).is_some());
         }
     }

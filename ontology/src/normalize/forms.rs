@@ -1,10 +1,12 @@
-//! Forms of class expressions and axioms that RDF documents have, and horned-owl does not match, into those that it does.
+//! Rewrites forms of class expressions and axioms that occur in RDF documents, but are not recognised by
+//! horned-owl.
 //!
-//! - A class that *is* an expression, as OWL 1 wrote definitions: equivalent to it ([1], tables 17 and 18).
-//! - Expressions without a type, or with another one: typed by what they say.
-//! - Axioms of many members that have an IRI: blank nodes.
-//! - Cardinalities of inverse properties: of a name that `crate::horned` translates back.
-//! - Headers of ontologies without an IRI: taken away.
+//! - A named class that *is* an expression, as in OWL 1, becomes equivalent to the expression ([1], tables 17
+//!   and 18).
+//! - Expressions without a type, or with a wrong one, get a type from their properties.
+//! - N-ary axioms with an IRI become blank nodes.
+//! - Inverse properties in cardinality restrictions get a name, which `crate::horned` translates back.
+//! - Headers of ontologies without an IRI are removed.
 //!
 //! [1] OWL 2 Web Ontology Language, Mapping to RDF Graphs, W3C 2012.
 
@@ -15,12 +17,12 @@ use crate::graph::{Graph, is_type, subject_of};
 use crate::owl::INVERSE;
 use crate::vocab::{owl, rdf, rdfs, xsd};
 
-/// What a boolean combination or an enumeration is said by.
+/// Properties that define a boolean class expression or an enumeration.
 const CONNECTIVES: [&str; 5] =
     [owl::INTERSECTION_OF, owl::UNION_OF, owl::COMPLEMENT_OF, owl::ONE_OF, owl::DATATYPE_COMPLEMENT_OF];
 
-/// What a restriction says besides its property.
-const RESTRICTS: [&str; 14] = [
+/// Properties that define a restriction.
+const RESTRICTION_PROPERTIES: [&str; 14] = [
     owl::ON_PROPERTY,
     owl::ON_PROPERTIES,
     owl::SOME_VALUES_FROM,
@@ -38,14 +40,14 @@ const RESTRICTS: [&str; 14] = [
 ];
 
 pub(crate) fn rewrite(graph: &mut Graph) {
-    anonymous_headers(graph);
-    unname(graph);
+    remove_anonymous_headers(graph);
+    remove_axiom_iris(graph);
     definitions(graph);
-    types(graph);
-    inverses(graph);
+    correct_types(graph);
+    name_inverses(graph);
 }
 
-fn anonymous_headers(graph: &mut Graph) {
+fn remove_anonymous_headers(graph: &mut Graph) {
     for (_, node) in graph.instances(owl::ONTOLOGY) {
         if let NamedOrBlankNode::BlankNode(_) = node {
             take_all(graph, &node);
@@ -53,15 +55,16 @@ fn anonymous_headers(graph: &mut Graph) {
     }
 }
 
+/// Removes all triples of a subject.
 fn take_all(graph: &mut Graph, node: &NamedOrBlankNode) {
-    let own: Vec<usize> = graph.of(node).map(|(index, _)| index).collect();
-    for index in own {
+    let indices: Vec<usize> = graph.of(node).map(|(index, _)| index).collect();
+    for index in indices {
         graph.take(index);
     }
 }
 
-/// Moves what is said of axioms that have an IRI to blank nodes.
-fn unname(graph: &mut Graph) {
+/// Moves the triples of axioms with an IRI to blank nodes.
+fn remove_axiom_iris(graph: &mut Graph) {
     let kinds = [owl::ALL_DIFFERENT, owl::NEGATIVE_PROPERTY_ASSERTION, owl::AXIOM, owl::ANNOTATION];
     let named: Vec<NamedOrBlankNode> = kinds
         .iter()
@@ -71,14 +74,14 @@ fn unname(graph: &mut Graph) {
         .collect();
     for node in named {
         let fresh = graph.fresh().into();
-        let said: Vec<usize> = graph.of(&node).map(|(index, _)| index).collect();
-        for triple in said.into_iter().filter_map(|index| graph.take(index)).collect::<Vec<_>>() {
+        let indices: Vec<usize> = graph.of(&node).map(|(index, _)| index).collect();
+        for triple in indices.into_iter().filter_map(|index| graph.take(index)).collect::<Vec<_>>() {
             graph.state(&fresh, triple.predicate.as_str(), triple.object);
         }
     }
 }
 
-/// Makes of named classes that are an expression ones that are equivalent to it.
+/// Makes a named class with the triples of an expression equivalent to a blank node with these triples.
 fn definitions(graph: &mut Graph) {
     let datatypes: FxHashSet<NamedOrBlankNode> =
         graph.instances(rdfs::DATATYPE).into_iter().map(|(_, node)| node).collect();
@@ -104,15 +107,15 @@ fn definitions(graph: &mut Graph) {
         graph.state(&node, triple.predicate.as_str(), triple.object);
     }
     for class in restricted {
-        let said = graph.of(&class).filter(|(_, triple)| {
-            RESTRICTS.contains(&triple.predicate.as_str()) || is_type(triple, owl::RESTRICTION)
+        let parts = graph.of(&class).filter(|(_, triple)| {
+            RESTRICTION_PROPERTIES.contains(&triple.predicate.as_str()) || is_type(triple, owl::RESTRICTION)
         });
-        let said: Vec<usize> = said.map(|(index, _)| index).collect();
+        let indices: Vec<usize> = parts.map(|(index, _)| index).collect();
         let node = graph.fresh();
         state(graph, &class, rdf::TYPE, owl::CLASS);
         graph.state(&class, owl::EQUIVALENT_CLASS, Term::from(node.clone()));
         let node = node.into();
-        for triple in said.into_iter().filter_map(|index| graph.take(index)).collect::<Vec<_>>() {
+        for triple in indices.into_iter().filter_map(|index| graph.take(index)).collect::<Vec<_>>() {
             graph.state(&node, triple.predicate.as_str(), triple.object);
         }
     }
@@ -122,8 +125,8 @@ fn state(graph: &mut Graph, subject: &NamedOrBlankNode, predicate: &str, object:
     graph.state(subject, predicate, NamedNode::new_unchecked(object));
 }
 
-/// Gives each anonymous expression the one type that it needs.
-fn types(graph: &mut Graph) {
+/// Gives each anonymous expression the type that its properties require, and removes other types.
+fn correct_types(graph: &mut Graph) {
     let datatypes: FxHashSet<Term> =
         graph.instances(rdfs::DATATYPE).into_iter().map(|(_, node)| Term::from(node)).collect();
     let mut kinds: FxHashMap<NamedOrBlankNode, &str> = FxHashMap::default();
@@ -147,25 +150,25 @@ fn types(graph: &mut Graph) {
     }
     let expressions = [owl::CLASS, rdfs::CLASS, owl::RESTRICTION, rdfs::DATATYPE, owl::DATA_RANGE];
     for node in nodes {
-        let wanted = kinds[&node];
-        let others: Vec<usize> = graph
+        let expected = kinds[&node];
+        let wrong: Vec<usize> = graph
             .of(&node)
             .filter(|(_, triple)| {
                 let is = |class: &&str| is_type(triple, class);
-                expressions.iter().any(&is) && !is(&wanted)
+                expressions.iter().any(&is) && !is(&expected)
             })
             .map(|(index, _)| index)
             .collect();
-        for index in others {
+        for index in wrong {
             graph.take(index);
         }
-        if !graph.of(&node).any(|(_, triple)| is_type(triple, wanted)) {
-            state(graph, &node, rdf::TYPE, wanted);
+        if !graph.of(&node).any(|(_, triple)| is_type(triple, expected)) {
+            state(graph, &node, rdf::TYPE, expected);
         }
     }
 }
 
-/// Whether the members of a list are values or data ranges; its first member decides.
+/// Returns `true` if the first member of a list is a value or a data range.
 fn has_values(graph: &Graph, list: &Term, datatypes: &FxHashSet<Term>) -> bool {
     let first = subject_of(list).and_then(|node| graph.objects(&node, rdf::FIRST).next());
     match first {
@@ -175,11 +178,11 @@ fn has_values(graph: &Graph, list: &Term, datatypes: &FxHashSet<Term>) -> bool {
                 || [rdfs::LITERAL, rdf::PLAIN_LITERAL].contains(&iri.as_str())
                 || datatypes.contains(&Term::from(iri.clone()))
         }
-        Some(node @ Term::BlankNode(own)) => {
+        Some(node @ Term::BlankNode(blank)) => {
             let data = [owl::ON_DATATYPE, owl::DATATYPE_COMPLEMENT_OF];
-            let own = NamedOrBlankNode::from(own.clone());
+            let blank = NamedOrBlankNode::from(blank.clone());
             datatypes.contains(node)
-                || graph.of(&own).any(|(_, triple)| {
+                || graph.of(&blank).any(|(_, triple)| {
                     data.contains(&triple.predicate.as_str()) || is_type(triple, owl::DATA_RANGE)
                 })
         }
@@ -187,8 +190,9 @@ fn has_values(graph: &Graph, list: &Term, datatypes: &FxHashSet<Term>) -> bool {
     }
 }
 
-/// Names anonymous inverses where horned-owl wants a name, and leaves no types on the others.
-fn inverses(graph: &mut Graph) {
+/// Names anonymous inverses in qualified cardinality restrictions, where horned-owl requires a name. Removes
+/// the types of all anonymous inverses.
+fn name_inverses(graph: &mut Graph) {
     let mut inverses: FxHashMap<Term, String> = FxHashMap::default();
     let mut typed = Vec::new();
     for (_, triple) in graph.iter().filter(|(_, triple)| triple.predicate.as_str() == owl::INVERSE_OF) {
@@ -196,8 +200,8 @@ fn inverses(graph: &mut Graph) {
             (&triple.subject, &triple.object)
         {
             inverses.insert(node.clone().into(), format!("{INVERSE}{}", property.as_str()));
-            let own = graph.of(&triple.subject).filter(|(_, said)| is_type(said, owl::OBJECT_PROPERTY));
-            typed.extend(own.map(|(index, _)| index));
+            let types = graph.of(&triple.subject).filter(|(_, triple)| is_type(triple, owl::OBJECT_PROPERTY));
+            typed.extend(types.map(|(index, _)| index));
         }
     }
     for index in typed {
@@ -207,11 +211,11 @@ fn inverses(graph: &mut Graph) {
     let restrictions: Vec<NamedOrBlankNode> = qualified.map(|(_, triple)| triple.subject.clone()).collect();
     let mut renamed = Vec::new();
     for restriction in restrictions {
-        let found = graph.of(&restriction).find_map(|(index, triple)| {
+        let replacement = graph.of(&restriction).find_map(|(index, triple)| {
             let is_property = triple.predicate.as_str() == owl::ON_PROPERTY;
             Some((index, inverses.get(&triple.object).filter(|_| is_property)?.clone()))
         });
-        if let Some((index, name)) = found
+        if let Some((index, name)) = replacement
             && let Some(triple) = graph.get_mut(index)
         {
             let name = NamedNode::new_unchecked(name);
@@ -219,6 +223,7 @@ fn inverses(graph: &mut Graph) {
             state(graph, &name.into(), rdf::TYPE, owl::OBJECT_PROPERTY);
         }
     }
+    // An inverse without a remaining reference would be left over by horned-owl.
     let references = graph.references();
     for node in renamed {
         if let Term::BlankNode(node) = node

@@ -1,8 +1,9 @@
-//! Every entity gets a declaration: horned-owl drops assertions of properties whose kind it does not know.
+//! Adds a declaration for every entity, because horned-owl drops assertions of properties whose kind is
+//! unknown.
 //!
-//! Declarations come from the imports closure where it has them. What is declared nowhere gets its kind from its use,
-//! with a warning: a property with literals as values is a data property, one between individuals an object property,
-//! one that describes only classes, properties or ontologies an annotation property.
+//! An entity that the imports closure does not declare gets a kind from its use, with a warning: a property
+//! with literals as values is a data property, a property between individuals an object property, and a
+//! property that describes only classes, properties or ontologies an annotation property.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -16,25 +17,26 @@ use crate::names::Names;
 use crate::owl::{ANONYMOUS, EntityKind, Iri};
 use crate::vocab::{is_reserved, owl, rdf, rdfs, swrl, swrla, xsd};
 
-/// How far a kind spreads between undeclared properties.
-const SPREADS: usize = 16;
+/// Limit on the rounds in which kinds propagate between undeclared properties.
+const MAX_PROPAGATION_ROUNDS: usize = 16;
 
-/// How an undeclared property is used.
+/// Observed uses of an undeclared property.
 #[derive(Clone, Copy, Debug, Default)]
 #[allow(clippy::struct_excessive_bools)] // independent observations
 struct Use {
     literal: bool,
     individual: bool,
-    /// By an axiom or rule that says which.
+    /// Used as a data property in an axiom or rule.
     data: bool,
+    /// Used as an object property in an axiom or rule.
     object: bool,
-    /// By a restriction that does not say which.
+    /// Used in a restriction of unknown kind.
     restricted: bool,
-    /// On something that is not an individual.
+    /// Its subject is not an individual.
     entity: bool,
 }
 
-/// Declares what is not; `classes` are used elsewhere and not declared.
+/// Declares all undeclared entities. `classes` are undeclared classes of triples outside the graph.
 pub(crate) fn declare(graph: &mut Graph, mut classes: BTreeSet<String>, warnings: &mut Vec<Warning>) {
     let (declared, mut properties) = (Declared::of(graph), BTreeMap::new());
     for (_, triple) in graph.iter() {
@@ -42,25 +44,25 @@ pub(crate) fn declare(graph: &mut Graph, mut classes: BTreeSet<String>, warnings
         record_property(graph, triple, &declared, &mut properties);
     }
     let kinds = Kinds { declared: &declared, uses: properties };
-    let properties = kinds.between_properties(graph, warnings);
+    let properties = kinds.propagate_kinds(graph, warnings);
     for class in classes {
         state(graph, &class, owl::CLASS);
         warnings.push(Warning::Undeclared { iri: class, kind: "a class", position: None });
     }
-    for (property, used) in properties {
-        let (class, kind) = kind_of(used);
+    for (property, usage) in properties {
+        let (class, kind) = kind_of(usage);
         state(graph, &property, class);
         warnings.push(Warning::Undeclared { iri: property, kind, position: None });
     }
     let enabled = swrla::IS_RULE_ENABLED;
-    let used = graph.iter().any(|(_, triple)| triple.predicate.as_str() == enabled);
-    if used && !declared.annotation_properties.contains(enabled) {
+    let is_used = graph.iter().any(|(_, triple)| triple.predicate.as_str() == enabled);
+    if is_used && !declared.annotation_properties.contains(enabled) {
         state(graph, enabled, owl::ANNOTATION_PROPERTY);
     }
     state(graph, ORIGIN, owl::ANNOTATION_PROPERTY);
 }
 
-/// Declares those of some entities that documents name and do not declare.
+/// Declares the `known` entities that the documents mention without a declaration.
 pub(crate) fn declare_known(graph: &mut Graph, known: &[(EntityKind, Iri)], names: &Names) {
     if known.is_empty() {
         return;
@@ -83,14 +85,14 @@ pub(crate) fn declare_known(graph: &mut Graph, known: &[(EntityKind, Iri)], name
     }
 }
 
-/// What is known of properties: their declarations and their uses.
+/// Declarations and uses of properties.
 struct Kinds<'a> {
     declared: &'a Declared,
     uses: BTreeMap<String, Use>,
 }
 
 impl Kinds<'_> {
-    /// The kind of a property, as the class that declares it; `None` while nothing is known.
+    /// Returns the class that declares properties of this kind; `None` if the kind is unknown.
     fn of(&self, property: &str) -> Option<&'static str> {
         if self.declared.object_properties.contains(property) {
             Some(owl::OBJECT_PROPERTY)
@@ -99,13 +101,14 @@ impl Kinds<'_> {
         } else if self.declared.properties.contains(property) {
             Some(owl::DATATYPE_PROPERTY)
         } else {
-            self.uses.get(property).map(|used| kind_of(*used).0)
+            self.uses.get(property).map(|usage| kind_of(*usage).0)
         }
     }
 
-    /// Properties that are said to be equivalent, disjoint or one below the other have one kind: a known one spreads,
-    /// an axiom between two kinds is taken away (horned-owl rejects the whole document for it).
-    fn between_properties(mut self, graph: &mut Graph, warnings: &mut Vec<Warning>) -> BTreeMap<String, Use> {
+    /// Unifies the kinds of properties that axioms relate (equivalent, disjoint or subproperties): a known kind
+    /// propagates to undeclared properties. An axiom between properties of different kinds is removed, because
+    /// horned-owl rejects documents with such axioms.
+    fn propagate_kinds(mut self, graph: &mut Graph, warnings: &mut Vec<Warning>) -> BTreeMap<String, Use> {
         let relations = [owl::EQUIVALENT_PROPERTY, owl::PROPERTY_DISJOINT_WITH, rdfs::SUB_PROPERTY_OF];
         let pairs: Vec<_> = graph
             .iter()
@@ -116,8 +119,8 @@ impl Kinds<'_> {
             })
             .filter(|(_, first, second)| !is_reserved(first) && !is_reserved(second))
             .collect();
-        // As often as kinds can spread along a path of pairs.
-        for _ in 0..pairs.len().min(SPREADS) {
+        // A round propagates at least one step along a path of pairs.
+        for _ in 0..pairs.len().min(MAX_PROPAGATION_ROUNDS) {
             for (_, first, second) in &pairs {
                 match (self.of(first), self.of(second)) {
                     (Some(kind), None) => self.assume(second, kind),
@@ -141,19 +144,20 @@ impl Kinds<'_> {
 
     fn assume(&mut self, property: &str, kind: &str) {
         if !self.declared.properties.contains(property) {
-            let used = self.uses.entry(property.to_owned()).or_default();
-            used.object |= kind == owl::OBJECT_PROPERTY;
-            used.data |= kind == owl::DATATYPE_PROPERTY;
-            used.entity |= kind == owl::ANNOTATION_PROPERTY;
+            let usage = self.uses.entry(property.to_owned()).or_default();
+            usage.object |= kind == owl::OBJECT_PROPERTY;
+            usage.data |= kind == owl::DATATYPE_PROPERTY;
+            usage.entity |= kind == owl::ANNOTATION_PROPERTY;
         }
     }
 }
 
-fn kind_of(used: Use) -> (&'static str, &'static str) {
-    let values_only = used.literal && !used.object;
-    if used.data || values_only && (!used.entity || used.restricted && !used.individual) {
+/// Returns the most probable kind as the declaring class and as text.
+fn kind_of(usage: Use) -> (&'static str, &'static str) {
+    let values_only = usage.literal && !usage.object;
+    if usage.data || values_only && (!usage.entity || usage.restricted && !usage.individual) {
         (owl::DATATYPE_PROPERTY, "a data property")
-    } else if used.object || used.restricted || (used.individual && !used.entity) {
+    } else if usage.object || usage.restricted || (usage.individual && !usage.entity) {
         (owl::OBJECT_PROPERTY, "an object property")
     } else {
         (owl::ANNOTATION_PROPERTY, "an annotation property")
@@ -165,7 +169,7 @@ fn state(graph: &mut Graph, iri: &str, class: &str) {
     graph.state(&subject, rdf::TYPE, NamedNode::new_unchecked(class));
 }
 
-/// What the closure declares.
+/// The declarations of the imports closure.
 struct Declared {
     classes: HashSet<String>,
     datatypes: HashSet<String>,
@@ -176,17 +180,17 @@ struct Declared {
 
 impl Declared {
     fn of(graph: &Graph) -> Self {
-        let all = |types: &[&str]| -> HashSet<String> {
+        let instances_of = |types: &[&str]| -> HashSet<String> {
             let typed = types.iter().flat_map(|class| graph.instances(class));
             typed.filter_map(|(_, node)| named(&node).map(str::to_owned)).collect()
         };
-        let object_properties = all(&[owl::OBJECT_PROPERTY]);
-        let annotation_properties = all(&[owl::ANNOTATION_PROPERTY]);
-        let mut properties = all(&[owl::DATATYPE_PROPERTY]);
+        let object_properties = instances_of(&[owl::OBJECT_PROPERTY]);
+        let annotation_properties = instances_of(&[owl::ANNOTATION_PROPERTY]);
+        let mut properties = instances_of(&[owl::DATATYPE_PROPERTY]);
         properties.extend(object_properties.iter().chain(&annotation_properties).cloned());
         Self {
-            classes: all(&[owl::CLASS, rdfs::CLASS]),
-            datatypes: all(&[rdfs::DATATYPE]),
+            classes: instances_of(&[owl::CLASS, rdfs::CLASS]),
+            datatypes: instances_of(&[rdfs::DATATYPE]),
             properties,
             object_properties,
             annotation_properties,
@@ -200,9 +204,9 @@ impl Declared {
             || iri.starts_with(rdf::NS)
     }
 
-    /// Whether the node is something else than an individual.
+    /// Returns `true` if the node is an ontology, class or property and not an individual.
     fn is_entity(&self, graph: &Graph, node: &NamedOrBlankNode) -> bool {
-        // Most of what headers say are annotations.
+        // Statements about an ontology header are usually annotations.
         if graph.of(node).any(|(_, triple)| is_type(triple, owl::ONTOLOGY)) {
             return true;
         }
@@ -226,7 +230,7 @@ fn named(node: &NamedOrBlankNode) -> Option<&str> {
     }
 }
 
-/// Whether a restriction is one on values.
+/// Returns `true` if a restriction is about data values.
 fn restricts_data(graph: &Graph, restriction: &NamedOrBlankNode, declared: &Declared) -> bool {
     graph.of(restriction).any(|(_, triple)| match triple.predicate.as_str() {
         owl::ON_DATA_RANGE => true,
@@ -235,7 +239,7 @@ fn restricts_data(graph: &Graph, restriction: &NamedOrBlankNode, declared: &Decl
             Term::NamedNode(filler) => declared.is_datatype(filler.as_str()),
             Term::BlankNode(node) => {
                 let node = NamedOrBlankNode::from(node.clone());
-                graph.of(&node).any(|(_, said)| is_type(said, rdfs::DATATYPE))
+                graph.of(&node).any(|(_, triple)| is_type(triple, rdfs::DATATYPE))
             }
             Term::Literal(_) => false,
         },
@@ -243,9 +247,9 @@ fn restricts_data(graph: &Graph, restriction: &NamedOrBlankNode, declared: &Decl
     })
 }
 
-/// Notes the undeclared classes that a triple names.
+/// Records the undeclared classes that a triple uses.
 fn record_classes(triple: &Triple, declared: &Declared, classes: &mut BTreeSet<String>) {
-    let mut note = |iri: Option<&str>| {
+    let mut record = |iri: Option<&str>| {
         if let Some(iri) = iri.filter(|iri| !is_reserved(iri))
             && !declared.classes.contains(iri)
             && !declared.datatypes.contains(iri)
@@ -255,23 +259,23 @@ fn record_classes(triple: &Triple, declared: &Declared, classes: &mut BTreeSet<S
     };
     let object = iri_of(&triple.object);
     match triple.predicate.as_str() {
-        rdf::TYPE | rdfs::DOMAIN | swrl::CLASS_PREDICATE => note(object),
+        rdf::TYPE | rdfs::DOMAIN | swrl::CLASS_PREDICATE => record(object),
         rdfs::RANGE => {
             let object_property =
                 named(&triple.subject).is_some_and(|iri| declared.object_properties.contains(iri));
-            note(object.filter(|_| object_property));
+            record(object.filter(|_| object_property));
         }
         rdfs::SUB_CLASS_OF | owl::EQUIVALENT_CLASS | owl::DISJOINT_WITH => {
-            note(named(&triple.subject));
-            note(object);
+            record(named(&triple.subject));
+            record(object);
         }
         _ => {}
     }
 }
 
-/// Notes how a triple uses an undeclared property.
+/// Records the use of an undeclared property in a triple.
 fn record_property(graph: &Graph, triple: &Triple, declared: &Declared, uses: &mut BTreeMap<String, Use>) {
-    let mut note = |iri: &str, change: &dyn Fn(&mut Use)| {
+    let mut record = |iri: &str, change: &dyn Fn(&mut Use)| {
         if !is_reserved(iri)
             && !declared.properties.contains(iri)
             && iri != ORIGIN
@@ -286,32 +290,32 @@ fn record_property(graph: &Graph, triple: &Triple, declared: &Declared, uses: &m
         swrl::PROPERTY_PREDICATE => {
             let data = graph.of(&triple.subject).any(|(_, t)| is_type(t, swrl::DATAVALUED_PROPERTY_ATOM));
             if let Some(property) = object {
-                note(property, &|used| if data { used.data = true } else { used.object = true });
+                record(property, &|usage| if data { usage.data = true } else { usage.object = true });
             }
         }
         rdfs::DOMAIN => {
             if let Some(property) = named(&triple.subject) {
-                note(property, &|_| ());
+                record(property, &|_| ());
             }
         }
         owl::ON_PROPERTY => {
             let data = restricts_data(graph, &triple.subject, declared);
             if let Some(property) = object {
-                note(property, &|used| if data { used.data = true } else { used.restricted = true });
+                record(property, &|usage| if data { usage.data = true } else { usage.restricted = true });
             }
         }
         owl::INVERSE_OF => {
             for property in [named(&triple.subject), object].into_iter().flatten() {
-                note(property, &|used| used.object = true);
+                record(property, &|usage| usage.object = true);
             }
         }
         rdfs::RANGE => {
             let data = object.is_some_and(|range| declared.is_datatype(range));
             let class = object.is_some_and(|range| declared.classes.contains(range));
             if let Some(property) = named(&triple.subject) {
-                note(property, &|used| {
-                    used.data |= data;
-                    used.object |= class;
+                record(property, &|usage| {
+                    usage.data |= data;
+                    usage.object |= class;
                 });
             }
         }
@@ -320,10 +324,10 @@ fn record_property(graph: &Graph, triple: &Triple, declared: &Declared, uses: &m
     if !is_reserved(predicate) && !declared.properties.contains(predicate) {
         let entity = declared.is_entity(graph, &triple.subject);
         let literal = matches!(triple.object, Term::Literal(_));
-        note(predicate, &|used| {
-            used.entity |= entity;
-            used.literal |= literal;
-            used.individual |= !literal;
+        record(predicate, &|usage| {
+            usage.entity |= entity;
+            usage.literal |= literal;
+            usage.individual |= !literal;
         });
     }
 }

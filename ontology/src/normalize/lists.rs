@@ -1,5 +1,5 @@
-//! Axioms that lie in lists: `AllDisjointClasses` and `AllDisjointProperties` into pairs, a list that several axioms
-//! share into one copy each, property chains that are not lists taken away.
+//! Rewrites axioms with lists: `AllDisjointClasses` and `AllDisjointProperties` become pairs, a list that
+//! several axioms share is copied, and malformed property chains are removed.
 
 use oxrdf::{NamedNode, NamedOrBlankNode, Term};
 
@@ -8,7 +8,7 @@ use crate::graph::{Graph, iri_of, subject_of};
 use crate::owl::{AnnotatedAxiom, Axiom, ClassExpression, Iri};
 use crate::vocab::{owl, rdf};
 
-/// Returns the axioms that need no reader.
+/// Rewrites the lists. Returns the axioms that horned-owl does not have to read.
 pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) -> Vec<AnnotatedAxiom> {
     let groups = groups(graph);
     pairs(graph, owl::ALL_DISJOINT_CLASSES, owl::DISJOINT_WITH, warnings);
@@ -18,11 +18,11 @@ pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) -> Vec<Ann
     groups
 }
 
-/// So many members of a group are still read by others, or paired.
-const PAIRS: usize = 16;
+/// Number of members up to which horned-owl reads a group, or the group becomes pairs.
+const MAX_PAIRED_MEMBERS: usize = 16;
 
-/// Takes the axioms that many named classes are disjoint, or many named individuals different: pairs would be too many, and
-/// horned-owl takes time that grows with the square of a list.
+/// Removes and returns axioms about many disjoint named classes or many different named individuals. Pairs
+/// would be too many, and the time of horned-owl grows with the square of the length of a list.
 fn groups(graph: &mut Graph) -> Vec<AnnotatedAxiom> {
     let mut axioms = Vec::new();
     for (kind, class) in
@@ -37,7 +37,7 @@ fn groups(graph: &mut Graph) -> Vec<AnnotatedAxiom> {
                 continue;
             };
             let named: Option<Vec<Iri>> = list.items.iter().map(|item| iri_of(item).map(Iri::from)).collect();
-            let Some(named) = named.filter(|named| named.len() > PAIRS) else { continue };
+            let Some(named) = named.filter(|named| named.len() > MAX_PAIRED_MEMBERS) else { continue };
             for item in list.items.iter().filter_map(subject_of) {
                 graph.state(&item, rdf::TYPE, NamedNode::new_unchecked(class));
             }
@@ -46,23 +46,23 @@ fn groups(graph: &mut Graph) -> Vec<AnnotatedAxiom> {
                 _ => Axiom::DifferentIndividuals(named),
             };
             axioms.push(AnnotatedAxiom { axiom, annotations: Vec::new() });
-            let own = graph.of(&node).map(|(index, _)| index).chain(list.spine.iter().copied()).collect();
-            take(graph, own);
+            let indices = graph.of(&node).map(|(index, _)| index).chain(list.spine.iter().copied()).collect();
+            take(graph, indices);
         }
     }
     axioms
 }
 
-/// Replaces each `class` axiom by `predicate` between all pairs of its members.
+/// Replaces each axiom of type `class` by `predicate` between all pairs of its members.
 fn pairs(graph: &mut Graph, class: &str, predicate: &str, warnings: &mut Vec<Warning>) {
     for (_, node) in graph.instances(class) {
         let members = graph.object(&node, owl::MEMBERS).and_then(|head| graph.list(head));
-        let own: Vec<usize> = graph.of(&node).map(|(index, _)| index).collect();
+        let axiom_triples: Vec<usize> = graph.of(&node).map(|(index, _)| index).collect();
         match members {
             Ok(list) => {
                 let members: Vec<_> = list.items.iter().filter_map(subject_of).collect();
-                for (place, first) in members.iter().enumerate() {
-                    for second in &members[place + 1..] {
+                for (index, first) in members.iter().enumerate() {
+                    for second in &members[index + 1..] {
                         graph.state(first, predicate, Term::from(second.clone()));
                     }
                 }
@@ -72,7 +72,7 @@ fn pairs(graph: &mut Graph, class: &str, predicate: &str, warnings: &mut Vec<War
                 warnings.push(Warning::Unread { statement: format!("{node} a <{class}>"), reason });
             }
         }
-        take(graph, own);
+        take(graph, axiom_triples);
     }
 }
 
@@ -82,7 +82,7 @@ fn take(graph: &mut Graph, indices: Vec<usize>) {
     }
 }
 
-/// horned-owl panics on a property chain whose list holds anything but properties.
+/// Removes property chains with members other than properties: horned-owl panics on them.
 fn check_chains(graph: &mut Graph, warnings: &mut Vec<Warning>) {
     let chains: Vec<_> = graph
         .iter()
@@ -113,10 +113,11 @@ fn chain_fault(graph: &Graph, item: &Term) -> Option<String> {
     }
 }
 
-/// Gives each triple that points at a list a list of its own, without types: horned-owl consumes lists.
+/// Copies a list for every triple that refers to it, because horned-owl consumes lists. Removes the types of
+/// lists.
 fn unshare(graph: &mut Graph) {
     let references = graph.references();
-    let mut seen = std::collections::HashSet::new();
+    let mut visited = std::collections::HashSet::new();
     let shared: Vec<(usize, Term)> = graph
         .iter()
         .filter(|(_, triple)| triple.predicate.as_str() != rdf::REST)
@@ -124,7 +125,7 @@ fn unshare(graph: &mut Graph) {
             Term::BlankNode(node) if references.get(node).is_some_and(|&count| count > 1) => {
                 let is_list =
                     graph.objects(&NamedOrBlankNode::from(node.clone()), rdf::FIRST).next().is_some();
-                (is_list && !seen.insert(node.clone())).then(|| (index, triple.object.clone()))
+                (is_list && !visited.insert(node.clone())).then(|| (index, triple.object.clone()))
             }
             _ => None,
         })

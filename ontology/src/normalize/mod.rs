@@ -1,20 +1,21 @@
-//! Merged triples to triples that horned-owl reads without loss.
+//! Normalises merged triples, so that horned-owl reads them without loss.
 //!
-//! Its RDF reader matches exact shapes and passes over what deviates: rules that have an IRI, atoms with an annotation,
-//! data atoms about an individual, empty bodies, lists used twice, `AllDisjointClasses`, undeclared properties, blank
-//! nodes as individuals. Real knowledge bases contain most of these. The passes below rewrite them, one file each:
+//! Its RDF reader matches exact patterns and skips triples that deviate: rules with an IRI, atoms with an
+//! annotation, data atoms about an individual, empty bodies, shared lists, `AllDisjointClasses`, undeclared
+//! properties, blank nodes as individuals. Real knowledge bases contain most of these. The passes below rewrite
+//! them, one file each:
 //!
 //! | pass | rewrites |
 //! |---|---|
-//! | here | headers of imported ontologies (taken away) |
-//! | `bulk` | nothing: tells which statements no other pass looks at |
-//! | `swrl` | every rule into one canonical shape |
-//! | `forms` | definitions as OWL 1 writes them, expressions without types, axioms with IRIs |
-//! | `lists` | disjointness of many into pairs, shared lists into copies, property chains checked |
-//! | `anonymous` | blank-node individuals into IRIs |
-//! | `annotative` | axioms that treat an annotation property as another one (taken away) |
-//! | `kinds` | undeclared entities into declared ones |
-//! | `plain` | statements that need no reader into our own structures |
+//! | here | headers of imported ontologies (removed) |
+//! | `bulk` | nothing: detects statements that the other passes can skip |
+//! | `swrl` | every rule to one canonical form |
+//! | `forms` | definitions in the form of OWL 1, expressions without types, axioms with IRIs |
+//! | `lists` | n-ary disjointness to pairs, shared lists to copies; checks property chains |
+//! | `anonymous` | blank-node individuals to IRIs |
+//! | `annotative` | axioms that use an annotation property as another kind of property (removed) |
+//! | `kinds` | undeclared entities to declared ones |
+//! | `plain` | statements that need no reader to our own structures |
 
 mod annotative;
 mod anonymous;
@@ -26,7 +27,7 @@ mod lists;
 mod plain;
 mod swrl;
 
-use depth::DEEPEST;
+use depth::MAX_NESTING;
 pub(crate) use swrl::{INDIVIDUAL, ORIGIN, Origin, TRUE, VARIABLE};
 
 use crate::contents::Parts;
@@ -37,33 +38,33 @@ use crate::owl::{EntityKind, Iri};
 use crate::triples::Document;
 use crate::vocab::{owl, rdf};
 
-/// What normalisation yields.
+/// Result of the normalisation.
 #[derive(Debug)]
 pub(crate) struct Normal {
-    /// The document for horned-owl.
+    /// The N-Triples document for horned-owl.
     pub ntriples: Vec<u8>,
-    /// What does not have to go through it.
+    /// Axioms and annotations that horned-owl does not have to read.
     pub plain: Parts,
-    /// The IRIs in `plain`.
+    /// The IRIs of `plain`.
     pub names: Names,
-    /// Where each rule comes from; its canonical form is annotated with the index here.
+    /// Origin of each rule. The canonical form of a rule has its index in this list as an annotation.
     pub rules: Vec<Origin>,
     pub warnings: Vec<Warning>,
 }
 
-/// The triples of all documents, with the header of the first only.
+/// The triples of all documents, with the header of the first document only.
 pub(crate) struct Merged {
     pub graph: Graph,
-    /// Statements that are left out of the graph.
+    /// Statements that are not in the graph.
     pub bulk: Vec<Compact>,
-    /// For each document, where it starts in the graph, and the ontology that it is.
+    /// For each document, the index of its first triple in the graph, and its ontology.
     pub parts: Vec<(usize, Iri)>,
 }
 
-/// Merges documents; what `is_bulk` holds of stays out of the graph.
+/// Merges documents. Triples for which `is_bulk` returns `true` are not added to the graph.
 pub(crate) fn merge(documents: Vec<Document>, names: &Names, is_bulk: impl Fn(&Compact) -> bool) -> Merged {
     let (mut graph, mut bulk, mut parts) = (Graph::default(), Vec::new(), Vec::new());
-    let [kind, ontology, imports, version] =
+    let [rdf_type, ontology, imports, version] =
         [rdf::TYPE, owl::ONTOLOGY, owl::IMPORTS, owl::VERSION_IRI].map(|iri| names.find(iri));
     for (index, document) in documents.into_iter().enumerate() {
         let name = document.iri.clone().unwrap_or_else(|| document.name.as_str().into());
@@ -71,7 +72,7 @@ pub(crate) fn merge(documents: Vec<Document>, names: &Names, is_bulk: impl Fn(&C
         for triple in document.triples {
             let predicate = Some(triple.predicate);
             let is_ontology = matches!(triple.object, Object::Node(class) if Some(class) == ontology);
-            let header = predicate == version || (predicate == kind && is_ontology);
+            let header = predicate == version || (predicate == rdf_type && is_ontology);
             if predicate == imports || (header && index > 0) {
                 continue;
             }
@@ -86,28 +87,35 @@ pub(crate) fn merge(documents: Vec<Document>, names: &Names, is_bulk: impl Fn(&C
     Merged { graph, bulk, parts }
 }
 
-/// Merges and rewrites; see the module documentation. What is `known` need not be declared.
+/// Merges and rewrites documents; see the module documentation. Entities of `known_entities` need no
+/// declaration.
 ///
 /// # Errors
-/// Class expressions are nested too deep.
+/// Returns O112 if class expressions are nested too deeply.
 pub(crate) fn normalize(
     documents: Vec<Document>,
     mut names: Names,
     known_entities: &[(EntityKind, Iri)],
 ) -> Result<Normal, Error> {
     let files: Vec<String> = documents.iter().map(|document| document.name.clone()).collect();
-    let known = bulk::Known::of(&documents, &names);
-    let Merged { mut graph, bulk, parts } = merge(documents, &names, |triple| known.is_bulk(triple));
-    let mut undeclared = known.undeclared(&bulk, &names);
+    let usage = bulk::Usage::of(&documents, &names);
+    let Merged { mut graph, bulk, parts } = merge(documents, &names, |triple| usage.is_bulk(triple));
+    let mut undeclared = usage.undeclared(&bulk, &names);
     for (kind, iri) in known_entities {
         if *kind == EntityKind::Class {
             undeclared.remove(&**iri);
         }
     }
     let mut warnings = Vec::new();
+    // Later passes are recursive.
     if let Some((index, about)) = depth::too_deep(&graph) {
         let part = parts.partition_point(|(start, _)| *start <= index).saturating_sub(1);
-        return Err(Error::TooDeep { file: files[part].clone(), about, position: None, deepest: DEEPEST });
+        return Err(Error::TooDeep {
+            file: files[part].clone(),
+            about,
+            position: None,
+            deepest: MAX_NESTING,
+        });
     }
     kinds::declare_known(&mut graph, known_entities, &names);
     let rules = swrl::rewrite(&mut graph, &parts, &mut warnings);

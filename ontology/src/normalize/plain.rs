@@ -1,9 +1,9 @@
-//! Plain assertions and annotations out of the graph, straight into our own structures.
+//! Converts plain assertions and annotations of the graph directly to our own structures.
 //!
-//! Most of a large knowledge base says of individuals which class they are of and which values they have. Such a triple
-//! is an axiom by itself, once the kinds of its terms are known, so that no pattern has to be matched. What may be part
-//! of a pattern stays: subjects that an annotated axiom mentions, headers of ontologies, predicates of several kinds,
-//! and the vocabularies of OWL itself.
+//! Most triples of a large knowledge base state the class or a property value of an individual. Once the kinds
+//! of the terms are known, such a triple is an axiom by itself, and no pattern has to be matched. Triples that
+//! may be part of a pattern remain in the graph: subjects of annotated axioms, headers of ontologies,
+//! predicates of several kinds, and OWL's own vocabulary.
 
 use oxrdf::{NamedOrBlankNode, Term, Triple};
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -19,7 +19,7 @@ use crate::vocab::{is_reserved, owl, rdf, rdfs};
 /// Annotation properties that need no declaration.
 const DESCRIPTIONS: [&str; 4] = [rdfs::LABEL, rdfs::COMMENT, rdfs::SEE_ALSO, rdfs::IS_DEFINED_BY];
 
-/// What a plain triple says of its subject.
+/// Kind of a plain statement.
 #[derive(Clone, Copy)]
 enum Statement {
     Individual,
@@ -29,15 +29,17 @@ enum Statement {
     Annotation,
 }
 
-/// What an IRI is declared to be.
+/// Declared kinds of an IRI.
 #[derive(Clone, Copy, Default)]
 struct Kinds {
     class: bool,
-    /// The statement that it makes as a predicate; `Err` where it is a property of several kinds.
+    /// Kind of the statements with the IRI as predicate. `Err` if the IRI is declared as several kinds of
+    /// property.
     property: Option<Result<Statement, ()>>,
 }
 
-/// Takes plain statements from a graph whose entities are all declared, and those that were left out of it.
+/// Removes the plain statements from a graph in which all entities are declared, and converts them together
+/// with the `bulk` statements.
 pub(crate) fn take(graph: &mut Graph, bulk: Vec<Compact>, names: &mut Names) -> Parts {
     let mut parts = Parts::default();
     let (statements, declared) = (statements(graph), Declared::of(graph, names));
@@ -46,6 +48,7 @@ pub(crate) fn take(graph: &mut Graph, bulk: Vec<Compact>, names: &mut Names) -> 
         if declared.contains(&triple) {
             parts.axioms.push(axiom(triple, names));
         } else {
+            // The predicate turned out to be of another kind, so that horned-owl has to read the triple.
             graph.add(names.triple(triple));
         }
     }
@@ -57,10 +60,10 @@ pub(crate) fn take(graph: &mut Graph, bulk: Vec<Compact>, names: &mut Names) -> 
     parts
 }
 
-/// The plain statements with the indices of their triples, in order.
+/// Returns the plain statements with the indices of their triples, in order.
 fn statements(graph: &Graph) -> Vec<(usize, Statement)> {
     let (kinds, patterns, headers) = (kinds(graph), patterns(graph), headers(graph));
-    let of = |triple: &Triple| {
+    let classify = |triple: &Triple| {
         let subject = named(triple).filter(|subject| !is_reserved(subject) && !patterns.contains(subject))?;
         let is_header = headers.contains(subject);
         let kind = |iri: &str| kinds.get(iri).copied().unwrap_or_default();
@@ -87,27 +90,27 @@ fn statements(graph: &Graph) -> Vec<(usize, Statement)> {
             },
         }
     };
-    graph.iter().filter_map(|(index, triple)| Some((index, of(triple)?))).collect()
+    graph.iter().filter_map(|(index, triple)| Some((index, classify(triple)?))).collect()
 }
 
-/// The kinds of what is declared in the end, by number.
+/// Declared kinds by the number of a name.
 struct Declared {
     kinds: FxHashMap<u32, Kinds>,
-    kind: Option<u32>,
+    rdf_type: Option<u32>,
 }
 
 impl Declared {
     fn of(graph: &Graph, names: &Names) -> Self {
-        let all = kinds(graph).into_iter();
-        let kinds = all.filter_map(|(iri, kinds)| Some((names.find(iri)?, kinds))).collect();
-        Self { kinds, kind: names.find(rdf::TYPE) }
+        let declarations = kinds(graph).into_iter();
+        let kinds = declarations.filter_map(|(iri, kinds)| Some((names.find(iri)?, kinds))).collect();
+        Self { kinds, rdf_type: names.find(rdf::TYPE) }
     }
 
-    /// Whether a statement is one by itself with these kinds.
+    /// Returns `true` if a triple is an axiom by itself under the declared kinds.
     fn contains(&self, triple: &Compact) -> bool {
         let property = || self.kinds.get(&triple.predicate).and_then(|kinds| kinds.property);
         match &triple.object {
-            Object::Node(class) if Some(triple.predicate) == self.kind => {
+            Object::Node(class) if Some(triple.predicate) == self.rdf_type => {
                 self.kinds.get(class).is_some_and(|kinds| kinds.class)
             }
             Object::Node(_) => matches!(property(), Some(Ok(Statement::Object))),
@@ -116,7 +119,7 @@ impl Declared {
     }
 }
 
-/// What a statement of numbers says.
+/// Converts a triple of numbers to an axiom.
 fn axiom(triple: Compact, names: &Names) -> AnnotatedAxiom {
     let text = |number| names.text(number).clone();
     let (subject, predicate) = (text(triple.subject), text(triple.predicate));
@@ -155,8 +158,8 @@ fn kinds(graph: &Graph) -> FxHashMap<&str, Kinds> {
             owl::ANNOTATION_PROPERTY => Statement::Annotation,
             _ => continue,
         };
-        let known = &mut kinds.entry(subject).or_default().property;
-        *known = match known {
+        let property_kind = &mut kinds.entry(subject).or_default().property;
+        *property_kind = match property_kind {
             Some(Ok(other)) if std::mem::discriminant(other) != std::mem::discriminant(&property) => {
                 Some(Err(()))
             }
@@ -167,13 +170,14 @@ fn kinds(graph: &Graph) -> FxHashMap<&str, Kinds> {
     kinds
 }
 
-/// Subjects of which a triple may be part of more than one statement.
+/// Subjects with annotated axioms: their triples may be part of a pattern.
 fn patterns(graph: &Graph) -> FxHashSet<&str> {
     let annotated = graph.iter().filter(|(_, triple)| triple.predicate.as_str() == owl::ANNOTATED_SOURCE);
     annotated.filter_map(|(_, triple)| iri_of(&triple.object)).collect()
 }
 
-/// Ontologies, whose annotations are read by others. What else is said of one it is said of as an individual.
+/// IRIs of ontologies. Their annotations are read elsewhere; their other triples are statements about
+/// individuals.
 fn headers(graph: &Graph) -> FxHashSet<&str> {
     let typed = graph.iter().filter(|(_, triple)| crate::graph::is_type(triple, owl::ONTOLOGY));
     typed.filter_map(|(_, triple)| named(triple)).collect()

@@ -1,8 +1,10 @@
-//! Every SWRL rule into one shape: a blank node, typed lists, one blank node an atom with nothing but its arguments.
+//! Rewrites every SWRL rule to one canonical form: a blank node with typed lists, and a blank node for each
+//! atom with only its arguments.
 //!
-//! What the shape cannot say is said in IRIs that `crate::horned` translates back: variables and individuals live in
-//! separate name spaces (real files give them one), an individual as first argument of a data atom is a variable that
-//! names it, an empty body or head is one atom that always holds.
+//! IRIs encode facts that the form cannot express, and `crate::horned` decodes them. Variables and individuals
+//! have separate namespaces (in real files one IRI can be both). An individual as the first argument of a data
+//! atom becomes a variable with the individual's name. An empty body or head becomes one atom that always
+//! holds.
 
 use std::collections::HashSet;
 
@@ -13,28 +15,29 @@ use crate::graph::{Graph, iri_of, subject_of};
 use crate::owl::{ANONYMOUS, Iri};
 use crate::vocab::{owl, rdf, swrl};
 
-/// Where a rule comes from.
+/// Origin of a rule.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Origin {
-    /// The ontology that states it, or the document's name.
+    /// IRI of the ontology that states the rule; the document's name if the ontology has no IRI.
     pub ontology: Iri,
-    /// Its place there, from 0.
+    /// Index of the rule in its ontology, from 0.
     pub position: u32,
-    /// Its own IRI, if it has one.
+    /// The rule's IRI, if it has one.
     pub iri: Option<Iri>,
 }
 
-/// What the IRIs of rule variables start with; the rule's index and a colon follow. Two rules never share a variable,
-/// or horned-owl would take equal rules of two ontologies for one and mix their annotations.
+/// Prefix of the IRIs of rule variables; the rule's index and a colon follow. Rules share no variables, because
+/// horned-owl would merge equal rules of two ontologies and mix their annotations.
 pub(crate) const VARIABLE: &str = "urn:metaplan:variable:";
-/// What the IRI of a variable starts with that stands for an individual.
+/// Prefix of the IRI of a variable that represents an individual.
 pub(crate) const INDIVIDUAL: &str = "urn:metaplan:individual:";
-/// `sameAs(TRUE, TRUE)` is the only atom of an empty body or head.
+/// Individual of the atom `sameAs(TRUE, TRUE)`, the only atom of an empty body or head.
 pub(crate) const TRUE: &str = "urn:metaplan:true";
-/// The annotation that holds a rule's index among the [`Origin`]s.
+/// Property of the annotation with a rule's index in the list of [`Origin`]s.
 pub(crate) const ORIGIN: &str = "urn:metaplan:origin";
 
-/// Rewrites the rules of `graph`, whose parts (first index, ontology) come from one document each.
+/// Rewrites the rules of `graph`. Each element of `parts` is a document: the index of its first triple, and its
+/// ontology.
 pub(crate) fn rewrite(graph: &mut Graph, parts: &[(usize, Iri)], warnings: &mut Vec<Warning>) -> Vec<Origin> {
     let mut pass = Pass::new(graph);
     let (mut origins, mut positions) = (Vec::new(), vec![0; parts.len()]);
@@ -65,7 +68,7 @@ pub(crate) fn rewrite(graph: &mut Graph, parts: &[(usize, Iri)], warnings: &mut 
                 });
                 let (ontology, position) = (origin.ontology.to_string(), origin.position);
                 warnings.push(Warning::UnreadRule { ontology, position, label, reason });
-                pass.rubbish.extend(graph.of(&node).map(|(index, _)| index));
+                pass.replaced.extend(graph.of(&node).map(|(index, _)| index));
             }
         }
     }
@@ -73,29 +76,28 @@ pub(crate) fn rewrite(graph: &mut Graph, parts: &[(usize, Iri)], warnings: &mut 
     origins
 }
 
-/// An atom: its type and its arguments as (predicate, object), in the order in which horned-owl wants them.
+/// An atom: its type and its arguments as (predicate, object), in the order that horned-owl requires.
 struct Atom {
     class: &'static str,
     arguments: Vec<(&'static str, Term)>,
-    /// The arguments of a built-in.
+    /// Arguments of a built-in.
     list: Option<Vec<Term>>,
 }
 
-/// State of the pass over all rules.
+/// State of the rewriting of all rules.
 struct Pass {
-    /// Variables as written.
+    /// Declared variables, under their original names.
     variables: HashSet<Term>,
-    /// All terms that are described outside rules.
-    known: HashSet<Term>,
-    /// Data properties by declaration (and not object properties as well).
+    /// Terms that occur outside of rules.
+    described: HashSet<Term>,
+    /// Data properties that are not object properties, too.
     data_properties: HashSet<Term>,
-    /// Triples that are replaced.
-    rubbish: HashSet<usize>,
-    /// Index of the current rule.
+    /// Indices of the replaced triples.
+    replaced: HashSet<usize>,
     rule: usize,
-    /// Canonical variables used.
-    used: Vec<NamedNode>,
-    /// Arguments of the current rule that are neither variables nor known.
+    /// Canonical variables of all rules.
+    canonical_variables: Vec<NamedNode>,
+    /// Arguments of the current rule that are neither variables nor described individuals.
     unknown: Vec<String>,
 }
 
@@ -106,22 +108,30 @@ impl Pass {
         let object_properties: HashSet<Term> = declared(owl::OBJECT_PROPERTY).collect();
         let data_properties =
             declared(owl::DATATYPE_PROPERTY).filter(|term| !object_properties.contains(term)).collect();
-        let mut known = HashSet::new();
-        let mut rubbish = HashSet::new();
+        let mut described = HashSet::new();
+        let mut replaced = HashSet::new();
         for (index, triple) in graph.iter() {
             if triple.predicate.as_str().starts_with(swrl::NS) {
                 continue;
             }
             if crate::graph::is_type(triple, swrl::VARIABLE) {
-                rubbish.insert(index);
+                replaced.insert(index);
                 continue;
             }
-            known.insert(Term::from(triple.subject.clone()));
+            described.insert(Term::from(triple.subject.clone()));
             if triple.predicate.as_str() != rdf::TYPE {
-                known.insert(triple.object.clone());
+                described.insert(triple.object.clone());
             }
         }
-        Self { variables, known, data_properties, rubbish, rule: 0, used: Vec::new(), unknown: Vec::new() }
+        Self {
+            variables,
+            described,
+            data_properties,
+            replaced,
+            rule: 0,
+            canonical_variables: Vec::new(),
+            unknown: Vec::new(),
+        }
     }
 
     fn read(&mut self, graph: &Graph, rule: &NamedOrBlankNode) -> Result<(Vec<Atom>, Vec<Atom>), String> {
@@ -138,37 +148,42 @@ impl Pass {
         let Some(list) = graph.objects(rule, part).next() else { return Ok(Vec::new()) };
         graph.object(rule, part)?;
         let list = graph.list(list)?;
-        self.rubbish.extend(list.spine);
+        self.replaced.extend(list.spine);
         list.items.iter().map(|item| self.atom(graph, item)).collect()
     }
 
     fn atom(&mut self, graph: &Graph, item: &Term) -> Result<Atom, String> {
         let node =
             subject_of(item).ok_or_else(|| format!("the literal {item} stands where an atom should"))?;
-        self.rubbish.extend(graph.of(&node).map(|(index, _)| index));
+        self.replaced.extend(graph.of(&node).map(|(index, _)| index));
         let types: Vec<_> = graph.objects(&node, rdf::TYPE).filter_map(iri_of).collect();
         let typed = |class: &str| types.contains(&class);
         let object = |predicate| graph.object(&node, predicate).cloned();
-        let two = [swrl::ARGUMENT1, swrl::ARGUMENT2];
+        let argument_iris = [swrl::ARGUMENT1, swrl::ARGUMENT2];
         if typed(swrl::CLASS_ATOM) {
             let class = (swrl::CLASS_PREDICATE, object(swrl::CLASS_PREDICATE)?);
-            let argument = self.individual(&object(two[0])?)?;
-            Ok(Atom::new(swrl::CLASS_ATOM, vec![(two[0], argument), class]))
+            let argument = self.individual(&object(argument_iris[0])?)?;
+            Ok(Atom::new(swrl::CLASS_ATOM, vec![(argument_iris[0], argument), class]))
         } else if typed(swrl::DATA_RANGE_ATOM) {
             let range = (swrl::DATA_RANGE, object(swrl::DATA_RANGE)?);
-            let argument = self.data(&object(two[0])?)?;
-            Ok(Atom::new(swrl::DATA_RANGE_ATOM, vec![(two[0], argument), range]))
+            let argument = self.data(&object(argument_iris[0])?)?;
+            Ok(Atom::new(swrl::DATA_RANGE_ATOM, vec![(argument_iris[0], argument), range]))
         } else if typed(swrl::INDIVIDUAL_PROPERTY_ATOM) || typed(swrl::DATAVALUED_PROPERTY_ATOM) {
-            self.property_atom(object(swrl::PROPERTY_PREDICATE)?, &object(two[0])?, &object(two[1])?, &typed)
+            self.property_atom(
+                object(swrl::PROPERTY_PREDICATE)?,
+                &object(argument_iris[0])?,
+                &object(argument_iris[1])?,
+                &typed,
+            )
         } else if typed(swrl::SAME_INDIVIDUAL_ATOM) || typed(swrl::DIFFERENT_INDIVIDUALS_ATOM) {
-            let same = typed(swrl::SAME_INDIVIDUAL_ATOM);
-            let class = if same { swrl::SAME_INDIVIDUAL_ATOM } else { swrl::DIFFERENT_INDIVIDUALS_ATOM };
-            let first = self.individual(&object(two[0])?)?;
-            let second = self.individual(&object(two[1])?)?;
-            Ok(Atom::new(class, vec![(two[0], first), (two[1], second)]))
+            let is_same = typed(swrl::SAME_INDIVIDUAL_ATOM);
+            let class = if is_same { swrl::SAME_INDIVIDUAL_ATOM } else { swrl::DIFFERENT_INDIVIDUALS_ATOM };
+            let first = self.individual(&object(argument_iris[0])?)?;
+            let second = self.individual(&object(argument_iris[1])?)?;
+            Ok(Atom::new(class, vec![(argument_iris[0], first), (argument_iris[1], second)]))
         } else if typed(swrl::BUILTIN_ATOM) || object(swrl::BUILTIN).is_ok() {
             let list = graph.list(&object(swrl::ARGUMENTS)?)?;
-            self.rubbish.extend(list.spine);
+            self.replaced.extend(list.spine);
             let arguments = list.items.iter().map(|item| self.data(item)).collect::<Result<_, _>>()?;
             let builtin = (swrl::BUILTIN, object(swrl::BUILTIN)?);
             Ok(Atom { class: swrl::BUILTIN_ATOM, arguments: vec![builtin], list: Some(arguments) })
@@ -177,7 +192,8 @@ impl Pass {
         }
     }
 
-    /// A property atom; the declaration of its property decides between the two types where they disagree.
+    /// Builds a property atom. The declaration of the property decides between data and object atoms if it
+    /// contradicts the type.
     fn property_atom(
         &mut self,
         property: Term,
@@ -185,11 +201,11 @@ impl Pass {
         second: &Term,
         typed: &dyn Fn(&str) -> bool,
     ) -> Result<Atom, String> {
-        let data = typed(swrl::DATAVALUED_PROPERTY_ATOM)
+        let is_data = typed(swrl::DATAVALUED_PROPERTY_ATOM)
             || self.data_properties.contains(&property)
             || matches!(second, Term::Literal(_));
         let subject = self.individual(first)?;
-        let (class, subject, value) = if data {
+        let (class, subject, value) = if is_data {
             (swrl::DATAVALUED_PROPERTY_ATOM, self.as_variable(subject), self.data(second)?)
         } else {
             (swrl::INDIVIDUAL_PROPERTY_ATOM, subject, self.individual(second)?)
@@ -199,14 +215,15 @@ impl Pass {
         Ok(Atom::new(class, arguments))
     }
 
-    /// An argument that is an individual or a variable for one.
+    /// Converts an argument that is an individual or an individual variable.
     fn individual(&mut self, term: &Term) -> Result<Term, String> {
         if self.variables.contains(term) {
             return Ok(self.variable(term));
         }
         match term {
             Term::NamedNode(node) => {
-                if !self.known.contains(term) {
+                // A misspelt variable looks like an individual without description.
+                if !self.described.contains(term) {
                     self.unknown.push(node.as_str().to_owned());
                 }
                 Ok(term.clone())
@@ -218,7 +235,7 @@ impl Pass {
         }
     }
 
-    /// An argument that is a literal or a variable for one.
+    /// Converts an argument that is a literal or a data variable.
     fn data(&mut self, term: &Term) -> Result<Term, String> {
         if self.variables.contains(term) {
             return Ok(self.variable(term));
@@ -240,7 +257,7 @@ impl Pass {
         self.canonical(format!("{VARIABLE}{}:{name}", self.rule))
     }
 
-    /// A data atom's subject: horned-owl has variables there, and no individuals.
+    /// Converts the subject of a data atom: horned-owl admits only variables there.
     fn as_variable(&mut self, term: Term) -> Term {
         match &term {
             Term::NamedNode(node) if !node.as_str().starts_with(VARIABLE) => {
@@ -252,12 +269,12 @@ impl Pass {
 
     fn canonical(&mut self, iri: String) -> Term {
         let node = NamedNode::new_unchecked(iri);
-        self.used.push(node.clone());
+        self.canonical_variables.push(node.clone());
         node.into()
     }
 
-    /// Adds the canonical form of a rule, with the annotations of `old`.
-    fn write(&mut self, graph: &mut Graph, old: &NamedOrBlankNode, body: &[Atom], head: &[Atom]) {
+    /// Adds the canonical form of a rule, with the annotations of the original rule.
+    fn write(&mut self, graph: &mut Graph, original: &NamedOrBlankNode, body: &[Atom], head: &[Atom]) {
         let rule = NamedOrBlankNode::from(graph.fresh());
         graph.state(&rule, rdf::TYPE, NamedNode::new_unchecked(swrl::IMP));
         for (part, atoms) in [(swrl::BODY, body), (swrl::HEAD, head)] {
@@ -270,23 +287,23 @@ impl Pass {
             graph.state(&rule, part, list);
         }
         graph.state(&rule, ORIGIN, Literal::new_simple_literal(self.rule.to_string()));
-        let annotations: Vec<_> = graph.of(old).map(|(index, triple)| (index, triple.clone())).collect();
+        let annotations: Vec<_> = graph.of(original).map(|(index, triple)| (index, triple.clone())).collect();
         for (index, triple) in annotations {
             let predicate = triple.predicate.as_str();
             if !predicate.starts_with(rdf::NS) && !predicate.starts_with(swrl::NS) {
                 graph.state(&rule, predicate, triple.object);
             }
-            self.rubbish.insert(index);
+            self.replaced.insert(index);
         }
     }
 
     fn finish(mut self, graph: &mut Graph) {
-        for index in self.rubbish {
+        for index in self.replaced {
             graph.take(index);
         }
-        self.used.sort();
-        self.used.dedup();
-        for variable in self.used {
+        self.canonical_variables.sort();
+        self.canonical_variables.dedup();
+        for variable in self.canonical_variables {
             graph.state(&variable.into(), rdf::TYPE, NamedNode::new_unchecked(swrl::VARIABLE));
         }
     }
@@ -297,7 +314,7 @@ impl Atom {
         Self { class, arguments, list: None }
     }
 
-    /// The atom that always holds.
+    /// Returns an atom that always holds.
     fn truth() -> Self {
         let term = || Term::from(NamedNode::new_unchecked(TRUE));
         Self::new(swrl::SAME_INDIVIDUAL_ATOM, vec![(swrl::ARGUMENT1, term()), (swrl::ARGUMENT2, term())])

@@ -5,7 +5,7 @@ use super::message::shortened;
 use super::syntax::{self, Syntax};
 use crate::error::{Error, Errors, Position};
 use crate::horned;
-use crate::normalize::depth::DEEPEST;
+use crate::normalize::depth::MAX_NESTING;
 
 /// A document in one of the two.
 pub(super) struct Structural<'a> {
@@ -26,7 +26,7 @@ impl Structural<'_> {
 
     fn too_deep(&self, offset: usize) -> Errors {
         let (file, position) = (self.name.to_owned(), Some(self.place(offset)));
-        Error::TooDeep { file, about: None, position, deepest: DEEPEST }.into()
+        Error::TooDeep { file, about: None, position, deepest: MAX_NESTING }.into()
     }
 
     /// OWL/XML as N-Triples.
@@ -34,7 +34,7 @@ impl Structural<'_> {
         let whole =
             entities::expanded(self.text).map_err(|fault| self.malformed(fault.offset, &fault.message))?;
         // The reader takes memory without end where an element is not closed, and recurses into elements.
-        match syntax::mismatched_tag(&whole.text, DEEPEST + MARGIN) {
+        match syntax::mismatched_tag(&whole.text, MAX_NESTING + MARGIN) {
             Ok(None) => {}
             Ok(Some(offset)) => {
                 let message = "an element is not closed, or another one than is open";
@@ -58,7 +58,7 @@ impl Structural<'_> {
                 b")" => depth = depth.saturating_sub(1),
                 _ => {}
             }
-            if depth > DEEPEST + MARGIN {
+            if depth > MAX_NESTING + MARGIN {
                 return Err(self.too_deep(offset));
             }
         }
