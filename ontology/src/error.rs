@@ -262,7 +262,7 @@ pub enum Warning {
         /// The document read second.
         second: String,
     },
-    /// O206: an import is not found, and `ignore_missing_imports` is set.
+    /// O206: an import is not found, and `allow_missing_imports` is set.
     #[error(
         "warning[O206]: {}: the import <{import}> is left out: found nowhere", place(file, position.as_ref())
     )]

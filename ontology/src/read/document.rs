@@ -1,7 +1,8 @@
-//! One document to triples: the parser that its content asks for, blank nodes renamed so that documents can be merged.
+//! Parses one document to triples. The content selects the parser, and blank nodes are renamed, so that
+//! documents can be merged.
 //!
-//! OWL/XML and functional-style documents are first written as RDF by `crate::horned`, so that everything after
-//! this file sees triples only.
+//! `crate::horned` first converts OWL/XML and functional-style documents to RDF, so that all later stages
+//! process triples.
 
 use std::borrow::Cow;
 
@@ -18,10 +19,10 @@ use crate::names::{Compact, Names, Object};
 use crate::triples::Document;
 use crate::vocab::{owl, rdf};
 
-/// After so many syntax errors in one document its parser is stopped.
-const MOST_ERRORS: usize = 10;
+/// Number of syntax errors in a document after which parsing stops.
+const MAX_SYNTAX_ERRORS: usize = 10;
 
-/// The text of a document in UTF-8, without a byte order mark.
+/// Decodes a document to UTF-8 without a byte order mark.
 pub(crate) fn decoded<'a>(bytes: &'a [u8], name: &str) -> Result<Cow<'a, [u8]>, Errors> {
     encoding::decoded(bytes).map_err(|message| {
         let position = Position::of_offset(name, bytes, 0);
@@ -29,10 +30,10 @@ pub(crate) fn decoded<'a>(bytes: &'a [u8], name: &str) -> Result<Cow<'a, [u8]>, 
     })
 }
 
-/// Refuses a document that is in none of the syntaxes.
+/// Rejects a document in an unsupported syntax.
 ///
 /// # Errors
-/// The document is in another syntax, which the error names.
+/// Returns O113, which names the detected syntax.
 pub(crate) fn require_syntax(text: &[u8], name: &str) -> Result<(), Errors> {
     match foreign::recognized(text) {
         Some(what) => {
@@ -42,8 +43,8 @@ pub(crate) fn require_syntax(text: &[u8], name: &str) -> Result<(), Errors> {
     }
 }
 
-/// Parses `text`. Relative IRIs are resolved against `base`; blank nodes get names that start with `prefix`, and all names
-/// numbers of `names`.
+/// Parses a document. Relative IRIs are resolved against `base`, and the names of blank nodes get `prefix`. All
+/// names are added to `names`.
 pub(crate) fn parse(
     text: &[u8],
     name: &str,
@@ -67,10 +68,10 @@ pub(crate) fn parse(
         }
     }
     let Sink { names, triples, .. } = sink;
-    let [kind, ontology, imports, version] =
+    let [rdf_type, ontology, imports, version] =
         [rdf::TYPE, owl::ONTOLOGY, owl::IMPORTS, owl::VERSION_IRI].map(|iri| names.number(iri));
     let is_header = |triple: &&Compact| {
-        triple.predicate == kind
+        triple.predicate == rdf_type
             && matches!(triple.object, Object::Node(class) if class == ontology)
             && !names.is_blank(triple.subject)
     };
@@ -83,14 +84,15 @@ pub(crate) fn parse(
         })
     };
     let version = objects(version).next();
-    let place = |iri: &str| std::str::from_utf8(text).ok()?.find(iri);
-    let position = |iri: &str| place(iri).map(|offset| Position::of_offset(name, text, offset));
+    // Parsers report no positions of triples, so the text is searched for the IRI.
+    let offset_of = |iri: &str| std::str::from_utf8(text).ok()?.find(iri);
+    let position = |iri: &str| offset_of(iri).map(|offset| Position::of_offset(name, text, offset));
     let imports = objects(imports).map(|iri| (iri.to_string(), position(&iri))).collect();
     Ok(Document { name: name.to_owned(), syntax, iri: header, version, imports, triples })
 }
 
-/// Takes triples, and numbers blank nodes in order of appearance: parsers give anonymous ones random names, and two documents
-/// may use one name for two nodes.
+/// Collects triples. Blank nodes are numbered in order of appearance, because parsers give anonymous ones
+/// random names, and two documents may use the same label for different nodes.
 struct Sink<'a> {
     names: &'a mut Names,
     prefix: &'a str,
@@ -111,7 +113,7 @@ impl Sink<'_> {
     }
 }
 
-/// The ontology IRI declared in `head`, the start of a document (its end may be cut off).
+/// Returns the ontology IRI that `head`, the start of a possibly truncated document, declares.
 pub(crate) fn ontology_iri(head: &[u8]) -> Option<String> {
     let base = "file:///";
     let head = encoding::decoded(head).ok()?;
@@ -138,21 +140,24 @@ pub(crate) fn ontology_iri(head: &[u8]) -> Option<String> {
     }
 }
 
+/// Returns the text between the first `start` and the next `end`.
 fn between(text: &[u8], start: &str, end: char) -> Option<String> {
     let text = String::from_utf8_lossy(text);
-    let rest = &text[text.find(start)? + start.len()..];
-    rest.find(end).map(|length| rest[..length].to_owned())
+    let tail = &text[text.find(start)? + start.len()..];
+    tail.find(end).map(|length| tail[..length].to_owned())
 }
 
-/// Takes the triples of a document that is N-Triples, which is Turtle without abbreviations: nothing is left to resolve. `false`
-/// where it is not, or where resolving would change an IRI.
+/// Parses a document in N-Triples, a subset of Turtle without relative IRIs and prefixes. Returns `false` and
+/// no triples if the document is not N-Triples, or if the Turtle parser would change an IRI by removing dot
+/// segments.
 fn parse_ntriples(text: &[u8], sink: &mut Sink) -> bool {
     let start = text.iter().find(|byte| !byte.is_ascii_whitespace());
     if !matches!(start, Some(b'<' | b'_' | b'#')) || memchr::memmem::find(text, b"/.").is_some() {
         return false;
     }
-    let known = sink.names.len();
-    // To check each IRI once, and not each time it is named, takes half as long. Nothing else may be left unchecked.
+    let first_new = sink.names.len();
+    // The lenient parser skips all checks. Checking each distinct IRI once halves the time; `is_strict` does
+    // the other checks.
     let plain = memchr::memchr(b'\\', text).is_none();
     let parser = oxttl::NTriplesParser::new();
     let parser = if plain { parser.lenient() } else { parser };
@@ -167,7 +172,7 @@ fn parse_ntriples(text: &[u8], sink: &mut Sink) -> bool {
         sink.add(triple);
     }
     let is_wrong = |name: &str| !name.starts_with("_:") && oxiri::Iri::parse(name).is_err();
-    if plain && (known..sink.names.len()).any(|number| is_wrong(sink.names.text(number as u32))) {
+    if plain && (first_new..sink.names.len()).any(|number| is_wrong(sink.names.text(number as u32))) {
         sink.triples.clear();
         sink.blanks.clear();
         return false;
@@ -175,7 +180,7 @@ fn parse_ntriples(text: &[u8], sink: &mut Sink) -> bool {
     true
 }
 
-/// Whether a triple is one that a parser takes that is not lenient, as far as its IRIs are valid.
+/// Returns `true` if the strict parser would accept the triple, given that its IRIs are valid.
 fn is_strict(triple: &Triple) -> bool {
     let is_blank = |node: &oxrdf::NamedNode| node.as_str().starts_with("_:");
     if is_blank(&triple.predicate)
@@ -206,7 +211,7 @@ fn parse_turtle(text: &[u8], name: &str, base: &str, sink: &mut Sink) -> Result<
             Ok(triple) => sink.add(triple),
             Err(error) => {
                 errors.push(malformed_turtle(&error, name));
-                if errors.len() == MOST_ERRORS {
+                if errors.len() == MAX_SYNTAX_ERRORS {
                     break;
                 }
             }
@@ -215,7 +220,8 @@ fn parse_turtle(text: &[u8], name: &str, base: &str, sink: &mut Sink) -> Result<
     if errors.is_empty() { Ok(()) } else { Err(errors.into()) }
 }
 
-/// Refuses what is not N-Triples: entities and prefixes can make much of a short text.
+/// Rejects documents that are not N-Triples: with entities or prefixes, a short text can expand to a very large
+/// one.
 pub(crate) fn require_ntriples(text: &[u8], name: &str) -> Result<(), Errors> {
     match oxttl::NTriplesParser::new().for_slice(text).find_map(Result::err) {
         Some(error) => Err(vec![malformed_turtle(&error, name)].into()),
@@ -249,7 +255,7 @@ fn parse_rdf_xml(text: &[u8], name: &str, base: &str, sink: &mut Sink) -> Result
             }
         }
     }
-    // The parser takes the end of the text for the end of the document, wherever it is.
+    // The parser does not report an unclosed root element.
     if let Some(root) = syntax::unclosed_root(&flat.text) {
         return Err(malformed(text.len(), &format!("the document ends before </{root}>")).into());
     }

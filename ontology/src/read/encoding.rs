@@ -1,8 +1,8 @@
-//! The bytes of a document to UTF-8: byte order marks, UTF-16, and the encoding that an XML declaration names.
+//! Decodes documents to UTF-8: byte order marks, UTF-16, and the encoding of an XML declaration.
 
 use std::borrow::Cow;
 
-/// The text without a byte order mark; `Err` names an encoding that nobody knows.
+/// Returns the text without a byte order mark. The error names an unknown encoding.
 pub(super) fn decoded(bytes: &[u8]) -> Result<Cow<'_, [u8]>, String> {
     let marked = encoding_rs::Encoding::for_bom(bytes);
     let unmarked = match bytes {
@@ -11,9 +11,9 @@ pub(super) fn decoded(bytes: &[u8]) -> Result<Cow<'_, [u8]>, String> {
         _ => None,
     };
     let bytes = marked.map_or(bytes, |(_, length)| &bytes[length..]);
-    let by_itself = marked.map(|(encoding, _)| encoding).or(unmarked);
+    let detected = marked.map(|(encoding, _)| encoding).or(unmarked);
     let declared = declared(bytes);
-    let encoding = match (by_itself, declared) {
+    let encoding = match (detected, declared) {
         (Some(encoding), _) => encoding,
         (None, Some(label)) => encoding_rs::Encoding::for_label(label)
             .ok_or_else(|| format!("the encoding `{}` is not known", String::from_utf8_lossy(label)))?,
@@ -26,12 +26,13 @@ pub(super) fn decoded(bytes: &[u8]) -> Result<Cow<'_, [u8]>, String> {
     Ok(Cow::Owned(as_utf8(text)))
 }
 
-/// What an XML declaration says of its document's encoding.
+/// Returns the encoding label of an XML declaration.
 fn declared(text: &[u8]) -> Option<&[u8]> {
     let label = label(text)?;
     Some(&text[label])
 }
 
+/// Returns the byte range of the encoding label in an XML declaration.
 fn label(text: &[u8]) -> Option<std::ops::Range<usize>> {
     if !text.starts_with(b"<?xml") {
         return None;
@@ -43,7 +44,8 @@ fn label(text: &[u8]) -> Option<std::ops::Range<usize>> {
     Some(quote + 1..quote + 1 + length)
 }
 
-/// A decoded document says that it is UTF-8, and everything else stays in its column where there is room.
+/// Replaces the declared encoding by UTF-8. Spaces keep the columns of the following text, if the old label is
+/// long enough.
 fn as_utf8(text: Vec<u8>) -> Vec<u8> {
     let Some(label) = label(&text) else { return text };
     let mut result = text[..label.start].to_vec();

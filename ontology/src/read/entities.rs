@@ -1,84 +1,88 @@
-//! The entities of an XML document, expanded within bounds: ten of them can stand for gigabytes, and neither parser knows all
-//! spellings of their declarations.
+//! Expands the entities of an XML document within limits: ten declarations can expand to gigabytes, and the
+//! parsers do not support all forms of declarations.
 
 use std::collections::HashMap;
 
 use super::syntax::Flattened;
 
-/// A document may grow by this factor ...
-const GROWTH: usize = 16;
-/// ... and by so many bytes besides, by all of its entities together.
-const ALLOWANCE: usize = 1 << 20;
-/// Entities may contain entities so deep.
-const DEPTH: usize = 16;
+/// Factor of the limit on the expanded size: `MAX_GROWTH_FACTOR * size + EXTRA_BYTES`.
+const MAX_GROWTH_FACTOR: usize = 16;
+/// Constant term of the limit on the expanded size, in bytes.
+const EXTRA_BYTES: usize = 1 << 20;
+/// Limit on the nesting of entities.
+const MAX_ENTITY_DEPTH: usize = 16;
 
-/// The entities that XML itself declares.
+/// Entities that XML predefines.
 const PREDEFINED: [&[u8]; 5] = [b"lt", b"gt", b"amp", b"quot", b"apos"];
 
-/// Why a document's entities cannot be expanded, and where in the document.
+/// An entity that cannot be expanded.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Fault {
+    /// Byte offset in the document.
     pub offset: usize,
     pub message: String,
 }
 
-/// The internal subset of a document type declaration, and where it ends.
+/// The internal subset of a document type declaration.
 struct Declarations<'a> {
     entities: HashMap<&'a [u8], &'a [u8]>,
-    /// Where `<!DOCTYPE` stands.
+    /// Byte offset of `<!DOCTYPE`.
     start: usize,
+    /// Byte offset after the declaration.
     end: usize,
 }
 
-/// The document without its declarations of entities, each reference replaced by what it stands for.
+/// Returns the document without the document type declaration and with expanded entity references.
 pub(super) fn expanded(text: &[u8]) -> Result<Flattened<'_>, Fault> {
     let Some(declarations) = declarations(text) else { return Ok(Flattened::unchanged(text)) };
     let mut expansion = Expansion {
         entities: &declarations.entities,
-        known: HashMap::new(),
-        left: text.len().saturating_mul(GROWTH).saturating_add(ALLOWANCE),
+        cache: HashMap::new(),
+        budget: text.len().saturating_mul(MAX_GROWTH_FACTOR).saturating_add(EXTRA_BYTES),
     };
     let mut flat = text[..declarations.start].to_vec();
-    let (mut moved, mut at) = (vec![(flat.len(), declarations.end)], declarations.end);
-    while let Some(next) = text[at..].iter().position(|byte| matches!(byte, b'<' | b'&')) {
-        flat.extend_from_slice(&text[at..at + next]);
-        at += next;
-        let rest = &text[at..];
-        let verbatim: Option<&[u8]> = match rest {
+    let (mut offsets, mut cursor) = (vec![(flat.len(), declarations.end)], declarations.end);
+    while let Some(next) = text[cursor..].iter().position(|byte| matches!(byte, b'<' | b'&')) {
+        flat.extend_from_slice(&text[cursor..cursor + next]);
+        cursor += next;
+        let tail = &text[cursor..];
+        // References are not expanded in comments, CDATA sections and processing instructions.
+        let verbatim: Option<&[u8]> = match tail {
             [b'<', b'!', b'-', b'-', ..] => Some(b"-->"),
-            _ if rest.starts_with(b"<![CDATA[") => Some(b"]]>"),
+            _ if tail.starts_with(b"<![CDATA[") => Some(b"]]>"),
             [b'<', b'?', ..] => Some(b"?>"),
             [b'<', ..] => Some(b"<"),
             _ => None,
         };
         if let Some(end) = verbatim {
-            let length = rest.windows(end.len()).position(|window| window == end);
-            let length = length.map_or(rest.len(), |position| position + end.len());
-            flat.extend_from_slice(&rest[..length]);
-            at += length;
+            let length = tail.windows(end.len()).position(|window| window == end);
+            let length = length.map_or(tail.len(), |position| position + end.len());
+            flat.extend_from_slice(&tail[..length]);
+            cursor += length;
             continue;
         }
-        let Some((name, length)) = reference(rest) else {
+        let Some((name, length)) = reference(tail) else {
             flat.push(b'&');
-            at += 1;
+            cursor += 1;
             continue;
         };
         if PREDEFINED.contains(&name) {
-            flat.extend_from_slice(&rest[..length]);
+            flat.extend_from_slice(&tail[..length]);
         } else {
             let message = expansion.append(name, &mut flat, 0).err();
             if let Some(message) = message {
-                return Err(Fault { offset: at, message });
+                return Err(Fault { offset: cursor, message });
             }
-            moved.push((flat.len(), at + length));
+            offsets.push((flat.len(), cursor + length));
         }
-        at += length;
+        cursor += length;
     }
-    flat.extend_from_slice(&text[at..]);
-    Ok(Flattened { text: flat.into(), moved })
+    flat.extend_from_slice(&text[cursor..]);
+    Ok(Flattened { text: flat.into(), offsets })
 }
 
-/// The name of the entity that a text which starts with `&` refers to, and the length of the reference.
+/// Parses the entity reference at the start of a text. Returns the name of the entity and the length of the
+/// reference.
 fn reference(text: &[u8]) -> Option<(&[u8], usize)> {
     let end = text.iter().take(256).position(|&byte| byte == b';')?;
     let name = &text[1..end];
@@ -88,125 +92,129 @@ fn reference(text: &[u8]) -> Option<(&[u8], usize)> {
 
 struct Expansion<'a> {
     entities: &'a HashMap<&'a [u8], &'a [u8]>,
-    /// What short entities stand for, so that each is resolved once.
-    known: HashMap<&'a [u8], Vec<u8>>,
-    /// Bytes that may still be added.
-    left: usize,
+    /// Expansions of entities, so that each one is computed once.
+    cache: HashMap<&'a [u8], Vec<u8>>,
+    /// Number of bytes that may still be added.
+    budget: usize,
 }
 
 impl<'a> Expansion<'a> {
-    fn append(&mut self, name: &[u8], to: &mut Vec<u8>, depth: usize) -> Result<(), String> {
-        let shown = || String::from_utf8_lossy(name).into_owned();
+    fn append(&mut self, name: &[u8], target: &mut Vec<u8>, depth: usize) -> Result<(), String> {
+        let display_name = || String::from_utf8_lossy(name).into_owned();
         let Some((&name, &value)) = self.entities.get_key_value(name) else {
-            return Err(format!("the entity `&{};` is not declared", shown()));
+            return Err(format!("the entity `&{};` is not declared", display_name()));
         };
-        if depth == DEPTH {
+        if depth == MAX_ENTITY_DEPTH {
             return Err(format!(
-                "the entity `&{};` contains itself, or others more than {DEPTH} deep",
-                shown()
+                "the entity `&{};` contains itself, or others more than {MAX_ENTITY_DEPTH} deep",
+                display_name()
             ));
         }
-        if !self.known.contains_key(name) {
+        if !self.cache.contains_key(name) {
             let resolved = self.resolved(value, depth)?;
-            self.known.insert(name, resolved);
+            self.cache.insert(name, resolved);
         }
-        let value = &self.known[name];
-        if value.len() > self.left {
-            let limit = format!("more than {GROWTH} times the document and {ALLOWANCE} bytes");
-            return Err(format!("the entities of the document, `&{};` the last, stand for {limit}", shown()));
+        let value = &self.cache[name];
+        if value.len() > self.budget {
+            let limit = format!("more than {MAX_GROWTH_FACTOR} times the document and {EXTRA_BYTES} bytes");
+            return Err(format!(
+                "the entities of the document, `&{};` the last, stand for {limit}",
+                display_name()
+            ));
         }
-        self.left -= value.len();
-        to.extend_from_slice(value);
+        self.budget -= value.len();
+        target.extend_from_slice(value);
         Ok(())
     }
 
+    /// Expands the references in the value of an entity.
     fn resolved(&mut self, value: &'a [u8], depth: usize) -> Result<Vec<u8>, String> {
-        let (mut resolved, mut at) = (Vec::new(), 0);
-        // Quotation marks are text in an entity, unless it has markup of its own.
+        let (mut resolved, mut cursor) = (Vec::new(), 0);
+        // Quotation marks are escaped in a value without markup, because the reference may be in an attribute.
         let is_text = !value.contains(&b'<');
-        while at < value.len() {
-            match (value[at], reference(&value[at..])) {
+        while cursor < value.len() {
+            match (value[cursor], reference(&value[cursor..])) {
                 (b'&', Some((name, length))) if !PREDEFINED.contains(&name) => {
                     self.append(name, &mut resolved, depth + 1)?;
-                    at += length;
+                    cursor += length;
                     continue;
                 }
                 (b'"', _) if is_text => resolved.extend_from_slice(b"&quot;"),
                 (b'\'', _) if is_text => resolved.extend_from_slice(b"&apos;"),
                 (byte, _) => resolved.push(byte),
             }
-            at += 1;
+            cursor += 1;
         }
         Ok(resolved)
     }
 }
 
-/// The declarations of a document that has an internal subset; external entities are not looked at.
+/// Parses the document type declaration of a document with an internal subset. External entities are ignored.
 fn declarations(text: &[u8]) -> Option<Declarations<'_>> {
     let start = text.windows(9).position(|window| window == b"<!DOCTYPE")?;
-    // Nothing but the declaration of XML, comments and instructions stands before it.
-    let mut at = 0;
-    while at < start {
-        let next = at + text[at..].iter().position(|&byte| byte == b'<')?;
+    // Only the XML declaration, comments and processing instructions may precede it.
+    let mut cursor = 0;
+    while cursor < start {
+        let next = cursor + text[cursor..].iter().position(|&byte| byte == b'<')?;
         let end: &[u8] = match &text[next..] {
             [b'<', b'!', b'-', b'-', ..] => b"-->",
             [b'<', b'?', ..] => b"?>",
             _ if next == start => break,
             _ => return None,
         };
-        at = next + text[next..].windows(end.len()).position(|window| window == end)? + end.len();
+        cursor = next + text[next..].windows(end.len()).position(|window| window == end)? + end.len();
     }
     let subset = text[start..].iter().position(|&byte| byte == b'[' || byte == b'>')? + start;
     if text[subset] == b'>' {
         return None;
     }
-    let (mut entities, mut at) = (HashMap::new(), subset + 1);
+    let (mut entities, mut cursor) = (HashMap::new(), subset + 1);
     loop {
-        let rest = &text[at..];
-        match rest.first()? {
+        let tail = &text[cursor..];
+        match tail.first()? {
             b']' => {
-                let end = at + rest.iter().position(|&byte| byte == b'>')? + 1;
+                let end = cursor + tail.iter().position(|&byte| byte == b'>')? + 1;
                 return Some(Declarations { entities, start, end });
             }
-            b'<' if rest.starts_with(b"<!--") => {
-                at += rest.windows(3).position(|window| window == b"-->")? + 3;
+            b'<' if tail.starts_with(b"<!--") => {
+                cursor += tail.windows(3).position(|window| window == b"-->")? + 3;
             }
             b'<' => {
-                let length = declaration_length(rest)?;
-                if let Some((name, value)) = entity(&rest[..length]) {
-                    // The first declaration counts.
+                let length = declaration_length(tail)?;
+                if let Some((name, value)) = entity(&tail[..length]) {
+                    // XML: the first declaration of an entity is binding.
                     entities.entry(name).or_insert(value);
                 }
-                at += length;
+                cursor += length;
             }
-            _ => at += 1,
+            _ => cursor += 1,
         }
     }
 }
 
-/// How long a declaration is, whose `>` may stand in quotes.
+/// Returns the length of a declaration. A `>` in quotes does not end it.
 fn declaration_length(text: &[u8]) -> Option<usize> {
     let mut quote = None;
-    for (at, &byte) in text.iter().enumerate() {
+    for (index, &byte) in text.iter().enumerate() {
         match (quote, byte) {
             (None, b'"' | b'\'') => quote = Some(byte),
             (Some(open), _) if open == byte => quote = None,
-            (None, b'>') => return Some(at + 1),
+            (None, b'>') => return Some(index + 1),
             _ => {}
         }
     }
     None
 }
 
-/// The name and the value of `<!ENTITY name "value">`, in quotes of either kind.
+/// Parses `<!ENTITY name "value">`, with quotes of either kind. Returns name and value.
 fn entity(declaration: &[u8]) -> Option<(&[u8], &[u8])> {
-    let rest = declaration.strip_prefix(b"<!ENTITY")?.trim_ascii_start();
-    let end = rest.iter().position(u8::is_ascii_whitespace)?;
-    let (name, rest) = rest.split_at(end);
-    let rest = rest.trim_ascii_start();
-    let quote = *rest.first().filter(|byte| matches!(byte, b'"' | b'\''))?;
-    let length = rest[1..].iter().position(|&byte| byte == quote)?;
-    Some((name, &rest[1..=length]))
+    let tail = declaration.strip_prefix(b"<!ENTITY")?.trim_ascii_start();
+    let end = tail.iter().position(u8::is_ascii_whitespace)?;
+    let (name, tail) = tail.split_at(end);
+    let tail = tail.trim_ascii_start();
+    let quote = *tail.first().filter(|byte| matches!(byte, b'"' | b'\''))?;
+    let length = tail[1..].iter().position(|&byte| byte == quote)?;
+    Some((name, &tail[1..=length]))
 }
 
 #[cfg(test)]
@@ -214,22 +222,22 @@ mod tests {
     use super::*;
 
     fn check(text: &str, expected: Result<&str, (usize, &str)>) {
-        let found = expanded(text.as_bytes());
-        let found = found.as_ref().map(|flat| {
+        let actual = expanded(text.as_bytes());
+        let actual = actual.as_ref().map(|flat| {
             assert_eq!(flat.origin(flat.text.len()), text.len(), "{text}");
             String::from_utf8_lossy(&flat.text).into_owned()
         });
-        match (found, expected) {
-            (Ok(found), Ok(expected)) => assert_eq!(found, expected, "{text}"),
+        match (actual, expected) {
+            (Ok(actual), Ok(expected)) => assert_eq!(actual, expected, "{text}"),
             (Err(fault), Err((offset, message))) => {
                 assert!(fault.offset == offset && fault.message.contains(message), "{text}: {fault:?}");
             }
-            (found, expected) => panic!("{text}: {found:?}, not {expected:?}"),
+            (actual, expected) => panic!("{text}: {actual:?}, not {expected:?}"),
         }
     }
 
     #[test]
-    fn entities_stand_for_their_text() {
+    fn references_are_replaced_by_the_value_of_the_entity() {
         check("<a>&lt;</a>", Ok("<a>&lt;</a>"));
         check("<!DOCTYPE a [<!ENTITY b 'c'>]><a d='&b;e'>&b;&amp;</a>", Ok("<a d='ce'>c&amp;</a>"));
         check(
@@ -251,14 +259,14 @@ mod tests {
     }
 
     #[test]
-    fn a_bomb_is_refused_at_once() {
+    fn exponential_expansion_is_rejected() {
         let mut text = "<!DOCTYPE a [<!ENTITY e0 'aaaaaaaaaa'>".to_owned();
         for level in 1..12 {
             text.extend([format!("<!ENTITY e{level} '{}'>", format!("&e{};", level - 1).repeat(10))]);
         }
         let start = text.len() + "]><a>".len();
         check(&format!("{text}]><a>&e11;</a>"), Err((start, "more than 16 times")));
-        let many = "&e5;".repeat(1_000);
-        assert!(expanded(format!("{text}]><a>{many}</a>").as_bytes()).is_err());
+        let references = "&e5;".repeat(1_000);
+        assert!(expanded(format!("{text}]><a>{references}</a>").as_bytes()).is_err());
     }
 }

@@ -1,27 +1,26 @@
-//! The bytes of files and of standard input.
+//! Reads files and standard input.
 use std::io::Read;
 use std::path::Path;
 
 use crate::error::{Error, Errors};
 
-/// Documents with more bytes are not read.
-const LARGEST: u64 = 1 << 30;
+/// Maximum size of a document in bytes.
+const MAX_BYTES: u64 = 1 << 30;
 
-/// The bytes of a regular file: a pipe would keep us waiting, and some devices have no end.
+/// Reads a regular file. Other files are rejected: a pipe could block, and some devices have no end.
 pub(super) fn regular_file(path: &Path) -> std::io::Result<Vec<u8>> {
     let metadata = std::fs::metadata(path)?;
     if !metadata.is_file() {
         return Err(std::io::Error::other("it is not a regular file"));
     }
-    let mut bytes = Vec::with_capacity(metadata.len().min(LARGEST) as usize + 1);
-    std::fs::File::open(path)?.take(LARGEST + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > LARGEST {
-        return Err(std::io::Error::other(format!("it has more than {LARGEST} bytes")));
+    let mut bytes = Vec::with_capacity(metadata.len().min(MAX_BYTES) as usize + 1);
+    std::fs::File::open(path)?.take(MAX_BYTES + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > MAX_BYTES {
+        return Err(std::io::Error::other(format!("it has more than {MAX_BYTES} bytes")));
     }
     Ok(bytes)
 }
 
-/// The bytes of standard input.
 pub(super) fn standard_input() -> Result<Vec<u8>, Errors> {
     let mut text = Vec::new();
     match std::io::stdin().read_to_end(&mut text) {

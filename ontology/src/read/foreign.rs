@@ -1,6 +1,6 @@
-//! What a document looks like that is in none of the syntaxes, so that its message can say so.
+//! Recognises documents in unsupported syntaxes, for the error message.
 
-/// What `text` looks like, and what to do about it.
+/// Returns a description of the detected format with a suggestion; `None` if the format is unknown.
 pub(super) fn recognized(text: &[u8]) -> Option<&'static str> {
     let head = text.trim_ascii_start();
     if head.is_empty() {
@@ -26,14 +26,14 @@ pub(super) fn recognized(text: &[u8]) -> Option<&'static str> {
     }
 }
 
-/// Whether the first line that is not a comment starts with a keyword of Manchester syntax.
+/// Returns `true` if the first line that is not a comment starts with a keyword of Manchester syntax.
 fn is_manchester(head: &[u8]) -> bool {
     let mut lines = head.split(|&byte| byte == b'\n').map(<[u8]>::trim_ascii);
     let first = lines.find(|line| !line.is_empty() && !line.starts_with(b"#")).unwrap_or_default();
     let keywords = ["Prefix:", "Ontology:", "Class:", "ObjectProperty:", "DataProperty:", "Individual:"];
     keywords.iter().any(|keyword| {
-        let rest = first.strip_prefix(keyword.as_bytes());
-        rest.is_some_and(|rest| rest.is_empty() || rest[0].is_ascii_whitespace())
+        let tail = first.strip_prefix(keyword.as_bytes());
+        tail.is_some_and(|tail| tail.is_empty() || tail[0].is_ascii_whitespace())
     })
 }
 
@@ -42,7 +42,7 @@ mod tests {
     use super::recognized;
 
     #[test]
-    fn other_formats_are_named() {
+    fn unsupported_formats_are_recognised() {
         for (text, expected) in [
             ("", "empty"),
             (" \n\t", "empty"),
@@ -57,11 +57,11 @@ mod tests {
             ("@prefix : <http://x#> .", ""),
             ("Prefix(:=<http://x#>)", ""),
         ] {
-            let found = recognized(text.as_bytes());
-            let fits =
-                found.map_or(expected.is_empty(), |found| !expected.is_empty() && found.contains(expected));
-            assert!(fits, "{text}: {found:?}");
+            let message = recognized(text.as_bytes());
+            let fits = message
+                .map_or(expected.is_empty(), |message| !expected.is_empty() && message.contains(expected));
+            assert!(fits, "{text}: {message:?}");
         }
-        assert!(recognized(b"\x1f\x8b\x08").is_some_and(|found| found.contains("compressed")));
+        assert!(recognized(b"\x1f\x8b\x08").is_some_and(|message| message.contains("compressed")));
     }
 }

@@ -1,17 +1,22 @@
-//! Where an imported IRI lies on this machine. Never the network.
+//! Resolves imports to files on this machine. The network is never used.
 //!
-//! Real knowledge bases import by URL (`https://raw.githubusercontent.com/…/ros2/owl/tomasys.owl`) what declares
-//! another ontology IRI (`http://metacontrol.org/tomasys`). So an import is looked for, in this order:
+//! Real knowledge bases import a URL (`https://raw.githubusercontent.com/…/ros2/owl/tomasys.owl`) whose
+//! document declares another ontology IRI (`http://metacontrol.org/tomasys`). Therefore an import is searched
+//! in this order:
 //!
 //! 1. as a file, if it is a `file:` IRI or was written relative to its document;
 //! 2. among the documents already read, by ontology or version IRI;
-//! 3. in the catalogs given, then in `catalog-v001.xml` beside the importing document (OASIS XML Catalogs);
-//! 4. beside the importing document, then in the directories given and below: by ontology IRI, then by the last
-//!    segment of the URL; among several files of that name, the one whose path has most segments of the URL;
-//! 5. in a directory that is named as a part of the URL, beside those that the importing document lies in, as
-//!    repositories are that were checked out side by side;
+//! 3. in the given catalogs, then in `catalog-v001.xml` in the directory of the importing document (OASIS XML
+//! Catalogs);
+//! 4. in the directory of the importing document, then in the given directories and their subdirectories: by
+//! ontology IRI, then
+//!    by the last segment of the URL; among several files with this name, the one whose path has most segments
+//! of the URL;
+//! 5. in a directory with the name of a segment of the URL next to an ancestor directory of the importing
+//! document: repositories
+//!    are often checked out side by side;
 //! 6. among the documents already read, by file name;
-//! 7. among the knowledge bases that this crate embeds ([`crate::kb`]), by IRI or by where they have been published.
+//! 7. among the embedded knowledge bases ([`crate::kb`]), by IRI or by the URL of their publication.
 
 use std::cell::OnceCell;
 use std::path::{Path, PathBuf};
@@ -23,33 +28,32 @@ use crate::error::{Error, Errors};
 use crate::kb;
 use crate::triples::Document;
 
-/// The catalog that Protégé writes beside an ontology.
+/// Name of the catalog that Protégé writes.
 const CATALOG: &str = "catalog-v001.xml";
 
-/// How deep directories are searched.
-const DEPTH: usize = 4;
+/// Limit on the depth of the search in a directory.
+const MAX_DEPTH: usize = 4;
 
-/// In so many directories above that of a document, others are looked for by the segments of a URL.
-const LEVELS: usize = 3;
+/// Number of ancestor directories in which directories named like segments of the URL are searched.
+const MAX_ANCESTORS: usize = 3;
 
-/// Only the start of a file is searched for its ontology IRI, in bytes.
-const HEAD: usize = 1 << 16;
+/// Number of bytes at the start of a file that are searched for its ontology IRI.
+const HEAD_BYTES: usize = 1 << 16;
 
-/// What an import resolves to.
+/// Result of resolving an import.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Resolution {
-    /// A document that has been read.
+    /// A document that has already been read.
     Loaded,
-    /// A file.
     File(PathBuf),
-    /// A text embedded in this crate, with a name for messages.
+    /// An embedded text, with a name for messages.
     Embedded(&'static str, &'static str),
 }
 
 pub(crate) struct Resolver {
     catalogs: Vec<horned_catalog::Catalog>,
-    /// Ontology files under the directories given, found when first needed.
-    below: OnceCell<Vec<Candidate>>,
+    /// Ontology files under the given directories; collected on first use.
+    files: OnceCell<Vec<Candidate>>,
     directories: Vec<PathBuf>,
 }
 
@@ -59,7 +63,7 @@ struct Candidate {
 }
 
 impl Resolver {
-    /// Reads the catalogs named in `options`.
+    /// Creates a resolver and reads the catalogs of `options`.
     pub(crate) fn new(options: &ReadOptions) -> Result<Self, Errors> {
         let (mut catalogs, mut errors) = (Vec::new(), Vec::new());
         for file in &options.catalogs {
@@ -71,10 +75,10 @@ impl Resolver {
         if !errors.is_empty() {
             return Err(errors.into());
         }
-        Ok(Self { catalogs, below: OnceCell::new(), directories: options.directories.clone() })
+        Ok(Self { catalogs, files: OnceCell::new(), directories: options.directories.clone() })
     }
 
-    /// Where `import` lies, which the document at `importer` (`None` for a text) imports.
+    /// Resolves an import of the document at `importer` (`None` if the document has no path).
     pub(crate) fn resolve(
         &self,
         import: &str,
@@ -90,16 +94,18 @@ impl Resolver {
         if let Some(path) = self.in_catalogs(import, importer)? {
             return Ok(Some(Resolution::File(path)));
         }
-        let beside = importer.and_then(Path::parent).map(|directory| candidates(directory, 0));
-        let found = beside.and_then(|files| best(import, &files)).or_else(|| best(import, self.below()));
-        let found = found.or_else(|| checked_out(import, importer?));
+        let siblings = importer.and_then(Path::parent).map(|directory| candidates(directory, 0));
+        let file = siblings
+            .and_then(|files| best_match(import, &files))
+            .or_else(|| best_match(import, self.files()));
+        let file = file.or_else(|| checked_out(import, importer?));
         let named = || is_named_alike(import, documents).then_some(Resolution::Loaded);
-        Ok(found.map(Resolution::File).or_else(named).or_else(|| embedded(import)))
+        Ok(file.map(Resolution::File).or_else(named).or_else(|| embedded(import)))
     }
 
     fn in_catalogs(&self, import: &str, importer: Option<&Path>) -> Result<Option<PathBuf>, Error> {
-        let given = self.catalogs.iter().find_map(|catalog| catalog.resolve(import));
-        if let Some(path) = given.filter(|path| path.is_file()) {
+        let mapped = self.catalogs.iter().find_map(|catalog| catalog.resolve(import));
+        if let Some(path) = mapped.filter(|path| path.is_file()) {
             return Ok(Some(path));
         }
         let Some(file) = importer.and_then(Path::parent).map(|directory| directory.join(CATALOG)) else {
@@ -113,8 +119,9 @@ impl Resolver {
         Ok(catalog.resolve(import).filter(|path| path.is_file()))
     }
 
-    fn below(&self) -> &[Candidate] {
-        self.below.get_or_init(|| self.directories.iter().flat_map(|root| candidates(root, DEPTH)).collect())
+    fn files(&self) -> &[Candidate] {
+        self.files
+            .get_or_init(|| self.directories.iter().flat_map(|root| candidates(root, MAX_DEPTH)).collect())
     }
 }
 
@@ -124,7 +131,7 @@ fn embedded(import: &str) -> Option<Resolution> {
     Some(Resolution::Embedded(iri, text))
 }
 
-/// Whether an IRI is a place where the TOMASys metamodel has been published: its repository, on whatever branch.
+/// Returns `true` if the IRI is a URL of the published TOMASys metamodel: its repository on any branch.
 fn is_published_tomasys(import: &str) -> bool {
     let hosts = ["https://raw.githubusercontent.com/", "https://github.com/"];
     let path = hosts.iter().find_map(|host| import.strip_prefix(host));
@@ -133,7 +140,7 @@ fn is_published_tomasys(import: &str) -> bool {
     })
 }
 
-/// The file that an import means in a checked-out repository beside that of its importer.
+/// Searches a file in a repository that is checked out next to the importer's repository.
 fn checked_out(import: &str, importer: &Path) -> Option<PathBuf> {
     let plain = |segment: &&str| {
         !segment.starts_with('.') && segment.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c))
@@ -141,12 +148,12 @@ fn checked_out(import: &str, importer: &Path) -> Option<PathBuf> {
     let (_, path) = import.split_once("://")?;
     let segments: Vec<&str> = path.split('/').skip(1).filter(plain).collect();
     let (_, directories) = segments.split_last()?;
-    for above in importer.ancestors().skip(2).take(LEVELS) {
-        // An owner and a repository.
+    for ancestor in importer.ancestors().skip(2).take(MAX_ANCESTORS) {
+        // The first segments of the URL are usually owner and repository.
         for segment in directories.iter().take(2) {
-            let beside = above.join(segment);
-            if beside.is_dir()
-                && let Some(path) = best(import, &candidates(&beside, DEPTH))
+            let repository = ancestor.join(segment);
+            if repository.is_dir()
+                && let Some(path) = best_match(import, &candidates(&repository, MAX_DEPTH))
             {
                 return Some(path);
             }
@@ -155,7 +162,7 @@ fn checked_out(import: &str, importer: &Path) -> Option<PathBuf> {
     None
 }
 
-/// IRIs of ontologies are written with and without a final `#` or `/`.
+/// Compares ontology IRIs, which are written with and without a final `#` or `/`.
 fn same_iri(left: &str, right: &str) -> bool {
     left.trim_end_matches(['#', '/']) == right.trim_end_matches(['#', '/'])
 }
@@ -182,8 +189,8 @@ fn is_ontology_file(path: &Path) -> bool {
     })
 }
 
-/// Ontology files in a directory, down to `depth` levels below it, sorted by path. Unreadable directories and symbolic
-/// links to directories are passed over (so that a loop of links ends).
+/// Returns the ontology files in a directory and `depth` levels of subdirectories, sorted by path. Skips
+/// unreadable directories, and symbolic links to directories, which could form a cycle.
 fn candidates(directory: &Path, depth: usize) -> Vec<Candidate> {
     let Ok(entries) = std::fs::read_dir(directory) else { return Vec::new() };
     let mut entries: Vec<_> = entries.filter_map(Result::ok).collect();
@@ -203,34 +210,35 @@ fn candidates(directory: &Path, depth: usize) -> Vec<Candidate> {
     files
 }
 
-/// The ontology IRI that a file declares, or `None` where its start declares none.
+/// Returns the ontology IRI that the start of a file declares.
 fn declared_iri(path: &Path) -> Option<String> {
     use std::io::Read;
     if !path.is_file() {
         return None;
     }
-    let mut head = Vec::with_capacity(HEAD);
-    std::fs::File::open(path).ok()?.take(HEAD as u64).read_to_end(&mut head).ok()?;
+    let mut head = Vec::with_capacity(HEAD_BYTES);
+    std::fs::File::open(path).ok()?.take(HEAD_BYTES as u64).read_to_end(&mut head).ok()?;
     document::ontology_iri(&head)
 }
 
-/// The file that stands for `import`, by ontology IRI or else by name.
-fn best(import: &str, files: &[Candidate]) -> Option<PathBuf> {
+/// Returns the file that matches an import best: by ontology IRI, otherwise by file name; ties are resolved by
+/// the number of common path segments.
+fn best_match(import: &str, files: &[Candidate]) -> Option<PathBuf> {
     let by_iri: Vec<_> =
         files.iter().filter(|file| file.iri.as_deref().is_some_and(|iri| same_iri(iri, import))).collect();
     let name = last_segment(import);
     let by_name =
         || files.iter().filter(|file| file.path.file_name().is_some_and(|file_name| file_name == name));
-    let among: Vec<_> = if by_iri.is_empty() { by_name().collect() } else { by_iri };
+    let matching: Vec<_> = if by_iri.is_empty() { by_name().collect() } else { by_iri };
     let segments: Vec<&str> = import.split('/').filter(|segment| !segment.is_empty()).collect();
     let shared = |file: &Candidate| {
         let parts = file.path.iter().filter_map(|part| part.to_str());
         parts.filter(|part| segments.contains(part)).count()
     };
     let mut best: Option<(usize, &Candidate)> = None;
-    for file in among {
+    for file in matching {
         let count = shared(file);
-        if best.is_none_or(|(most, _)| count > most) {
+        if best.is_none_or(|(max_count, _)| count > max_count) {
             best = Some((count, file));
         }
     }

@@ -1,11 +1,11 @@
-//! What parsers say.
+//! Messages of parsers.
 
-/// Messages of parsers are cut after so many characters.
-const LONGEST_MESSAGE: usize = 300;
+/// Maximum length of a parser's message, in characters.
+const MAX_MESSAGE_CHARS: usize = 300;
 
-/// Parsers quote what they cannot read, which may be the whole document.
+/// Truncates a message: parsers quote the unreadable text, which may be the whole document.
 pub(super) fn shortened(message: &str) -> String {
-    match message.char_indices().nth(LONGEST_MESSAGE) {
+    match message.char_indices().nth(MAX_MESSAGE_CHARS) {
         Some((end, _)) => format!("{}…", &message[..end]),
         None => message.to_owned(),
     }

@@ -1,4 +1,5 @@
-//! Documents to an [`Ontology`]: parse, follow imports on this machine, merge, normalise, build the OWL structures.
+//! Reads documents to an [`Ontology`]: parses them, follows imports on this machine, merges, normalises, and
+//! builds the OWL structures.
 //!
 //! ```text
 //! file ── document ──┐
@@ -37,21 +38,20 @@ use crate::owl::{Iri, Ontology, Source};
 use crate::triples::Document;
 use file::{regular_file, standard_input};
 use imports::{Resolution, Resolver};
-use text::{Seen, Text};
+use text::{Text, Visited};
 
-/// Reads documents and all that they import into one ontology. The file `-` is standard input.
+/// Reads documents and their imports into one ontology. The file `-` is standard input.
 ///
-/// A document reached twice is read once, however it is named.
+/// A document that is reached several times, possibly under different names, is read once.
 ///
 /// # Errors
-/// All problems found, and not only the first: files that cannot be read, syntax errors with their positions, imports
-/// found nowhere.
+/// Returns all errors of all documents: unreadable files, syntax errors with positions, unresolved imports.
 pub fn read_files<P: AsRef<Path>>(files: &[P], options: &ReadOptions) -> Result<Ontology, Errors> {
     let roots = files.iter().map(|file| Pending::File(file.as_ref().to_owned()));
     read(roots.collect(), options)
 }
 
-/// Reads an ontology from a text in any supported syntax; `name` stands for the file in messages.
+/// Reads an ontology from a text in any supported syntax. Messages use `name` as the file name.
 ///
 /// ```
 /// use ontology::{ReadOptions, read_text};
@@ -65,13 +65,14 @@ pub fn read_files<P: AsRef<Path>>(files: &[P], options: &ReadOptions) -> Result<
 /// ```
 ///
 /// # Errors
-/// As [`read_files`].
+/// See [`read_files`].
 pub fn read_text(text: &str, name: &str, options: &ReadOptions) -> Result<Ontology, Errors> {
     let root = Pending::Text(name.to_owned(), text.as_bytes().to_vec());
     read(VecDeque::from([root]), options)
 }
 
-/// The triples of documents and all that they import; only the first document keeps its header, and nothing is imported.
+/// Reads documents and their imports, and returns the merged triples. Only the first document keeps its header,
+/// and the result has no imports.
 pub(crate) fn merged<P: AsRef<Path>>(
     files: &[P],
     options: &ReadOptions,
@@ -83,7 +84,7 @@ pub(crate) fn merged<P: AsRef<Path>>(
     Ok((normalize::merge(documents, &names, keep_all).graph.into_triples(), warnings))
 }
 
-/// A document still to be read.
+/// A document to be read.
 enum Pending {
     File(PathBuf),
     Text(String, Vec<u8>),
@@ -96,10 +97,10 @@ fn read(roots: VecDeque<Pending>, options: &ReadOptions) -> Result<Ontology, Err
     span.record("documents", documents.len());
     let sources: Vec<Source> = documents.iter().map(source).collect();
     let about = sources.first().and_then(|source| source.iri.clone()).unwrap_or_default();
-    let Normal { ntriples, plain, names, rules, warnings: more } = info_span!("normalize")
+    let Normal { ntriples, plain, names, rules, warnings: normalization_warnings } = info_span!("normalize")
         .in_scope(|| normalize::normalize(documents, names, &options.known))
         .map_err(|error| vec![spelling::placed(error, &texts)])?;
-    warnings.extend(more);
+    warnings.extend(normalization_warnings);
     let parts = info_span!("axioms").in_scope(|| horned::build(&ntriples, &about, &rules, plain, names));
     let parts = parts.map_err(|reason| {
         let place = spelling::place(&reason, &texts);
@@ -130,7 +131,7 @@ fn source(document: &Document) -> Source {
     }
 }
 
-/// Reads the roots and what they import, breadth first.
+/// Reads the roots and their imports, in breadth-first order.
 fn closure(
     mut pending: VecDeque<Pending>,
     options: &ReadOptions,
@@ -139,19 +140,19 @@ fn closure(
 ) -> Result<(Vec<Document>, Vec<Warning>), Errors> {
     let resolver = Resolver::new(options)?;
     let (mut documents, mut paths) = (Vec::<Document>::new(), Vec::<Option<PathBuf>>::new());
-    let (mut seen, mut errors, mut warnings) = (Seen::default(), Vec::new(), Vec::new());
+    let (mut visited, mut errors, mut warnings) = (Visited::default(), Vec::new(), Vec::new());
     let mut next = 0;
     loop {
         while let Some(item) = pending.pop_front() {
-            match load(item, options.documents_before + documents.len(), &mut seen, options, names) {
+            match load(item, options.documents_before + documents.len(), &mut visited, options, names) {
                 Ok(Some((document, path, text))) => {
                     texts.push((document.name.clone(), text));
-                    warnings.extend(twice(&document, &documents));
+                    warnings.extend(duplicate_ontology(&document, &documents));
                     documents.push(document);
                     paths.push(path);
                 }
                 Ok(None) => {}
-                Err(found) => errors.extend(found),
+                Err(document_errors) => errors.extend(document_errors),
             }
         }
         let Some(importer) = documents.get(next) else { break };
@@ -161,12 +162,12 @@ fn closure(
                 warnings.push(Warning::ImportOfUpdate { file, position: position.clone(), import });
                 continue;
             }
-            let found = if options.closed {
+            let resolution = if options.closed {
                 Ok(None)
             } else {
                 resolver.resolve(import, paths[next].as_deref(), &documents)
             };
-            match found {
+            match resolution {
                 Ok(Some(Resolution::Loaded)) => {}
                 Ok(Some(Resolution::File(path))) => pending.push_back(Pending::File(path)),
                 Ok(Some(Resolution::Embedded(name, text))) => {
@@ -190,11 +191,11 @@ fn closure(
 
 type Loaded = Option<(Document, Option<PathBuf>, Text)>;
 
-/// Reads and parses one document; `None` if the same file, or the same text, has been read already.
+/// Reads and parses one document. Returns `None` if the same file or an equal text was read before.
 fn load(
     item: Pending,
     index: usize,
-    seen: &mut Seen,
+    visited: &mut Visited,
     options: &ReadOptions,
     names: &mut Names,
 ) -> Result<Loaded, Errors> {
@@ -206,7 +207,7 @@ fn load(
                 vec![Error::Unreadable { file: file.clone(), reason: error.to_string() }]
             };
             let path = file.canonicalize().map_err(unreadable)?;
-            if !seen.paths.insert(path.clone()) {
+            if !visited.paths.insert(path.clone()) {
                 return Ok(None);
             }
             let text = regular_file(&path).map_err(unreadable)?;
@@ -215,6 +216,7 @@ fn load(
     };
     let base =
         path.as_ref().map_or_else(|| "file:///".to_owned(), |path| format!("file://{}", path.display()));
+    // Reject other syntaxes before decoding: this mode is for untrusted documents.
     if options.closed {
         document::require_ntriples(&text, &name)?;
     }
@@ -226,11 +228,11 @@ fn load(
         document::require_syntax(&text, &name)?;
     }
     let document = document::parse(&text, &name, &base, &format!("d{index}"), names)?;
-    Ok(seen.text(text, path.as_deref()).map(|text| (document, path, text)))
+    Ok(visited.text(text, path.as_deref()).map(|text| (document, path, text)))
 }
 
-/// A warning where another document declares the same ontology.
-fn twice(document: &Document, documents: &[Document]) -> Option<Warning> {
+/// Returns a warning if another document declares the same ontology and version.
+fn duplicate_ontology(document: &Document, documents: &[Document]) -> Option<Warning> {
     let iri: &Iri = document.iri.as_ref()?;
     let first = documents
         .iter()

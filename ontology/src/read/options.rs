@@ -1,28 +1,29 @@
-//! How documents are read.
+//! Options of the reader.
 
 use std::path::PathBuf;
 
 use crate::owl::{EntityKind, Iri};
 
-/// Where to look for what a document imports.
+/// Options of the reader: sources of imports, and accepted documents.
 #[derive(Clone, Debug, Default)]
 #[allow(clippy::struct_excessive_bools)] // independent choices
 pub struct ReadOptions {
-    /// OASIS XML catalogs.
+    /// Paths of OASIS XML catalogs.
     pub catalogs: Vec<PathBuf>,
-    /// Directories to search, with those below them.
+    /// Directories to search for imports, with their subdirectories.
     pub directories: Vec<PathBuf>,
-    /// Whether an import that is found nowhere is a warning instead of an error.
+    /// If `true`, an unresolved import is a warning instead of an error.
     pub allow_missing_imports: bool,
-    /// Whether a document may be empty, as one with what is added or removed.
+    /// If `true`, documents may be empty (for documents with additions or retractions).
     pub allow_empty: bool,
-    /// Whether documents are N-Triples that import nothing, as for those that nobody vouches for: no file is opened but those
-    /// that are named, and no text is larger when it has been read.
+    /// If `true`, documents must be N-Triples, and their imports are not resolved. For untrusted documents: no
+    /// other file is opened, and the text cannot expand.
     pub closed: bool,
-    /// Whether imports are not followed, as those of a document that changes a knowledge base.
+    /// If `true`, imports are not followed (for documents that change a knowledge base).
     pub without_imports: bool,
-    /// The number of documents that have been read before, whose individuals without a name are not those of these documents.
+    /// Number of documents that were read before. Blank nodes of the new documents get names that differ from
+    /// theirs.
     pub documents_before: usize,
-    /// Entities that documents need not declare, as those of the knowledge base that they ask about.
+    /// Entities that the documents need not declare (those of the knowledge base that they refer to).
     pub known: Vec<(EntityKind, Iri)>,
 }

@@ -1,23 +1,24 @@
-//! Where documents spell the names that warnings are about. Parsers hand on triples without their places, so the text is
-//! searched for the name: as a whole IRI, or its last part behind a prefix.
+//! Finds positions for warnings about names. Parsers return triples without positions, so the text is searched
+//! for the name: for the whole IRI, or for the local name after a prefix.
 
 use super::text::Text;
 use crate::error::{Error, Position, Warning};
 
-/// Only so many warnings are given a place: each costs a search through all documents.
-const MOST_SEARCHES: usize = 100;
+/// Number of warnings that are located: each one costs a search through all documents.
+const MAX_SEARCHES: usize = 100;
 
-/// Gives undeclared names the place where a document spells them first.
+/// Sets the positions of undeclared names to their first occurrence.
 pub(super) fn locate(warnings: &mut [Warning], texts: &[(String, Text)]) {
     let undeclared = |warning: &&mut Warning| matches!(warning, Warning::Undeclared { .. });
-    let mut open: Vec<&mut Warning> = warnings.iter_mut().take(MOST_SEARCHES).filter(undeclared).collect();
+    let mut unlocated: Vec<&mut Warning> =
+        warnings.iter_mut().take(MAX_SEARCHES).filter(undeclared).collect();
     for (name, text) in texts {
-        if open.is_empty() {
+        if unlocated.is_empty() {
             return;
         }
         let text = text.get();
         let Ok(words) = std::str::from_utf8(&text) else { continue };
-        open.retain_mut(|warning| {
+        unlocated.retain_mut(|warning| {
             let Warning::Undeclared { iri, position, .. } = &mut **warning else { return false };
             *position = offset(iri, words).map(|offset| Position::of_offset(name, &text, offset));
             position.is_none()
@@ -25,19 +26,19 @@ pub(super) fn locate(warnings: &mut [Warning], texts: &[(String, Text)]) {
     }
 }
 
-/// An error with the place of what it is about, if it has none and its document spells that.
+/// Adds a position to an error without one, if its document contains the IRI that the error is about.
 pub(super) fn placed(error: Error, texts: &[(String, Text)]) -> Error {
     match error {
         Error::TooDeep { file, about: Some(iri), position: None, deepest } => {
-            let own: Vec<_> = texts.iter().filter(|(name, _)| *name == file).cloned().collect();
-            let position = place(&format!("<{iri}>"), &own);
+            let document_texts: Vec<_> = texts.iter().filter(|(name, _)| *name == file).cloned().collect();
+            let position = place(&format!("<{iri}>"), &document_texts);
             Error::TooDeep { file, about: Some(iri), position, deepest }
         }
         error => error,
     }
 }
 
-/// Where documents spell the first IRI that a message names in angle brackets.
+/// Returns the position of the first IRI that a message contains in angle brackets.
 pub(super) fn place(message: &str, texts: &[(String, Text)]) -> Option<Position> {
     let iri = message.split_once('<')?.1.split_once('>')?.0;
     texts.iter().find_map(|(name, text)| {
@@ -47,7 +48,8 @@ pub(super) fn place(message: &str, texts: &[(String, Text)]) -> Option<Position>
     })
 }
 
-/// Where a text spells an IRI: whole between brackets or quotes, or its local name behind `:` or `#`.
+/// Returns the offset of an IRI in a text: of the whole IRI in brackets or quotes, or of its local name after
+/// `:` or `#`.
 fn offset(iri: &str, text: &str) -> Option<usize> {
     let whole = spelled(text, iri, |c| matches!(c, '<' | '"' | '\''));
     let local = iri.rsplit(['#', '/', ':']).next().filter(|local| !local.is_empty());
@@ -55,11 +57,12 @@ fn offset(iri: &str, text: &str) -> Option<usize> {
     [whole, short].into_iter().flatten().min()
 }
 
-/// The first place where a word stands behind one of some characters and no name goes on after it.
+/// Returns the first offset of a word that follows a character accepted by `opens` and is not the prefix of a
+/// longer name.
 fn spelled(text: &str, word: &str, opens: impl Fn(char) -> bool) -> Option<usize> {
-    let goes_on = |c: char| c.is_alphanumeric() || matches!(c, '_' | '-');
+    let continues = |c: char| c.is_alphanumeric() || matches!(c, '_' | '-');
     memchr::memmem::find_iter(text.as_bytes(), word).find(|offset| {
         text[..*offset].chars().next_back().is_some_and(&opens)
-            && !text[offset + word.len()..].chars().next().is_some_and(goes_on)
+            && !text[offset + word.len()..].chars().next().is_some_and(continues)
     })
 }

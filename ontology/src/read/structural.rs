@@ -1,4 +1,5 @@
-//! OWL/XML and functional-style documents as N-Triples: what their readers do not take is treated or refused before.
+//! Converts OWL/XML and functional-style documents to N-Triples. Input that horned-owl's readers do not handle
+//! is rewritten or rejected first.
 
 use super::entities;
 use super::message::shortened;
@@ -7,7 +8,7 @@ use crate::error::{Error, Errors, Position};
 use crate::horned;
 use crate::normalize::depth::MAX_NESTING;
 
-/// A document in one of the two.
+/// A document in OWL/XML or functional-style syntax.
 pub(super) struct Structural<'a> {
     pub name: &'a str,
     pub text: &'a [u8],
@@ -29,28 +30,28 @@ impl Structural<'_> {
         Error::TooDeep { file, about: None, position, deepest: MAX_NESTING }.into()
     }
 
-    /// OWL/XML as N-Triples.
+    /// Converts OWL/XML to N-Triples.
     pub(super) fn owl_xml(&self) -> Result<Vec<u8>, Errors> {
-        let whole =
+        let expanded =
             entities::expanded(self.text).map_err(|fault| self.malformed(fault.offset, &fault.message))?;
-        // The reader takes memory without end where an element is not closed, and recurses into elements.
-        match syntax::mismatched_tag(&whole.text, MAX_NESTING + MARGIN) {
+        // horned-owl allocates memory without limit if an element is not closed, and recurses into elements.
+        match syntax::mismatched_tag(&expanded.text, MAX_NESTING + NESTING_MARGIN) {
             Ok(None) => {}
             Ok(Some(offset)) => {
                 let message = "an element is not closed, or another one than is open";
-                return Err(self.malformed(whole.origin(offset), message));
+                return Err(self.malformed(expanded.origin(offset), message));
             }
-            Err(offset) => return Err(self.too_deep(whole.origin(offset))),
+            Err(offset) => return Err(self.too_deep(expanded.origin(offset))),
         }
-        let flat = syntax::flattened(&whole.text);
+        let flat = syntax::flattened(&expanded.text);
         let fault =
-            |fault: horned::Fault| self.malformed(whole.origin(flat.origin(fault.offset)), &fault.message);
+            |fault: horned::Fault| self.malformed(expanded.origin(flat.origin(fault.offset)), &fault.message);
         horned::transcribe(&flat.text, self.syntax).map(relabelled).map_err(fault)
     }
 
-    /// Functional-style syntax as N-Triples.
+    /// Converts functional-style syntax to N-Triples.
     pub(super) fn functional(&self) -> Result<Vec<u8>, Errors> {
-        let words = Words { text: self.text, at: 0 };
+        let words = Words { text: self.text, cursor: 0 };
         let mut depth = 0_usize;
         for (offset, word) in words.clone() {
             match word {
@@ -58,11 +59,12 @@ impl Structural<'_> {
                 b")" => depth = depth.saturating_sub(1),
                 _ => {}
             }
-            if depth > MAX_NESTING + MARGIN {
+            if depth > MAX_NESTING + NESTING_MARGIN {
                 return Err(self.too_deep(offset));
             }
         }
         let fault = |fault: horned::Fault| match undeclared_prefix(words.clone()) {
+            // horned-owl reports an undeclared prefix as a generic syntax error.
             Some((offset, prefix)) => {
                 self.malformed(offset, &format!("the prefix `{prefix}` is not declared"))
             }
@@ -72,15 +74,15 @@ impl Structural<'_> {
     }
 }
 
-/// Elements or parentheses around an expression: ontology, axiom, annotations.
-const MARGIN: usize = 8;
+/// Nesting levels of elements or parentheses around an expression: ontology, axiom, annotations.
+const NESTING_MARGIN: usize = 8;
 
-/// The words of functional-style syntax with their places: parentheses, equality signs, names; strings, IRIs and comments
-/// are passed over.
+/// Iterates over the words of functional-style syntax with their offsets: parentheses, equality signs and
+/// names. Strings, IRIs and comments are skipped.
 #[derive(Clone)]
 struct Words<'a> {
     text: &'a [u8],
-    at: usize,
+    cursor: usize,
 }
 
 impl<'a> Iterator for Words<'a> {
@@ -88,30 +90,30 @@ impl<'a> Iterator for Words<'a> {
 
     fn next(&mut self) -> Option<Self::Item> {
         loop {
-            let rest = &self.text[self.at..];
-            let length = match rest.first()? {
+            let tail = &self.text[self.cursor..];
+            let length = match tail.first()? {
                 byte if byte.is_ascii_whitespace() => 1,
-                b'#' => rest.iter().position(|&byte| byte == b'\n').unwrap_or(rest.len()),
-                b'<' => rest.iter().position(|&byte| byte == b'>').map_or(rest.len(), |end| end + 1),
-                b'"' => string_length(rest),
+                b'#' => tail.iter().position(|&byte| byte == b'\n').unwrap_or(tail.len()),
+                b'<' => tail.iter().position(|&byte| byte == b'>').map_or(tail.len(), |end| end + 1),
+                b'"' => string_length(tail),
                 _ => break,
             };
-            self.at += length;
+            self.cursor += length;
         }
-        let rest = &self.text[self.at..];
+        let tail = &self.text[self.cursor..];
         let ends = |byte: &u8| byte.is_ascii_whitespace() || b"()=<\"".contains(byte);
-        let length = rest.iter().position(ends).unwrap_or(rest.len()).max(1);
-        let start = self.at;
-        self.at += length;
-        Some((start, &rest[..length]))
+        let length = tail.iter().position(ends).unwrap_or(tail.len()).max(1);
+        let start = self.cursor;
+        self.cursor += length;
+        Some((start, &tail[..length]))
     }
 }
 
 fn string_length(text: &[u8]) -> usize {
     let mut escaped = false;
-    for (at, &byte) in text.iter().enumerate().skip(1) {
+    for (index, &byte) in text.iter().enumerate().skip(1) {
         match (escaped, byte) {
-            (false, b'"') => return at + 1,
+            (false, b'"') => return index + 1,
             (false, b'\\') => escaped = true,
             _ => escaped = false,
         }
@@ -119,41 +121,42 @@ fn string_length(text: &[u8]) -> usize {
     text.len()
 }
 
-/// The first name whose prefix nothing declares; OWL's own prefixes need no declaration.
+/// Returns the first name with an undeclared prefix. OWL's own prefixes need no declaration.
 fn undeclared_prefix(words: Words) -> Option<(usize, String)> {
     let mut declared: Vec<&[u8]> =
         vec![b"owl:", b"rdf:", b"rdfs:", b"xsd:", b"xml:", b"_:", b"swrl:", b"swrlb:"];
-    let mut before: [&[u8]; 2] = [b"", b""];
+    let mut previous: [&[u8]; 2] = [b"", b""];
     for (offset, word) in words {
         if let Some(colon) = word.iter().position(|&byte| byte == b':') {
-            let start = word.iter().rposition(|&byte| byte == b'^').map_or(0, |at| at + 1).min(colon);
+            let start = word.iter().rposition(|&byte| byte == b'^').map_or(0, |index| index + 1).min(colon);
             let prefix = &word[start..=colon];
-            if before == [&b"Prefix"[..], b"("] {
+            if previous == [&b"Prefix"[..], b"("] {
                 declared.push(prefix);
             } else if !declared.contains(&prefix) {
                 return Some((offset + start, String::from_utf8_lossy(prefix).into_owned()));
             }
         }
-        before = [before[1], word];
+        previous = [previous[1], word];
     }
     None
 }
 
-/// The readers keep `_:` as a part of the names of blank nodes, so that writing N-Triples says it twice.
+/// Removes a duplicate `_:` from blank nodes: the readers keep it as part of the label, and the writer adds
+/// another one.
 fn relabelled(ntriples: Vec<u8>) -> Vec<u8> {
-    const TWICE: &[u8] = b"_:_:";
-    if !ntriples.windows(TWICE.len()).any(|window| window == TWICE) {
+    const DOUBLE_PREFIX: &[u8] = b"_:_:";
+    if !ntriples.windows(DOUBLE_PREFIX.len()).any(|window| window == DOUBLE_PREFIX) {
         return ntriples;
     }
     let mut result = Vec::with_capacity(ntriples.len());
     for line in ntriples.split_inclusive(|&byte| byte == b'\n') {
-        for (place, term) in line.splitn(3, |&byte| byte == b' ').enumerate() {
-            if place > 0 {
+        for (index, term) in line.splitn(3, |&byte| byte == b' ').enumerate() {
+            if index > 0 {
                 result.push(b' ');
             }
-            match term.strip_prefix(TWICE) {
+            match term.strip_prefix(DOUBLE_PREFIX) {
                 Some(label) => {
-                    // A name of the document is not one of the writer's.
+                    // The prefix `own-` separates labels of the document from labels that the writer generates.
                     result.extend_from_slice(b"_:own-");
                     result.extend_from_slice(label);
                 }
@@ -169,7 +172,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn prefixes_are_declared_before_they_are_used() {
+    fn the_first_undeclared_prefix_is_found() {
         for (text, expected) in [
             ("Prefix(:=<http://x#>) Ontology(<http://x> Declaration(Class(:A)))", None),
             ("Ontology(<http://x>\nDeclaration(Class(foo:A))\n)", Some((38, "foo:"))),
@@ -177,9 +180,9 @@ mod tests {
             ("Ontology(ClassAssertion(owl:Thing _:x))", None),
             ("Prefix(a:=<u:>) Ontology(DataPropertyAssertion(a:p a:i \"1\"^^b:c))", Some((60, "b:"))),
         ] {
-            let found = undeclared_prefix(Words { text: text.as_bytes(), at: 0 });
+            let actual = undeclared_prefix(Words { text: text.as_bytes(), cursor: 0 });
             let expected = expected.map(|(offset, prefix)| (offset, prefix.to_owned()));
-            assert_eq!(found, expected, "{text}");
+            assert_eq!(actual, expected, "{text}");
         }
     }
 }

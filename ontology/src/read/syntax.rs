@@ -1,5 +1,5 @@
-//! Which concrete syntax a document is written in, by its content: file names do not tell (real files named `.owl`
-//! are RDF/XML or Turtle).
+//! Detects the concrete syntax of a document from its content. File names are not reliable: real files named
+//! `.owl` are RDF/XML or Turtle.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -10,7 +10,7 @@ use std::fmt;
 pub enum Syntax {
     /// RDF/XML.
     RdfXml,
-    /// Turtle; N-Triples is a part of it.
+    /// Turtle, including N-Triples.
     Turtle,
     /// OWL/XML.
     OwlXml,
@@ -30,8 +30,8 @@ impl fmt::Display for Syntax {
 }
 
 impl Syntax {
-    /// The syntax that `text` looks like. Anything that is neither XML nor functional-style is taken for Turtle,
-    /// whose parser then says what is wrong with it.
+    /// Detects the syntax of `text`. Text that is neither XML nor functional-style counts as Turtle, whose
+    /// parser then reports the errors.
     pub fn detect(text: &[u8]) -> Self {
         let head = skip_comments(text);
         if head.starts_with(b"<") && !is_iri_reference(head) {
@@ -45,7 +45,7 @@ impl Syntax {
     }
 }
 
-/// `text` from its first byte that is neither white space nor in a `#` comment.
+/// Skips white space and `#` comments at the start of a text.
 fn skip_comments(mut text: &[u8]) -> &[u8] {
     loop {
         text = text.trim_ascii_start();
@@ -57,9 +57,10 @@ fn skip_comments(mut text: &[u8]) -> &[u8] {
     }
 }
 
-/// Whether a text that starts with `<` starts with an IRI, as Turtle does, and not with an XML tag: an IRI ends without
-/// white space, and has a colon, or a character that no name of an element has. An element whose name has a colon needs
-/// white space, to declare its prefix, unless it stands within a document type.
+/// Returns `true` if a text with `<` at the start begins with an IRI (Turtle) and not with an XML tag. An IRI
+/// ends without white space, and contains a colon or a character that element names cannot contain. An element
+/// name with a colon is followed by white space for the declaration of its prefix, except after a document type
+/// declaration.
 fn is_iri_reference(text: &[u8]) -> bool {
     let Some(end) = text.iter().position(|&byte| byte == b'>' || byte.is_ascii_whitespace()) else {
         return false;
@@ -75,7 +76,8 @@ fn is_iri_reference(text: &[u8]) -> bool {
             || inside.is_empty())
 }
 
-/// The name of the first element after the XML declaration, comments and document type, and what follows the name.
+/// Returns the name of the root element, after XML declaration, comments and document type, and the text after
+/// the name.
 fn xml_root(mut text: &[u8]) -> Option<(&[u8], &[u8])> {
     loop {
         text = &text[text.iter().position(|&byte| byte == b'<')? + 1..];
@@ -94,15 +96,15 @@ fn xml_root(mut text: &[u8]) -> Option<(&[u8], &[u8])> {
     }
 }
 
-/// The name of the root element, if nothing closes it.
+/// Returns the name of the root element if it is not closed.
 pub(super) fn unclosed_root(text: &[u8]) -> Option<String> {
-    let (root, rest) = xml_root(text)?;
+    let (root, tail) = xml_root(text)?;
     let close = [b"</", root].concat();
     if text.windows(close.len()).rev().any(|window| window == close) {
         return None;
     }
     let (mut quote, mut previous) = (None, b' ');
-    for &byte in rest {
+    for &byte in tail {
         match (quote, byte) {
             (None, b'"' | b'\'') => quote = Some(byte),
             (Some(open), _) if open == byte => quote = None,
@@ -115,13 +117,13 @@ pub(super) fn unclosed_root(text: &[u8]) -> Option<String> {
     Some(String::from_utf8_lossy(root).into_owned())
 }
 
-/// Where the first tag stands that closes another element than the one that is open; or the end of the text, if
-/// elements are open there. `Err` is where elements are nested too deep.
-pub(super) fn mismatched_tag(text: &[u8], deepest: usize) -> Result<Option<usize>, usize> {
-    let (mut open, mut at) = (Vec::new(), 0);
-    while let Some((start, end)) = next_markup(text, at) {
+/// Returns the offset of the first closing tag that does not match the open element, or the end of the text if
+/// an element is not closed. The error is the offset at which the nesting exceeds `max_depth`.
+pub(super) fn mismatched_tag(text: &[u8], max_depth: usize) -> Result<Option<usize>, usize> {
+    let (mut open, mut cursor) = (Vec::new(), 0);
+    while let Some((start, end)) = next_markup(text, cursor) {
         let Some(end) = end else { return Ok(Some(start)) };
-        if open.len() > deepest {
+        if open.len() > max_depth {
             return Err(start);
         }
         let inside = &text[start + 1..end - 1];
@@ -132,40 +134,40 @@ pub(super) fn mismatched_tag(text: &[u8], deepest: usize) -> Result<Option<usize
             _ if inside.ends_with(b"/") => {}
             _ => open.push(&inside[..name(inside)]),
         }
-        at = end;
+        cursor = end;
     }
     Ok((!open.is_empty()).then_some(text.len()))
 }
 
-/// A document that was rewritten, with the places that its parts had before.
+/// A rewritten document with a map of its offsets to the original text.
 #[derive(Debug)]
 pub(super) struct Flattened<'a> {
     pub text: Cow<'a, [u8]>,
-    /// After each change, the same place in the flattened and in the original text.
-    pub moved: Vec<(usize, usize)>,
+    /// Pairs of equal places after each change: offset in the rewritten text, offset in the original text;
+    /// increasing.
+    pub offsets: Vec<(usize, usize)>,
 }
 
 impl<'a> Flattened<'a> {
-    /// The document as it was.
     pub(super) fn unchanged(text: &'a [u8]) -> Self {
-        Self { text: Cow::Borrowed(text), moved: Vec::new() }
+        Self { text: Cow::Borrowed(text), offsets: Vec::new() }
     }
 
-    /// Where in the original text a place of the flattened one is.
+    /// Maps an offset in the rewritten text to the original text.
     pub(super) fn origin(&self, offset: usize) -> usize {
-        let after = self.moved.partition_point(|&(here, _)| here <= offset);
-        let (here, there) = after.checked_sub(1).map_or((0, 0), |last| self.moved[last]);
-        there + (offset - here)
+        let after = self.offsets.partition_point(|&(rewritten, _)| rewritten <= offset);
+        let (rewritten, original) = after.checked_sub(1).map_or((0, 0), |last| self.offsets[last]);
+        original + (offset - rewritten)
     }
 }
 
-/// Leaves comments out and writes CDATA sections as ordinary text: horned-owl takes their delimiters for a part of the
-/// literal that they stand in.
+/// Removes comments and converts CDATA sections to ordinary text: horned-owl includes their delimiters in
+/// literals.
 pub(super) fn flattened(text: &[u8]) -> Flattened<'_> {
     const SECTION: &[u8] = b"<![CDATA[";
-    let (mut flat, mut moved, mut at, mut copied) = (Vec::new(), Vec::new(), 0, 0);
-    while let Some((start, Some(end))) = next_markup(text, at) {
-        at = end;
+    let (mut flat, mut offsets, mut cursor, mut copied) = (Vec::new(), Vec::new(), 0, 0);
+    while let Some((start, Some(end))) = next_markup(text, cursor) {
+        cursor = end;
         let section = text[start..end].strip_prefix(SECTION);
         if section.is_none() && !text[start..].starts_with(b"<!--") {
             continue;
@@ -180,18 +182,19 @@ pub(super) fn flattened(text: &[u8]) -> Flattened<'_> {
             }
         }
         copied = end;
-        moved.push((flat.len(), end));
+        offsets.push((flat.len(), end));
     }
-    if moved.is_empty() {
-        return Flattened { text: Cow::Borrowed(text), moved };
+    if offsets.is_empty() {
+        return Flattened { text: Cow::Borrowed(text), offsets };
     }
     flat.extend_from_slice(&text[copied..]);
-    Flattened { text: Cow::Owned(flat), moved }
+    Flattened { text: Cow::Owned(flat), offsets }
 }
 
-/// The next tag, comment, CDATA section or instruction from `at` on: where it starts, and where it ends if it does.
-fn next_markup(text: &[u8], at: usize) -> Option<(usize, Option<usize>)> {
-    let start = at + text[at..].iter().position(|&byte| byte == b'<')?;
+/// Returns start and end of the next tag, comment, CDATA section or processing instruction after `from`. The
+/// end is `None` if the markup is not closed.
+fn next_markup(text: &[u8], from: usize) -> Option<(usize, Option<usize>)> {
+    let start = from + text[from..].iter().position(|&byte| byte == b'<')?;
     let markup = &text[start..];
     let (skip, end): (usize, &[u8]) = match markup {
         [b'<', b'!', b'-', b'-', ..] => (4, b"-->"),
@@ -204,7 +207,7 @@ fn next_markup(text: &[u8], at: usize) -> Option<(usize, Option<usize>)> {
     Some((start, length.map(|length| start + skip + length + end.len())))
 }
 
-/// Where a tag's `>` stands, outside of quotes.
+/// Returns the offset of a tag's `>` outside of quotes.
 fn end_of_tag(tag: &[u8]) -> Option<usize> {
     let mut quote = None;
     tag.iter().position(|&byte| {
@@ -217,7 +220,7 @@ fn end_of_tag(tag: &[u8]) -> Option<usize> {
     })
 }
 
-/// Whether a `!DOCTYPE` has an internal subset, which contains `>` itself.
+/// Returns `true` if a `!DOCTYPE` has an internal subset, which may contain `>`.
 fn declares_entities(text: &[u8]) -> bool {
     let stop = text.iter().position(|&byte| byte == b'[' || byte == b'>');
     stop.is_some_and(|index| text[index] == b'[')
@@ -244,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn text_is_flattened_and_places_are_kept() {
+    fn flattening_keeps_offsets() {
         for (text, expected) in [
             ("<a>b</a>", "<a>b</a>"),
             ("<a>b<!-- <c> --> d</a>", "<a>b d</a>"),
@@ -254,13 +257,13 @@ mod tests {
             let flat = flattened(text.as_bytes());
             assert_eq!(String::from_utf8_lossy(&flat.text), expected, "{text}");
             assert_eq!(flat.origin(flat.text.len()), text.len(), "{text}");
-            let (here, there) = (expected.find("</a>"), text.find("</a>"));
-            assert_eq!(here.map(|offset| flat.origin(offset)), there, "{text}");
+            let (rewritten, original) = (expected.find("</a>"), text.find("</a>"));
+            assert_eq!(rewritten.map(|offset| flat.origin(offset)), original, "{text}");
         }
     }
 
     #[test]
-    fn content_decides() {
+    fn the_content_determines_the_syntax() {
         for (text, expected) in [
             ("<?xml version=\"1.0\"?>\n<rdf:RDF xmlns:rdf=\"r\">", Syntax::RdfXml),
             ("<!DOCTYPE rdf:RDF [ <!ENTITY a \"b\"> ]>\n<rdf:RDF>", Syntax::RdfXml),

@@ -1,5 +1,5 @@
-//! The texts of documents after they have been parsed: they are only looked at again where a message needs a place, and may be
-//! large. What lies in a file is read again then.
+//! Texts of documents after parsing. They are needed only to find positions for messages and may be large, so
+//! the text of a file is read again on demand.
 
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
@@ -13,14 +13,14 @@ use super::file::regular_file;
 /// The text of a document.
 #[derive(Clone, Debug)]
 pub(super) enum Text {
-    /// In a file.
+    /// The text is in a file.
     File(PathBuf),
-    /// Nowhere else.
+    /// The text is only in memory.
     Memory(Arc<Vec<u8>>),
 }
 
 impl Text {
-    /// The text in UTF-8; nothing where its file is not there any more.
+    /// Returns the text in UTF-8; empty if the file no longer exists.
     pub(super) fn get(&self) -> Cow<'_, [u8]> {
         match self {
             Self::Memory(text) => Cow::Borrowed(text),
@@ -32,26 +32,28 @@ impl Text {
     }
 }
 
-/// The files and texts that have been read.
+/// Files and texts that have been read.
 #[derive(Default)]
-pub(super) struct Seen {
+pub(super) struct Visited {
+    /// Canonical paths of the files.
     pub paths: HashSet<PathBuf>,
     hash: RandomState,
+    /// Texts by hash, to compare only texts with equal hashes.
     texts: HashMap<u64, Vec<Text>>,
 }
 
-impl Seen {
-    /// Remembers a text; `None` if the same has been seen.
+impl Visited {
+    /// Adds a text. Returns `None` if an equal text was added before.
     pub(super) fn text(&mut self, text: Vec<u8>, file: Option<&Path>) -> Option<Text> {
-        let known = self.texts.entry(self.hash.hash_one(&text)).or_default();
-        if known.iter().any(|other| *other.get() == *text) {
+        let same_hash = self.texts.entry(self.hash.hash_one(&text)).or_default();
+        if same_hash.iter().any(|other| *other.get() == *text) {
             return None;
         }
         let text = match file {
             Some(path) => Text::File(path.to_owned()),
             None => Text::Memory(Arc::new(text)),
         };
-        known.push(text.clone());
+        same_hash.push(text.clone());
         Some(text)
     }
 }
