@@ -1,9 +1,9 @@
-//! What an ontology says, while it is being put together.
+//! Intermediate form of an ontology's contents.
 
 use crate::error::Warning;
 use crate::owl::{AnnotatedAxiom, Annotation, EntityKind, Iri, Rule};
 
-/// The contents of an ontology, each list sorted but the rules, which are in document order.
+/// Contents of an ontology. All lists are sorted, except the rules, which are in document order.
 #[derive(Debug, Default)]
 pub(crate) struct Parts {
     pub entities: Vec<(EntityKind, Iri)>,

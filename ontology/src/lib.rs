@@ -1,10 +1,11 @@
-//! What the robot is: OWL 2 knowledge bases, read and lowered to rules and facts.
+//! Reads OWL 2 knowledge bases of a robot and lowers them to rules and facts.
 //!
-//! [`read_files`] reads RDF/XML, Turtle, N-Triples, OWL/XML and functional-style documents with their imports into an
-//! [`Ontology`]; [`lower`](lower()) turns that into a `rules::Program` and facts; [`tomasys`] is the typed view on what an
-//! engine has concluded, [`runtime`] keeps one in step with the robot; [`kb`] holds the knowledge bases that we wrote.
+//! [`read_files`] reads RDF/XML, Turtle, N-Triples, OWL/XML and functional-style documents with their imports
+//! into an [`Ontology`]. [`lower`](lower()) translates it to a `rules::Program` and facts. [`tomasys`] is the
+//! typed view of the conclusions of an engine. [`runtime`] updates an engine with the reports of a robot.
+//! [`kb`] contains the embedded knowledge bases.
 //!
-//! Absent here: PDDL, plans, clocks and the network.
+//! Absent: PDDL, plans, clocks and the network.
 
 pub mod vocab;
 
@@ -40,7 +41,7 @@ pub use revise::{Change, Stated};
 pub use write::{OutputSyntax, convert_files, turtle};
 pub use {num_rational::BigRational, rules};
 
-/// The example of the README is compiled and run with the tests.
+/// Compiles and runs the example of the README as a test.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

@@ -1,22 +1,22 @@
-//! IRIs as shared text and as numbers: each is kept once, however often documents name it. Triples of numbers take a tenth of
-//! the room of triples of text.
+//! Interns IRIs: each one is stored once and has a number. Triples of numbers take a tenth of the memory of
+//! triples of text.
 
 use oxrdf::{BlankNode, NamedNode, NamedOrBlankNode, Term, Triple};
 use rustc_hash::FxHashMap;
 
 use crate::owl::{Iri, Literal};
 
-/// What the text of a blank node begins with; no IRI does.
+/// Prefix of the text of a blank node. No IRI has this prefix.
 const BLANK: &str = "_:";
 
-/// The IRIs and blank nodes met so far, each with its number.
+/// Interned IRIs and blank nodes.
 #[derive(Debug, Default)]
 pub(crate) struct Names {
     texts: Vec<Iri>,
     numbers: FxHashMap<Iri, u32>,
 }
 
-/// A triple of numbers.
+/// A triple whose names are numbers.
 #[derive(Debug)]
 pub(crate) struct Compact {
     pub subject: u32,
@@ -24,7 +24,6 @@ pub(crate) struct Compact {
     pub object: Object,
 }
 
-/// The object of a triple.
 #[derive(Debug)]
 pub(crate) enum Object {
     /// An IRI or a blank node.
@@ -32,14 +31,15 @@ pub(crate) enum Object {
     Literal(Box<Literal>),
 }
 
+// Numbers are indices in `texts`.
 impl Names {
-    /// The shared text of an IRI.
+    /// Interns an IRI and returns its shared text.
     pub(crate) fn iri(&mut self, name: &str) -> Iri {
         let number = self.number(name);
         self.text(number).clone()
     }
 
-    /// The number of an IRI.
+    /// Interns an IRI and returns its number.
     pub(crate) fn number(&mut self, name: &str) -> u32 {
         if let Some(number) = self.numbers.get(name) {
             return *number;
@@ -51,39 +51,39 @@ impl Names {
         number
     }
 
-    /// The number of a blank node.
+    /// Interns a blank node and returns its number.
     pub(crate) fn blank(&mut self, name: &str) -> u32 {
         self.number(&format!("{BLANK}{name}"))
     }
 
-    /// The number of an IRI that has been met.
+    /// Returns the number of an interned IRI.
     pub(crate) fn find(&self, name: &str) -> Option<u32> {
         self.numbers.get(name).copied()
     }
 
-    /// The text of a number; of a blank node with `_:`.
+    /// Returns the text of a number. Blank nodes begin with `_:`.
     pub(crate) fn text(&self, number: u32) -> &Iri {
         &self.texts[number as usize]
     }
 
-    /// Whether a number is that of a blank node.
+    /// Returns `true` if the number belongs to a blank node.
     pub(crate) fn is_blank(&self, number: u32) -> bool {
         self.text(number).starts_with(BLANK)
     }
 
-    /// How many there are.
+    /// Number of interned names.
     pub(crate) fn len(&self) -> usize {
         self.texts.len()
     }
 
-    /// For the text of each name, by where it lies, its place among all in alphabetic order.
+    /// Ranks of all names in alphabetical order. The keys are the addresses of the shared texts.
     pub(crate) fn ranks(&self) -> FxHashMap<*const u8, u32> {
         let mut sorted: Vec<&Iri> = self.texts.iter().collect();
         sorted.sort_unstable();
         sorted.into_iter().zip(0..).map(|(iri, rank)| (iri.as_ptr(), rank)).collect()
     }
 
-    /// A triple in numbers; `blank` gives the number of a blank node's name.
+    /// Converts a triple to numbers. `blank` returns the number of a blank node.
     pub(crate) fn compact(
         &mut self,
         triple: Triple,
@@ -102,7 +102,7 @@ impl Names {
         Compact { subject, predicate, object }
     }
 
-    /// A literal of RDF as ours.
+    /// Converts an RDF literal.
     pub(crate) fn literal(&mut self, literal: oxrdf::Literal) -> Literal {
         let (lexical, datatype, language) = literal.destruct();
         Literal {
@@ -112,7 +112,7 @@ impl Names {
         }
     }
 
-    /// The triple of numbers in text.
+    /// Converts a triple of numbers to text.
     pub(crate) fn triple(&self, compact: Compact) -> Triple {
         let named = |number| NamedNode::new_unchecked(&**self.text(number));
         let node = |number| match self.text(number).strip_prefix(BLANK) {

@@ -1,4 +1,4 @@
-//! Facts as an N-Triples document: sorted, each once, one triple a line.
+//! Writes facts as a sorted N-Triples document without duplicates.
 
 use rules::{Fact, Symbol, Symbols, Value};
 use rustc_hash::FxHashMap;
@@ -7,10 +7,10 @@ use crate::lower::INTERNAL;
 use crate::owl::ANONYMOUS;
 use crate::vocab::{owl, rdf};
 
-/// Writes facts about individuals: a fact with one argument as `rdf:type`, one with two as a property.
+/// Writes facts about individuals: unary facts as `rdf:type`, binary facts as properties.
 ///
-/// Left out are facts that no triple can state (other arities), the relations that [`crate::lower`] invents, and that
-/// an individual is one (an `owl:Thing`), or the same as itself. Anonymous individuals become blank nodes again.
+/// Omits facts of other arities, the auxiliary relations of [`crate::lower`], membership in `owl:Thing`, and
+/// `sameAs` of an individual with itself. Anonymous individuals become blank nodes again.
 pub fn ntriples<'a>(symbols: &Symbols, facts: impl IntoIterator<Item = &'a Fact>) -> String {
     let mut terms = Terms::new(symbols);
     let mut triples: Vec<[u32; 3]> = facts.into_iter().filter_map(|fact| terms.triple(fact)).collect();
@@ -29,16 +29,16 @@ pub fn ntriples<'a>(symbols: &Symbols, facts: impl IntoIterator<Item = &'a Fact>
     text
 }
 
-/// The terms of triples, each written once.
+/// The distinct terms of the triples.
 struct Terms<'a> {
     symbols: &'a Symbols,
-    /// What each is written as, with a blank behind it, so that lines are in the order of their terms.
+    /// Text of each term with a trailing space, so that the order of the terms is the order of the lines.
     texts: Vec<String>,
-    /// By symbol; `None` for what is not a term.
+    /// Term numbers by symbol; `None` if there are too many terms for a number.
     numbers: FxHashMap<Symbol, Option<u32>>,
 }
 
-/// The number of `rdf:type`.
+/// Term number of `rdf:type`.
 const TYPE: u32 = 0;
 
 impl<'a> Terms<'a> {
@@ -46,7 +46,7 @@ impl<'a> Terms<'a> {
         Self { symbols, texts: vec![format!("<{}> ", rdf::TYPE)], numbers: FxHashMap::default() }
     }
 
-    /// The numbers of subject, predicate and object.
+    /// Converts a fact to the numbers of subject, predicate and object.
     fn triple(&mut self, fact: &Fact) -> Option<[u32; 3]> {
         let name = |symbol| self.symbols.value(symbol).as_name();
         let predicate = name(fact.predicate).filter(|name| !name.starts_with(INTERNAL))?;
@@ -59,7 +59,7 @@ impl<'a> Terms<'a> {
         }
     }
 
-    /// The number of what is not a literal.
+    /// Returns the number of a term that is not a literal.
     fn node(&mut self, symbol: Symbol) -> Option<u32> {
         self.symbols.value(symbol).as_name()?;
         self.term(symbol)
@@ -82,13 +82,13 @@ impl<'a> Terms<'a> {
         number
     }
 
-    /// Numbers the terms of triples anew, in the order of what they are written as, which is returned.
+    /// Replaces the numbers in `triples` by the ranks of the terms' texts. Returns the sorted texts.
     fn rank(self, triples: &mut [[u32; 3]]) -> Vec<String> {
         let mut texts: Vec<(String, u32)> = self.texts.into_iter().zip(0..).collect();
         texts.sort_unstable();
         let (mut ranks, mut ranked) = (vec![0; texts.len()], Vec::<String>::with_capacity(texts.len()));
         for (text, number) in texts {
-            // Two terms may be written the same.
+            // Two symbols may have the same text, and then get the same rank.
             if ranked.last() != Some(&text) {
                 ranked.push(text);
             }
@@ -106,9 +106,9 @@ mod tests {
     use super::*;
     use rules::Literal;
 
-    /// Lines are in the order of their texts, however terms go on where others end.
+    /// Terms that are prefixes of other terms must not change the order.
     #[test]
-    fn lines_are_sorted_and_once() {
+    fn lines_are_sorted_and_unique() {
         let mut symbols = Symbols::new();
         let anonymous = ["d0b1", "d0b10", "d0b2"].map(|label| format!("{ANONYMOUS}{label}"));
         let names = [
@@ -147,7 +147,8 @@ mod tests {
         sorted.sort_unstable();
         sorted.dedup();
         assert_eq!(lines, sorted);
-        // Predicates are the seven IRIs; `rdf:type` says the same as a class does.
+        // Ten subjects, seven predicates (the IRIs) and 17 objects. Facts with one argument give triples of
+        // `rdf:type` that exist already.
         assert_eq!(lines.len(), 10 * 7 * 17);
         assert!(lines.contains(&"_:d0b10 <http://e/ab> \"x\"@en ."), "{text}");
     }

@@ -1,4 +1,4 @@
-//! Documents as triples.
+//! Parsed documents.
 
 use std::sync::Arc;
 
@@ -6,16 +6,16 @@ use crate::error::Position;
 use crate::names::Compact;
 use crate::read::syntax::Syntax;
 
-/// The triples of one document and what they say about the document.
+/// The triples of a document, and its header.
 #[derive(Debug)]
 pub(crate) struct Document {
-    /// Path or name, for messages.
+    /// Path or name for messages.
     pub name: String,
     pub syntax: Syntax,
     /// The ontology IRI, if the document declares one.
     pub iri: Option<Arc<str>>,
     pub version: Option<Arc<str>>,
-    /// The IRIs imported, in order of appearance, with the place of each where it is spelled out.
+    /// Imported IRIs in order of appearance. The position is known if the text contains the IRI literally.
     pub imports: Vec<(String, Option<Position>)>,
     pub triples: Vec<Compact>,
 }

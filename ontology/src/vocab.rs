@@ -1,8 +1,9 @@
-//! The IRIs that this crate knows, one module per vocabulary, as constants.
+//! IRIs of the vocabularies that this crate uses, as constants in one module per vocabulary.
 //!
-//! Each module has `NS`, its namespace, and one constant per term; `OWL` terms are named as in the OWL 2 structural
-//! specification. Knowledge bases in real use spread TOMASys over two namespaces (with and without `www`), so the
-//! typed view in [`crate::tomasys`] goes by a table of these constants and not by one namespace.
+//! Each module has its namespace `NS` and a constant for each term. The terms of OWL are named as in the OWL 2
+//! structural specification. Knowledge bases in use spread TOMASys over several namespaces (for example with
+//! and without `www`), so the typed view in [`crate::tomasys`] uses a table of these constants instead of one
+//! namespace.
 
 macro_rules! vocabulary {
     ($(#[$doc:meta])* $module:ident = $ns:literal { $($name:ident = $local:literal),* $(,)? }) => {
@@ -94,14 +95,14 @@ vocabulary! {
 }
 
 vocabulary! {
-    /// The rule annotations that Protégé writes.
+    /// Rule annotations of Protégé.
     swrla = "http://swrl.stanford.edu/ontologies/3.3/swrla.owl#" {
         IS_RULE_ENABLED = "isRuleEnabled",
     }
 }
 
 vocabulary! {
-    /// TOMASys as the Metacontrol and MROS knowledge bases use it, with the co-adaptation terms of `kb/tomasys.ttl`.
+    /// TOMASys in the knowledge bases of Metacontrol and MROS, with the additional terms of `kb/tomasys.ttl`.
     tomasys = "http://metacontrol.org/tomasys#" {
         FUNCTION = "Function", FUNCTION_DESIGN = "FunctionDesign", FUNCTION_GROUNDING = "FunctionGrounding",
         OBJECTIVE = "Objective", COMPONENT = "Component", QUALITY_ATTRIBUTE_TYPE = "QualityAttributeType",
@@ -120,7 +121,7 @@ vocabulary! {
 }
 
 vocabulary! {
-    /// TOMASys as the PLANTA knowledge bases use it (note `www`).
+    /// TOMASys in the knowledge bases of PLANTA (with `www`).
     pddl_tomasys = "http://www.metacontrol.org/tomasys#" {
         FUNCTION = "Function", FUNCTION_DESIGN = "FunctionDesign", COMPONENT = "Component",
         QUALITY_ATTRIBUTE_TYPE = "QualityAttributeType", QA_VALUE = "QAvalue", ACTION = "Action",
@@ -132,7 +133,8 @@ vocabulary! {
 }
 
 vocabulary! {
-    /// TOMASys as knowledge bases of SUAVE have it that were merged with all they import: under their own name.
+    /// TOMASys in knowledge bases of SUAVE that were merged with their imports under the IRI of the importing
+    /// ontology.
     suave = "http://www.metacontrol.org/suave#" {
         FUNCTION = "Function", FUNCTION_DESIGN = "FunctionDesign", COMPONENT = "Component",
         QUALITY_ATTRIBUTE_TYPE = "QualityAttributeType", QA_VALUE = "QAvalue", ACTION = "Action",
@@ -157,13 +159,14 @@ vocabulary! {
 }
 
 vocabulary! {
-    /// PDDL names of ontology entities, as PLANTA annotates them.
+    /// PDDL names of ontology entities, from annotations of PLANTA.
     pddl = "http://www.metacontrol.org/pddl#" {
         HAS_PDDL_TYPE = "hasPddlType", PDDL_NAME = "pddlName",
     }
 }
 
-/// The part of an IRI after its last `#`, or else after its last `/` (or the whole IRI).
+/// Returns the part of an IRI after the last `#`, otherwise after the last `/`, or the whole IRI if this part
+/// is empty.
 ///
 /// ```
 /// assert_eq!(ontology::vocab::local_name("http://metacontrol.org/tomasys#Function"), "Function");
@@ -173,7 +176,7 @@ pub fn local_name(iri: &str) -> &str {
     if start < iri.len() { &iri[start..] } else { iri }
 }
 
-/// Whether an IRI belongs to the vocabularies of RDF, RDFS, OWL, SWRL or XML Schema itself.
+/// Returns `true` if an IRI belongs to the vocabularies of RDF, RDFS, OWL, SWRL or XML Schema.
 pub(crate) fn is_reserved(iri: &str) -> bool {
     [rdf::NS, rdfs::NS, owl::NS, swrl::NS, xsd::NS].iter().any(|ns| iri.starts_with(ns))
 }

@@ -1,4 +1,4 @@
-//! The front door: documents and rules to knowledge at run time.
+//! Builds a [`Runtime`] from documents and rules.
 
 use std::path::PathBuf;
 
@@ -9,7 +9,7 @@ use crate::lower::{Equality, lower_together};
 use crate::read::{ReadOptions, read_files};
 use crate::runtime::knowledge::{Mode, Runtime};
 
-/// Puts documents and rules together; [`Runtime::builder`] makes it.
+/// Builder of a [`Runtime`]; see [`Runtime::builder`].
 ///
 /// ```
 /// use ontology::runtime::Runtime;
@@ -39,49 +39,50 @@ pub struct RuntimeBuilder {
 }
 
 impl RuntimeBuilder {
-    /// A document, in any syntax that is read, with all that it imports.
+    /// Adds a document in any supported syntax; its imports are read, too.
     #[must_use]
     pub fn file(mut self, file: impl Into<PathBuf>) -> Self {
         self.files.push(file.into());
         self
     }
 
-    /// Where imports are looked for.
+    /// Sets the options of the reader.
     #[must_use]
     pub fn options(self, options: ReadOptions) -> Self {
         Self { options, ..self }
     }
 
-    /// Rules in SWRL's human-readable syntax besides those of the documents; `source` names the text in errors. What one text asks for,
-    /// another may conclude.
+    /// Adds rules in SWRL's human-readable syntax to the rules of the documents. Errors name the text `source`.
+    /// Rules of one text can use conclusions of another text.
     #[must_use]
     pub fn rules(mut self, source: &str, text: &str) -> Self {
         self.rules.push((source.to_owned(), text.to_owned()));
         self
     }
 
-    /// Whether two names may stand for one individual; as in OWL unless said otherwise.
+    /// Sets the semantics of names. Default: OWL, where two names can denote the same individual.
     #[must_use]
     pub fn equality(self, equality: Equality) -> Self {
         Self { equality, ..self }
     }
 
-    /// What becomes of a conclusion whose cause is gone; it goes, too, unless said otherwise.
+    /// Sets the treatment of conclusions without a cause. Default: [`Mode::Retract`].
     #[must_use]
     pub fn mode(self, mode: Mode) -> Self {
         Self { mode, ..self }
     }
 
-    /// The limits of the first derivation and of each later update.
+    /// Sets the limits of the initial derivation and of each update.
     #[must_use]
     pub fn limits(self, limits: Limits) -> Self {
         Self { limits, ..self }
     }
 
-    /// Reads everything, and derives what follows; beside it what was left out or may be other than meant.
+    /// Reads all documents and rules and derives the consequences. Also returns the warnings.
     ///
     /// # Errors
-    /// All errors of all documents and rules: O101 to O112; those of rules and of the engine are [`Error::Engine`].
+    /// Returns all errors of all documents and rules: O101 to O112, and [`Error::Engine`] for errors of rules
+    /// and of the engine.
     pub fn build(self) -> Result<(Runtime, Vec<Warning>), Errors> {
         let mut symbols = Symbols::new();
         let texts: Vec<(&str, &str)> =
@@ -91,8 +92,8 @@ impl RuntimeBuilder {
         let (ontology, rules) = match (read, rules) {
             (Ok(ontology), Ok(rules)) => (ontology, rules),
             (read, rules) => {
-                let wrong = rules.err().into_iter().flatten().map(Error::Engine);
-                return Err(read.err().into_iter().flatten().chain(wrong).collect());
+                let rule_errors = rules.err().into_iter().flatten().map(Error::Engine);
+                return Err(read.err().into_iter().flatten().chain(rule_errors).collect());
             }
         };
         let lowered = lower_together(&ontology, rules.rules, self.equality, &mut symbols);
@@ -104,7 +105,7 @@ impl RuntimeBuilder {
 }
 
 impl Runtime {
-    /// To read documents and rules.
+    /// Starts building a runtime from documents and rules.
     pub fn builder() -> RuntimeBuilder {
         RuntimeBuilder::default()
     }

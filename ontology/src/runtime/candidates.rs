@@ -1,14 +1,18 @@
-//! The designs for an objective, each with its utility and the reasons that rule it out: the selection rule of MROS.
+//! The designs for an objective, with their utility and the reasons that exclude them: the selection rule of
+//! MROS.
 //!
-//! A design is ruled out if it is not available, if the error log says that it failed the objective before, or if a
-//! measurement stands to one of its estimations in the relation that the attribute's `qa_comparison_operator` names
-//! (`<`: measured below estimated). An attribute that has not been measured rules nothing out; MROS stops with an
-//! exception there, and where a design violates two attributes. Its utility is the estimation of the attribute type named
-//! `performance` if there is exactly one, or else 0.001 (PLANTA's `fd_utility`, where a knowledge base concludes it).
+//! A design is excluded if it is unavailable, if the error log contains its failure for the objective, or if
+//! the comparison of a measurement with one of its estimations by the attribute's `qa_comparison_operator` is
+//! true (`<`: measured below estimated). An attribute without a measurement excludes no design. MROS raises an
+//! exception in this case, and for a design that violates two attributes. The utility is PLANTA's `fd_utility`
+//! if the knowledge base concludes it, otherwise the estimation of the attribute type `performance` if there is
+//! exactly one, otherwise 0.001.
 //!
-//! Besides, each design has the requirements of the objective that it is estimated to miss. On which side of a bound a design has to be is said by the rules of the knowledge base only (MROS's `QAenergy`:
-//! above the bound is in error). So the rules are asked: on a copy, the objective is grounded with the design, and what is
-//! measured of it is what it is estimated to give. A requirement is missed if the objective is in error then.
+//! Each design also has the requirements of the objective that its estimations do not meet. Only the rules of
+//! the knowledge base define on which side of a bound a value has to be (MROS's `QAenergy`: above the bound is
+//! an error). Therefore the rules are evaluated on a copy of the engine: the objective is grounded with the
+//! design, and the estimation is asserted as the measured value. The requirement is missed if the objective is
+//! then in error.
 
 use std::collections::BTreeMap;
 
@@ -21,69 +25,74 @@ use crate::error::Error;
 use crate::tomasys::Individual;
 use crate::tomasys::change;
 use crate::tomasys::facts::Facts;
-use crate::tomasys::terms::{self, beside};
+use crate::tomasys::terms::{self, term_for};
 use crate::vocab::tomasys;
 
 /// A design for an objective.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Candidate {
-    /// Which design.
+    /// The design.
     pub design: Individual,
-    /// What it is worth; larger is better.
+    /// Utility; larger is better.
     pub utility: BigRational,
-    /// Why it is ruled out; it is not if there is nothing here.
+    /// Reasons that exclude the design; empty if it can be selected.
     pub rejections: Vec<Rejection>,
-    /// Requirements of the objective that it is estimated to miss.
+    /// Requirements of the objective that its estimations do not meet.
     pub missed: Vec<Missed>,
 }
 
-/// Why a design is ruled out.
+/// A reason that excludes a design.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Rejection {
-    /// The knowledge base says that it cannot be used now.
+    /// The knowledge base concludes or states that the design cannot be used now.
     Unavailable,
-    /// It has failed this objective before.
+    /// The error log contains a failure of the design for this objective.
     Failed,
-    /// A measurement is on the wrong side of its estimation.
+    /// A measurement is on the wrong side of an estimation.
     Violates {
         /// Local name of the attribute type.
         attribute: String,
-        /// What was measured, in the type's unit.
+        /// Measured value, in the unit of the attribute type.
         measured: BigRational,
-        /// The comparison that rules the design out, with the measurement on its left.
+        /// The comparison `measured operator estimation` that excludes the design.
         operator: String,
-        /// What the design is estimated to need or give.
+        /// Estimated value of the design.
         estimation: BigRational,
     },
 }
 
-/// A requirement of an objective that a design is estimated to miss.
+/// A requirement of an objective that an estimation of a design does not meet.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Missed {
     /// Local name of the attribute type.
     pub attribute: String,
-    /// What the design is estimated to need or give, in the type's unit.
+    /// Estimated value of the design, in the unit of the attribute type.
     pub estimation: BigRational,
     /// The bound that the objective requires.
     pub bound: BigRational,
-    /// The status that the rules would conclude of the objective.
+    /// Status of the objective that the rules would conclude.
     pub status: String,
 }
 
 impl Runtime {
-    /// The designs that solve an objective's function, sorted by IRI. What they are worth is their estimation of an attribute type,
-    /// by local name; or else MROS's utility.
+    /// Returns the designs that solve an objective's function, sorted by IRI. Their utility is the estimation
+    /// of the attribute type with the local name `utility_attribute`, or MROS's utility if it is `None`.
     ///
     /// # Errors
-    /// [`Error::Unknown`] where there is no such objective, [`Error::Engine`] where the rules run away.
-    pub fn candidates(&self, objective: &str, worth: Option<&str>) -> Result<Vec<Candidate>, Error> {
+    /// Returns [`Error::Unknown`] if there is no such objective, [`Error::Engine`] if the rules exceed their
+    /// limits.
+    pub fn candidates(
+        &self,
+        objective: &str,
+        utility_attribute: Option<&str>,
+    ) -> Result<Vec<Candidate>, Error> {
         let facts = self.facts();
-        let (symbol, _) = self.all().find("objective", terms::OBJECTIVE, objective)?;
+        let (symbol, _) = self.all_facts().find("objective", terms::OBJECTIVE, objective)?;
         let mut candidates = Vec::new();
         for design in self.designs_of(facts, &facts.objects(symbol, terms::TYPE_F)) {
             let (rejections, missed) = (rejections(facts, design, symbol), self.missed(symbol, design)?);
-            let utility = match worth {
+            let utility = match utility_attribute {
                 None => utility(facts, design),
                 Some(attribute) => self.estimation(design, attribute).unwrap_or_default(),
             };
@@ -92,15 +101,15 @@ impl Runtime {
         Ok(candidates)
     }
 
-    /// The designs that the knowledge base does not rule out, of one function or of all, sorted by IRI. In
-    /// latch mode these are the designs that MROS takes for available; [`Runtime::view`] shows what holds instead.
+    /// Returns the available designs of one function or of all functions, sorted by IRI. In latch mode, these
+    /// are the designs that MROS regards as available; [`Runtime::view`] shows the current conclusions instead.
     ///
     /// # Errors
-    /// [`Error::Unknown`] where there is no such function.
+    /// Returns [`Error::Unknown`] if there is no such function.
     pub fn available_designs(&self, function: Option<&str>) -> Result<Vec<Individual>, Error> {
         let facts = self.facts();
         let functions = match function {
-            Some(name) => vec![self.all().find("function", terms::FUNCTION, name)?.0],
+            Some(name) => vec![self.all_facts().find("function", terms::FUNCTION, name)?.0],
             None => facts.members(terms::FUNCTION),
         };
         let mut designs = self.designs_of(facts, &functions);
@@ -108,7 +117,7 @@ impl Runtime {
         Ok(designs.into_iter().map(|design| self.individual(design)).collect())
     }
 
-    /// The designs that solve any of the functions, sorted by IRI.
+    /// Returns the designs that solve any of the functions, sorted by IRI.
     fn designs_of(&self, facts: Facts, functions: &[Symbol]) -> Vec<Symbol> {
         let mut designs: Vec<Symbol> =
             functions.iter().flat_map(|&function| facts.subjects(function, terms::SOLVES_F)).collect();
@@ -117,7 +126,7 @@ impl Runtime {
         designs
     }
 
-    /// What a design is estimated to give or need of an attribute type, by local name.
+    /// Returns a design's estimation of the attribute type with this local name.
     fn estimation(&self, design: Symbol, attribute: &str) -> Option<BigRational> {
         let facts = self.facts();
         let is_of = |value: &Symbol| {
@@ -128,13 +137,13 @@ impl Runtime {
         values.filter(is_of).find_map(|value| facts.number(value, terms::HAS_VALUE))
     }
 
-    /// The requirements of an objective that a design is estimated to miss, by the rules of the knowledge base.
+    /// Returns the requirements of an objective that a design's estimations do not meet according to the rules.
     fn missed(&self, objective: Symbol, design: Symbol) -> Result<Vec<Missed>, Error> {
         let facts = self.facts();
         let mut required: BTreeMap<Symbol, BigRational> = BTreeMap::new();
         for requirement in facts.objects(objective, terms::HAS_NFR) {
             let kinds = facts.objects(requirement, terms::IS_TYPE).into_iter();
-            // What is compared with measurements of the surroundings has been looked at before.
+            // `rejections` compares the other estimations, with measurements of the environment.
             let kind = kinds.filter(|&kind| facts.texts(kind, terms::OPERATOR).is_empty()).min();
             required.extend(kind.zip(facts.number(requirement, terms::HAS_VALUE)));
         }
@@ -142,15 +151,16 @@ impl Runtime {
         for (kind, bound) in required {
             let attribute = self.individual(kind).name;
             let Some(estimation) = self.estimation(design, &attribute) else { continue };
-            if let Some(status) = self.tried(objective, design, kind, &estimation)? {
+            if let Some(status) = self.hypothetical_status(objective, design, kind, &estimation)? {
                 missed.push(Missed { attribute, estimation, bound, status });
             }
         }
         Ok(missed)
     }
 
-    /// The status of an objective, if it is in error, were it grounded with a design of which this is measured.
-    fn tried(
+    /// Returns the error status that the objective would have if it were grounded with `design` and the
+    /// attribute `kind` were measured as `value`.
+    fn hypothetical_status(
         &self,
         objective: Symbol,
         design: Symbol,
@@ -161,32 +171,36 @@ impl Runtime {
         let name = self.individual(objective).iri;
         let grounding = copy.ground(&name, &self.individual(design).iri)?;
         let Some(grounding) = copy.engine.symbols().find_name(&grounding.iri) else { return Ok(None) };
-        // Measurements so far are of the design before, or of the surroundings, which have been looked at.
+        // Existing measurements belong to the previous design, or to the environment, which `rejections`
+        // considers.
         let delete = copy.statements(grounding, terms::HAS_QA_VALUE);
         copy.apply(Delta { insert: Vec::new(), delete })?;
-        if copy.error_of(&name)?.is_some() {
+        // The error has another cause than this attribute.
+        if copy.error_status(&name)?.is_some() {
             return Ok(None);
         }
-        let class =
-            self.all().find("quality attribute type", terms::ATTRIBUTE_TYPE, &self.individual(kind).iri)?.1;
+        let class = self
+            .all_facts()
+            .find("quality attribute type", terms::ATTRIBUTE_TYPE, &self.individual(kind).iri)?
+            .1;
         let holder = copy.engine.symbols_mut().name(&format!("{}estimated", tomasys::NS));
         let value =
             copy.engine.symbols_mut().literal(rules::Literal::Decimal(rules::Decimal::from_rational(value)));
         let insert = vec![
-            copy.fact(beside(terms::QA_VALUE, class), [holder]),
-            copy.fact(beside(terms::IS_TYPE, class), [holder, kind]),
-            copy.fact(beside(terms::HAS_VALUE, class), [holder, value]),
+            copy.fact(term_for(terms::QA_VALUE, class), [holder]),
+            copy.fact(term_for(terms::IS_TYPE, class), [holder, kind]),
+            copy.fact(term_for(terms::HAS_VALUE, class), [holder, value]),
             copy.fact(terms::HAS_QA_VALUE[0], [grounding, holder]),
         ];
         copy.apply(Delta { insert, delete: Vec::new() })?;
-        copy.error_of(&name)
+        copy.error_status(&name)
     }
 
-    /// The status of an objective at the end of a cycle, if it is in error.
-    fn error_of(&mut self, objective: &str) -> Result<Option<String>, Error> {
+    /// Ends a cycle and returns the error status of an objective.
+    fn error_status(&mut self, objective: &str) -> Result<Option<String>, Error> {
         self.conclude()?;
-        let found = self.objectives().into_iter().find(|own| own.individual.iri == objective);
-        Ok(found.filter(Objective::is_in_error).and_then(|own| own.statuses.into_iter().next()))
+        let objective_state = self.objectives().into_iter().find(|state| state.individual.iri == objective);
+        Ok(objective_state.filter(Objective::is_in_error).and_then(|state| state.statuses.into_iter().next()))
     }
 }
 
@@ -207,7 +221,7 @@ fn rejections(facts: Facts, design: Symbol, objective: Symbol) -> Vec<Rejection>
     rejections
 }
 
-/// What rules a design with this estimation out, if something does.
+/// Returns the reason why an estimation excludes its design, if it does.
 fn violation(facts: Facts, estimation: Symbol) -> Option<Rejection> {
     let &kind = facts.objects(estimation, terms::IS_TYPE).first()?;
     let operator = facts.texts(kind, terms::OPERATOR).pop()?;
@@ -234,7 +248,7 @@ fn utility(facts: Facts, design: Symbol) -> BigRational {
     let estimations = facts.objects(design, terms::HAS_ESTIMATION).into_iter();
     let performances: Vec<Symbol> = estimations.filter(is_performance).collect();
     let estimated = match performances[..] {
-        [only] => facts.number(only, terms::HAS_VALUE),
+        [performance] => facts.number(performance, terms::HAS_VALUE),
         _ => None,
     };
     concluded.or(estimated).unwrap_or_else(|| BigRational::new(1.into(), 1000.into()))

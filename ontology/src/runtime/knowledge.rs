@@ -1,4 +1,4 @@
-//! What is known at run time: an engine, and the reports that change what it knows.
+//! Run-time knowledge: an engine, and the reports that update it.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,34 +12,33 @@ use crate::tomasys::terms::{self, Term};
 use crate::tomasys::{Individual, View};
 use crate::vocab::owl;
 
-/// What becomes of a conclusion whose cause is gone.
+/// Treatment of a conclusion whose cause no longer holds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mode {
-    /// It goes too.
+    /// The conclusion is retracted.
     #[default]
     Retract,
-    /// It stays, as with the MROS reasoner: each [`Runtime::conclude`] turns conclusions into statements, and only
-    /// those count for queries. A design's realisability is forgotten when a component that had failed or recovered
-    /// reports again, a grounding's status with the grounding, an objective's status when it is grounded, and a
-    /// design's error log never.
+    /// The conclusion remains, as in the MROS reasoner. Each [`Runtime::conclude`] turns conclusions into
+    /// assertions, and only assertions count for queries. A design's realisability is removed when a component
+    /// that had failed or recovered reports again, a grounding's status with the grounding, and an objective's
+    /// status when the objective is grounded. A design's error log is never removed.
     Latch,
 }
 
-/// Knowledge at run time.
 #[derive(Clone, Debug)]
 pub struct Runtime {
     pub(super) engine: Engine,
     pub(super) mode: Mode,
-    /// In latch mode, facts that may have become conclusions since the last cycle.
+    /// In latch mode, facts that may have been concluded since the last cycle.
     pub(super) pending: BTreeSet<Fact>,
-    /// Why latched statuses were concluded.
+    /// Derivations of latched facts.
     pub(super) reasons: BTreeMap<Fact, Derivation>,
-    /// Relations that have statements, with their arity.
+    /// Relations with asserted facts, and their arities.
     pub(super) relations: BTreeSet<(Symbol, usize)>,
 }
 
 impl Runtime {
-    /// Takes over an engine.
+    /// Creates a runtime from an engine.
     pub fn new(engine: Engine, mode: Mode) -> Self {
         let facts: Vec<Fact> = engine.facts().collect();
         let relations = facts.iter().map(|fact| (fact.predicate, fact.arguments.len())).collect();
@@ -50,31 +49,31 @@ impl Runtime {
         Self { engine, mode, pending, reasons: BTreeMap::new(), relations }
     }
 
-    /// The engine, to ask for facts and derivations.
+    /// The engine, for queries of facts and derivations.
     pub fn engine(&self) -> &Engine {
         &self.engine
     }
 
-    /// The engine, to intern names; changes of facts go through [`Runtime::apply`].
+    /// The engine, for interning names. Changes of facts must use [`Runtime::apply`].
     pub fn engine_mut(&mut self) -> &mut Engine {
         &mut self.engine
     }
 
-    /// The typed view on everything that holds now.
+    /// The typed view of all facts that hold.
     pub fn view(&self) -> View<'_> {
         View::new(&self.engine)
     }
 
-    /// Changes statements and returns what holds from now on, and what no more.
+    /// Changes assertions. Returns the resulting change of all facts.
     ///
     /// # Errors
-    /// [`Error::Engine`] where the rules run away; nothing has changed then.
+    /// Returns [`Error::Engine`] if the rules exceed their limits; the runtime is then unchanged.
     pub fn apply(&mut self, delta: Delta) -> Result<Delta, Error> {
         self.relations.extend(delta.insert.iter().map(|fact| (fact.predicate, fact.arguments.len())));
         if self.mode == Mode::Retract {
             return Ok(self.engine.apply(delta)?);
         }
-        // A statement that is taken back may still be a conclusion.
+        // A retracted assertion may still be a conclusion.
         let deleted = delta.delete.clone();
         let net = self.engine.apply(delta)?;
         for fact in &deleted {
@@ -84,10 +83,10 @@ impl Runtime {
         Ok(net)
     }
 
-    /// Changes statements and rules in one step, as [`crate::Stated::change`] has them.
+    /// Changes assertions and rules in one step; see [`crate::Stated::change`].
     ///
     /// # Errors
-    /// As [`Engine::change`]; nothing has changed then.
+    /// Returns the errors of [`Engine::change`]; the engine is then unchanged.
     pub fn revise(&mut self, delta: Delta, program: Option<Program>) -> Result<Delta, rules::Errors> {
         self.relations.extend(delta.insert.iter().map(|fact| (fact.predicate, fact.arguments.len())));
         let deleted = delta.delete.clone();
@@ -104,11 +103,11 @@ impl Runtime {
         Ok(net)
     }
 
-    /// Ends a cycle: returns what contradicts itself and, in latch mode and if nothing does, turns what was concluded
-    /// into statements. The MROS reasoner adapts nothing while there is a contradiction.
+    /// Ends a cycle. Returns the violations. In latch mode without violations, turns conclusions into
+    /// assertions. The MROS reasoner does not adapt while there are violations.
     ///
     /// # Errors
-    /// As [`Runtime::apply`].
+    /// Returns the errors of [`Runtime::apply`].
     pub fn conclude(&mut self) -> Result<Vec<Violation>, Error> {
         let violations = self.engine.violations();
         if self.mode == Mode::Latch && violations.is_empty() {
@@ -123,57 +122,58 @@ impl Runtime {
         Ok(violations)
     }
 
-    /// Whether a fact is a conclusion about individuals, as a reasoner writes it back.
+    /// Returns `true` if a fact is a conclusion about individuals that a reasoner stores.
     fn is_latched(&self, fact: &Fact) -> bool {
         let name = self.engine.symbols().value(fact.predicate).as_name().unwrap_or_default();
-        let written = !name.starts_with(INTERNAL) && ![owl::SAME_AS, owl::DIFFERENT_FROM].contains(&name);
-        written && self.engine.holds(fact) && !self.engine.is_asserted(fact)
+        let is_stored = !name.starts_with(INTERNAL) && ![owl::SAME_AS, owl::DIFFERENT_FROM].contains(&name);
+        is_stored && self.engine.holds(fact) && !self.engine.is_asserted(fact)
     }
 
-    /// A component has a status from now on.
+    /// Sets the status of a component.
     ///
     /// # Errors
-    /// [`Error::Unknown`] where the knowledge base has no such component; [`Error::Engine`].
+    /// Returns [`Error::Unknown`] if the knowledge base has no such component, or [`Error::Engine`].
     pub fn report_component(&mut self, component: &str, status: Status) -> Result<Delta, Error> {
         let delta = change::component_status(&mut self.engine, component, status)?;
         self.report(component, delta)
     }
 
-    /// As [`Runtime::report_component`], with the status in the reporter's spelling.
+    /// Sets the status of a component in the reporter's spelling; see [`Runtime::report_component`].
     ///
     /// # Errors
-    /// As [`Runtime::report_component`].
+    /// Returns the errors of [`Runtime::report_component`].
     pub fn report_component_as(&mut self, component: &str, status: Literal) -> Result<Delta, Error> {
         let delta = change::component_report(&mut self.engine, component, status)?;
         self.report(component, delta)
     }
 
-    /// A component has no known status from now on.
+    /// Removes the status of a component.
     ///
     /// # Errors
-    /// As [`Runtime::report_component`].
+    /// Returns the errors of [`Runtime::report_component`].
     pub fn clear_component(&mut self, component: &str) -> Result<Delta, Error> {
         let delta = change::clear_component_status(&mut self.engine, component)?;
         self.report(component, delta)
     }
 
-    /// Applies a component's report; in latch mode designs get another chance if it had failed or recovered before.
+    /// Applies a component's report. In latch mode, removes the realisability of all designs if the component
+    /// had failed or recovered.
     fn report(&mut self, component: &str, mut delta: Delta) -> Result<Delta, Error> {
         let facts = self.facts();
-        let (component, _) = self.all().find("component", terms::COMPONENT, component)?;
-        let known = |status: &String| change::is_failed(status) || change::is_recovered(status);
-        if self.mode == Mode::Latch && facts.texts(component, terms::STATUS).iter().any(known) {
-            for design in self.all().members(terms::FUNCTION_DESIGN) {
+        let (component, _) = self.all_facts().find("component", terms::COMPONENT, component)?;
+        let is_fault_status = |status: &String| change::is_failed(status) || change::is_recovered(status);
+        if self.mode == Mode::Latch && facts.texts(component, terms::STATUS).iter().any(is_fault_status) {
+            for design in self.all_facts().members(terms::FUNCTION_DESIGN) {
                 delta.delete.extend(self.statements(design, terms::REALISABILITY));
             }
         }
         self.apply(delta)
     }
 
-    /// An attribute was measured.
+    /// Reports the measured value of an attribute.
     ///
     /// # Errors
-    /// [`Error::Unknown`] where the knowledge base has no such attribute type, [`Error::NotANumber`],
+    /// Returns [`Error::Unknown`] if the knowledge base has no such attribute type, [`Error::NotANumber`] or
     /// [`Error::Engine`].
     pub fn measure(&mut self, attribute: &str, value: Literal) -> Result<Delta, Error> {
         if value.as_rational().is_none() {
@@ -183,13 +183,13 @@ impl Runtime {
         self.apply(delta)
     }
 
-    /// What counts for queries: in latch mode what is stated, otherwise all that holds.
+    /// The facts that count for queries: assertions in latch mode, otherwise all facts that hold.
     pub(super) fn facts(&self) -> Facts<'_> {
         Facts::stated(&self.engine, self.mode == Mode::Latch)
     }
 
-    /// Everything that holds.
-    pub(super) fn all(&self) -> Facts<'_> {
+    /// All facts that hold.
+    pub(super) fn all_facts(&self) -> Facts<'_> {
         Facts::new(&self.engine)
     }
 
@@ -197,26 +197,26 @@ impl Runtime {
         Individual::new(self.facts().name(symbol).unwrap_or_default())
     }
 
-    /// The stated values of a property, as facts.
+    /// Returns the assertions of a property's values.
     pub(super) fn statements(&self, subject: Symbol, property: Term) -> Vec<Fact> {
-        let mut found = Vec::new();
+        let mut facts = Vec::new();
         for predicate in property.iter().filter_map(|name| self.engine.symbols().find_name(name)) {
-            found.extend(change::replace(&self.engine, predicate, subject, None).delete);
+            facts.extend(change::replace(&self.engine, predicate, subject, None).delete);
         }
-        found
+        facts
     }
 
-    /// All statements that mention an individual.
+    /// Returns all assertions that mention an individual.
     pub(super) fn mentions(&self, individual: Symbol) -> Vec<Fact> {
-        let mut found = Vec::new();
+        let mut mentions = Vec::new();
         for &(predicate, arity) in &self.relations {
-            for place in 0..arity {
-                let pattern: Vec<_> = (0..arity).map(|i| (i == place).then_some(individual)).collect();
+            for column in 0..arity {
+                let pattern: Vec<_> = (0..arity).map(|i| (i == column).then_some(individual)).collect();
                 let rows = self.engine.matching(predicate, &pattern);
                 let facts = rows.map(|row| Fact::new(predicate, row.iter().copied()));
-                found.extend(facts.filter(|fact| self.engine.is_asserted(fact)));
+                mentions.extend(facts.filter(|fact| self.engine.is_asserted(fact)));
             }
         }
-        found
+        mentions
     }
 }

@@ -1,14 +1,16 @@
-//! An engine and what a robot reports to it at run time: the working knowledge of the MROS reasoner \[1\].
+//! An engine with the reports of a robot at run time: the knowledge of the MROS reasoner \[1\].
 //!
-//! A [`Runtime`] takes reports (component statuses, measurements, objectives, groundings) as updates of its engine
-//! and answers what an adaptation loop asks: which objectives are in error and why, which designs are available, which
-//! of them is best. A value of a functional property is replaced within one update, so no rule ever sees two.
+//! A [`Runtime`] applies reports (component statuses, measurements, objectives, groundings) to its engine. It
+//! answers the queries of an adaptation loop: objectives in error with reasons, available designs, and their
+//! utility. The value of a functional property is replaced in one update, so that no rule is evaluated with two
+//! values.
 //!
-//! What was concluded goes when its cause goes ([`Mode::Retract`]). MROS instead writes conclusions back as statements
-//! once a cycle, so they stay until grounding or a component's report takes them away; [`Mode::Latch`] does the same,
-//! for those who want to compare or to migrate.
+//! A conclusion is retracted with its cause ([`Mode::Retract`]). MROS instead stores conclusions as statements
+//! once per cycle, so that they remain until grounding or a component's report removes them. [`Mode::Latch`]
+//! reproduces this, for comparison and migration.
 //!
-//! - \[1\] Bozhinoski et al., MROS: Runtime Adaptation For Robot Control Architectures, Advanced Robotics 36, 2022.
+//! - \[1\] Bozhinoski et al., MROS: Runtime Adaptation For Robot Control Architectures, Advanced Robotics 36,
+//!   2022.
 
 mod builder;
 mod candidates;

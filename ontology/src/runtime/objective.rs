@@ -1,4 +1,4 @@
-//! Objectives and groundings come and go: each as one update.
+//! Adds, removes and grounds objectives, each as one update.
 
 use rules::{Delta, Fact, Literal, Symbol};
 
@@ -6,48 +6,48 @@ use super::knowledge::{Mode, Runtime};
 use crate::error::Error;
 use crate::tomasys::Individual;
 use crate::tomasys::change::{self, is_recovered};
-use crate::tomasys::terms::{self, beside};
+use crate::tomasys::terms::{self, term_for};
 use crate::vocab::{local_name, tomasys};
 
-/// The status of an objective that no design has been chosen for.
+/// Status of an objective without a selected design.
 const UNGROUNDED: &str = "UNGROUNDED";
 
-/// An objective to pursue.
+/// An objective to add.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NewObjective<'a> {
-    /// Its IRI, or a name in the namespace of TOMASys as MROS makes it.
+    /// IRI, or a name in the namespace of TOMASys, as in MROS.
     pub name: &'a str,
-    /// The function to provide, by IRI or local name.
+    /// IRI or local name of the function to provide.
     pub function: &'a str,
-    /// Non-functional requirements: an attribute type, by IRI or local name, and a bound in its unit.
+    /// Non-functional requirements: IRI or local name of an attribute type, and a bound in its unit.
     pub requirements: Vec<(&'a str, Literal)>,
-    /// Whether to look for a better design also while all is well.
+    /// `true` if a better design is searched even without a problem.
     pub always_improve: bool,
 }
 
 impl Runtime {
-    /// Begins to pursue an objective; it is ungrounded at first.
+    /// Adds an objective, which is ungrounded at first.
     ///
     /// # Errors
-    /// [`Error::Unknown`] for a function or attribute type that is not in the knowledge base, [`Error::Exists`],
-    /// [`Error::BadName`], [`Error::Engine`].
+    /// Returns [`Error::Unknown`] for an unknown function or attribute type, [`Error::Exists`],
+    /// [`Error::BadName`] or [`Error::Engine`].
     pub fn add_objective(&mut self, objective: &NewObjective) -> Result<Delta, Error> {
-        let (function, _) = self.all().find("function", terms::FUNCTION, objective.function)?;
-        if self.all().find("objective", terms::OBJECTIVE, objective.name).is_ok() {
+        let (function, _) = self.all_facts().find("function", terms::FUNCTION, objective.function)?;
+        if self.all_facts().find("objective", terms::OBJECTIVE, objective.name).is_ok() {
             return Err(Error::Exists { name: objective.name.to_owned() });
         }
         let name = iri_of(objective.name)?;
         let mut insert = Vec::new();
         for (attribute, bound) in &objective.requirements {
             let (kind, class) =
-                self.all().find("quality attribute type", terms::ATTRIBUTE_TYPE, attribute)?;
+                self.all_facts().find("quality attribute type", terms::ATTRIBUTE_TYPE, attribute)?;
             let requirement = format!("{name}_nfr_{}", local_name(attribute));
             let requirement = self.engine.symbols_mut().name(&requirement);
             let bound = self.engine.symbols_mut().literal(bound.clone());
             insert.extend([
-                self.fact(beside(terms::QA_VALUE, class), [requirement]),
-                self.fact(beside(terms::IS_TYPE, class), [requirement, kind]),
-                self.fact(beside(terms::HAS_VALUE, class), [requirement, bound]),
+                self.fact(term_for(terms::QA_VALUE, class), [requirement]),
+                self.fact(term_for(terms::IS_TYPE, class), [requirement, kind]),
+                self.fact(term_for(terms::HAS_VALUE, class), [requirement, bound]),
             ]);
             let subject = self.engine.symbols_mut().name(&name);
             insert.push(self.fact(terms::HAS_NFR[0], [subject, requirement]));
@@ -66,52 +66,53 @@ impl Runtime {
         self.apply(Delta { insert, delete: Vec::new() })
     }
 
-    /// Gives an objective up, with its requirements and its grounding.
+    /// Removes an objective with its requirements and groundings.
     ///
     /// # Errors
-    /// [`Error::Unknown`], [`Error::Engine`].
+    /// Returns [`Error::Unknown`] or [`Error::Engine`].
     pub fn remove_objective(&mut self, objective: &str) -> Result<Delta, Error> {
-        let (objective, _) = self.all().find("objective", terms::OBJECTIVE, objective)?;
+        let (objective, _) = self.all_facts().find("objective", terms::OBJECTIVE, objective)?;
         let facts = self.facts();
-        let mut gone = facts.objects(objective, terms::HAS_NFR);
-        gone.extend(facts.subjects(objective, terms::SOLVES_O));
-        gone.push(objective);
-        let delete = gone.into_iter().flat_map(|individual| self.mentions(individual)).collect();
+        let mut removed = facts.objects(objective, terms::HAS_NFR);
+        removed.extend(facts.subjects(objective, terms::SOLVES_O));
+        removed.push(objective);
+        let delete = removed.into_iter().flat_map(|individual| self.mentions(individual)).collect();
         self.apply(Delta { insert: Vec::new(), delete })
     }
 
-    /// A design provides an objective's function from now on, in place of any other. The objective's status is
-    /// forgotten. In retract mode the grounding sees what has been measured so far and recoveries count as noted; in
-    /// latch mode, as with MROS, it sees measurements from the next one on.
+    /// Grounds an objective: the design replaces any other design, and the objective's status is removed. In
+    /// retract mode, existing measurements are linked to the grounding, and recoveries count as noted. In latch
+    /// mode, as in MROS, only later measurements are linked.
     ///
     /// # Errors
-    /// [`Error::Unknown`], [`Error::Engine`].
+    /// Returns [`Error::Unknown`] or [`Error::Engine`].
     pub fn ground(&mut self, objective: &str, design: &str) -> Result<Individual, Error> {
-        let (found, _) = self.all().find("objective", terms::OBJECTIVE, objective)?;
-        let noted = self.mode == Mode::Retract && self.facts().is_true(found, terms::UPDATABLE);
-        let recoveries = if noted { self.recoveries() } else { Vec::new() };
-        self.ground_and_forget(objective, design, recoveries).map(|(grounding, _)| grounding)
+        let (symbol, _) = self.all_facts().find("objective", terms::OBJECTIVE, objective)?;
+        let is_updatable = self.mode == Mode::Retract && self.facts().is_true(symbol, terms::UPDATABLE);
+        let recoveries = if is_updatable { self.recoveries() } else { Vec::new() };
+        self.ground_and_withdraw(objective, design, recoveries).map(|(grounding, _)| grounding)
     }
 
-    /// As [`Runtime::ground`], and what components have reported stays as it is, recoveries among it; returns what holds
-    /// since, and what no more.
+    /// Grounds an objective like [`Runtime::ground`], but keeps all reports of components, including
+    /// recoveries. Returns the change of all facts.
     ///
     /// # Errors
-    /// [`Error::Unknown`], [`Error::Engine`].
+    /// Returns [`Error::Unknown`] or [`Error::Engine`].
     pub fn assign(&mut self, objective: &str, design: &str) -> Result<Delta, Error> {
-        self.ground_and_forget(objective, design, Vec::new()).map(|(_, delta)| delta)
+        self.ground_and_withdraw(objective, design, Vec::new()).map(|(_, delta)| delta)
     }
 
-    fn ground_and_forget(
+    /// Grounds an objective and deletes the facts `withdrawn` in the same update.
+    fn ground_and_withdraw(
         &mut self,
         objective: &str,
         design: &str,
-        forgotten: Vec<Fact>,
+        withdrawn: Vec<Fact>,
     ) -> Result<(Individual, Delta), Error> {
-        let (objective, _) = self.all().find("objective", terms::OBJECTIVE, objective)?;
-        let (design, _) = self.all().find("function design", terms::FUNCTION_DESIGN, design)?;
+        let (objective, _) = self.all_facts().find("objective", terms::OBJECTIVE, objective)?;
+        let (design, _) = self.all_facts().find("function design", terms::FUNCTION_DESIGN, design)?;
         let mut delete = self.release(objective);
-        delete.extend(forgotten);
+        delete.extend(withdrawn);
         let iri = self.grounding_name(objective, design);
         let measurements = self.measurements(design);
         let grounding = self.engine.symbols_mut().name(&iri);
@@ -127,55 +128,56 @@ impl Runtime {
         Ok((Individual::new(&iri), delta))
     }
 
-    /// No design provides an objective's function from now on.
+    /// Removes the groundings of an objective, which becomes ungrounded.
     ///
     /// # Errors
-    /// [`Error::Unknown`], [`Error::Engine`].
+    /// Returns [`Error::Unknown`] or [`Error::Engine`].
     pub fn unground(&mut self, objective: &str) -> Result<Delta, Error> {
-        let (objective, _) = self.all().find("objective", terms::OBJECTIVE, objective)?;
+        let (objective, _) = self.all_facts().find("objective", terms::OBJECTIVE, objective)?;
         let delete = self.release(objective);
         let status = self.engine.symbols_mut().literal(Literal::string(UNGROUNDED));
         let insert = vec![self.fact(terms::OBJECTIVE_STATUS[0], [objective, status])];
         self.apply(Delta { insert, delete })
     }
 
-    /// Components that report their recovery count as working from now on: the loop has seen that objectives are
-    /// updatable. MROS does this before it plans for an updatable objective.
+    /// Changes components that report their recovery to working, because the loop has noticed that objectives
+    /// are updatable. MROS does this before it plans for an updatable objective.
     ///
     /// # Errors
-    /// [`Error::Engine`].
+    /// Returns [`Error::Engine`].
     pub fn note_recoveries(&mut self) -> Result<Delta, Error> {
         let delete = self.recoveries();
         self.apply(Delta { insert: Vec::new(), delete })
     }
 
-    /// What was measured of the design before does not count for the one that an objective is grounded with now, until it is measured
-    /// again. Measurements of the surroundings count: those of attribute types with a `qa_comparison_operator`.
+    /// Unlinks measurements of the previous design's performance from the grounding of an objective, until they
+    /// are reported again. Measurements of the environment, whose attribute types have a
+    /// `qa_comparison_operator`, remain.
     ///
     /// # Errors
-    /// [`Error::Unknown`], [`Error::Engine`].
+    /// Returns [`Error::Unknown`] or [`Error::Engine`].
     pub fn forget_performance(&mut self, objective: &str) -> Result<Delta, Error> {
-        let (objective, _) = self.all().find("objective", terms::OBJECTIVE, objective)?;
-        let facts = self.all();
-        let is_of_surroundings = |&holder: &Symbol| {
+        let (objective, _) = self.all_facts().find("objective", terms::OBJECTIVE, objective)?;
+        let facts = self.all_facts();
+        let is_environmental = |&holder: &Symbol| {
             let mut kinds = facts.objects(holder, terms::IS_TYPE).into_iter();
             kinds.any(|kind| !facts.texts(kind, terms::OPERATOR).is_empty())
         };
         let groundings = facts.subjects(objective, terms::SOLVES_O).into_iter();
         let links = groundings.flat_map(|grounding| self.statements(grounding, terms::HAS_QA_VALUE));
-        let is_stale = |fact: &Fact| fact.arguments.get(1).is_some_and(|holder| !is_of_surroundings(holder));
+        let is_stale = |fact: &Fact| fact.arguments.get(1).is_some_and(|holder| !is_environmental(holder));
         let delete = links.filter(is_stale).collect();
         self.apply(Delta { insert: Vec::new(), delete })
     }
 
-    /// States which designs have failed an objective, so that this is known when its status is forgotten. MROS keeps that for ever;
-    /// here it goes with the objective.
+    /// Asserts the concluded failures of designs for an objective, so that they remain when its status is
+    /// removed. MROS keeps them indefinitely; here they are removed with the objective.
     ///
     /// # Errors
-    /// [`Error::Unknown`], [`Error::Engine`].
+    /// Returns [`Error::Unknown`] or [`Error::Engine`].
     pub fn log_failures(&mut self, objective: &str) -> Result<Delta, Error> {
-        let (objective, _) = self.all().find("objective", terms::OBJECTIVE, objective)?;
-        let facts = self.all();
+        let (objective, _) = self.all_facts().find("objective", terms::OBJECTIVE, objective)?;
+        let facts = self.all_facts();
         let symbols = self.engine.symbols();
         let predicates = terms::ERROR_LOG.iter().filter_map(|name| symbols.find_name(name));
         let rows = predicates.flat_map(|predicate| {
@@ -186,7 +188,7 @@ impl Runtime {
         self.apply(Delta { insert, delete: Vec::new() })
     }
 
-    /// The statements that components have recovered.
+    /// Returns the assertions that components have recovered.
     fn recoveries(&self) -> Vec<Fact> {
         let facts = self.facts();
         let recovered =
@@ -195,7 +197,7 @@ impl Runtime {
         components.flat_map(|component| self.statements(component, terms::STATUS)).collect()
     }
 
-    /// What goes when an objective is grounded anew: its groundings and its status.
+    /// Returns the facts to delete before a new grounding: the groundings and the status of the objective.
     fn release(&self, objective: Symbol) -> Vec<Fact> {
         let groundings = self.facts().subjects(objective, terms::SOLVES_O).into_iter();
         let mut delete: Vec<Fact> = groundings.flat_map(|grounding| self.mentions(grounding)).collect();
@@ -204,7 +206,8 @@ impl Runtime {
         delete
     }
 
-    /// What holds measurements of the attributes that a design has estimations of; none in latch mode.
+    /// Returns the individuals that hold measurements of the attributes in a design's estimations; empty in
+    /// latch mode.
     fn measurements(&self, design: Symbol) -> Vec<Symbol> {
         if self.mode == Mode::Latch {
             return Vec::new();
@@ -215,16 +218,17 @@ impl Runtime {
         kinds.flat_map(|kind| change::holders(facts, kind)).collect()
     }
 
-    /// `fg_<design>`, and the objective's name too where another objective has a grounding of that name.
+    /// Returns `fg_<design>`, with the objective's name as a suffix if another objective has a grounding with
+    /// this name.
     fn grounding_name(&self, objective: Symbol, design: Symbol) -> String {
         let facts = self.facts();
         let (design, owner) = (self.individual(design).name, self.individual(objective).name);
         let design = design.strip_prefix("fd_").unwrap_or(&design);
         let name = format!("{}fg_{design}", tomasys::NS);
-        let taken = self.engine.symbols().find_name(&name).is_some_and(|grounding| {
+        let is_taken = self.engine.symbols().find_name(&name).is_some_and(|grounding| {
             facts.objects(grounding, terms::SOLVES_O).iter().any(|&other| other != objective)
         });
-        if taken { format!("{name}_{owner}") } else { name }
+        if is_taken { format!("{name}_{owner}") } else { name }
     }
 
     pub(super) fn fact<const N: usize>(&mut self, predicate: &str, arguments: [Symbol; N]) -> Fact {
@@ -232,7 +236,7 @@ impl Runtime {
     }
 }
 
-/// The IRI of a new individual.
+/// Builds the IRI of a new individual. The error is O107.
 fn iri_of(name: &str) -> Result<String, Error> {
     let forbidden = |c: &char| c.is_whitespace() || c.is_control() || "<>\"{}|\\^`".contains(*c);
     match name.chars().find(forbidden) {

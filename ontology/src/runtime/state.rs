@@ -1,4 +1,4 @@
-//! What an adaptation loop asks: objectives with their status and why, groundings, components.
+//! Queries of an adaptation loop: objectives, their statuses with reasons, and groundings.
 
 use rules::{Derivation, Fact, Literal, Symbol};
 
@@ -8,35 +8,35 @@ use crate::tomasys::Individual;
 use crate::tomasys::facts::Facts;
 use crate::tomasys::terms::{self, Term};
 
-/// Statuses that call for another design: those of MROS, and of Metacontrol before it.
+/// Statuses that require another design, in MROS and its predecessor Metacontrol.
 const ERRORS: [&str; 6] =
     ["IN_ERROR_COMPONENT", "IN_ERROR_FR", "IN_ERROR_NFR", "INTERNAL_ERROR", "EXTERNAL_ERROR", "UPDATABLE"];
 
-/// An objective and how it fares.
+/// An objective and its state.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Objective {
-    /// Which objective.
+    /// The objective.
     pub individual: Individual,
     /// The function to provide, if one is stated.
     pub function: Option<Individual>,
-    /// `UNGROUNDED`, `IN_ERROR_COMPONENT` and so on, as the rules say; none while all is well. Two statuses contradict
-    /// each other.
+    /// Statuses that the rules conclude (`UNGROUNDED`, `IN_ERROR_COMPONENT`, …); empty if there is no problem.
+    /// Two statuses are a contradiction.
     pub statuses: Vec<String>,
-    /// Whether a component has recovered, so that a better design may be available.
+    /// `true` if a component has recovered, so that a better design may be available.
     pub updatable: bool,
-    /// Whether to look for a better design also while all is well.
+    /// `true` if a better design is searched even without a problem.
     pub always_improve: bool,
-    /// What provides the function now.
+    /// Designs that currently provide the function.
     pub groundings: Vec<Grounding>,
 }
 
 impl Objective {
-    /// Whether its status says that something is wrong.
+    /// Returns `true` if a status is an error.
     pub fn is_in_error(&self) -> bool {
         self.statuses.iter().any(|status| ERRORS.contains(&status.as_str()))
     }
 
-    /// Whether a design should be selected for it now.
+    /// Returns `true` if a design should be selected now.
     pub fn wants_design(&self) -> bool {
         self.is_in_error()
             || self.updatable
@@ -48,13 +48,13 @@ impl Objective {
 /// A design in use for an objective.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Grounding {
-    /// Which grounding.
+    /// The grounding.
     pub individual: Individual,
     /// The design.
     pub design: Option<Individual>,
-    /// Its status, as the rules say; none while all is well.
+    /// Statuses that the rules conclude; empty if there is no problem.
     pub statuses: Vec<String>,
-    /// What was measured of it since: the holder of the value, and the value.
+    /// Measurements since the grounding: the individual that holds the value, and the value.
     pub measurements: Vec<(Individual, Option<Literal>)>,
 }
 
@@ -68,15 +68,15 @@ impl Runtime {
         objectives
     }
 
-    /// Why an objective has its status, or is updatable: one derivation for each.
+    /// Returns one derivation for each status of an objective, and for its being updatable.
     ///
     /// # Errors
-    /// [`Error::Unknown`] where there is no such objective.
+    /// Returns [`Error::Unknown`] if there is no such objective.
     pub fn why(&self, objective: &str) -> Result<Vec<Derivation>, Error> {
-        let (objective, _) = self.all().find("objective", terms::OBJECTIVE, objective)?;
+        let (objective, _) = self.all_facts().find("objective", terms::OBJECTIVE, objective)?;
         let mut derivations = Vec::new();
         for property in [terms::OBJECTIVE_STATUS, terms::UPDATABLE] {
-            for fact in self.known(objective, property) {
+            for fact in self.property_facts(objective, property) {
                 let latched = self.reasons.get(&fact).cloned();
                 derivations.extend(latched.or_else(|| self.engine.why(&fact)));
             }
@@ -84,8 +84,8 @@ impl Runtime {
         Ok(derivations)
     }
 
-    /// The facts that say the values of a property, as far as they count.
-    fn known(&self, subject: Symbol, property: Term) -> Vec<Fact> {
+    /// The facts with the values of a property that the current [`Mode`](super::Mode) takes into account.
+    fn property_facts(&self, subject: Symbol, property: Term) -> Vec<Fact> {
         let values = self.facts().objects(subject, property);
         let symbols = self.engine.symbols();
         let predicates = property.iter().filter_map(|name| symbols.find_name(name));

@@ -1,27 +1,28 @@
-//! What the robot reports, as updates of an engine.
+//! Translates reports of the robot to updates of an engine.
 //!
-//! A functional value is replaced in one [`Delta`], so that no engine ever sees two of them. Retraction does the
-//! rest: a status that was concluded from the old value goes with it.
+//! The value of a functional property is replaced in one [`Delta`], so that no engine evaluates rules with two
+//! values. Conclusions from the old value are retracted with it.
 
 use rules::{Atom, BuiltIn, Delta, Engine, Fact, Literal, Symbol, Symbols, Term as Argument};
 
 use super::facts::Facts;
-use super::terms::{self, beside};
+use super::terms::{self, term_for};
 use crate::error::Error;
 use crate::vocab::local_name;
 
-/// How a component is.
+/// State of a component.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
-    /// Out of order.
+    /// The component does not work.
     Failed,
-    /// In order again after a failure.
+    /// The component works again after a failure.
     Recovered,
-    /// In order.
+    /// The component works.
     Working,
 }
 
-/// How the vocabularies in real use write a status: strings in MROS, other strings in PLANTA, booleans before that.
+/// Spellings of a status in the vocabularies in use: strings in MROS, other strings in PLANTA, booleans in
+/// older ones.
 fn spellings(status: Status) -> Vec<Literal> {
     let (mros, planta, truth) = match status {
         Status::Failed => ("FALSE", "ERROR", false),
@@ -31,13 +32,13 @@ fn spellings(status: Status) -> Vec<Literal> {
     vec![Literal::string(mros), Literal::string(planta), Literal::Boolean(truth)]
 }
 
-/// Whether a status in any spelling says that a component is out of order.
+/// Returns `true` if a status in any spelling is a failure.
 pub(crate) fn is_failed(status: &str) -> bool {
     spells(Status::Failed, status)
 }
 
-/// Whether a status says that a component is in order after a failure. Vocabularies without a word for that say only
-/// that it is in order, which is not meant here.
+/// Returns `true` if a status is a recovery. Vocabularies without a term for recovery use the status of a
+/// working component, which does not count.
 pub(crate) fn is_recovered(status: &str) -> bool {
     spells(Status::Recovered, status) && !spells(Status::Working, status)
 }
@@ -46,14 +47,14 @@ fn spells(status: Status, text: &str) -> bool {
     spellings(status).iter().any(|literal| literal.lexical() == text)
 }
 
-/// The update that gives a component a status, in place of any it was said to have. The component is named by its
-/// IRI or local name; the status is spelled as the knowledge base's range of the status property asks.
+/// Builds the update that sets the status of a component, given by its IRI or local name. The status gets the
+/// spelling that the constraints of the knowledge base allow.
 ///
 /// # Errors
-/// [`Error::Unknown`] where the knowledge base has no such component.
+/// Returns [`Error::Unknown`] if the knowledge base has no such component.
 pub fn component_status(engine: &mut Engine, component: &str, status: Status) -> Result<Delta, Error> {
     let (subject, class) = Facts::new(engine).find("component", terms::COMPONENT, component)?;
-    let property = engine.symbols_mut().name(beside(terms::STATUS, class));
+    let property = engine.symbols_mut().name(term_for(terms::STATUS, class));
     let spellings: Vec<Symbol> =
         spellings(status).into_iter().map(|literal| engine.symbols_mut().literal(literal)).collect();
     let fitting = spellings.iter().copied().find(|&value| allows(engine, property, value));
@@ -61,47 +62,50 @@ pub fn component_status(engine: &mut Engine, component: &str, status: Status) ->
     Ok(replace(engine, property, subject, Some(value)))
 }
 
-/// As [`component_status`], with the status as someone else spells it; whether the knowledge base allows it is not
-/// looked at, so that a wrong spelling is a contradiction.
+/// Builds the update that sets the status of a component in a given spelling. The spelling is not checked, so
+/// that a wrong one violates a constraint of the knowledge base.
 ///
 /// # Errors
-/// As [`component_status`].
+/// Returns the errors of [`component_status`].
 pub fn component_report(engine: &mut Engine, component: &str, status: Literal) -> Result<Delta, Error> {
     let (subject, class) = Facts::new(engine).find("component", terms::COMPONENT, component)?;
-    let property = engine.symbols_mut().name(beside(terms::STATUS, class));
+    let property = engine.symbols_mut().name(term_for(terms::STATUS, class));
     let value = engine.symbols_mut().literal(status);
     Ok(replace(engine, property, subject, Some(value)))
 }
 
-/// The update that takes away what was said of a component's status.
+/// Builds the update that removes the status of a component.
 ///
 /// # Errors
-/// [`Error::Unknown`] where the knowledge base has no such component.
+/// Returns [`Error::Unknown`] if the knowledge base has no such component.
 pub fn clear_component_status(engine: &mut Engine, component: &str) -> Result<Delta, Error> {
     let (subject, class) = Facts::new(engine).find("component", terms::COMPONENT, component)?;
-    let property = engine.symbols_mut().name(beside(terms::STATUS, class));
+    let property = engine.symbols_mut().name(term_for(terms::STATUS, class));
     Ok(replace(engine, property, subject, None))
 }
 
-/// The update after which a function design, named by its IRI or local name, is said not to be realisable whatever its components and
-/// measurements are like, or after which nobody says so any more.
+/// Builds the update that states that a function design, given by its IRI or local name, is not realisable,
+/// whatever the states of its components and the measurements are. If `realisable`, the update removes this
+/// statement.
 ///
 /// # Errors
-/// [`Error::Unknown`] where the knowledge base has no such design.
+/// Returns [`Error::Unknown`] if the knowledge base has no such design.
 pub fn design_realisable(engine: &mut Engine, design: &str, realisable: bool) -> Result<Delta, Error> {
     let (subject, class) = Facts::new(engine).find("function design", terms::FUNCTION_DESIGN, design)?;
-    let property = engine.symbols_mut().name(beside(terms::REALISABILITY, class));
+    let property = engine.symbols_mut().name(term_for(terms::REALISABILITY, class));
     let value = (!realisable).then(|| engine.symbols_mut().literal(Literal::Boolean(false)));
     Ok(replace(engine, property, subject, value))
 }
 
-/// The update that sets the measured value of a quality attribute, named by the IRI or local name of its type.
+/// Builds the update that sets the measured value of a quality attribute, given by the IRI or local name of its
+/// type.
 ///
-/// Where nothing holds measurements of that type yet, an individual `obs_<type>` is made. Groundings whose design has
-/// an estimation of the type are linked to what holds the measurement, as the rules of MROS expect.
+/// If no individual holds measurements of this type, the update adds an individual `obs_<type>`. Groundings
+/// whose design has an estimation of the type are linked to the individuals that hold the measurement, as
+/// required by the rules of MROS.
 ///
 /// # Errors
-/// [`Error::Unknown`] where the knowledge base has no such attribute type.
+/// Returns [`Error::Unknown`] if the knowledge base has no such attribute type.
 pub fn measured_value(engine: &mut Engine, attribute: &str, value: Literal) -> Result<Delta, Error> {
     let facts = Facts::new(engine);
     let (kind, class) = facts.find("quality attribute type", terms::ATTRIBUTE_TYPE, attribute)?;
@@ -117,7 +121,7 @@ pub fn measured_value(engine: &mut Engine, attribute: &str, value: Literal) -> R
         holders.push(holder);
     }
     let symbols = engine.symbols_mut();
-    let property = symbols.name(beside(terms::HAS_VALUE, class));
+    let property = symbols.name(term_for(terms::HAS_VALUE, class));
     let (link, value) = (symbols.name(terms::HAS_QA_VALUE[0]), symbols.literal(value));
     for holder in holders {
         delta.insert.extend(groundings.iter().map(|&grounding| Fact::new(link, [grounding, holder])));
@@ -128,25 +132,26 @@ pub fn measured_value(engine: &mut Engine, attribute: &str, value: Literal) -> R
     Ok(delta)
 }
 
-/// The update that withdraws the measured value of a quality attribute, named by the IRI or local name of its type.
+/// Builds the update that removes the measured value of a quality attribute, given by the IRI or local name of
+/// its type.
 ///
 /// # Errors
-/// As [`measured_value`].
+/// Returns the errors of [`measured_value`].
 pub fn unmeasured(engine: &mut Engine, attribute: &str) -> Result<Delta, Error> {
     let facts = Facts::new(engine);
     let (kind, class) = facts.find("quality attribute type", terms::ATTRIBUTE_TYPE, attribute)?;
     let holders = holders(facts, kind);
-    let property = engine.symbols_mut().name(beside(terms::HAS_VALUE, class));
+    let property = engine.symbols_mut().name(term_for(terms::HAS_VALUE, class));
     let changes = holders.into_iter().map(|holder| replace(engine, property, holder, None));
     let delete = changes.flat_map(|change| change.delete).collect();
     Ok(Delta { insert: Vec::new(), delete })
 }
 
-/// The facts that make `holder` hold measurements of a type.
+/// Builds the facts by which `holder` holds measurements of a type.
 fn observation(symbols: &mut Symbols, holder: Symbol, kind: Symbol, class: &str) -> Vec<Fact> {
     let mut facts = vec![
-        Fact::new(symbols.name(beside(terms::QA_VALUE, class)), [holder]),
-        Fact::new(symbols.name(beside(terms::IS_TYPE, class)), [holder, kind]),
+        Fact::new(symbols.name(term_for(terms::QA_VALUE, class)), [holder]),
+        Fact::new(symbols.name(term_for(terms::IS_TYPE, class)), [holder, kind]),
     ];
     if let Some(measured) = symbols.find_name(terms::IS_MEASURED[0]) {
         let truth = symbols.literal(Literal::Boolean(true));
@@ -155,7 +160,8 @@ fn observation(symbols: &mut Symbols, holder: Symbol, kind: Symbol, class: &str)
     facts
 }
 
-/// What holds measurements of an attribute type: what says so, and what is named as MROS names it.
+/// Returns the individuals that hold measurements of an attribute type: the ones with `isMeasured` true, and
+/// the ones named `obs_…` as in MROS.
 pub(crate) fn holders(facts: Facts, kind: Symbol) -> Vec<Symbol> {
     let named = |holder| facts.name(holder).is_some_and(|iri| local_name(iri).starts_with("obs_"));
     let mut holders = facts.subjects(kind, terms::IS_TYPE);
@@ -163,14 +169,14 @@ pub(crate) fn holders(facts: Facts, kind: Symbol) -> Vec<Symbol> {
     holders
 }
 
-/// The groundings whose design has an estimation of an attribute type.
+/// Returns the groundings whose design has an estimation of an attribute type.
 fn groundings(facts: Facts, kind: Symbol) -> Vec<Symbol> {
     let values = facts.subjects(kind, terms::IS_TYPE).into_iter();
     let designs = values.flat_map(|value| facts.subjects(value, terms::HAS_ESTIMATION));
     designs.flat_map(|design| facts.subjects(design, terms::TYPE_FD)).collect()
 }
 
-/// The update after which `subject` has one stated value of a property, or none.
+/// Builds the update after which `subject` has one asserted value of a property, or no value if it is `None`.
 pub fn replace(engine: &Engine, property: Symbol, subject: Symbol, value: Option<Symbol>) -> Delta {
     let pattern = [Some(subject), None];
     let rows = engine.matching(property, &pattern);
@@ -180,8 +186,8 @@ pub fn replace(engine: &Engine, property: Symbol, subject: Symbol, value: Option
     Delta { insert: new.into_iter().collect(), delete }
 }
 
-/// Whether no constraint of the program forbids a value because it lies outside the property's range: outside an
-/// enumeration, or in another datatype.
+/// Returns `true` if no constraint of the program forbids the value because it is outside the range of the
+/// property: outside of an enumeration, or in another datatype.
 fn allows(engine: &Engine, property: Symbol, value: Symbol) -> bool {
     let literal = |symbol| engine.symbols().value(symbol).as_literal();
     let Some(value) = literal(value) else { return true };

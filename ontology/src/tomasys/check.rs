@@ -1,5 +1,5 @@
-//! What looks like a mistake of a model's author: nothing here is wrong OWL, and all of it makes a robot adapt less
-//! than its author expects.
+//! Lints for models: legal OWL that is probably a mistake, because the robot adapts less than its author
+//! expects.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,7 +14,7 @@ use crate::owl::{
     ObjectPropertyExpression as Property, Ontology,
 };
 
-/// Checks a model: the ontology, and an engine that holds what follows from it. Sorted.
+/// Checks a model. `engine` contains the consequences of `ontology`. The warnings are sorted.
 pub fn check(ontology: &Ontology, engine: &Engine) -> Vec<Warning> {
     let facts = Facts::new(engine);
     let mut warnings = functions(facts);
@@ -31,7 +31,7 @@ fn iri(facts: Facts, symbol: Symbol) -> String {
     facts.name(symbol).unwrap_or_default().to_owned()
 }
 
-/// Designs without function and functions without design.
+/// Reports designs without a function and functions without a design.
 fn functions(facts: Facts) -> Vec<Warning> {
     let mut warnings = Vec::new();
     for design in facts.members(terms::FUNCTION_DESIGN) {
@@ -47,24 +47,24 @@ fn functions(facts: Facts) -> Vec<Warning> {
     warnings
 }
 
-/// Bounds of designs without minimum and maximum, and requirements of objectives without value.
+/// Reports bounds of designs without minimum and maximum, and requirements of objectives without a value.
 fn requirements(facts: Facts) -> Vec<Warning> {
-    let says = |requirement: Symbol, properties: &[Term]| {
+    let has_value = |requirement: Symbol, properties: &[Term]| {
         properties.iter().any(|property| !facts.literals(requirement, property).is_empty())
     };
     let bounds = facts.members(terms::REQUIREMENT).into_iter();
-    let mut silent: BTreeSet<Symbol> =
-        bounds.filter(|&bound| !says(bound, &[terms::HAS_MINIMUM, terms::HAS_MAXIMUM])).collect();
+    let mut without_value: BTreeSet<Symbol> =
+        bounds.filter(|&bound| !has_value(bound, &[terms::HAS_MINIMUM, terms::HAS_MAXIMUM])).collect();
     for objective in facts.members(terms::OBJECTIVE) {
         let required = facts.objects(objective, terms::HAS_NFR).into_iter();
-        silent.extend(required.filter(|&value| !says(value, &[terms::HAS_VALUE])));
+        without_value.extend(required.filter(|&value| !has_value(value, &[terms::HAS_VALUE])));
     }
     let warning = |requirement| Warning::RequirementWithoutValue { requirement: iri(facts, requirement) };
-    silent.into_iter().map(warning).collect()
+    without_value.into_iter().map(warning).collect()
 }
 
-/// Attributes of which nothing was measured, though designs bound them, or have estimations of them and the attribute
-/// has a comparison operator.
+/// Reports attributes without a measurement that designs bound, or that have a comparison operator and
+/// estimations of designs.
 fn measurements(facts: Facts) -> Vec<Warning> {
     let estimated = |kind: Symbol| {
         let mut values = facts.subjects(kind, terms::IS_TYPE).into_iter();
@@ -84,12 +84,12 @@ fn measurements(facts: Facts) -> Vec<Warning> {
     unmeasured.map(|kind| Warning::NothingMeasured { attribute: iri(facts, kind) }).collect()
 }
 
-/// Individuals with several stated values of a functional property. Numbers are compared by value.
+/// Reports individuals with several asserted values of a functional property. Numbers are compared by value.
 fn several_values(ontology: &Ontology) -> Vec<Warning> {
     let functional: BTreeSet<&Iri> = ontology.axioms.iter().filter_map(functional).collect();
-    // Axioms are sorted, so that the values of one property of one individual are neighbours.
-    let neighbours = ontology.axioms.chunk_by(|a, b| edge(a).is_some_and(|edge| Some(edge) == self::edge(b)));
-    let several = neighbours.filter(|axioms| axioms.len() > 1).filter_map(|axioms| {
+    // Axioms are sorted, so that the values of one property of one individual are adjacent.
+    let groups = ontology.axioms.chunk_by(|a, b| edge(a).is_some_and(|edge| Some(edge) == self::edge(b)));
+    let several = groups.filter(|axioms| axioms.len() > 1).filter_map(|axioms| {
         let (property, subject) = edge(&axioms[0]).filter(|(property, _)| functional.contains(property))?;
         let values: BTreeSet<String> = axioms.iter().filter_map(object).collect();
         let individuals = matches!(axioms[0].axiom, Axiom::ObjectPropertyAssertion(..));
@@ -109,17 +109,20 @@ fn several_values(ontology: &Ontology) -> Vec<Warning> {
     several.collect()
 }
 
-/// Whether two of the values of assertions are certainly two.
+/// Returns `true` if two of the asserted values certainly differ.
 fn any_differ(axioms: &[AnnotatedAxiom]) -> bool {
     let values = axioms.iter().filter_map(|annotated| match &annotated.axiom {
         Axiom::DataPropertyAssertion(_, _, to) => Some(value(to)),
         _ => None,
     });
     let values: Vec<Value> = values.collect();
-    values.iter().enumerate().any(|(at, one)| values[at + 1..].iter().any(|other| one.differs(other)))
+    values
+        .iter()
+        .enumerate()
+        .any(|(index, first)| values[index + 1..].iter().any(|second| first.differs(second)))
 }
 
-/// The property that an axiom says is functional.
+/// Returns the property of a functionality axiom.
 fn functional(annotated: &AnnotatedAxiom) -> Option<&Iri> {
     match &annotated.axiom {
         Axiom::FunctionalDataProperty(property)
@@ -130,7 +133,7 @@ fn functional(annotated: &AnnotatedAxiom) -> Option<&Iri> {
     }
 }
 
-/// Property and subject of an assertion.
+/// Returns property and subject of an assertion.
 fn edge(annotated: &AnnotatedAxiom) -> Option<(&Iri, &Iri)> {
     match &annotated.axiom {
         Axiom::ObjectPropertyAssertion(Property::Property(property), subject, _)
@@ -139,7 +142,7 @@ fn edge(annotated: &AnnotatedAxiom) -> Option<(&Iri, &Iri)> {
     }
 }
 
-/// The value of an assertion, as N-Triples writes it.
+/// Returns the value of an assertion in N-Triples syntax.
 fn object(annotated: &AnnotatedAxiom) -> Option<String> {
     match &annotated.axiom {
         Axiom::ObjectPropertyAssertion(_, _, to) => Some(format!("<{to}>")),
@@ -152,7 +155,7 @@ fn value(literal: &Literal) -> Value {
     Value::parse(&literal.lexical, literal.datatype.as_deref(), literal.language.as_deref())
 }
 
-/// What a status may be.
+/// Kind of a status value, for messages.
 fn kind(value: &Value) -> &'static str {
     match value {
         Value::Boolean(_) => "a boolean",
@@ -161,14 +164,15 @@ fn kind(value: &Value) -> &'static str {
     }
 }
 
-/// Stated statuses of another kind than the property's ranges ask for or, where it has none, than rules test.
+/// Reports asserted statuses of another kind than the property's ranges allow or, if it has no range, than
+/// rules compare it with.
 fn statuses(ontology: &Ontology) -> Vec<Warning> {
     let properties =
         [terms::STATUS, terms::OBJECTIVE_STATUS, terms::GROUNDING_STATUS, terms::REALISABILITY].concat();
     let mut expected = BTreeMap::<&str, &'static str>::new();
     for property in properties {
-        let ranges = ranges(ontology, property);
-        let kinds = if ranges.is_empty() { tested(ontology, property) } else { ranges };
+        let range_kinds = kinds_of_ranges(ontology, property);
+        let kinds = if range_kinds.is_empty() { tested_kinds(ontology, property) } else { range_kinds };
         if let &[kind] = kinds.iter().collect::<Vec<_>>().as_slice() {
             expected.insert(property, kind);
         }
@@ -190,15 +194,15 @@ fn statuses(ontology: &Ontology) -> Vec<Warning> {
     warnings
 }
 
-/// The kinds of values that the ranges of a property allow.
-fn ranges(ontology: &Ontology, property: &str) -> BTreeSet<&'static str> {
+/// Returns the kinds of values that the ranges of a property allow.
+fn kinds_of_ranges(ontology: &Ontology, property: &str) -> BTreeSet<&'static str> {
     let mut kinds = BTreeSet::new();
     for annotated in &ontology.axioms {
         match &annotated.axiom {
-            Axiom::DataPropertyRange(of, DataRange::OneOf(values)) if &**of == property => {
+            Axiom::DataPropertyRange(ranged, DataRange::OneOf(values)) if &**ranged == property => {
                 kinds.extend(values.iter().map(|literal| kind(&value(literal))));
             }
-            Axiom::DataPropertyRange(of, DataRange::Datatype(datatype)) if &**of == property => {
+            Axiom::DataPropertyRange(ranged, DataRange::Datatype(datatype)) if &**ranged == property => {
                 kinds.insert(match crate::vocab::local_name(datatype) {
                     "boolean" => "a boolean",
                     "string" => "a string",
@@ -211,11 +215,11 @@ fn ranges(ontology: &Ontology, property: &str) -> BTreeSet<&'static str> {
     kinds
 }
 
-/// The kinds of values that rules test a property for.
-fn tested(ontology: &Ontology, property: &str) -> BTreeSet<&'static str> {
+/// Returns the kinds of constants that rules compare the values of a property with.
+fn tested_kinds(ontology: &Ontology, property: &str) -> BTreeSet<&'static str> {
     let atoms = ontology.rules.iter().flat_map(|rule| &rule.body);
     let constants = atoms.filter_map(|atom| match atom {
-        Atom::DataProperty(of, _, Argument::Literal(literal)) if &**of == property => {
+        Atom::DataProperty(predicate, _, Argument::Literal(literal)) if &**predicate == property => {
             Some(kind(&value(literal)))
         }
         _ => None,

@@ -1,4 +1,4 @@
-//! Point look-ups in an engine by notion: what is said of one individual, without a pass over all facts.
+//! Point queries of an engine by TOMASys term, without iterating over all facts.
 
 use num_rational::BigRational;
 use rules::{Engine, Fact, Literal, Symbol};
@@ -7,55 +7,56 @@ use super::terms::Term;
 use crate::error::Error;
 use crate::vocab::local_name;
 
-/// Reads an engine by the vocabulary table.
+/// Queries an engine with the terms of the vocabulary table.
 #[derive(Clone, Copy)]
 pub(crate) struct Facts<'a> {
     engine: &'a Engine,
-    /// Whether only stated facts count, and not what follows from them.
-    stated: bool,
+    /// If `true`, only asserted facts count.
+    only_stated: bool,
 }
 
+// A term can have several IRIs; queries combine the facts of all of them.
 impl<'a> Facts<'a> {
-    /// Everything that holds.
+    /// Queries all facts that hold.
     pub(crate) fn new(engine: &'a Engine) -> Self {
-        Self { engine, stated: false }
+        Self { engine, only_stated: false }
     }
 
-    /// What is stated, or everything that holds.
-    pub(crate) fn stated(engine: &'a Engine, stated: bool) -> Self {
-        Self { engine, stated }
+    /// Queries only asserted facts if `only_stated`, otherwise all facts that hold.
+    pub(crate) fn stated(engine: &'a Engine, only_stated: bool) -> Self {
+        Self { engine, only_stated }
     }
 
     pub(crate) fn name(self, symbol: Symbol) -> Option<&'a str> {
         self.engine.symbols().value(symbol).as_name()
     }
 
-    /// One column of the rows of the notion's relations that fit, sorted, each once.
+    /// Returns one column of the matching rows of a term's relations, sorted and without duplicates.
     fn column(self, term: Term, pattern: &[Option<Symbol>], column: usize) -> Vec<Symbol> {
-        let mut found = Vec::new();
+        let mut symbols = Vec::new();
         for predicate in term.iter().filter_map(|name| self.engine.symbols().find_name(name)) {
             let rows = self.engine.matching(predicate, pattern);
             let counts = |row: &rules::Arguments| {
-                !self.stated || self.engine.is_asserted(&Fact::new(predicate, row.iter().copied()))
+                !self.only_stated || self.engine.is_asserted(&Fact::new(predicate, row.iter().copied()))
             };
-            found.extend(rows.filter(counts).map(|row| row[column]));
+            symbols.extend(rows.filter(counts).map(|row| row[column]));
         }
-        found.sort_unstable();
-        found.dedup();
-        found
+        symbols.sort_unstable();
+        symbols.dedup();
+        symbols
     }
 
-    /// The members of a class.
+    /// Members of a class.
     pub(crate) fn members(self, class: Term) -> Vec<Symbol> {
         self.column(class, &[None], 0)
     }
 
-    /// The values of a property.
+    /// Values of a property.
     pub(crate) fn objects(self, subject: Symbol, property: Term) -> Vec<Symbol> {
         self.column(property, &[Some(subject), None], 1)
     }
 
-    /// What has a value of a property.
+    /// Subjects with this value of a property.
     pub(crate) fn subjects(self, object: Symbol, property: Term) -> Vec<Symbol> {
         self.column(property, &[None, Some(object)], 0)
     }
@@ -74,7 +75,7 @@ impl<'a> Facts<'a> {
         self.literals(subject, property).contains(&&Literal::Boolean(false))
     }
 
-    /// The numeric value of a property, if it has just one.
+    /// Numeric value of a property, if it has exactly one value.
     pub(crate) fn number(self, subject: Symbol, property: Term) -> Option<BigRational> {
         match self.literals(subject, property)[..] {
             [value] => value.as_rational(),
@@ -82,17 +83,17 @@ impl<'a> Facts<'a> {
         }
     }
 
-    /// The texts of the values of a property, sorted.
+    /// Lexical forms of the values of a property, sorted.
     pub(crate) fn texts(self, subject: Symbol, property: Term) -> Vec<String> {
         let mut texts: Vec<_> = self.literals(subject, property).into_iter().map(Literal::lexical).collect();
         texts.sort();
         texts
     }
 
-    /// The individual with that IRI or local name among the members of a class, and the class by its IRI.
+    /// Finds the member of a class with this IRI or local name. Also returns the IRI of the class.
     ///
     /// # Errors
-    /// [`Error::Unknown`] with the names that there are.
+    /// Returns [`Error::Unknown`] with the existing names.
     pub(crate) fn find(
         self,
         kind: &'static str,
@@ -106,7 +107,8 @@ impl<'a> Facts<'a> {
             let named = |&symbol: &Symbol| {
                 self.name(symbol).is_some_and(|iri| iri == name || local_name(iri) == name)
             };
-            // Where several individuals have the local name, the same one is taken in every history.
+            // Several individuals can have the local name. The choice must not depend on the history of the
+            // engine.
             if let Some(symbol) = members.filter(named).min_by_key(|&symbol| self.name(symbol)) {
                 return Ok((symbol, class));
             }

@@ -1,8 +1,9 @@
-//! What an engine has concluded, in the nouns of TOMASys: functions, designs, components, attributes, actions.
+//! Typed view of an engine's facts, in the terms of TOMASys: functions, designs, components, attributes,
+//! actions.
 //!
-//! [`View`] reads; [`change`] builds the updates that keep an engine's knowledge in step with the robot; [`check`] tells
-//! authors what looks like a mistake. All know the vocabularies in real use through one table. Individuals are given by IRI and by local name, lists are sorted
-//! by IRI, numbers are exact.
+//! [`View`] reads facts. [`change`] builds updates from reports of the robot. [`check`] reports probable
+//! mistakes of a model. All of them use one table of the vocabularies in use. Individuals have an IRI and a
+//! local name, lists are sorted by IRI, and numbers are exact.
 
 pub mod change;
 mod check;
@@ -21,16 +22,16 @@ use rules::{Engine, Literal, Symbol, Value};
 use crate::vocab::local_name;
 use terms::Term;
 
-/// An individual: its IRI, and the last part of it, or what it is called here.
+/// An individual with its IRI and name.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Individual {
     /// The IRI.
     pub iri: String,
-    /// Its local name; the name that a view was told to call it by, if there is one.
+    /// Local name, or the name that the view assigns to the IRI.
     pub name: String,
 }
 
-/// What individuals are called in place of their local names, by IRI.
+/// Names that replace the local names of individuals, by IRI.
 pub type CalledNames = BTreeMap<String, String>;
 
 impl Individual {
@@ -39,111 +40,112 @@ impl Individual {
     }
 }
 
-/// A way to solve a function.
+/// A design that solves a function.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FunctionDesign {
-    /// Which design.
+    /// The design.
     pub individual: Individual,
-    /// The functions that it solves: one, unless the knowledge base says that several are the same.
+    /// The functions that it solves. There is one, unless the knowledge base states that several functions are
+    /// the same.
     pub solves: Vec<Individual>,
     /// The components that it requires.
     pub components: Vec<Individual>,
-    /// Estimated values by the local name of their attribute type, in the type's unit.
+    /// Estimated values by the local name of the attribute type, in the unit of the type.
     pub estimations: BTreeMap<String, BigRational>,
     /// Bounds on measured attributes.
     pub requirements: Vec<Requirement>,
-    /// False where the knowledge base concludes or states that the design cannot be used now.
+    /// `false` if the knowledge base concludes or states that the design cannot be used now.
     pub available: bool,
-    /// Its utility or efficacy, where there is one; larger is better.
+    /// Utility or efficacy, if known; larger is better.
     pub utility: Option<BigRational>,
 }
 
-/// Bounds that a measured attribute must keep.
+/// Bounds on a measured attribute.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Requirement {
     /// Local name of the attribute type.
     pub attribute: String,
-    /// The least allowed value.
+    /// Minimum, inclusive.
     pub minimum: Option<BigRational>,
-    /// The greatest allowed value.
+    /// Maximum, inclusive.
     pub maximum: Option<BigRational>,
 }
 
 /// A part of the robot that can fail.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Component {
-    /// Which component.
+    /// The component.
     pub individual: Individual,
-    /// Its status, as the knowledge base writes it (`FALSE`, `RECOVERED`, `ERROR`, `false`, …), if known.
+    /// Status in the spelling of the knowledge base (`FALSE`, `RECOVERED`, `ERROR`, `false`, …), if known.
     pub status: Option<String>,
 }
 
-/// A value that sensors report.
+/// A measured value.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Measurement {
     /// The individual that holds the value.
     pub individual: Individual,
     /// Local name of the attribute type.
     pub attribute: String,
-    /// The value, if there is one yet, in the type's unit.
+    /// The value in the unit of the attribute type, if there is one.
     pub value: Option<BigRational>,
 }
 
 /// An action of the task plan.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Action {
-    /// Which action.
+    /// The action.
     pub individual: Individual,
-    /// The functions that must be solved while it runs.
+    /// The functions that are required while the action runs.
     pub requires: Vec<Individual>,
-    /// Bounds that the designs must keep which are chosen for these functions.
+    /// Bounds on the designs that are selected for these functions.
     pub quality: Vec<Quality>,
 }
 
-/// Bounds on an estimated attribute of the designs that are chosen for an action.
+/// Bounds on an estimated attribute of the designs that are selected for an action.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Quality {
-    /// The individual that states the bounds.
+    /// The individual with the bounds.
     pub individual: Individual,
     /// The attribute and its bounds.
     pub bounds: Requirement,
-    /// The predicate of the planning domain that says where the bounds count; everywhere if there is none.
+    /// Predicate of the planning domain that is true where the bounds apply; `None` if they apply everywhere.
     pub context: Option<String>,
 }
 
-/// Values by subject.
+/// Values of a property by subject.
 type Edges = Rc<HashMap<Symbol, Vec<Symbol>>>;
 
-/// A view on everything that holds in an engine.
+/// A view of all facts that hold in an engine.
 #[derive(Debug)]
 pub struct View<'a> {
     engine: &'a Engine,
-    /// What individuals are called in place of their local names.
+    /// Names that replace the local names of individuals.
     called: Option<&'a CalledNames>,
-    /// Properties that have been read, by name and direction.
+    /// Cache of properties by IRI and direction.
     edges: RefCell<HashMap<(&'static str, bool), Edges>>,
 }
 
 impl<'a> View<'a> {
-    /// Looks at an engine.
+    /// Creates a view of an engine.
     pub fn new(engine: &'a Engine) -> Self {
         Self { engine, called: None, edges: RefCell::default() }
     }
 
-    /// The same view, in which individuals have other names.
+    /// Replaces the local names of individuals by the given names.
     #[must_use]
     pub fn calling(self, called: &'a CalledNames) -> Self {
         Self { called: (!called.is_empty()).then_some(called), ..self }
     }
 
-    /// The named individuals of a class, by its IRI.
+    /// The named individuals of the class with this IRI.
     pub fn individuals_of(&self, class_iri: &str) -> Vec<Individual> {
         let Some(class) = self.engine.symbols().find_name(class_iri) else { return Vec::new() };
         let members = self.engine.matching(class, &[None]).filter_map(|row| self.individual(row[0]));
         sorted(members)
     }
 
-    /// The named individuals of all classes with that local name, in whatever vocabulary.
+    /// The named individuals of all classes with this local name, in any namespace.
     pub fn individuals_of_class_named(&self, class_name: &str) -> Vec<Individual> {
         let is_class = |&(predicate, arity): &(Symbol, usize)| {
             arity == 1 && self.name(predicate).is_some_and(|iri| local_name(iri) == class_name)
@@ -153,7 +155,7 @@ impl<'a> View<'a> {
         sorted(members.filter_map(|row| self.individual(row[0])))
     }
 
-    /// The values of a property of an individual, both by IRI: individuals first, then literals, each sorted.
+    /// The values of a property (given by IRIs): individuals first, then literals, each sorted.
     pub fn values(&self, subject_iri: &str, property_iri: &str) -> Vec<Value> {
         let symbols = self.engine.symbols();
         let (Some(subject), Some(property)) =
@@ -168,22 +170,20 @@ impl<'a> View<'a> {
         values
     }
 
-    /// All functions.
     pub fn functions(&self) -> Vec<Individual> {
         self.members(terms::FUNCTION)
     }
 
-    /// All quality attribute types.
     pub fn attribute_types(&self) -> Vec<Individual> {
         self.members(terms::ATTRIBUTE_TYPE)
     }
 
-    /// All function designs, with what is known of them.
+    /// All function designs.
     pub fn function_designs(&self) -> Vec<FunctionDesign> {
         self.members(terms::FUNCTION_DESIGN).into_iter().map(|design| self.function_design(design)).collect()
     }
 
-    /// All components with their status.
+    /// All components with their statuses.
     pub fn components(&self) -> Vec<Component> {
         let status = |component: &Individual| {
             let value = self.literals(&component.iri, terms::STATUS).into_iter().next();
@@ -193,7 +193,7 @@ impl<'a> View<'a> {
         components.map(|individual| Component { status: status(&individual), individual }).collect()
     }
 
-    /// All measured values: those that say so, and those named `obs_…` as MROS names them.
+    /// All measured values: individuals with `isMeasured` true, and individuals named `obs_…` as in MROS.
     pub fn measurements(&self) -> Vec<Measurement> {
         let measured = |value: &Individual| {
             value.name.starts_with("obs_")
@@ -267,7 +267,8 @@ impl<'a> View<'a> {
         sorted(term.iter().flat_map(|class| self.individuals_of(class)))
     }
 
-    /// The values of a property, or its subjects by value, read from the engine once.
+    /// Returns the values of a property by subject, or its subjects by value if `inverse`. Reads the engine
+    /// only once.
     fn edges(&self, property: &'static str, inverse: bool) -> Edges {
         if let Some(edges) = self.edges.borrow().get(&(property, inverse)) {
             return edges.clone();
@@ -298,7 +299,7 @@ impl<'a> View<'a> {
         sorted(self.related(iri, term, true).into_iter().filter_map(|symbol| self.individual(symbol)))
     }
 
-    /// Literal values, sorted by their text.
+    /// Literal values, sorted by text.
     fn literals(&self, iri: &str, term: Term) -> Vec<&'a Literal> {
         let symbols = self.engine.symbols();
         let values = self.related(iri, term, false).into_iter();

@@ -1,4 +1,4 @@
-//! An [`Ontology`] as a document in functional-style syntax, with IRIs in full.
+//! Writes an [`Ontology`] in functional-style syntax, with full IRIs.
 
 use std::fmt::Write;
 
@@ -7,7 +7,7 @@ use crate::owl::{
 };
 use crate::vocab::{is_reserved, rdfs, xsd};
 
-/// The document; what stands where depends on the ontology alone.
+/// Writes the document. The order of the statements depends only on the ontology.
 pub(super) fn document(ontology: &Ontology) -> String {
     let mut text = String::from("Prefix(xsd:=<http://www.w3.org/2001/XMLSchema#>)\n\n");
     let root = ontology.sources.first();
@@ -15,38 +15,39 @@ pub(super) fn document(ontology: &Ontology) -> String {
     let version = root.and_then(|source| source.version.as_ref());
     let version = version.map(|version| format!(" <{version}>")).unwrap_or_default();
     line(&mut text, &format!("Ontology({iri}{version}"));
-    let about = |subject: &Iri| Some(subject) == ontology.iri();
-    for (_, found) in ontology.annotations.iter().filter(|(subject, _)| about(subject)) {
-        line(&mut text, &annotation(found));
+    let is_header = |subject: &Iri| Some(subject) == ontology.iri();
+    for (_, entry) in ontology.annotations.iter().filter(|(subject, _)| is_header(subject)) {
+        line(&mut text, &annotation(entry));
     }
     for (kind, iri) in &ontology.entities {
         line(&mut text, &format!("Declaration({}(<{iri}>))", entity(*kind)));
     }
-    for annotated in ontology.axioms.iter().filter(|annotated| says_something(&annotated.axiom)) {
-        let annotations: String = annotated.annotations.iter().map(|found| annotation(found) + " ").collect();
+    for annotated in ontology.axioms.iter().filter(|annotated| has_form(&annotated.axiom)) {
+        let annotations: String = annotated.annotations.iter().map(|entry| annotation(entry) + " ").collect();
         let axiom = annotated.axiom.to_string();
-        // The name of an axiom ends at its first parenthesis, where its annotations belong.
+        // The annotations of an axiom follow its first parenthesis.
         line(&mut text, &axiom.replacen('(', &format!("({annotations}"), 1));
     }
-    for (subject, found) in ontology.annotations.iter().filter(|(subject, _)| !about(subject)) {
-        let annotations = annotations_of(ontology, subject, found);
-        if let Some(axiom) = annotation_axiom(ontology, subject, found) {
+    for (subject, entry) in ontology.annotations.iter().filter(|(subject, _)| !is_header(subject)) {
+        let annotations = annotations_of(ontology, subject, entry);
+        if let Some(axiom) = annotation_axiom(ontology, subject, entry) {
             line(&mut text, &axiom.replacen('(', &format!("({annotations}"), 1));
             continue;
         }
-        let (property, value) = (&found.property, value(&found.value));
+        let (property, value) = (&entry.property, value(&entry.value));
         let subject = node(subject);
         line(&mut text, &format!("AnnotationAssertion({annotations}<{property}> {subject} {value})"));
     }
-    for found in &ontology.rules {
-        line(&mut text, &rule(found));
+    for swrl_rule in &ontology.rules {
+        line(&mut text, &rule(swrl_rule));
     }
     text + ")\n"
 }
 
-/// Whether an axiom about several entities is about more than one: the syntax has no form for others, which say nothing.
-fn says_something(axiom: &Axiom) -> bool {
-    let several = match axiom {
+/// Returns `false` for n-ary axioms with fewer than two members: they state nothing, and the syntax has no form
+/// for them.
+fn has_form(axiom: &Axiom) -> bool {
+    let member_count = match axiom {
         Axiom::SameIndividual(items)
         | Axiom::DifferentIndividuals(items)
         | Axiom::EquivalentDataProperties(items)
@@ -55,20 +56,23 @@ fn says_something(axiom: &Axiom) -> bool {
         Axiom::EquivalentObjectProperties(items) | Axiom::DisjointObjectProperties(items) => items.len(),
         _ => return true,
     };
-    several > 1
+    member_count > 1
 }
 
-/// The annotations of an annotation.
-fn annotations_of(ontology: &Ontology, subject: &Iri, found: &Annotation) -> String {
-    let all = &ontology.annotation_annotations;
-    let start = all.partition_point(|(s, annotation, _)| (s, annotation) < (subject, found));
-    let own = all[start..].iter().take_while(|(s, annotation, _)| (s, annotation) == (subject, found));
-    own.map(|(.., own)| annotation(own) + " ").collect()
+/// Returns the annotations of an annotation.
+fn annotations_of(ontology: &Ontology, subject: &Iri, entry: &Annotation) -> String {
+    let sorted = &ontology.annotation_annotations;
+    let start = sorted
+        .partition_point(|(other_subject, annotation, _)| (other_subject, annotation) < (subject, entry));
+    let nested = sorted[start..]
+        .iter()
+        .take_while(|(other_subject, annotation, _)| (other_subject, annotation) == (subject, entry));
+    nested.map(|(.., nested)| annotation(nested) + " ").collect()
 }
 
-/// An axiom about an annotation property, which an ontology keeps as an annotation.
-fn annotation_axiom(ontology: &Ontology, subject: &Iri, found: &Annotation) -> Option<String> {
-    let AnnotationValue::Iri(value) = &found.value else { return None };
+/// Returns the axiom about an annotation property that an ontology stores as an annotation.
+fn annotation_axiom(ontology: &Ontology, subject: &Iri, entry: &Annotation) -> Option<String> {
+    let AnnotationValue::Iri(value) = &entry.value else { return None };
     let is_annotative = |iri: &Iri| {
         is_reserved(iri)
             || ontology.entities.binary_search(&(EntityKind::AnnotationProperty, iri.clone())).is_ok()
@@ -76,7 +80,7 @@ fn annotation_axiom(ontology: &Ontology, subject: &Iri, found: &Annotation) -> O
     if !is_annotative(subject) || value.starts_with(ANONYMOUS) {
         return None;
     }
-    match &*found.property {
+    match &*entry.property {
         rdfs::SUB_PROPERTY_OF if is_annotative(value) => {
             Some(format!("SubAnnotationPropertyOf(<{subject}> <{value}>)"))
         }
@@ -87,7 +91,7 @@ fn annotation_axiom(ontology: &Ontology, subject: &Iri, found: &Annotation) -> O
 }
 
 fn line(text: &mut String, content: &str) {
-    // Writing to a string does not fail.
+    // Writing to a string cannot fail.
     let _ = writeln!(text, "{content}");
 }
 
@@ -118,7 +122,7 @@ fn value(value: &AnnotationValue) -> String {
 }
 
 fn rule(rule: &Rule) -> String {
-    let annotations: String = rule.annotations.iter().map(|found| annotation(found) + " ").collect();
+    let annotations: String = rule.annotations.iter().map(|entry| annotation(entry) + " ").collect();
     let atoms = |atoms: &[Atom]| atoms.iter().map(atom).collect::<Vec<_>>().join(" ");
     format!("DLSafeRule({annotations}Body({}) Head({}))", atoms(&rule.body), atoms(&rule.head))
 }
@@ -148,7 +152,7 @@ fn argument(argument: &Argument) -> String {
     match argument {
         Argument::Variable(iri) => format!("Variable(<{iri}>)"),
         Argument::Individual(iri) => node(iri),
-        // A plain literal would come back as one, but the parsers of rules want a datatype.
+        // Parsers of rules require a datatype; `xsd:string` is read as a plain literal.
         Argument::Literal(literal) if literal.datatype.is_none() && literal.language.is_none() => {
             format!("{literal}^^<{}>", xsd::STRING)
         }

@@ -1,8 +1,8 @@
-//! Knowledge bases to documents in any of the syntaxes that are read: documents and all that they import, merged into
-//! one that imports nothing.
+//! Writes knowledge bases in all supported syntaxes: documents and their imports are merged into one document
+//! without imports.
 //!
-//! The RDF syntaxes hold every triple as it was read, with blank nodes renamed. Functional-style syntax and OWL/XML
-//! hold what was understood: entities, axioms, annotations and rules, and a warning for everything else.
+//! The RDF syntaxes contain every triple that was read, with renamed blank nodes. Functional-style syntax and
+//! OWL/XML contain entities, axioms, annotations and rules; all other triples cause warnings.
 
 mod functional;
 use std::path::Path;
@@ -15,22 +15,22 @@ use crate::horned;
 use crate::read::{self, ReadOptions};
 use crate::vocab::{owl, rdf, rdfs, swrl, tomasys, xsd};
 
-/// A syntax to write.
+/// An output syntax.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OutputSyntax {
     /// RDF/XML.
     RdfXml,
     /// Turtle.
     Turtle,
-    /// N-Triples, sorted, each triple once.
+    /// N-Triples, sorted and without duplicates.
     NTriples,
     /// OWL/XML.
     OwlXml,
-    /// OWL 2 functional-style syntax, rules as `DLSafeRule`.
+    /// OWL 2 functional-style syntax with `DLSafeRule` for rules.
     Functional,
 }
 
-/// Reads documents with all that they import, and writes them as one document.
+/// Reads documents with their imports and writes them as one document.
 ///
 /// ```
 /// use ontology::{OutputSyntax, ReadOptions, convert_files};
@@ -43,7 +43,8 @@ pub enum OutputSyntax {
 /// ```
 ///
 /// # Errors
-/// As [`crate::read_files`]; [`Error::Unwritable`] where the syntax has no form for something.
+/// Returns the errors of [`crate::read_files`], and [`Error::Unwritable`] if the syntax cannot express a
+/// statement.
 pub fn convert_files<P: AsRef<Path>>(
     files: &[P],
     options: &ReadOptions,
@@ -74,10 +75,10 @@ pub fn convert_files<P: AsRef<Path>>(
         .map_err(|reason| Error::Unwritable { syntax: format.name(), reason }.into())
 }
 
-/// Writes an N-Triples document (of this crate's making) as Turtle with the prefixes of the vocabularies in it.
+/// Converts N-Triples of [`crate::ntriples()`] to Turtle. Declares the prefixes of the vocabularies that occur.
 ///
 /// # Errors
-/// [`Error::Unwritable`] where it is not N-Triples.
+/// Returns [`Error::Unwritable`] if the text is not N-Triples.
 pub fn turtle(ntriples: &str) -> Result<String, Error> {
     let unwritable = |reason| Error::Unwritable { syntax: "Turtle", reason };
     let parsed: Result<Vec<Triple>, _> =
@@ -96,7 +97,7 @@ fn serialize(format: RdfFormat, triples: &[Triple]) -> Result<String, String> {
         ("tomasys", tomasys::NS),
         ("xsd", xsd::NS),
     ] {
-        // A prefix that nothing uses does not help a reader.
+        // Unused prefixes are not declared.
         let uses = |iri: &NamedNode| iri.as_str().starts_with(namespace);
         let used = |triple: &Triple| {
             uses(&triple.predicate)
