@@ -1,7 +1,7 @@
-//! Knowledge bases from their files to all that follows, and one measured value later.
+//! Benchmarks: from the files of a knowledge base to all conclusions, and updates of one measured value.
 //!
-//! The files are those of SUAVE in `../shared`; without them our own robot stands in. Larger ones are made here, in the
-//! shape of SUAVE: functions with designs, each with a component and an estimation.
+//! The files are those of SUAVE in `../shared`, or the embedded UUV if they do not exist. Larger knowledge
+//! bases are generated in the shape of SUAVE: functions with designs, each with a component and an estimation.
 
 use std::fmt::Write;
 use std::hint::black_box;
@@ -36,8 +36,8 @@ fn mission(ontology: &Ontology) -> Runtime {
     let (name, function) = ("search", "f_generate_search_path");
     let objective = NewObjective { name, function, requirements: Vec::new(), always_improve: false };
     runtime.add_objective(&objective).expect("known");
-    let best = &runtime.available_designs(Some(function)).expect("known")[0];
-    runtime.ground(name, &best.name).expect("known");
+    let design = &runtime.available_designs(Some(function)).expect("known")[0];
+    runtime.ground(name, &design.name).expect("known");
     runtime
 }
 

@@ -1,4 +1,5 @@
-//! Which function designs of a knowledge base can be used, and what the failure of each component costs.
+//! Lists the function designs of a knowledge base that can be used, and the designs that each component's
+//! failure makes unavailable.
 //!
 //! `cargo run -p metaplan-ontology --example availability -- KNOWLEDGE_BASE`
 #![expect(clippy::print_stdout, reason = "an example prints")]
@@ -11,12 +12,13 @@ use ontology::tomasys::change::Status;
 fn main() -> Result<(), Box<dyn Error>> {
     let own = concat!(env!("CARGO_MANIFEST_DIR"), "/kb/ugv.ttl");
     let file =
-        std::env::args().nth(1).filter(|word| !word.starts_with('-')).unwrap_or_else(|| own.to_owned());
+        std::env::args().nth(1).filter(|word| !word.starts_with('-')).unwrap_or_else(|| default.to_owned());
     let (runtime, warnings) = Runtime::builder().file(file).build()?;
     for warning in warnings {
         println!("{warning}");
     }
     let designs = runtime.view().function_designs();
+    // Cloning is cheap: the copy shares unchanged data.
     println!("{} designs", designs.len());
     for component in runtime.view().components() {
         // A copy shares everything that does not change.

@@ -1,5 +1,6 @@
-//! Small documents, one for each thing that a reasoner or a reader of OWL 2 can be wrong about, with the verdict that the
-//! standard gives: OWL 2 Syntax and Direct Semantics, the tables of OWL 2 RL, the mapping from RDF (with OWL 1's forms).
+//! Small documents for errors that a reasoner or reader of OWL 2 can have, with the result that the standard
+//! requires: OWL 2 Syntax and Direct Semantics, the tables of OWL 2 RL, the mapping from RDF (including the
+//! forms of OWL 1).
 
 use std::collections::BTreeSet;
 
@@ -15,7 +16,7 @@ const HEAD: &str = "@prefix : <http://e/#> .
 :d a owl:DatatypeProperty . :e a owl:DatatypeProperty . :f a owl:DatatypeProperty , owl:FunctionalProperty .
 ";
 
-/// What follows and is not stated, in short; nothing where the knowledge contradicts itself.
+/// The derived facts in short form; `None` if the knowledge is inconsistent.
 fn inferred(ontology: &Ontology) -> Option<Vec<String>> {
     let mut symbols = Symbols::new();
     let lowered = lower(ontology, &mut symbols);
@@ -35,7 +36,7 @@ fn turtle(text: &str) -> Option<Vec<String>> {
 }
 
 #[test]
-fn what_contradicts_itself() {
+fn contradictions_are_detected() {
     let inverse = "[ a owl:Restriction ; owl:onProperty [ owl:inverseOf :p ] ; owl:onClass :A ;";
     for text in [
         ":i a owl:Nothing .",
@@ -64,13 +65,13 @@ fn what_contradicts_itself() {
 }
 
 #[test]
-fn what_is_undecided_or_right() {
+fn equal_and_undecided_values_are_no_contradiction() {
     for text in [
         // One value in two spellings.
         ":i :f \"0A\"^^xsd:hexBinary , \"0a\"^^xsd:hexBinary .",
         ":i :f \"2/6\"^^owl:rational , \"1/3\"^^owl:rational .",
         ":i :f \"1\"^^xsd:int , \"1.0\"^^xsd:decimal .",
-        // Nothing is known of the values of a datatype without a definition, or of XML of another spelling.
+        // The values of an undefined datatype, or of XML with another spelling, may be equal.
         ":D a rdfs:Datatype . :i :f \"a\"^^:D , \"b\"^^:D .",
         ":D a rdfs:Datatype . :i :f \"a\"^^:D , \"b\" .",
         ":i :f \"<a/>\"^^rdf:XMLLiteral , \"<a></a>\"^^rdf:XMLLiteral .",
@@ -82,11 +83,11 @@ fn what_is_undecided_or_right() {
 }
 
 #[test]
-fn what_follows() {
+fn consequences_are_derived() {
     let inverse = "[ a owl:Restriction ; owl:onProperty [ owl:inverseOf :p ] ; owl:onClass :A ;";
-    let one = "\"1\"^^xsd:nonNegativeInteger ]";
+    let cardinality_one = "\"1\"^^xsd:nonNegativeInteger ]";
     for (text, expected) in [
-        // Definitions as OWL 1 writes them.
+        // Definitions in the form of OWL 1.
         (":C owl:intersectionOf ( :A :B ) . :i a :A , :B . :j a :C .", &["i a C", "j a A", "j a B"][..]),
         (":C owl:unionOf ( :A :B ) . :i a :A .", &["i a C"]),
         (":C owl:oneOf ( :i :j ) .", &["i a C", "j a C"]),
@@ -106,19 +107,21 @@ fn what_follows() {
         ("[ owl:unionOf ( :A :B ) ] rdfs:subClassOf :C . :i a :B .", &["i a C"]),
         (
             &format!(
-                ":C rdfs:subClassOf {inverse} owl:maxQualifiedCardinality {one} . :i a :C . :j a :A ; :p :i . :k a :A ; :p :i ."
+                ":C rdfs:subClassOf {inverse} owl:maxQualifiedCardinality {cardinality_one} . :i a :C . :j a :A ; :p :i . :k a :A ; :p :i ."
             ),
             &["j sameAs k", "k sameAs j"],
         ),
         (
-            &format!("{inverse} owl:minQualifiedCardinality {one} rdfs:subClassOf :C . :j a :A ; :p :i ."),
+            &format!(
+                "{inverse} owl:minQualifiedCardinality {cardinality_one} rdfs:subClassOf :C . :j a :A ; :p :i ."
+            ),
             &["i a C"],
         ),
-        // Classes and properties that are one.
+        // Classes and properties that are the same individual.
         (":A owl:sameAs :B . :i a :A .", &["B sameAs A", "i a B"]),
         (":p owl:sameAs :q . :i :p :j .", &["i q j", "q sameAs p"]),
         (":d owl:sameAs :e . :i :d \"1\" .", &["e sameAs d", "i e \"1\""]),
-        // Individuals, whoever they are.
+        // Axioms about all individuals.
         (":p a owl:ReflexiveProperty . :i a owl:NamedIndividual . :k :q :l .", &["i p i", "k p k", "l p l"]),
         (
             "[ a owl:Restriction ; owl:onProperty owl:topObjectProperty ; owl:someValuesFrom owl:Thing ] rdfs:subClassOf :C . :i a owl:Thing .",
@@ -126,15 +129,15 @@ fn what_follows() {
         ),
         ("owl:Thing rdfs:subClassOf :C . :i :p :j .", &["i a C", "j a C"]),
     ] {
-        let found = turtle(text).unwrap_or_else(|| panic!("{text} contradicts itself"));
-        let lines = found.iter().map(String::as_str).filter(|line| !line.contains("topObjectProperty"));
+        let derived = turtle(text).unwrap_or_else(|| panic!("{text} contradicts itself"));
+        let lines = derived.iter().map(String::as_str).filter(|line| !line.contains("topObjectProperty"));
         let expected: BTreeSet<&str> = expected.iter().copied().collect();
         assert_eq!(lines.collect::<BTreeSet<_>>(), expected, "{text}");
     }
 }
 
 #[test]
-fn what_is_read_in_any_encoding_and_spelling() {
+fn documents_are_read_in_any_encoding_and_spelling() {
     let xml = |encoding: &str| {
         format!(
             "<?xml version=\"1.0\" encoding=\"{encoding}\"?><rdf:RDF xmlns:rdf=\"http://www.w3.org/1999/02/22-rdf-syntax-ns#\" \
@@ -193,9 +196,9 @@ fn what_is_read_in_any_encoding_and_spelling() {
     }
 }
 
-/// Every refusal says where, and what it is about, in words.
+/// The message contains a position and the cause.
 #[test]
-fn what_is_refused_has_its_place() {
+fn rejections_name_position_and_cause() {
     let deep =
         format!("{HEAD}\n:A rdfs:subClassOf {}:B{} .", "[ owl:complementOf ".repeat(200), " ]".repeat(200));
     for (name, text, expected) in [
@@ -231,7 +234,7 @@ fn what_is_refused_has_its_place() {
         ),
     ] {
         let errors = read_text(text, name, &ReadOptions::default()).expect_err(name);
-        let found = errors[0].to_string();
-        assert!(found.starts_with(expected), "{found}");
+        let message = errors[0].to_string();
+        assert!(message.starts_with(expected), "{message}");
     }
 }

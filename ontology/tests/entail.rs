@@ -1,4 +1,4 @@
-//! What is shown to follow, for each kind of statement, and what is not; and what follows about classes and properties.
+//! Entailment of each kind of statement, with counterexamples, and the class and property hierarchy.
 
 use ontology::entail::{Answer, annotations, entailments, schema};
 use ontology::{Ontology, ReadOptions, lower, read_text};
@@ -23,12 +23,12 @@ fn engine(text: &str) -> Engine {
     Engine::new(symbols, lowered.program, lowered.facts).expect("safe")
 }
 
-/// Whether all that the second text states follows from the first.
+/// Returns `true` if the first text entails all statements of the second one.
 fn follows(premise: &str, conclusion: &str) -> bool {
     let conclusion = read(conclusion);
-    let mut found = entailments(&engine(premise), &conclusion).expect("it ends");
-    found.extend(annotations(&engine(premise), &read(premise).annotations, &conclusion));
-    assert!(!found.is_empty(), "{conclusion:?}");
+    let mut results = entailments(&engine(premise), &conclusion).expect("it ends");
+    results.extend(annotations(&engine(premise), &read(premise).annotations, &conclusion));
+    assert!(!results.is_empty(), "{conclusion:?}");
     let answered = |answer: &Answer| match answer {
         Answer::Follows(reason) => {
             assert!(!reason.is_empty(), "{conclusion:?}");
@@ -36,11 +36,11 @@ fn follows(premise: &str, conclusion: &str) -> bool {
         }
         Answer::Open(_) => false,
     };
-    found.iter().all(|entailment| answered(&entailment.answer))
+    results.iter().all(|entailment| answered(&entailment.answer))
 }
 
 #[test]
-fn statements_follow_or_are_not_shown() {
+fn entailed_statements_are_proved_and_others_are_not() {
     let restricted = |kind: &str| format!("[ a owl:Restriction ; owl:onProperty :p ; {kind} ]");
     let (some, all) = (restricted("owl:someValuesFrom :B"), restricted("owl:allValuesFrom :B"));
     let most = restricted("owl:maxCardinality 1");
@@ -115,7 +115,7 @@ fn statements_follow_or_are_not_shown() {
     assert!(follows(":A owl:disjointWith :B . :i a :A , :B .", ":x :p :y ."), "anything follows");
 }
 
-/// Who asks need not declare again what the knowledge base declares.
+/// A conclusion need not repeat the declarations of the knowledge base.
 #[test]
 fn conclusions_use_the_declarations_of_the_knowledge_base() {
     let asks = |text: &str, known: &Ontology| {
@@ -132,25 +132,25 @@ fn conclusions_use_the_declarations_of_the_knowledge_base() {
         (":p rdfs:range :A .", true),
         (":p rdfs:range :B .", false),
     ] {
-        let found = entailments(&engine(premise), &asks(conclusion, &read(premise))).expect("it ends");
-        assert!(!found.is_empty(), "{conclusion}");
-        let all = found.iter().all(|one| matches!(one.answer, Answer::Follows(_)));
-        assert_eq!(all, expected, "{conclusion}: {found:?}");
+        let results = entailments(&engine(premise), &asks(conclusion, &read(premise))).expect("it ends");
+        assert!(!results.is_empty(), "{conclusion}");
+        let entailed = results.iter().all(|result| matches!(result.answer, Answer::Follows(_)));
+        assert_eq!(entailed, expected, "{conclusion}: {results:?}");
     }
 }
 
 #[test]
-fn classes_and_properties_are_ordered() {
+fn the_schema_is_the_hierarchy_of_classes_and_properties() {
     let text = ":A rdfs:subClassOf :B . :B rdfs:subClassOf :C . :C owl:disjointWith :D . :D a owl:Class .
         :E rdfs:subClassOf :C , :D . :E a owl:Class . :p rdfs:subPropertyOf :q . :q owl:equivalentProperty :r .";
-    let found = schema(&engine(text), &read(text).entities).expect("it ends");
+    let hierarchy = schema(&engine(text), &read(text).entities).expect("it ends");
     let local = |iris: &[String]| -> String {
         iris.iter().map(|iri| iri.trim_start_matches("http://e/#")).collect::<Vec<_>>().join(" ")
     };
-    let shown: Vec<String> = found
+    let shown: Vec<String> = hierarchy
         .classes
         .iter()
-        .chain(&found.object_properties)
+        .chain(&hierarchy.object_properties)
         .map(|entity| {
             let empty = if entity.empty.is_some() { " empty" } else { "" };
             let iri = std::slice::from_ref(&entity.iri);

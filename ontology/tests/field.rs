@@ -1,5 +1,5 @@
-//! Knowledge bases that reasoners have been wrong about, and documents that stop them: the verdict on each. They lie beside
-//! the project; without them nothing is checked, with a message.
+//! Knowledge bases that other reasoners evaluate wrongly, and documents that stop them, with the expected
+//! verdicts. The files are outside of the project; the tests print a message if they do not exist.
 
 #![allow(clippy::print_stdout, clippy::needless_for_each, clippy::case_sensitive_file_extension_comparisons)]
 
@@ -13,24 +13,24 @@ use cpu_time::ThreadTime;
 use ontology::{Equality, ReadOptions, lower_together, ntriples, read_files};
 use rules::{Engine, Fact, Prefixes, Symbols, parse_rules};
 
-/// What is to be said of a file.
+/// Expected result for a file.
 enum Verdict {
-    /// It is consistent, and these conclusions are among what follows (in short).
+    /// Consistent; the conclusions include these ones (in short form).
     Follows(&'static [&'static str]),
-    /// It is consistent, and nothing follows.
+    /// Consistent; there are no conclusions.
     Nothing,
-    /// It contradicts itself.
+    /// Inconsistent.
     Inconsistent,
-    /// It is refused with a message that contains all of this.
+    /// Rejected with a message that contains all of these texts.
     Refused(&'static [&'static str]),
-    /// It does not come to an end, which a message says.
+    /// A rule exceeds its budget, and a message reports it.
     Endless,
 }
 
 use Verdict::{Endless, Follows, Inconsistent, Nothing, Refused};
 
-/// The files of `field/ontology` by the reason for their verdicts: OWL 2 (Direct Semantics where it says anything, else the
-/// rules of OWL 2 RL), XSD 1.1, and the grammars of the syntaxes.
+/// The files of `field/ontology`, grouped by the specification that requires the verdict: OWL 2 (Direct
+/// Semantics if it applies, otherwise the rules of OWL 2 RL), XSD 1.1, and the grammars of the syntaxes.
 const FILES: [(&str, Verdict); 62] = [
     ("alldifferent-iri.ttl", Inconsistent),
     ("anonymous-header.ttl", Nothing),
@@ -63,7 +63,8 @@ const FILES: [(&str, Verdict); 62] = [
     ("metaclass.ttl", Follows(&["Eagle a Taxon"])),
     ("nan.ttl", Inconsistent),
     ("negprop.ttl", Inconsistent),
-    // "a  b" is not a token: the lexical form would be collapsed, the string is another value.
+    // "a  b" is not a token. Collapsing white space changes only lexical forms, so the string is a value
+    // outside of the datatype.
     ("normalized.ttl", Inconsistent),
     ("nothing-rule.ttl", Inconsistent),
     ("nothing.ttl", Inconsistent),
@@ -93,13 +94,13 @@ const FILES: [(&str, Verdict); 62] = [
     ("top-property.ttl", Follows(&["i a C"])),
     ("untyped-intersection.ttl", Follows(&["i a A", "i a B"])),
     ("untyped-restriction.ttl", Follows(&["i p v"])),
-    // What a datatype without a definition contains is undecided.
+    // The value space of an undefined datatype is unknown.
     ("user-datatype.ttl", Nothing),
     ("user-datatype2.ttl", Inconsistent),
 ];
 
-/// These two come with the verdicts above, and what stops readers and reasoners.
-const MORE: [(&str, Verdict); 16] = [
+/// Two files with the verdicts above, and files that stop other readers and reasoners.
+const HOSTILE_FILES: [(&str, Verdict); 16] = [
     ("userdt-functional.ttl", Nothing),
     ("zeros.ttl", Inconsistent),
     ("hostile/01-lol.owl", Refused(&["01-lol.owl:1:", "O102", "entit"])),
@@ -118,28 +119,28 @@ const MORE: [(&str, Verdict); 16] = [
     ("hostile/47-regex.ttl", Nothing),
 ];
 
-/// What is much work in any case.
-const MUCH: [(&str, Verdict); 3] = [
+/// Files that require much work from every reasoner.
+const EXPENSIVE_FILES: [(&str, Verdict); 3] = [
     ("hostile/40-trans.ttl", Follows(&["i0 p i1500", "i1 p i3"])),
     ("hostile/41-maxcard.ttl", Follows(&["i0 sameAs i1", "i7 sameAs i1000"])),
     ("hostile/42-swrl-runaway.ttl", Endless),
 ];
 
-/// Rules that go with a file, by its name.
+/// Returns the text of the rule file with the name of the document, or with its number.
 fn rules_of(path: &Path) -> Option<String> {
     let name = path.file_stem()?.to_str()?;
     let number = name.split('-').next()?;
-    let beside = [name, number].map(|stem| path.with_file_name(format!("{stem}.swrl")));
-    beside.iter().find_map(|file| std::fs::read_to_string(file).ok())
+    let candidates = [name, number].map(|stem| path.with_file_name(format!("{stem}.swrl")));
+    candidates.iter().find_map(|file| std::fs::read_to_string(file).ok())
 }
 
 fn engine(path: &Path) -> Result<Engine, String> {
-    let all = |errors: &[String]| errors.join("\n");
+    let join = |errors: &[String]| errors.join("\n");
     let ontology = read_files(&[path], &ReadOptions::default())
-        .map_err(|errors| all(&errors.iter().map(ToString::to_string).collect::<Vec<_>>()))?;
+        .map_err(|errors| join(&errors.iter().map(ToString::to_string).collect::<Vec<_>>()))?;
     let mut symbols = Symbols::new();
     let prefixes = Prefixes::default().with("", "http://x#");
-    let own = match rules_of(path) {
+    let rules = match rules_of(path) {
         Some(text) => {
             let prefixes =
                 if path.ends_with("thing-rule.ttl") { prefixes.with("", "http://e#") } else { prefixes };
@@ -147,12 +148,12 @@ fn engine(path: &Path) -> Result<Engine, String> {
         }
         None => Vec::new(),
     };
-    let lowered = lower_together(&ontology, own, Equality::Owl, &mut symbols);
+    let lowered = lower_together(&ontology, rules, Equality::Owl, &mut symbols);
     Engine::new(symbols, lowered.program, lowered.facts)
-        .map_err(|errors| all(&errors.iter().map(ToString::to_string).collect::<Vec<_>>()))
+        .map_err(|errors| join(&errors.iter().map(ToString::to_string).collect::<Vec<_>>()))
 }
 
-/// Local names only.
+/// Replaces IRIs by local names.
 fn short(text: &str) -> Vec<String> {
     let term = |term: &str| match term.split_once("^^") {
         Some((value, datatype)) => format!("{value}^^{}", local(datatype)),
@@ -170,7 +171,7 @@ fn local(term: &str) -> &str {
 
 fn check(file: &str, verdict: &Verdict) {
     let path = Path::new(common::SHARED).join("field/ontology").join(file);
-    let (start, at) = (ThreadTime::now(), Instant::now());
+    let (start, wall_start) = (ThreadTime::now(), Instant::now());
     let engine = engine(&path);
     match (verdict, engine) {
         (Refused(parts), Err(message)) => {
@@ -186,7 +187,9 @@ fn check(file: &str, verdict: &Verdict) {
             let derived = short(&ntriples(engine.symbols(), &derived));
             match verdict {
                 Follows(expected) => {
-                    let missing = expected.iter().find(|line| !derived.iter().any(|other| other == *line));
+                    let missing = expected
+                        .iter()
+                        .find(|line| !derived.iter().any(|derived_line| derived_line == *line));
                     assert_eq!(missing, None, "{file}: {derived:?}");
                 }
                 _ => assert_eq!(derived, [""; 0], "{file}"),
@@ -195,11 +198,12 @@ fn check(file: &str, verdict: &Verdict) {
         (_, Ok(_)) => panic!("{file} is not refused"),
         (_, Err(message)) => panic!("{file}: {message}"),
     }
-    // Without optimisation everything takes ten times as long, and so it may where others use the machine, too.
-    let (most, all) =
+    // Debug builds are ten times as slow. The wall-clock limit is generous because other processes may use the
+    // machine.
+    let (cpu_limit, wall_limit) =
         (Duration::from_secs(if cfg!(debug_assertions) { 60 } else { 5 }), Duration::from_secs(60));
-    assert!(start.elapsed() < most, "{file} took {:?} of processor time", start.elapsed());
-    assert!(at.elapsed() < all, "{file} took {:?}", at.elapsed());
+    assert!(start.elapsed() < cpu_limit, "{file} took {:?} of processor time", start.elapsed());
+    assert!(wall_start.elapsed() < wall_limit, "{file} took {:?}", wall_start.elapsed());
 }
 
 fn is_there() -> bool {
@@ -215,20 +219,20 @@ fn every_file_has_its_verdict() {
     if !is_there() {
         return;
     }
-    for (file, verdict) in FILES.iter().chain(&MORE) {
+    for (file, verdict) in FILES.iter().chain(&HOSTILE_FILES) {
         check(file, verdict);
     }
 }
 
 #[test]
 #[cfg_attr(debug_assertions, ignore = "takes a minute without optimisation")]
-fn what_is_much_work_ends() {
+fn expensive_files_finish_in_time() {
     if is_there() {
-        MUCH.iter().for_each(|(file, verdict)| check(file, verdict));
+        EXPENSIVE_FILES.iter().for_each(|(file, verdict)| check(file, verdict));
     }
 }
 
-/// No file is without a verdict.
+/// Every file of the directory has a verdict.
 #[test]
 fn every_file_is_in_the_table() {
     if !is_there() {
@@ -241,12 +245,15 @@ fn every_file_is_in_the_table() {
             if name.ends_with(".swrl") || name == "hostile" {
                 continue;
             }
-            assert!(FILES.iter().chain(&MORE).chain(&MUCH).any(|(file, _)| *file == name), "{name}");
+            assert!(
+                FILES.iter().chain(&HOSTILE_FILES).chain(&EXPENSIVE_FILES).any(|(file, _)| *file == name),
+                "{name}"
+            );
         }
     }
 }
 
-/// Every real file that was refused or misread once is read, with the imports that are there.
+/// Real files that were once rejected or misread, with their available imports.
 #[test]
 fn real_files_are_read() {
     let root = Path::new(common::SHARED).join("real/owl_field");

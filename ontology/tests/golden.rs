@@ -1,4 +1,5 @@
-//! The recorded knowledge bases with what Pellet and an independent closure inferred: ours must infer the same.
+//! Compares the conclusions about recorded knowledge bases with the conclusions of Pellet and of an independent
+//! closure.
 
 #![allow(clippy::print_stdout)] // a skipped test says so
 
@@ -12,7 +13,7 @@ use ontology::{
 use rules::{Delta, Engine, Fact, Literal, Symbols};
 use serde_json::Value;
 
-/// Cases that are not compared, each with the reason.
+/// Cases that are not compared, with the reason.
 const SKIPPED: [(&str, &str); 5] = [
     ("suave_26_second_cycle_latched", LATCHED),
     ("suave_27_second_cycle_status_removed_latched", LATCHED),
@@ -53,7 +54,7 @@ fn knowledge_bases_infer_what_the_reference_infers_with_unique_names() {
 }
 
 #[test]
-fn what_is_added_can_be_taken_back() {
+fn deleting_inserted_facts_restores_the_conclusions() {
     check_all("golden/kb", |case| {
         let mut engine = evaluate(&read_real(case, None), &[], Equality::Owl);
         let before: Vec<Fact> = engine.facts().collect();
@@ -79,7 +80,8 @@ fn one_question_ontologies_infer_what_the_reference_infers() {
         let ontology =
             read_text(&lines.join("\n"), "micro.nt", &ReadOptions::default()).expect("well-formed");
         let engine = evaluate(&ontology, &[], Equality::Owl);
-        // The reference closure knows fewer axioms and built-ins than Pellet: one of the two must agree.
+        // The reference closure supports fewer axioms and built-ins than Pellet, so agreement with one of them
+        // is sufficient.
         let by_pellet = || compare(&engine, &Value::Bool(case["status"] == "consistent"), &case["inferred"]);
         compare(&engine, &case["ref_consistent"], &case["ref_inferred"]).or_else(|reference| {
             by_pellet().map_err(|pellet| format!("reference: {reference}, Pellet: {pellet}"))
@@ -87,7 +89,7 @@ fn one_question_ontologies_infer_what_the_reference_infers() {
     });
 }
 
-/// Runs a comparison on every case of a directory and lists those that fail.
+/// Runs a comparison on every case of a directory and reports the failures.
 fn check_all(directory: &str, compare: impl Fn(&Value) -> Result<(), String>) {
     let cases = recorded(directory);
     let mut failures = Vec::new();
@@ -108,7 +110,7 @@ fn check_all(directory: &str, compare: impl Fn(&Value) -> Result<(), String>) {
     );
 }
 
-/// What differs from the reference, if anything does.
+/// Returns a description of the differences to the reference as an error.
 fn compare(engine: &Engine, consistent: &Value, expected: &Value) -> Result<(), String> {
     let violations = engine.violations();
     if consistent != violations.is_empty() {
@@ -132,21 +134,21 @@ fn compare(engine: &Engine, consistent: &Value, expected: &Value) -> Result<(), 
     }
 }
 
-/// The knowledge base of a case with what it adds, and what it removes.
+/// Returns the knowledge base of a case with the added triples, and the triples to remove.
 fn knowledge_base(case: &Value) -> (Ontology, Vec<Triple>) {
     let added = tempfile::Builder::new().suffix(".nt").tempfile().expect("temporary file");
     let text: String = triples(&case["added"]).iter().map(ntriple).collect();
-    // An empty document is none.
-    let more = (!text.is_empty()).then(|| added.path());
+    // An empty document is not an ontology.
+    let added_file = (!text.is_empty()).then(|| added.path());
     std::fs::write(added.path(), &text).expect("written");
-    (read_real(case, more), triples(&case["removed"]))
+    (read_real(case, added_file), triples(&case["removed"]))
 }
 
-/// The files of a case, and one more.
-fn read_real(case: &Value, more: Option<&Path>) -> Ontology {
+/// Reads the files of a case and an additional file.
+fn read_real(case: &Value, additional: Option<&Path>) -> Ontology {
     let real = Path::new(SHARED).join("real/owl");
     let files = case["kb"].as_array().expect("kb").iter().map(|file| real.join(file.as_str().expect("file")));
-    let files: Vec<PathBuf> = files.chain(more.map(Path::to_owned)).collect();
+    let files: Vec<PathBuf> = files.chain(additional.map(Path::to_owned)).collect();
     let options = ReadOptions { directories: vec![real], ..ReadOptions::default() };
     read_files(&files, &options).expect("readable")
 }
@@ -159,7 +161,7 @@ fn evaluate(ontology: &Ontology, removed: &[Triple], equality: Equality) -> Engi
     Engine::new(symbols, lowered.program, facts).expect("the rules are safe")
 }
 
-/// Types and property values of named individuals that follow and are not stated.
+/// The derived types and property values of named individuals.
 fn inferred(engine: &Engine) -> BTreeSet<String> {
     let symbols = engine.symbols();
     let shown = |fact: &Fact| {
@@ -186,7 +188,7 @@ fn ntriple([subject, predicate, object]: &Triple) -> String {
     format!("<{subject}> <{predicate}> {object} .\n")
 }
 
-/// A triple of a case as the fact that it becomes.
+/// Converts a triple of a case to a fact.
 fn fact([subject, predicate, object]: &Triple, symbols: &mut Symbols) -> Fact {
     let subject = symbols.name(subject);
     if predicate == vocab::rdf::TYPE {
@@ -197,8 +199,8 @@ fn fact([subject, predicate, object]: &Triple, symbols: &mut Symbols) -> Fact {
         let object = symbols.name(object);
         return Fact::new(predicate, [subject, object]);
     };
-    let (lexical, rest) = quoted.rsplit_once('"').expect("closing quote");
-    let datatype = rest.strip_prefix("^^<").and_then(|iri| iri.strip_suffix('>'));
-    let literal = symbols.literal(Literal::parse(lexical, datatype, rest.strip_prefix('@')));
+    let (lexical, suffix) = quoted.rsplit_once('"').expect("closing quote");
+    let datatype = suffix.strip_prefix("^^<").and_then(|iri| iri.strip_suffix('>'));
+    let literal = symbols.literal(Literal::parse(lexical, datatype, suffix.strip_prefix('@')));
     Fact::new(predicate, [subject, literal])
 }

@@ -1,8 +1,10 @@
-//! HermiT entails every conclusion about the real knowledge bases and the premises of the W3C's test cases.
+//! Checks that HermiT entails the conclusions about the real knowledge bases and about the premises of the
+//! W3C's test cases.
 //!
-//! HermiT is a complete reasoner for OWL 2 DL, and reads the documents by itself (the OWL API). Documents with imports, and those
-//! that use entities without declaring them, are converted first: the OWL API takes undeclared properties for annotations.
-//! A conclusion that HermiT does not entail is unsound; a contradiction that only HermiT finds may lie outside OWL 2 RL.
+//! HermiT is a complete reasoner for OWL 2 DL and reads documents with the OWL API. Documents with imports or
+//! undeclared entities are converted first, because the OWL API reads undeclared properties as annotation
+//! properties. A conclusion that HermiT does not entail is unsound. A contradiction that only HermiT finds may
+//! be outside of OWL 2 RL.
 //!
 //! ```sh
 //! apt-get install openjdk-17-jdk-headless
@@ -23,10 +25,10 @@ use rules::{Engine, Fact, Symbols};
 use crate::common;
 use crate::w3c::premises;
 
-/// Upper limit on the conclusions of one document that HermiT is asked for.
+/// Limit on the conclusions of one document that HermiT has to prove.
 const MAX_CONCLUSIONS: usize = 60;
 
-/// Documents that are inconsistent for the W3C and consistent for HermiT, each with the reason.
+/// Documents that are inconsistent according to the W3C and consistent according to HermiT, with the reason.
 const DIFFERENT: [(&str, &str); 2] = [
     (
         "rdfbased-sem-eqdis-different-irrflxv",
@@ -38,7 +40,7 @@ const DIFFERENT: [(&str, &str); 2] = [
     ),
 ];
 
-/// The class path of HermiT, of the Python package `owlready2`.
+/// Returns the class path of HermiT in the Python package `owlready2`.
 fn class_path() -> String {
     let python = std::env::var("METAPLAN_PYTHON").unwrap_or_else(|_| "python3".to_owned());
     let script = "import owlready2.reasoning as r; print(r._HERMIT_CLASSPATH)";
@@ -48,15 +50,15 @@ fn class_path() -> String {
     class_path
 }
 
-/// The documents below a folder.
-fn documents(folder: &Path, found: &mut Vec<PathBuf>) {
+/// Collects the documents in a folder and its subfolders.
+fn documents(folder: &Path, paths: &mut Vec<PathBuf>) {
     let Ok(entries) = std::fs::read_dir(folder) else { return };
     for path in entries.filter_map(Result::ok).map(|entry| entry.path()) {
         let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
         if path.is_dir() {
-            documents(&path, found);
+            documents(&path, paths);
         } else if ["owl", "ttl", "rdf"].contains(&extension) {
-            found.push(path);
+            paths.push(path);
         }
     }
 }
@@ -66,11 +68,11 @@ struct Conclusions {
     is_consistent: bool,
     /// A Turtle document of conclusions with declarations.
     text: String,
-    /// The document with declarations and imports, where it has not got all of them itself.
+    /// The document with declarations and imports, if it lacks some of them.
     declared: Option<String>,
 }
 
-/// What is concluded from a document; `None` where the document is refused.
+/// Computes the conclusions from a document; `None` if it is rejected.
 fn conclusions(document: &Path) -> Option<Conclusions> {
     let options = ReadOptions { allow_missing_imports: true, ..ReadOptions::default() };
     let ontology = read_files(&[document], &options).ok()?;

@@ -1,5 +1,5 @@
-//! The knowledge bases that we wrote: they load without warnings, say what the missions need, and react to what the
-//! robot reports.
+//! The embedded knowledge bases: they load without warnings, contain the data of the missions, and react to
+//! reports of the robot.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -23,7 +23,7 @@ fn engine(text: &str, name: &str) -> Engine {
     engine
 }
 
-/// One line a design: name, function, components, estimations, availability.
+/// One line per design: name, functions, components, estimations, availability.
 fn designs(engine: &Engine) -> Vec<String> {
     let line = |design: ontology::tomasys::FunctionDesign| {
         let names = |individuals: &[ontology::tomasys::Individual]| {
@@ -92,10 +92,10 @@ fn uuv_has_the_designs_of_the_mission() {
 #[test]
 fn a_failed_component_makes_its_designs_unavailable_until_it_recovers() {
     let mut engine = engine(kb::UGV, "ugv.ttl");
-    let all = available(&engine);
+    let initial = available(&engine);
     for (status, expected) in [
         (change::Status::Failed, vec!["fd_amcl_lidar", "fd_aruco", "fd_aruco_with_light", "fd_mrpt_lidar"]),
-        (change::Status::Recovered, all.iter().map(String::as_str).collect()),
+        (change::Status::Recovered, initial.iter().map(String::as_str).collect()),
     ] {
         let delta = change::component_status(&mut engine, "c_kinect", status).expect("known");
         engine.apply(delta).expect("applied");
@@ -104,7 +104,7 @@ fn a_failed_component_makes_its_designs_unavailable_until_it_recovers() {
     }
     let delta = change::clear_component_status(&mut engine, "c_kinect").expect("known");
     engine.apply(delta).expect("applied");
-    assert_eq!(available(&engine), all);
+    assert_eq!(available(&engine), initial);
 }
 
 #[test]
@@ -124,7 +124,7 @@ fn a_measurement_outside_a_requirement_makes_designs_unavailable() {
     check(kb::UGV, "ambient_light", "0.81", &["fd_amcl_kinect", "fd_mrpt_kinect"]);
     check(kb::UUV, "water_visibility", "2.5", &["fd_search_high"]);
     check(kb::UUV, "water_visibility", "1.0", &["fd_search_high", "fd_search_low", "fd_search_medium"]);
-    // Nothing measures battery usage yet: an observation is made, and no design requires anything of it.
+    // Battery usage has no measurement: the update adds an observation, and no design has a requirement on it.
     check(kb::UUV, "battery_usage", "1.0", &[]);
 }
 
@@ -139,7 +139,7 @@ fn unknown_names_are_reported_with_those_that_exist() {
     );
 }
 
-/// The rule texts that are evaluated together with a knowledge base agree with the rules in it.
+/// The rule texts that are evaluated together with a knowledge base are consistent with its own rules.
 #[test]
 fn rule_texts_can_be_added() {
     for (text, name, unavailable) in [(kb::UGV, "ugv.ttl", 2), (kb::UUV, "uuv.ttl", 3)] {
@@ -151,29 +151,31 @@ fn rule_texts_can_be_added() {
             lowered.program.rules.extend(program.expect("rules").rules);
         }
         let mut engine = Engine::new(symbols, lowered.program, lowered.facts).expect("stratified");
-        let all = available(&engine).len();
+        let before = available(&engine).len();
         let delta = change::component_status(&mut engine, "c_camera", change::Status::Failed).expect("known");
         engine.apply(delta).expect("applied");
-        assert_eq!(all - available(&engine).len(), unavailable, "{name}");
+        assert_eq!(before - available(&engine).len(), unavailable, "{name}");
         assert_eq!(engine.violations(), [], "{name}");
     }
 }
 
-/// What OWL 2 DL asks beyond OWL 2 Full, as far as it concerns what our knowledge bases use: everything is declared
-/// (horned-owl reads all of it, without a warning), no IRI is a property of two kinds or both class and datatype, and
-/// what composes (transitive, or a chain) is not counted, functional, irreflexive, asymmetric or disjoint.
+/// The restrictions of OWL 2 DL that concern these knowledge bases: everything is declared (horned-owl reads
+/// them without a warning), no IRI is a property of two kinds or both class and datatype, and composite
+/// properties (transitive, or defined by a chain) are not used in cardinality restrictions and not functional,
+/// irreflexive, asymmetric or disjoint.
 #[test]
 fn our_knowledge_bases_are_owl_2_dl() {
     for (text, name) in [(kb::TOMASYS, "tomasys.ttl"), (kb::UGV, "ugv.ttl"), (kb::UUV, "uuv.ttl")] {
         let ontology = read_text(text, name, &ReadOptions::default()).expect("well-formed");
         assert_eq!(ontology.warnings, [], "{name}");
-        let of = |kind| ontology.entities(kind).collect::<BTreeSet<_>>();
+        let entities_of = |kind| ontology.entities(kind).collect::<BTreeSet<_>>();
         let properties =
-            [EntityKind::ObjectProperty, EntityKind::DataProperty, EntityKind::AnnotationProperty].map(of);
+            [EntityKind::ObjectProperty, EntityKind::DataProperty, EntityKind::AnnotationProperty]
+                .map(entities_of);
         let [objects, data, annotations] = &properties;
         assert!(objects.is_disjoint(data) && objects.is_disjoint(annotations), "{name}");
         assert!(data.is_disjoint(annotations), "{name}");
-        assert!(of(EntityKind::Class).is_disjoint(&of(EntityKind::Datatype)), "{name}");
+        assert!(entities_of(EntityKind::Class).is_disjoint(&entities_of(EntityKind::Datatype)), "{name}");
         let (mut composite, mut simple) = (BTreeSet::new(), BTreeSet::new());
         for annotated in &ontology.axioms {
             match &annotated.axiom {

@@ -1,4 +1,5 @@
-//! Axioms as rules: what follows from each kind, what contradicts it, and what is reported as left out.
+//! Rules for axioms: conclusions and contradictions of each kind of axiom, and warnings about axioms that are
+//! not used in full.
 
 use std::collections::BTreeSet;
 
@@ -21,14 +22,14 @@ fn engine(text: &str) -> (Engine, Vec<String>) {
     assert_eq!(ontology.warnings, [], "{text}");
     let mut symbols = Symbols::new();
     let lowered = lower(&ontology, &mut symbols);
-    // Where something is left out, a summary follows.
+    // A summary accompanies warnings about axioms that are not used in full.
     let (summaries, warnings): (Vec<_>, Vec<_>) = lowered.warnings.iter().partition(|w| w.code() == "O304");
     assert_eq!(summaries.is_empty(), warnings.iter().all(|warning| warning.code() != "O301"), "{text}");
     let warnings = warnings.iter().map(ToString::to_string).collect();
     (Engine::new(symbols, lowered.program, lowered.facts).expect("safe"), warnings)
 }
 
-/// What is derived and not stated, in short.
+/// The derived facts in short form.
 fn derived(engine: &Engine) -> BTreeSet<String> {
     let facts: Vec<Fact> = engine.facts().filter(|fact| !engine.is_asserted(fact)).collect();
     let text = ntriples(engine.symbols(), &facts);
@@ -38,9 +39,9 @@ fn derived(engine: &Engine) -> BTreeSet<String> {
     short.lines().map(|line| line.trim_end_matches(" .").replace(['<', '>'], "")).collect()
 }
 
-/// Each text must give exactly these conclusions, consistently and without warnings.
+/// Each text has exactly these conclusions. It is consistent and causes no warnings.
 #[test]
-fn axioms_conclude() {
+fn axioms_have_their_conclusions() {
     for (text, expected) in [
         (":A rdfs:subClassOf :B . :B rdfs:subClassOf :C . :i a :A .", &["i a B", "i a C"][..]),
         (":A owl:equivalentClass :B . :i a :A . :j a :B .", &["i a B", "j a A"]),
@@ -204,16 +205,16 @@ fn axioms_forbid() {
         ),
         (":d rdfs:range xsd:boolean . :i :d ", "true .", "\"False\"^^xsd:boolean ."),
     ] {
-        for (more, expected) in [(consistent, true), (inconsistent, false)] {
-            let (engine, warnings) = engine(&format!("{axioms}{more}"));
-            assert_eq!(engine.violations().is_empty(), expected, "{axioms}{more}");
+        for (assertion, expected) in [(consistent, true), (inconsistent, false)] {
+            let (engine, warnings) = engine(&format!("{axioms}{assertion}"));
+            assert_eq!(engine.violations().is_empty(), expected, "{axioms}{assertion}");
             assert_eq!(warnings, [""; 0], "{axioms}");
         }
     }
 }
 
 #[test]
-fn what_has_no_rule_form_is_reported_once() {
+fn axioms_without_a_rule_form_are_reported_once() {
     for (text, expected) in [
         (
             ":A rdfs:subClassOf [ a owl:Restriction ; owl:onProperty :p ; owl:someValuesFrom :B ] .",
@@ -246,7 +247,7 @@ fn what_has_no_rule_form_is_reported_once() {
     }
 }
 
-/// What has a rule form of an axiom is used, although the rest has none.
+/// If only a part of an axiom has a rule form, this part is used.
 #[test]
 fn axioms_are_used_in_part() {
     let some = "[ a owl:Restriction ; owl:onProperty :p ; owl:someValuesFrom :C ]";
@@ -271,43 +272,48 @@ fn axioms_are_used_in_part() {
     }
 }
 
-/// A restriction that nothing can witness by name is in each restriction that includes it (scm-svf1, -svf2, -avf1, -avf2).
+/// A restriction without a named witness is contained in each restriction that includes it (scm-svf1, -svf2,
+/// -avf1, -avf2).
 #[test]
 fn restrictions_include_restrictions() {
     let restricted = |kind: &str, property: &str, class: &str| {
         format!("[ a owl:Restriction ; owl:onProperty {property} ; owl:{kind} {class} ]")
     };
     let some = |property: &str, class: &str| restricted("someValuesFrom", property, class);
-    let all = |property: &str, class: &str| restricted("allValuesFrom", property, class);
+    let every = |property: &str, class: &str| restricted("allValuesFrom", property, class);
     let inverse = |property: &str| format!("[ owl:inverseOf {property} ]");
     let base =
         ":B rdfs:subClassOf :C . :p rdfs:subPropertyOf :q . :D a owl:Class . :E a owl:Class . :i a :A .";
-    let none = &["i a A2"][..];
-    let known = &["i a A2", "i a D"][..];
+    let not_included = &["i a A2"][..];
+    let included = &["i a A2", "i a D"][..];
     for (concluded, condition, expected) in [
-        (some(":p", ":B"), some(":p", ":C"), known),
-        (some(":p", ":B"), some(":q", ":B"), known),
-        (some(":p", ":B"), some(":q", ":C"), known),
-        (some(":p", ":B"), some(":p", ":B"), known),
-        (some(":p", ":B"), some(":q", "owl:Thing"), known),
-        (some(":p", ":C"), some(":p", ":B"), none),
-        (some(":q", ":B"), some(":p", ":B"), none),
-        (some(":r", ":B"), some(":p", ":B"), none),
-        (some(&inverse(":p"), ":B"), some(&inverse(":q"), ":C"), known),
-        (some(&inverse(":p"), ":B"), some(":q", ":C"), none),
-        (some(":p", &some(":p", ":B")), some(":q", &some(":q", ":C")), known),
-        (some(":p", &some(":p", ":C")), some(":q", &some(":q", ":B")), none),
+        (some(":p", ":B"), some(":p", ":C"), included),
+        (some(":p", ":B"), some(":q", ":B"), included),
+        (some(":p", ":B"), some(":q", ":C"), included),
+        (some(":p", ":B"), some(":p", ":B"), included),
+        (some(":p", ":B"), some(":q", "owl:Thing"), included),
+        (some(":p", ":C"), some(":p", ":B"), not_included),
+        (some(":q", ":B"), some(":p", ":B"), not_included),
+        (some(":r", ":B"), some(":p", ":B"), not_included),
+        (some(&inverse(":p"), ":B"), some(&inverse(":q"), ":C"), included),
+        (some(&inverse(":p"), ":B"), some(":q", ":C"), not_included),
+        (some(":p", &some(":p", ":B")), some(":q", &some(":q", ":C")), included),
+        (some(":p", &some(":p", ":C")), some(":q", &some(":q", ":B")), not_included),
         (
             some(":p", "[ a owl:Class ; owl:intersectionOf ( :B :E ) ]"),
             some(":p", "[ a owl:Class ; owl:unionOf ( :C :E ) ]"),
-            known,
+            included,
         ),
-        (restricted("minCardinality", ":p", "\"2\"^^xsd:nonNegativeInteger"), some(":q", "owl:Thing"), known),
-        (all(":q", ":B"), all(":p", ":C"), known),
-        (all(":p", ":B"), all(":p", ":C"), known),
-        (all(":p", ":B"), all(":q", ":C"), none),
-        (all(":p", ":C"), all(":p", ":B"), none),
-        (all(":p", ":B"), some(":p", ":B"), none),
+        (
+            restricted("minCardinality", ":p", "\"2\"^^xsd:nonNegativeInteger"),
+            some(":q", "owl:Thing"),
+            included,
+        ),
+        (every(":q", ":B"), every(":p", ":C"), included),
+        (every(":p", ":B"), every(":p", ":C"), included),
+        (every(":p", ":B"), every(":q", ":C"), not_included),
+        (every(":p", ":C"), every(":p", ":B"), not_included),
+        (every(":p", ":B"), some(":p", ":B"), not_included),
     ] {
         let text = format!(
             "{base} :A2 a owl:Class . :A rdfs:subClassOf :A2 . :A2 rdfs:subClassOf {concluded} . {condition} rdfs:subClassOf :D ."
@@ -343,7 +349,7 @@ fn chains_of_restrictions_are_lowered() {
     assert_eq!(derived(&engine), BTreeSet::from(["i a A", "i a C", "i a N0"].map(str::to_owned)));
 }
 
-/// A definition by a restriction is lowered without an auxiliary relation, which would tell nothing.
+/// The lowering of a definition by a restriction needs no auxiliary relation.
 #[test]
 fn definitions_by_restrictions_have_no_auxiliary_relation() {
     let definition =

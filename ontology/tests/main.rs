@@ -1,4 +1,4 @@
-//! Reading, reasoning about and writing knowledge bases.
+//! Tests of reading, reasoning and writing knowledge bases.
 
 mod clauses;
 mod common;

@@ -1,5 +1,6 @@
-//! What individuals, classes that are individuals, and pieces of XML mean in rules and axioms: `owl:Thing` of constants, equality
-//! of classes and properties that is stated or derived (eq-rep of OWL 2 RL), and XML that may be one value.
+//! Semantics of individuals, punned classes and XML literals in rules and axioms: `owl:Thing` of constants,
+//! stated and derived equality of classes and properties (eq-rep of OWL 2 RL), and XML literals that may be
+//! equal.
 
 use ontology::{Equality, ReadOptions, lower_together, ntriples, read_text};
 use rules::{Engine, Fact, Prefixes, Symbols, parse_rules};
@@ -14,12 +15,12 @@ fn engine(document: &str, rules: &str) -> Engine {
     let ontology = read_text(document, "t", &ReadOptions::default()).expect("well-formed");
     let mut symbols = Symbols::new();
     let prefixes = Prefixes::new().with("", "http://e/#");
-    let own = parse_rules(rules, "rules", &mut symbols, &prefixes).expect("rules").rules;
-    let lowered = lower_together(&ontology, own, Equality::Owl, &mut symbols);
+    let rules = parse_rules(rules, "rules", &mut symbols, &prefixes).expect("rules").rules;
+    let lowered = lower_together(&ontology, rules, Equality::Owl, &mut symbols);
     Engine::new(symbols, lowered.program, lowered.facts).expect("safe")
 }
 
-/// What follows and is not stated, in short.
+/// The derived facts in short form.
 fn inferred(engine: &Engine) -> Vec<String> {
     let facts: Vec<Fact> = engine.facts().filter(|fact| !engine.is_asserted(fact)).collect();
     let text = ntriples(engine.symbols(), &facts);
@@ -34,7 +35,7 @@ fn every_constant_is_a_thing() {
     let people = format!("{HEAD}:A a owl:Class . :i a :A . :p a owl:NamedIndividual .");
     for (rule, expected) in [
         ("owl:Thing(:p) -> :Hit(:p)", vec!["p a Hit"]),
-        // Named nowhere but in the rule.
+        // Only the rule contains this name.
         ("owl:Thing(:q) -> :Hit(:q)", vec!["q a Hit"]),
         (":A(?x) ^ owl:Thing(:p) -> :near(?x, :p)", vec!["i near p"]),
         ("owl:Thing(?x) ^ owl:Thing(:p) -> :near(?x, :p)", vec!["i near p", "p near p"]),
@@ -50,7 +51,7 @@ fn every_constant_is_a_thing() {
 }
 
 #[test]
-fn classes_and_properties_that_are_one_have_the_same_members() {
+fn equal_classes_and_properties_have_the_same_members() {
     let head = format!(
         "{HEAD}:A a owl:Class . :B a owl:Class . :C a owl:Class . :p a owl:ObjectProperty . :q a owl:ObjectProperty .
         :d a owl:DatatypeProperty . :e a owl:DatatypeProperty . :of a owl:FunctionalProperty , owl:ObjectProperty .
@@ -62,25 +63,25 @@ fn classes_and_properties_that_are_one_have_the_same_members() {
         (":x :of :p , :q . :y :of :d , :e .", vec!["i q j", "i e \"1\""]),
         (":x :of :A . :y :of :B .", vec![]),
     ] {
-        let found = inferred(&engine(&format!("{head}{text}"), ""));
+        let derived = inferred(&engine(&format!("{head}{text}"), ""));
         let missing: Vec<&str> =
-            expected.iter().copied().filter(|one| !found.iter().any(|line| line == one)).collect();
-        assert_eq!(missing, [""; 0], "{text}: {found:?}");
-        let about = |line: &&String| line.starts_with("i ");
-        assert_eq!(found.iter().filter(about).count(), expected.len(), "{text}: {found:?}");
+            expected.iter().copied().filter(|fact| !derived.iter().any(|line| line == fact)).collect();
+        assert_eq!(missing, [""; 0], "{text}: {derived:?}");
+        let is_about_i = |line: &&String| line.starts_with("i ");
+        assert_eq!(derived.iter().filter(is_about_i).count(), expected.len(), "{text}: {derived:?}");
     }
-    // What follows from it goes with it.
+    // Retracting the cause of the equality retracts its consequences.
     let mut changing = engine(&format!("{head}:x :of :A , :B ."), "");
     let names = ["http://e/#of", "http://e/#x", "http://e/#B", "http://e/#i"]
         .map(|name| changing.symbols_mut().name(name));
-    let (said, concluded) = (Fact::new(names[0], [names[1], names[2]]), Fact::new(names[2], [names[3]]));
+    let (asserted, concluded) = (Fact::new(names[0], [names[1], names[2]]), Fact::new(names[2], [names[3]]));
     assert!(changing.holds(&concluded));
-    changing.apply(rules::Delta { insert: Vec::new(), delete: vec![said] }).expect("it ends");
+    changing.apply(rules::Delta { insert: Vec::new(), delete: vec![asserted] }).expect("it ends");
     assert!(!changing.holds(&concluded));
 }
 
 #[test]
-fn xml_is_one_value_or_undecided() {
+fn xml_literals_are_equal_or_undecided() {
     let xml = |first: &str, second: &str| {
         let property = ":d a owl:FunctionalProperty , owl:DatatypeProperty .";
         let values = [first, second].map(|text| format!("\"{text}\"^^rdf:XMLLiteral")).join(" , ");

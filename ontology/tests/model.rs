@@ -1,4 +1,4 @@
-//! What looks like a mistake in a model, and what does not.
+//! Lints for models: reported mistakes, and models without mistakes.
 
 #![allow(clippy::print_stdout)] // a skipped test says so
 
@@ -23,13 +23,13 @@ fn warnings(ontology: &Ontology) -> Vec<String> {
     tomasys::check(ontology, &engine).iter().map(ToString::to_string).collect()
 }
 
-/// Checks that a model's warnings start as given.
+/// Checks the number of a model's warnings and their beginnings.
 fn check(model: &str, expected: &[&str]) {
     let text = format!("{HEAD}{model}");
-    let found = warnings(&read_text(&text, "model.ttl", &ReadOptions::default()).expect("well-formed"));
-    assert_eq!(found.len(), expected.len(), "{model}: {found:#?}");
-    for (found, expected) in found.iter().zip(expected) {
-        assert!(found.starts_with(expected), "{model}: {found}");
+    let reported = warnings(&read_text(&text, "model.ttl", &ReadOptions::default()).expect("well-formed"));
+    assert_eq!(reported.len(), expected.len(), "{model}: {reported:#?}");
+    for (reported, expected) in reported.iter().zip(expected) {
+        assert!(reported.starts_with(expected), "{model}: {reported}");
     }
 }
 
@@ -55,7 +55,7 @@ fn mistakes_are_reported() {
         ],
     );
     check(":v a t:QAvalue ; t:hasValue 1 , 1.0 .", &[]);
-    // Nothing is known of values of a datatype without a definition, or of XML.
+    // The values of an undefined datatype, or of XML, may be equal.
     for (values, contradict) in [
         ("\"a\" , \"b\"", true),
         ("\"a\"^^:D , \"b\"^^:D", false),
@@ -63,8 +63,9 @@ fn mistakes_are_reported() {
         ("\"<a/>\"^^rdf:XMLLiteral , \"<b/>\"^^rdf:XMLLiteral", false),
     ] {
         let text = format!("{HEAD}:d a owl:DatatypeProperty , owl:FunctionalProperty . :i :d {values} .");
-        let found = warnings(&read_text(&text, "model.ttl", &ReadOptions::default()).expect("well-formed"));
-        let [warning] = &found[..] else { panic!("{found:?}") };
+        let reported =
+            warnings(&read_text(&text, "model.ttl", &ReadOptions::default()).expect("well-formed"));
+        let [warning] = &reported[..] else { panic!("{reported:?}") };
         assert!(warning.starts_with("warning[O404]"), "{warning}");
         let end = if contradict {
             "; this is a contradiction"
@@ -93,9 +94,10 @@ fn mistakes_are_reported() {
     check(":c a t:Component ; t:c_status \"FALSE\" .", &[]);
 }
 
-/// A string where the metamodel declares a boolean, as in the first generation of knowledge bases.
+/// The metamodel declares a boolean, and the model states a string, as in the first generation of knowledge
+/// bases.
 #[test]
-fn a_string_where_a_boolean_is_declared() {
+fn a_string_status_instead_of_a_boolean_is_reported() {
     let model = "@prefix t: <http://metacontrol.org/tomasys#> .\n\
         @prefix owl: <http://www.w3.org/2002/07/owl#> .\n\
         @prefix rdf: <http://www.w3.org/1999/02/22-rdf-syntax-ns#> .\n\
@@ -104,8 +106,8 @@ fn a_string_where_a_boolean_is_declared() {
         <urn:model> a owl:Ontology . t:Component a owl:Class .\n\
         t:c_status a owl:DatatypeProperty ; rdfs:range xsd:boolean .\n\
         <http://x#c> a t:Component ; t:c_status \"FALSE\" .";
-    let found = warnings(&read_text(model, "model.ttl", &ReadOptions::default()).expect("well-formed"));
-    let [warning] = &found[..] else { panic!("{found:?}") };
+    let reported = warnings(&read_text(model, "model.ttl", &ReadOptions::default()).expect("well-formed"));
+    let [warning] = &reported[..] else { panic!("{reported:?}") };
     assert!(warning.contains("\"FALSE\"") && warning.contains("a boolean is expected"), "{warning}");
 }
 
@@ -117,9 +119,9 @@ fn our_own_models_have_no_mistakes() {
     }
 }
 
-/// How many warnings the models in real use give.
+/// The codes of the warnings for models in use.
 #[test]
-fn models_in_real_use() {
+fn models_in_use_have_only_known_warnings() {
     let real = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/real/owl"));
     for (file, expected) in [
         ("suave/suave.owl", &["O405"][..]),
@@ -131,8 +133,8 @@ fn models_in_real_use() {
             return;
         }
         let options = ReadOptions { directories: vec![real.clone()], ..ReadOptions::default() };
-        let found = warnings(&read_files(&[real.join(file)], &options).expect("readable"));
-        let codes: Vec<_> = found.iter().map(|warning| &warning[8..12]).collect();
-        assert_eq!(codes, expected, "{file}: {found:#?}");
+        let reported = warnings(&read_files(&[real.join(file)], &options).expect("readable"));
+        let codes: Vec<_> = reported.iter().map(|warning| &warning[8..12]).collect();
+        assert_eq!(codes, expected, "{file}: {reported:#?}");
     }
 }

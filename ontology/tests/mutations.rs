@@ -1,4 +1,5 @@
-//! Knowledge bases in all five syntaxes, damaged at random: each is read or rejected, soon, and never with a panic.
+//! Randomly damaged knowledge bases in all five syntaxes: each document is read or rejected within a time limit
+//! and without a panic.
 
 #![allow(clippy::print_stdout)] // a long run says how far it came
 
@@ -19,10 +20,10 @@ const SYNTAXES: [OutputSyntax; 5] = [
     OutputSyntax::Functional,
 ];
 
-/// Longer than this is a hang: an undamaged one takes milliseconds.
-const PATIENCE: Duration = Duration::from_secs(20);
+/// Time limit for one document; an undamaged one takes milliseconds.
+const TIME_LIMIT: Duration = Duration::from_secs(20);
 
-/// A small generator of numbers (xorshift), the same on every machine.
+/// A pseudorandom number generator (xorshift) with the same numbers on every machine.
 struct Numbers(u64);
 
 impl Numbers {
@@ -34,7 +35,7 @@ impl Numbers {
     }
 }
 
-/// Our own and real knowledge bases, each in every syntax.
+/// Embedded and real knowledge bases in every syntax.
 fn seeds() -> Vec<Vec<u8>> {
     let ours = ["tomasys.ttl", "ugv.ttl"].map(|file| Path::new(OURS).join(file));
     let real = ["suave/suave.owl", "mros_ontology/mros.owl", "navigation_planta/navigation_with_imports.owl"];
@@ -50,25 +51,25 @@ fn seeds() -> Vec<Vec<u8>> {
     seeds
 }
 
-/// A copy with a few changes, of single bytes up to passages, some taken from another text.
+/// Returns a copy with a few changes, from single bytes to passages, some of them from another text.
 fn damaged(seed: &[u8], other: &[u8], numbers: &mut Numbers) -> Vec<u8> {
     const BYTES: &[u8] = b"<>\"'&;:#@^_.,()[]{}/\\=! \n\0\xff0aZ";
     let mut text = seed.to_vec();
     for _ in 0..=numbers.below(4).saturating_sub(2) {
-        let at = numbers.below(text.len());
-        let end = (at + 1 + numbers.below(60)).min(text.len());
+        let position = numbers.below(text.len());
+        let end = (position + 1 + numbers.below(60)).min(text.len());
         match numbers.below(7) {
-            0 => text.truncate(at),
-            1 => drop(text.drain(at..end)),
+            0 => text.truncate(position),
+            1 => drop(text.drain(position..end)),
             2 => {
-                let passage = text[at..end].to_vec();
+                let passage = text[position..end].to_vec();
                 let to = numbers.below(text.len());
                 text.splice(to..to, passage);
             }
             3 => {
                 let from = numbers.below(other.len());
                 let passage = &other[from..(from + numbers.below(200)).min(other.len())];
-                text.splice(at..end, passage.iter().copied());
+                text.splice(position..end, passage.iter().copied());
             }
             4 => {
                 let lines: Vec<&[u8]> = text.split_inclusive(|&byte| byte == b'\n').collect();
@@ -79,14 +80,14 @@ fn damaged(seed: &[u8], other: &[u8], numbers: &mut Numbers) -> Vec<u8> {
                 }
                 text = lines.concat();
             }
-            _ if at < text.len() => text[at] = BYTES[numbers.below(BYTES.len())],
+            _ if position < text.len() => text[position] = BYTES[numbers.below(BYTES.len())],
             _ => {}
         }
     }
     text
 }
 
-/// Reads and lowers; whether the text was accepted, and what it took.
+/// Reads and lowers a text. Returns `true` if it is accepted, and the elapsed time.
 fn survives(text: &[u8]) -> (bool, Duration) {
     let start = Instant::now();
     let options = ReadOptions { allow_missing_imports: true, ..ReadOptions::default() };
@@ -95,18 +96,19 @@ fn survives(text: &[u8]) -> (bool, Duration) {
     (accepted, start.elapsed())
 }
 
-/// Damages seeds until `enough` is true of the number of cases, and keeps what is wrong in a file.
+/// Damages random seeds until `enough` returns `true` for the number of cases. A failing text remains in a
+/// file.
 fn run(mut numbers: Numbers, enough: impl Fn(usize) -> bool) -> (usize, usize) {
     let seeds = seeds();
     let (mut cases, mut accepted) = (0, 0);
     while !enough(cases) {
         let (seed, other) = (&seeds[numbers.below(seeds.len())], &seeds[numbers.below(seeds.len())]);
         let text = damaged(seed, other, &mut numbers);
-        let kept = std::env::temp_dir().join(format!("metaplan-damaged-{}", std::process::id()));
-        std::fs::write(&kept, &text).expect("written");
-        let (was_accepted, took) = survives(&text);
-        assert!(took < PATIENCE, "case {cases} took {took:?}, see {}", kept.display());
-        std::fs::remove_file(&kept).expect("removed");
+        let file = std::env::temp_dir().join(format!("metaplan-damaged-{}", std::process::id()));
+        std::fs::write(&file, &text).expect("written");
+        let (was_accepted, elapsed) = survives(&text);
+        assert!(elapsed < TIME_LIMIT, "case {cases} took {elapsed:?}, see {}", file.display());
+        std::fs::remove_file(&file).expect("removed");
         accepted += usize::from(was_accepted);
         cases += 1;
     }
@@ -114,7 +116,7 @@ fn run(mut numbers: Numbers, enough: impl Fn(usize) -> bool) -> (usize, usize) {
 }
 
 #[test]
-fn a_few_damaged_documents() {
+fn damaged_documents_never_panic() {
     let (cases, accepted) = run(Numbers(0x9E37_79B9_7F4A_7C15), |cases| cases == 60);
     assert!(accepted > cases / 20, "{accepted} of {cases} were still knowledge bases");
 }
@@ -122,7 +124,7 @@ fn a_few_damaged_documents() {
 /// `METAPLAN_SECONDS=900 METAPLAN_SEED=7 cargo test --release -p metaplan-ontology --test all mutations:: -- --ignored --nocapture`
 #[test]
 #[ignore = "runs as long as METAPLAN_SECONDS says"]
-fn many_damaged_documents() {
+fn many_damaged_documents_never_panic() {
     let number = |name: &str, default: u64| {
         std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
     };

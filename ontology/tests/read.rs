@@ -1,4 +1,4 @@
-//! Reading: syntaxes, imports, repairs of what horned-owl would lose, and errors with their places.
+//! Reading: syntaxes, imports, repairs of triples that horned-owl would lose, and positions of errors.
 
 use std::path::{Path, PathBuf};
 
@@ -19,7 +19,7 @@ fn turtle(body: &str) -> Ontology {
     read_text(&format!("{PREFIXES}{body}"), "test.ttl", &ReadOptions::default()).expect("well-formed")
 }
 
-/// Rules and logical axioms as text, with `http://e/#` taken out.
+/// Rules and logical axioms as text, without `http://e/#`.
 fn shown(ontology: &Ontology) -> Vec<String> {
     let rules = ontology.rules().iter().map(ToString::to_string);
     let axioms = ontology.axioms.iter().map(|annotated| annotated.axiom.to_string());
@@ -78,9 +78,9 @@ fn every_syntax_gives_the_same_ontology() {
     }
 }
 
-/// What horned-owl loses in each of these, with the numbers of the list in the file `normalize/mod.rs` describes.
+/// Forms of rules that horned-owl does not read; see the documentation of `normalize/mod.rs`.
 #[test]
-fn rules_in_unusual_shapes_are_read() {
+fn rules_in_unusual_forms_are_read() {
     let atom = |class: &str, x: &str| {
         format!("[ a swrl:ClassAtom ; swrl:classPredicate {class} ; swrl:argument1 {x} ]")
     };
@@ -115,7 +115,7 @@ fn rules_in_unusual_shapes_are_read() {
             ),
             "<C>(?x) -> <D>(?x)",
         ),
-        // A list that is body of one rule and head of another.
+        // A list that is the body of one rule and the head of another.
         (format!("{} _:l rdf:first {c} ; rdf:rest rdf:nil .", rule("_:l", "_:l")), "<C>(?x) -> <C>(?x)"),
         // A blank node as individual and as variable.
         (
@@ -161,7 +161,7 @@ fn rules_in_unusual_shapes_are_read() {
 }
 
 #[test]
-fn axioms_in_unusual_shapes_are_read() {
+fn axioms_in_unusual_forms_are_read() {
     for (text, expected) in [
         (
             "[] a owl:AllDisjointClasses ; owl:members ( :C :D :E ) . :E a owl:Class .",
@@ -192,7 +192,7 @@ fn axioms_in_unusual_shapes_are_read() {
 }
 
 #[test]
-fn what_is_not_read_as_written_is_a_warning() {
+fn deviations_from_the_text_are_warnings() {
     for (text, expected) in [
         (
             ":i :undeclared 1 .",
@@ -277,7 +277,7 @@ fn a_missing_file_is_an_error() {
     assert!(matches!(&errors[..], [Error::Unreadable { .. }]), "{errors:?}");
 }
 
-/// Files by name in a new directory.
+/// Creates a new directory with files.
 fn directory(files: &[(&str, &str)]) -> tempfile::TempDir {
     let directory = tempfile::tempdir().expect("temporary directory");
     for (name, text) in files {
@@ -301,7 +301,7 @@ fn imports_are_found_on_this_machine() {
         "<catalog xmlns=\"urn:oasis:names:tc:entity:xmlns:xml:catalog\"><uri name=\"{url}\" uri=\"x/t.ttl\"/></catalog>"
     );
     let root = |import: &str| importing("http://e/root", &[import]);
-    // Files, whether `lib` is searched, whether `c.xml` is given as a catalog, file that must be found.
+    // Files, `true` if `lib` is searched, `true` if `c.xml` is given as a catalog, expected file.
     let cases = [
         (vec![("a.ttl", root("b.ttl")), ("b.ttl", tomasys.clone())], false, false, Some("b.ttl")),
         (
@@ -368,7 +368,7 @@ fn our_tomasys_is_found_without_any_file() {
 }
 
 #[test]
-fn circles_and_repetitions_of_imports_end() {
+fn cyclic_and_repeated_imports_terminate() {
     let (a, b) =
         (importing("http://e/a", &["b.ttl"]), importing("http://e/b", &["a.ttl", "http://e/a", "b.ttl"]));
     let directory = directory(&[("a.ttl", &a), ("b.ttl", &b)]);
@@ -394,9 +394,9 @@ fn one_ontology_iri_twice_is_reported() {
     assert!(warning.contains("both declare the ontology <http://e/a>; both are read"), "{warning}");
 }
 
-/// Comments and CDATA sections are markup, not text, and tags in them are none.
+/// Comments and CDATA sections are markup; tags inside of them are ignored.
 #[test]
-fn owl_xml_with_sections_and_comments_in_literals() {
+fn owl_xml_literals_may_contain_comments_and_cdata_sections() {
     let text = "<Ontology xmlns=\"http://www.w3.org/2002/07/owl#\" ontologyIRI=\"http://e/\">\n\
         <Declaration><NamedIndividual IRI=\"http://e/#i\"/></Declaration><!-- <Declaration> -->\n\
         <Declaration><DataProperty IRI=\"http://e/#d\"/></Declaration>\n\
@@ -406,9 +406,9 @@ fn owl_xml_with_sections_and_comments_in_literals() {
     assert_eq!(shown(&ontology), ["DataPropertyAssertion(<d> <i> \"a & </b> ]> & 'c d\")"]);
 }
 
-/// However quickly N-Triples are parsed, nothing passes that the grammar does not have.
+/// The fast path for N-Triples rejects everything that the grammar does not allow.
 #[test]
-fn triples_in_lines_are_checked() {
+fn the_fast_path_for_ntriples_checks_the_grammar() {
     let read = |subject: &str, object: &str| {
         read_text(&format!("{subject} <http://e/p> {object} .\n"), "t.nt", &ReadOptions::default())
     };
@@ -439,7 +439,8 @@ fn triples_in_lines_are_checked() {
     }
 }
 
-/// An axiom that treats an annotation property as another kind of property costs a warning, and not the document.
+/// An axiom that uses an annotation property as another kind of property causes a warning, and the document is
+/// read.
 #[test]
 fn annotation_properties_have_no_logical_axioms() {
     let head = "@prefix : <http://e.org/#> . @prefix owl: <http://www.w3.org/2002/07/owl#> . \

@@ -1,4 +1,5 @@
-//! Every real knowledge base loads, alone and with its imports, with the inventory recorded in `golden/README.md`.
+//! Every real knowledge base loads, alone and with its imports, with the contents recorded in
+//! `golden/README.md`.
 
 #![allow(clippy::print_stdout)] // a skipped test says so
 
@@ -10,8 +11,8 @@ use rules::Symbols;
 
 const REAL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/real/owl");
 
-/// File, rules, classes, object properties, data properties, annotation properties, individuals (declared in the file
-/// itself), rules with its imports.
+/// File, rules, classes, object properties, data properties, annotation properties, individuals (declared in
+/// the file itself), rules including imports.
 type Row = (&'static str, usize, usize, usize, usize, usize, usize, usize);
 
 const INVENTORY: [Row; 34] = [
@@ -65,7 +66,7 @@ fn with_imports(file: &Path) -> Ontology {
     read_files(&[file], &options).unwrap_or_else(|errors| panic!("{}: {errors:?}", file.display()))
 }
 
-/// Entities of a kind that the document itself declares.
+/// Number of entities of a kind that the document itself declares.
 fn declared(ontology: &Ontology, kind: ontology::EntityKind) -> usize {
     let undeclared = |iri: &str| {
         let mut warnings = ontology.warnings.iter();
@@ -81,12 +82,12 @@ fn each_file_loads_alone_with_its_inventory() {
         let text = std::fs::read_to_string(real.join(file)).expect("readable");
         let alone = text.replace("owl:imports", "rdfs:seeAlso");
         let ontology = read_text(&alone, file, &ReadOptions::default()).expect(file);
-        let found =
+        let counts =
             [Class, ObjectProperty, DataProperty, AnnotationProperty].map(|kind| declared(&ontology, kind));
         assert_eq!(ontology.rules().len(), rules, "{file}");
-        assert_eq!(found[..3], [classes, objects, data], "{file}");
-        // `isRuleEnabled` is declared for those that use it and do not declare it.
-        assert!(found[3] <= annotations + 1, "{file}: {found:?}");
+        assert_eq!(counts[..3], [classes, objects, data], "{file}");
+        // The reader adds a declaration of `isRuleEnabled` to documents that use it without one.
+        assert!(counts[3] <= annotations + 1, "{file}: {counts:?}");
         assert_eq!(ontology.individuals().len(), individuals, "{file}");
     }
 }
@@ -99,7 +100,7 @@ fn each_file_loads_with_its_imports() {
         let unread =
             |warning: &&Warning| matches!(warning, Warning::Unread { .. } | Warning::UnreadRule { .. });
         let unread: Vec<_> = ontology.warnings.iter().filter(unread).map(ToString::to_string).collect();
-        // 13 blank nodes in two of the files carry `isRuleEnabled true` and nothing else.
+        // In two files, 13 blank nodes have only `isRuleEnabled true`.
         assert!(
             unread.iter().all(|warning| warning.contains("isRuleEnabled> of 13 blank nodes")),
             "{file}: {unread:?}"
@@ -123,7 +124,7 @@ fn suave_has_27_rules_of_which_one_is_stated_twice() {
 }
 
 #[test]
-fn several_reads_are_equal_to_the_byte() {
+fn repeated_reads_give_identical_results() {
     let Some(real) = real() else { return };
     for (file, ..) in INVENTORY {
         let dump = || {

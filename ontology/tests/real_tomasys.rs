@@ -1,4 +1,5 @@
-//! The typed view and the updates on the real knowledge bases, and our metamodel against the real one.
+//! The typed view and the updates on real knowledge bases; comparison of the embedded metamodel with the real
+//! one.
 
 #![allow(clippy::print_stdout)] // a skipped test says so
 
@@ -32,7 +33,7 @@ fn unavailable(engine: &Engine) -> Vec<String> {
     designs.filter(|design| !design.available).map(|design| design.individual.name).collect()
 }
 
-/// A failed component: the file, the component, how the status must be spelled there, which designs go.
+/// A failed component: file, component, expected spelling of the status, designs that become unavailable.
 #[test]
 fn a_failure_is_spelled_as_the_knowledge_base_wants() {
     for (file, component, spelling, expected) in [
@@ -57,8 +58,8 @@ fn a_failure_is_spelled_as_the_knowledge_base_wants() {
             components.iter().find(|found| found.individual.name == component).expect("there").status.clone();
         assert_eq!(status.as_deref(), Some(spelling), "{file}");
         let after = unavailable(&engine);
-        let gone: Vec<_> = after.iter().filter(|name| !before.contains(name)).map(String::as_str).collect();
-        assert_eq!(gone, expected, "{file}");
+        let lost: Vec<_> = after.iter().filter(|name| !before.contains(name)).map(String::as_str).collect();
+        assert_eq!(lost, expected, "{file}");
         let cleared = change::clear_component_status(&mut engine, component).expect("known");
         engine.apply(cleared).expect("applied");
         assert_eq!(unavailable(&engine), before, "{file}");
@@ -78,8 +79,8 @@ fn a_measurement_reaches_what_holds_it() {
     }
 }
 
-/// The grounded design of SUAVE's search needs a visibility of 3.25: below that the grounding and its objective are in
-/// error, and no longer when the water clears up.
+/// The grounded design of SUAVE's search requires a visibility of 3.25. Below it the grounding and its
+/// objective are in error; above it they are not.
 #[test]
 fn a_measurement_puts_an_objective_in_error_and_out_of_it() {
     let Some(ontology) = read("suave/suave.owl") else { return };
@@ -113,7 +114,8 @@ fn our_metamodel_says_all_that_the_real_one_says() {
         ontology.axioms.iter().map(|annotated| annotated.axiom.clone()).collect()
     };
     let missing: Vec<String> = axioms(&real).difference(&axioms(&ours)).map(ToString::to_string).collect();
-    // What rules conclude may have several values in ours: a second reason must not contradict the first.
+    // Conclusions may have several values in the embedded metamodel: a second reason must not be a
+    // contradiction.
     let concluded =
         ["b_status", "cc_availability", "fd_realisability", "fg_status", "o_status", "o_updatable"];
     let functional = |name| format!("FunctionalDataProperty(<http://metacontrol.org/tomasys#{name}>)");

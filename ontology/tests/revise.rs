@@ -1,7 +1,7 @@
-//! Documents that are asserted and retracted mean what the one remaining document means.
+//! Asserting and retracting documents has the same result as reading the remaining statements.
 //!
-//! The oracle is the definition: the statements that remain are written into one document, which a new engine reads. It
-//! shares the reader and the lowering with what is tested, and nothing of updates.
+//! The oracle is the definition: the remaining statements are written to one document, which a new engine
+//! reads. The oracle shares the reader and the lowering with the tested code, but no code of updates.
 
 use std::collections::BTreeSet;
 
@@ -30,7 +30,7 @@ fn read(text: &str, known: Option<&Ontology>) -> Ontology {
     read_text(text, "text", &options).unwrap_or_else(|errors| panic!("{errors}\n{text}"))
 }
 
-/// What can be asked of an engine: what holds, whether it is stated, whether it has a reason; and consistency.
+/// Observable state of an engine: facts, each with two flags (asserted; has a derivation), and consistency.
 type Answers = (BTreeSet<(String, bool, bool)>, bool);
 
 fn answers(engine: &Engine) -> Answers {
@@ -49,7 +49,7 @@ fn from_scratch(text: &str) -> (Ontology, Engine) {
     (ontology, engine)
 }
 
-/// Knowledge that documents change.
+/// A knowledge base that documents change.
 struct Revised {
     stated: Stated,
     engine: Engine,
@@ -61,22 +61,22 @@ impl Revised {
         Self { stated: Stated::new(ontology, Vec::new(), Equality::Owl), engine }
     }
 
-    fn change(&mut self, come: &str, go: &str) -> Vec<Warning> {
-        let known = Some(self.stated.ontology());
-        let (come, go) = (read(come, known), read(go, known));
-        let change = self.stated.change_by(&come, &go, &mut self.engine).expect("names");
+    fn change(&mut self, asserted: &str, retracted: &str) -> Vec<Warning> {
+        let stated = Some(self.stated.ontology());
+        let (asserted, retracted) = (read(asserted, stated), read(retracted, stated));
+        let change = self.stated.change_by(&asserted, &retracted, &mut self.engine).expect("names");
         let changed = match change.program {
             Some(program) => self.engine.change(change.delta, program).expect("safe rules"),
             None => self.engine.apply(change.delta).expect("within the budget"),
         };
-        let both = changed.insert.iter().any(|fact| changed.delete.contains(fact));
-        assert!(!both, "{changed:?}");
+        let contradictory = changed.insert.iter().any(|fact| changed.delete.contains(fact));
+        assert!(!contradictory, "{changed:?}");
         self.stated = change.stated;
         change.warnings
     }
 }
 
-/// Numbers by Marsaglia's xorshift.
+/// Pseudorandom numbers: Marsaglia's xorshift.
 struct Random(u64);
 
 impl Random {
@@ -87,12 +87,12 @@ impl Random {
         (self.0 >> 20) as usize % bound
     }
 
-    fn of<'t>(&mut self, items: &[&'t str]) -> &'t str {
+    fn pick<'t>(&mut self, items: &[&'t str]) -> &'t str {
         items[self.below(items.len())]
     }
 
     fn class(&mut self) -> &'static str {
-        self.of(&[":A", ":B", ":C", ":D"])
+        self.pick(&[":A", ":B", ":C", ":D"])
     }
 
     fn property(&mut self) -> String {
@@ -103,19 +103,19 @@ impl Random {
     }
 
     fn named(&mut self) -> &'static str {
-        self.of(&[":p", ":q", ":r"])
+        self.pick(&[":p", ":q", ":r"])
     }
 
     fn data(&mut self) -> &'static str {
-        self.of(&[":n", ":m"])
+        self.pick(&[":n", ":m"])
     }
 
     fn individual(&mut self) -> &'static str {
-        self.of(&[":a", ":b", ":c", ":d", ":e"])
+        self.pick(&[":a", ":b", ":c", ":d", ":e"])
     }
 
     fn value(&mut self) -> &'static str {
-        self.of(&[
+        self.pick(&[
             "\"1\"^^xsd:integer",
             "\"2\"^^xsd:integer",
             "\"1.0\"^^xsd:decimal",
@@ -124,7 +124,7 @@ impl Random {
         ])
     }
 
-    /// A class expression that can be seen to hold.
+    /// Generates a class expression that can be a condition.
     fn condition(&mut self, depth: usize) -> String {
         match self.below(if depth == 0 { 3 } else { 9 }) {
             3 => format!("ObjectIntersectionOf({} {})", self.condition(depth - 1), self.condition(depth - 1)),
@@ -141,7 +141,7 @@ impl Random {
         }
     }
 
-    /// A class expression from which something follows.
+    /// Generates a class expression that has consequences.
     fn conclusion(&mut self, depth: usize) -> String {
         match self.below(if depth == 0 { 3 } else { 10 }) {
             3 => {
@@ -220,7 +220,7 @@ impl Random {
             0 => format!("FunctionalObjectProperty({})", self.property()),
             1 => format!("InverseFunctionalObjectProperty({})", self.property()),
             2 => {
-                let kind = self.of(&["Symmetric", "Transitive", "Irreflexive", "Asymmetric", "Reflexive"]);
+                let kind = self.pick(&["Symmetric", "Transitive", "Irreflexive", "Asymmetric", "Reflexive"]);
                 format!("{kind}ObjectProperty({})", self.named())
             }
             3 => format!("SubObjectPropertyOf({} {})", self.property(), self.property()),
@@ -248,27 +248,27 @@ impl Random {
 
     fn rule(&mut self) -> String {
         let [x, y] = ["Variable(<urn:v#x>)", "Variable(<urn:v#y>)"];
-        let (one, other) = (self.individual(), self.class());
+        let (individual, class) = (self.individual(), self.class());
         let head = match self.below(5) {
-            0 => format!("ClassAtom({other} {y})"),
+            0 => format!("ClassAtom({class} {y})"),
             1 => format!("ObjectPropertyAtom({} {y} {x})", self.named()),
             2 => format!("SameIndividualAtom({x} {y})"),
             3 => format!("DifferentIndividualsAtom({x} {y})"),
-            _ => format!("ObjectPropertyAtom({} {x} {one})", self.named()),
+            _ => format!("ObjectPropertyAtom({} {x} {individual})", self.named()),
         };
         let edge = format!("ObjectPropertyAtom({} {x} {y})", self.named());
-        let more = match self.below(4) {
+        let second_atom = match self.below(4) {
             0 => format!("DifferentIndividualsAtom({x} {y})"),
             1 => format!("ClassAtom({} {y})", self.class()),
-            2 => format!("SameIndividualAtom({x} {one})"),
+            2 => format!("SameIndividualAtom({x} {individual})"),
             _ => format!("ObjectPropertyAtom({} {y} {x})", self.named()),
         };
-        format!("DLSafeRule(Body({edge} {more}) Head({head}))")
+        format!("DLSafeRule(Body({edge} {second_atom}) Head({head}))")
     }
 }
 
-/// Random documents: some statements first, then twice some that come and some that go. `equalities` has every change
-/// exchange a pair of equal names, too.
+/// Starts with random statements, then asserts and retracts random statements twice. With `equalities`, every
+/// change also asserts an equality and retracts one.
 fn check(seeds: std::ops::Range<u64>, equalities: bool) {
     for seed in seeds {
         let mut random = Random((seed + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
@@ -282,40 +282,44 @@ fn check(seeds: std::ops::Range<u64>, equalities: bool) {
         let mut revised = Revised::new(&document(&stated, true));
         for step in 0..2 {
             let number = random.below(5);
-            let mut come: Vec<String> = (0..number).map(|_| random.statement()).collect();
+            let mut asserted: Vec<String> = (0..number).map(|_| random.statement()).collect();
             let number = random.below(5);
-            let mut go: Vec<String> = (0..number)
+            let mut retracted: Vec<String> = (0..number)
                 .filter(|_| !stated.is_empty())
                 .map(|_| stated[random.below(stated.len())].clone())
                 .collect();
             if equalities {
-                come.push(random.equality());
-                go.extend(stated.iter().find(|statement| statement.starts_with("SameIndividual")).cloned());
+                asserted.push(random.equality());
+                retracted
+                    .extend(stated.iter().find(|statement| statement.starts_with("SameIndividual")).cloned());
             }
             if random.below(4) == 0 {
-                go.push(random.statement());
+                retracted.push(random.statement());
             }
-            // What is written once more in other words is another statement of the same fact.
-            go.retain(|gone| !stated.iter().chain(&come).any(|other| other != gone && alike(other, gone)));
+            // Another spelling of a stated fact is not retracted: the change would remove the fact, but the
+            // oracle compares text.
+            retracted.retain(|item| {
+                !stated.iter().chain(&asserted).any(|other| other != item && alike(other, item))
+            });
             let before = stated.clone();
-            stated.retain(|statement| !go.contains(statement));
-            stated.extend(come.iter().cloned());
+            stated.retain(|statement| !retracted.contains(statement));
+            stated.extend(asserted.iter().cloned());
             stated.sort();
             stated.dedup();
             let declares = random.below(2) == 0;
-            let warnings = revised.change(&document(&come, declares), &document(&go, declares));
+            let warnings = revised.change(&document(&asserted, declares), &document(&retracted, declares));
             let (_, scratch) = from_scratch(&document(&stated, true));
-            let (found, expected) = (answers(&revised.engine), answers(&scratch));
+            let (actual, expected) = (answers(&revised.engine), answers(&scratch));
             let shown = || {
-                let missing: Vec<_> = expected.0.difference(&found.0).collect();
-                let spurious: Vec<_> = found.0.difference(&expected.0).collect();
+                let missing: Vec<_> = expected.0.difference(&actual.0).collect();
+                let spurious: Vec<_> = actual.0.difference(&expected.0).collect();
                 format!(
                     "seed {seed}, step {step}\nbefore:\n{}\ncome:\n{}\ngo:\n{}\nmissing {missing:#?}\nspurious {spurious:#?}\n\
                      consistent: {} instead of {}\n{warnings:?}",
                     before.join("\n"),
-                    come.join("\n"),
-                    go.join("\n"),
-                    found.1,
+                    asserted.join("\n"),
+                    retracted.join("\n"),
+                    actual.1,
                     expected.1
                 )
             };
@@ -324,8 +328,9 @@ fn check(seeds: std::ops::Range<u64>, equalities: bool) {
     }
 }
 
-/// Whether two statements state one axiom in two orders.
-fn alike(one: &str, other: &str) -> bool {
+/// Returns `true` if two statements differ only in the order of their words, in inverses or in numeric
+/// spelling.
+fn alike(first: &str, second: &str) -> bool {
     let words = |text: &str| -> Vec<String> {
         let mut words: Vec<String> = text
             .split([' ', '(', ')'])
@@ -335,7 +340,7 @@ fn alike(one: &str, other: &str) -> bool {
         words.sort();
         words
     };
-    words(one) == words(other)
+    words(first) == words(second)
 }
 
 #[test]
@@ -348,9 +353,9 @@ fn changes_with_equalities_mean_what_one_document_means() {
     check(1_000_000..1_000_200, true);
 }
 
-/// Scripts in which an update once lost an equality, or a group of individuals that differ.
+/// Regressions: an update lost an equality, or a group of different individuals.
 #[test]
-fn changes_that_went_wrong() {
+fn regressions_of_changes() {
     check(2_003_574..2_003_575, false);
     check(2_008_464..2_008_465, false);
     check(3_001_851..3_001_852, true);
@@ -375,18 +380,18 @@ fn many_changes_with_equalities_mean_what_one_document_means() {
 }
 
 #[test]
-fn what_cannot_be_retracted_is_named() {
+fn impossible_retractions_are_reported() {
     let mut revised = Revised::new(&document(&["ClassAssertion(:A :a)".into()], true));
     let warnings = revised.change(&document(&[], false), &document(&["ClassAssertion(:B :a)".into()], true));
     let shown: Vec<String> = warnings.iter().map(ToString::to_string).collect();
     assert!(shown.iter().any(|text| text.contains("O207") && text.contains("<urn:x#B>")), "{shown:?}");
-    let go = read(&document(&["ClassAssertion(:A _:one)".into()], true), None);
+    let retracted = read(&document(&["ClassAssertion(:A _:one)".into()], true), None);
     let error =
-        revised.stated.change_by(&Ontology::default(), &go, &mut revised.engine).expect_err("no name");
+        revised.stated.change_by(&Ontology::default(), &retracted, &mut revised.engine).expect_err("no name");
     assert!(matches!(&error[0], Error::Nameless { .. }), "{error}");
 }
 
-/// A literal is retracted by its value, and stays as long as another document states it.
+/// A literal is retracted by value, and remains while another document states it.
 #[test]
 fn values_are_retracted_by_value() {
     let integer = "DataPropertyAssertion(:n :a \"1\"^^xsd:integer)".to_owned();
@@ -401,23 +406,24 @@ fn values_are_retracted_by_value() {
     assert!(answers(&revised.engine).0.is_empty());
 }
 
-/// Individuals without a name are those of one document only.
+/// Anonymous individuals of two documents are different.
 #[test]
-fn individuals_without_a_name_stay_apart() {
+fn anonymous_individuals_of_two_documents_are_different() {
     let text = document(&["ClassAssertion(:A _:one)".into()], true);
     let mut revised = Revised::new(&text);
     let known = revised.stated.ontology().entities.clone();
     let options = ReadOptions { documents_before: 1, known, ..ReadOptions::default() };
-    let come = read_text(&text, "update", &options).expect("well-formed");
-    let change = revised.stated.change_by(&come, &Ontology::default(), &mut revised.engine).expect("names");
+    let asserted = read_text(&text, "update", &options).expect("well-formed");
+    let change =
+        revised.stated.change_by(&asserted, &Ontology::default(), &mut revised.engine).expect("names");
     assert_eq!(change.delta.insert.len(), 1);
     revised.engine.apply(change.delta).expect("within the budget");
     assert_eq!(answers(&revised.engine).0.len(), 2);
 }
 
-/// Restrictions that include others depend on axioms far from each other, each of which may come and go.
+/// Inclusions between restrictions depend on several axioms, each of which is asserted and retracted.
 #[test]
-fn inclusions_of_restrictions_come_and_go() {
+fn inclusions_of_restrictions_follow_each_change() {
     let axioms = [
         "SubClassOf(:A ObjectSomeValuesFrom(:p :B))",
         "SubClassOf(:B :C)",
@@ -429,15 +435,15 @@ fn inclusions_of_restrictions_come_and_go() {
     let (_, whole) = from_scratch(&document(&axioms, true));
     let member = "<urn:x#D>(<urn:x#a>)".to_owned();
     assert!(answers(&whole).0.contains(&(member, false, true)));
-    for (place, axiom) in axioms.iter().enumerate() {
-        let mut others = axioms.to_vec();
-        others.remove(place);
-        let mut revised = Revised::new(&document(&others, true));
-        let (none, one) = (document(&[], false), document(std::slice::from_ref(axiom), true));
+    for (index, axiom) in axioms.iter().enumerate() {
+        let mut remaining = axioms.to_vec();
+        remaining.remove(index);
+        let mut revised = Revised::new(&document(&remaining, true));
+        let (empty, single) = (document(&[], false), document(std::slice::from_ref(axiom), true));
         let before = answers(&revised.engine);
-        revised.change(&one, &none);
+        revised.change(&single, &empty);
         assert_eq!(answers(&revised.engine), answers(&whole), "{axiom}");
-        revised.change(&none, &one);
+        revised.change(&empty, &single);
         assert_eq!(answers(&revised.engine), before, "{axiom}");
     }
 }

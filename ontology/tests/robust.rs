@@ -3,7 +3,7 @@
 use ontology::{ReadOptions, kb, lower, read_text};
 use rules::Symbols;
 
-/// A small generator of numbers (xorshift), the same on every machine.
+/// A pseudorandom number generator (xorshift) with the same numbers on every machine.
 struct Numbers(u64);
 
 impl Numbers {
@@ -15,7 +15,7 @@ impl Numbers {
     }
 }
 
-/// Reads and lowers; true if the text was accepted.
+/// Reads and lowers a text. Returns `true` if it is accepted.
 fn survives(text: &str) -> bool {
     let Ok(ontology) = read_text(text, "damaged", &ReadOptions::default()) else { return false };
     lower(&ontology, &mut Symbols::new());
@@ -23,7 +23,7 @@ fn survives(text: &str) -> bool {
 }
 
 #[test]
-fn words_exchanged_at_random() {
+fn texts_with_exchanged_words_never_panic() {
     let words: Vec<&str> = kb::TOMASYS.split_inclusive(' ').collect();
     let mut numbers = Numbers(0x2545_F491_4F6C_DD1D);
     let mut accepted = 0;
@@ -39,7 +39,7 @@ fn words_exchanged_at_random() {
 }
 
 #[test]
-fn texts_cut_off_anywhere() {
+fn truncated_texts_never_panic() {
     for end in (0..kb::TOMASYS.len()).step_by(97) {
         if let Some(text) = kb::TOMASYS.get(..end) {
             survives(text);
@@ -47,7 +47,7 @@ fn texts_cut_off_anywhere() {
     }
 }
 
-/// What reading a text of one line that is not a document in any syntax says.
+/// Returns the error message for one line of text that is not a document in any syntax.
 fn garbage(length: usize) -> String {
     let text = "x".repeat(length);
     let errors = read_text(&text, "garbage", &ReadOptions::default()).expect_err("no document");
@@ -58,19 +58,19 @@ fn garbage(length: usize) -> String {
 }
 
 #[test]
-fn a_long_line_of_garbage() {
+fn a_long_line_of_garbage_is_rejected() {
     assert!(garbage(4_000_000).starts_with("garbage:1:"));
 }
 
 #[test]
 #[ignore = "takes a gigabyte of memory"]
-fn a_very_long_line_of_garbage() {
+fn a_very_long_line_of_garbage_is_rejected() {
     assert!(garbage(200_000_000).starts_with("garbage:1:"));
 }
 
 #[cfg(unix)]
 #[test]
-fn loops_of_links_end() {
+fn cyclic_symbolic_links_terminate() {
     use std::os::unix::fs::symlink;
     let directory = tempfile::tempdir().expect("temporary directory");
     let (root, below) = (directory.path().join("root.ttl"), directory.path().join("below"));
@@ -85,12 +85,12 @@ fn loops_of_links_end() {
     {
         std::fs::write(&root, format!("{header} <{import}> .")).expect("written");
         let result = ontology::read_files(&[&root], &options);
-        let found = result.map_err(|errors| errors[0].code()).map(|ontology| ontology.sources.len());
-        assert_eq!(found, code.map_or(Ok(1), Err), "{import}");
+        let actual = result.map_err(|errors| errors[0].code()).map(|ontology| ontology.sources.len());
+        assert_eq!(actual, code.map_or(Ok(1), Err), "{import}");
     }
 }
 
-/// Each with its place, as far as its syntax has places.
+/// Each message has a position, if its syntax has positions.
 #[test]
 fn malformed_documents_are_rejected_with_their_place() {
     let owl_xml = "<Ontology xmlns=\"http://www.w3.org/2002/07/owl#\" ontologyIRI=\"http://x\">\n";
@@ -104,7 +104,7 @@ fn malformed_documents_are_rejected_with_their_place() {
             "t:3:11: error[O102]",
         ),
         (format!("{owl_xml}<Declaration>\n<Class IRI=\"#a\"></Declaration></Ontology>"), "t:3:17: error[O102]"),
-        // This once took all memory.
+        // Regression: the reader allocated all memory.
         (format!("{owl_xml}<Declaration><Class IRI=\"#a>b\"/>"), "t:2:33: error[O102]"),
         (format!("{owl_xml}<Declaration><Klass IRI=\"#a\"/></Declaration></Ontology>"), "t:2:"),
         (format!("{functional}SubClassOf(:A foo:B)\n)"), "t:3:15: error[O102]"),
@@ -120,7 +120,7 @@ fn malformed_documents_are_rejected_with_their_place() {
     }
 }
 
-/// Nothing is declared: kinds are taken from use, with a warning for each.
+/// Undeclared entities get their kinds from their use, each with a warning.
 #[test]
 fn an_undeclared_vocabulary_is_read_with_warnings() {
     let text = "@prefix : <http://x#> .\n:a a :Robot ; :carries :b ; :mass 2.5 .\n:b a :Load .\n";

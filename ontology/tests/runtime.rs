@@ -1,4 +1,5 @@
-//! Reports in, objectives in error and designs out: a small robot in both modes, and the recorded second cycles.
+//! Reports, objectives in error and selection of designs: a small robot in both modes, and the recorded second
+//! cycles of MROS.
 
 #![allow(clippy::print_stdout)] // a skipped test says so
 
@@ -12,7 +13,7 @@ use rules::{Delta, Engine, Fact, Literal, Symbols};
 
 const SHARED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared");
 
-/// Two designs of one function; `slow` needs a motor and light and air, `fast` a motor that both share.
+/// Two designs of one function. `slow` depends on light and air; `fast` requires a motor.
 const ROBOT: &str = r#"
 @prefix t: <http://metacontrol.org/tomasys#> .
 @prefix m: <http://ros/mros#> .
@@ -46,7 +47,7 @@ t:qa_comparison_operator a owl:DatatypeProperty .
 :e_fast a t:QAvalue ; t:isQAtype :performance ; t:hasValue 0.0 .
 "#;
 
-/// What MROS concludes, in text.
+/// The rules of MROS in text form.
 const RULES: &str = r#"
 PREFIX t: <http://metacontrol.org/tomasys#>
 PREFIX m: <http://ros/mros#>
@@ -61,8 +62,8 @@ fn robot(mode: Mode) -> Runtime {
     robot_with(mode, "")
 }
 
-fn robot_with(mode: Mode, further: &str) -> Runtime {
-    let rules_text = format!("{RULES}{further}");
+fn robot_with(mode: Mode, additional_rules: &str) -> Runtime {
+    let rules_text = format!("{RULES}{additional_rules}");
     let ontology = read_text(ROBOT, "robot.ttl", &ReadOptions::default()).expect("well-formed");
     let mut symbols = Symbols::new();
     let mut lowered = lower(&ontology, &mut symbols);
@@ -72,25 +73,29 @@ fn robot_with(mode: Mode, further: &str) -> Runtime {
 }
 
 #[test]
-fn candidates_say_which_requirements_they_miss() {
+fn candidates_list_missed_requirements() {
     for mode in [Mode::Retract, Mode::Latch] {
         let mut runtime = robot(mode);
         let requirements = vec![("air", decimal("9")), ("performance", decimal("0.5"))];
         let objective = NewObjective { name: "o", function: "f_move", requirements, always_improve: false };
         runtime.add_objective(&objective).expect("known");
-        // No rule speaks of requirements.
+        // Without a rule about requirements, no requirement is missed.
         let missed = |runtime: &Runtime| {
             let candidates = runtime.candidates("o", None).expect("known").into_iter();
-            let said = |missed: ontology::runtime::Missed| format!("{} {}", missed.attribute, missed.status);
-            candidates.map(|own| own.missed.into_iter().map(said).collect()).collect::<Vec<Vec<String>>>()
+            let describe =
+                |missed: ontology::runtime::Missed| format!("{} {}", missed.attribute, missed.status);
+            candidates
+                .map(|candidate| candidate.missed.into_iter().map(describe).collect())
+                .collect::<Vec<Vec<String>>>()
         };
         assert_eq!(missed(&runtime), [Vec::<String>::new(), vec![]]);
         let mut runtime = robot_with(mode, LESS_IS_AN_ERROR);
         runtime.add_objective(&objective).expect("known");
-        // Both are estimated to perform worse; what is compared with the surroundings is not a requirement of this kind.
+        // The estimated performance of both designs is too low. Requirements on environmental attributes are
+        // not considered.
         assert_eq!(missed(&runtime), [["performance IN_ERROR_FR"], ["performance IN_ERROR_FR"]]);
         runtime.measure("performance", decimal("0.1")).expect("known");
-        // What was measured of a design before says nothing about the next one.
+        // Measurements of the previous design are not valid for the next one.
         runtime.ground("o", "fd_fast").expect("known");
         runtime.forget_performance("o").expect("known");
         runtime.conclude().expect("no runaway");
@@ -101,7 +106,7 @@ fn candidates_say_which_requirements_they_miss() {
     }
 }
 
-/// What is measured below a requirement is an error, as MROS's rules have it for energy.
+/// A rule for requirements: a measured value below the bound is an error, as in MROS's rules for energy.
 const LESS_IS_AN_ERROR: &str = r#"t:hasNFR(?o, ?n) ^ t:isQAtype(?n, ?q) ^ t:hasValue(?n, ?w) ^ t:solvesO(?fg, ?o) ^ t:hasQAvalue(?fg, ?m) ^ t:isQAtype(?m, ?q) ^ t:hasValue(?m, ?v) ^ swrlb:lessThan(?v, ?w) -> t:o_status(?o, "IN_ERROR_FR")
 "#;
 
@@ -114,13 +119,13 @@ fn pursue(runtime: &mut Runtime, name: &str, function: &str) {
     runtime.add_objective(&objective).expect("new");
 }
 
-/// The statuses of the only objective, and whether it is updatable.
+/// The statuses of the only objective, and `true` if it is updatable.
 fn status(runtime: &Runtime) -> (Vec<String>, bool) {
     let [objective] = &runtime.objectives()[..] else { panic!("one objective") };
     (objective.statuses.clone(), objective.updatable)
 }
 
-/// The statuses after a failure, after its repair and after grounding anew, in a mode.
+/// Checks the statuses after a failure, after the repair, and after a new grounding.
 fn check_failure(mode: Mode, after_repair: &[&str], updatable: bool) {
     let mut runtime = robot(mode);
     pursue(&mut runtime, "o", "f_move");
@@ -149,17 +154,17 @@ fn check_failure(mode: Mode, after_repair: &[&str], updatable: bool) {
 }
 
 #[test]
-fn a_status_goes_with_its_cause() {
+fn a_status_is_retracted_with_its_cause() {
     check_failure(Mode::Retract, &[], true);
 }
 
 #[test]
-fn a_latched_status_stays_until_grounding() {
+fn a_latched_status_remains_until_grounding() {
     check_failure(Mode::Latch, &["IN_ERROR_COMPONENT"], true);
 }
 
 #[test]
-fn nothing_measured_and_no_utility_is_no_obstacle() {
+fn designs_without_measurements_and_utility_are_selected() {
     let mut runtime = robot(Mode::Retract);
     pursue(&mut runtime, "o", "f_move");
     assert_eq!(selected(&runtime, "o").as_deref(), Some("fd_fast"));
@@ -168,7 +173,7 @@ fn nothing_measured_and_no_utility_is_no_obstacle() {
 }
 
 #[test]
-fn a_design_that_violates_two_attributes_is_ruled_out_once_with_both_reasons() {
+fn a_design_that_violates_two_attributes_is_rejected_with_both_reasons() {
     let mut runtime = robot(Mode::Retract);
     pursue(&mut runtime, "o", "f_move");
     for (attribute, value) in [("light", "1.99"), ("air", "5.0")] {
@@ -190,7 +195,7 @@ fn a_design_that_violates_two_attributes_is_ruled_out_once_with_both_reasons() {
 }
 
 #[test]
-fn a_grounding_sees_earlier_measurements_only_where_conclusions_are_retracted() {
+fn a_grounding_uses_earlier_measurements_only_in_retract_mode() {
     for (mode, expected) in [(Mode::Retract, &["IN_ERROR_NFR"][..]), (Mode::Latch, &[])] {
         let mut runtime = robot(mode);
         runtime.measure("light", decimal("1.0")).expect("known");
@@ -205,7 +210,7 @@ fn a_grounding_sees_earlier_measurements_only_where_conclusions_are_retracted() 
 }
 
 #[test]
-fn objectives_leave_nothing_behind() {
+fn removing_an_objective_restores_the_facts() {
     let mut runtime = robot(Mode::Retract);
     let before: Vec<Fact> = runtime.engine().facts().collect();
     let requirements = vec![("light", decimal("0.5")), ("air", decimal("1"))];
@@ -233,7 +238,7 @@ fn two_objectives_may_use_one_design() {
 }
 
 #[test]
-fn wrong_names_are_refused() {
+fn unknown_and_invalid_names_are_rejected() {
     let mut runtime = robot(Mode::Latch);
     let before: Vec<Fact> = runtime.engine().facts().collect();
     let objective =
@@ -265,15 +270,15 @@ fn our_own_robots_are_grounded_and_adapted() {
     let available = runtime.available_designs(Some("f_generate_search_path")).expect("known");
     let names: Vec<_> = available.iter().map(|design| design.name.as_str()).collect();
     assert_eq!(names, ["fd_search_low", "fd_search_medium"]);
-    let best = selected(&runtime, "search").expect("one is left");
-    assert!(names.contains(&best.as_str()), "{best}");
-    runtime.ground("search", &best).expect("known");
+    let design = selected(&runtime, "search").expect("one is left");
+    assert!(names.contains(&design.as_str()), "{design}");
+    runtime.ground("search", &design).expect("known");
     assert_eq!(runtime.engine().violations(), []);
 }
 
-/// The second cycles that were recorded of the original: nothing new follows, and the statuses have stayed.
+/// The recorded second cycles of MROS: there are no new conclusions, and the statuses remain.
 #[test]
-fn second_cycles_of_the_original() {
+fn recorded_second_cycles_of_mros_are_reproduced() {
     for (case, property, expected) in [
         ("suave_26_second_cycle_latched", None, "IN_ERROR_COMPONENT"),
         (
@@ -302,19 +307,23 @@ fn second_cycles_of_the_original() {
             None => {}
         }
         let engine = runtime.engine();
-        let new = |fact: &Fact| {
+        let new_facts = |fact: &Fact| {
             let name = engine.symbols().value(fact.predicate).as_name().expect("name");
             !engine.is_asserted(fact) && !name.starts_with(INTERNAL)
         };
-        let new: Vec<_> =
-            engine.facts().filter(new).map(|f| f.display(engine.symbols()).to_string()).collect();
-        assert_eq!(new.len(), case["reference"]["inferred"].as_array().expect("list").len(), "{new:?}");
+        let new_facts: Vec<_> =
+            engine.facts().filter(new_facts).map(|f| f.display(engine.symbols()).to_string()).collect();
+        assert_eq!(
+            new_facts.len(),
+            case["reference"]["inferred"].as_array().expect("list").len(),
+            "{new_facts:?}"
+        );
         assert_eq!(runtime.conclude().expect("applied"), []);
         assert_eq!(status(&runtime).0, [expected]);
     }
 }
 
-/// The knowledge base of a recorded case with its added triples.
+/// Builds a runtime from the knowledge base of a recorded case with its added triples.
 fn second_cycle(case: &serde_json::Value) -> Runtime {
     let real = PathBuf::from(SHARED).join("real/owl");
     let files = case["kb"].as_array().expect("kb").iter();
@@ -334,8 +343,8 @@ fn second_cycle(case: &serde_json::Value) -> Runtime {
             _ if object == vocab::owl::NAMED_INDIVIDUAL => {}
             _ if predicate == vocab::rdf::TYPE => insert.push(Fact::new(symbols.name(object), [subject])),
             Some(quoted) => {
-                let (lexical, rest) = quoted.rsplit_once('"').expect("quote");
-                let datatype = rest.trim_start_matches("^^<").trim_end_matches('>');
+                let (lexical, suffix) = quoted.rsplit_once('"').expect("quote");
+                let datatype = suffix.trim_start_matches("^^<").trim_end_matches('>');
                 let value = symbols.literal(Literal::parse(lexical, Some(datatype), None));
                 insert.push(Fact::new(symbols.name(predicate), [subject, value]));
             }

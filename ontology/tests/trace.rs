@@ -1,4 +1,4 @@
-//! What the unmodified MROS reasoner did step by step, replayed in latch mode.
+//! Replays recorded traces of the unmodified MROS reasoner in latch mode, step by step.
 
 #![allow(clippy::print_stdout)] // a skipped test says so
 
@@ -11,7 +11,7 @@ use ontology::{ReadOptions, lower, read_files, vocab};
 use rules::{Delta, Engine, Fact, Literal, Symbols};
 use serde_json::{Value, json};
 
-/// Where we differ on purpose: the trace, the first step from which it is not compared, and why.
+/// Intended differences: the trace, the first step that is not compared, and the reason.
 const EXCEPTIONS: [(&str, usize, &str); 3] = [
     (
         "suave_no_measurement_crash",
@@ -31,7 +31,7 @@ const EXCEPTIONS: [(&str, usize, &str); 3] = [
 ];
 
 #[test]
-fn traces_of_the_original() {
+fn recorded_traces_of_mros_are_reproduced() {
     let traces = recorded("golden/trace");
     let mut failures = Vec::new();
     for trace in &traces {
@@ -53,7 +53,7 @@ fn traces_of_the_original() {
     assert!(failures.is_empty(), "{} of {} differ:\n{}", failures.len(), traces.len(), failures.join("\n"));
 }
 
-/// The knowledge base of a trace.
+/// Builds a runtime from the knowledge base of a trace.
 fn runtime(trace: &Value) -> Runtime {
     let real = PathBuf::from(SHARED).join("real/owl");
     let folder = |file: &str| match file {
@@ -75,8 +75,8 @@ struct Replay {
     runtime: Runtime,
 }
 
-fn same(what: &str, ours: &Value, theirs: &Value) -> Result<(), String> {
-    if ours == theirs { Ok(()) } else { Err(format!("{what}\n  ours   {ours}\n  theirs {theirs}")) }
+fn same(subject: &str, ours: &Value, theirs: &Value) -> Result<(), String> {
+    if ours == theirs { Ok(()) } else { Err(format!("{subject}\n  ours   {ours}\n  theirs {theirs}")) }
 }
 
 fn decimal(text: &str) -> Literal {
@@ -112,7 +112,7 @@ impl Replay {
         same("state", &self.state(), &step["state"])
     }
 
-    /// A diagnostic message: an unknown name or a value that is not a number changes nothing.
+    /// Replays a diagnostic message. An unknown name, or a value that is not a number, changes nothing.
     fn report(&mut self, step: &Value) -> Result<(), String> {
         let text = |key: &str| step[key].as_str().unwrap_or_default().to_owned();
         let accepted = match step["message"].as_str().expect("message") {
@@ -134,7 +134,7 @@ impl Replay {
         same("accepted", &json!(accepted), &json!(theirs))
     }
 
-    /// One round of the original's loop: analyze, plan, execute.
+    /// Replays one cycle of MROS: analyze, plan, execute.
     fn cycle(&mut self, step: &Value) -> Result<(), String> {
         let reasoned = !self.runtime.objectives().is_empty();
         same("reasoned", &json!(reasoned), &step["reasoned"])?;
@@ -171,7 +171,7 @@ impl Replay {
     }
 
     fn state(&self) -> Value {
-        let one = |texts: &[String]| texts.first().map_or(Value::Null, |text| json!(text));
+        let first_text = |texts: &[String]| texts.first().map_or(Value::Null, |text| json!(text));
         let (mut objectives, mut groundings) = (BTreeMap::new(), BTreeMap::new());
         for objective in self.runtime.objectives() {
             for grounding in &objective.groundings {
@@ -188,7 +188,7 @@ impl Replay {
                     json!({
                         "typeFD": grounding.design.as_ref().map(|design| &design.name),
                         "solvesO": objective.individual.name,
-                        "fg_status": one(&grounding.statuses),
+                        "fg_status": first_text(&grounding.statuses),
                         "hasQAvalue": measurements,
                     }),
                 );
@@ -196,7 +196,7 @@ impl Replay {
             objectives.insert(
                 objective.individual.name.clone(),
                 json!({
-                    "o_status": one(&objective.statuses),
+                    "o_status": first_text(&objective.statuses),
                     "o_updatable": objective.updatable.then_some(true),
                     "typeF": objective.function.map(|function| function.name),
                 }),
@@ -218,7 +218,7 @@ impl Replay {
         })
     }
 
-    /// Which designs failed which objectives, as far as it has become a statement.
+    /// The asserted failures: objectives by design.
     fn error_log(&self) -> BTreeMap<String, Vec<String>> {
         let engine = self.runtime.engine();
         let mut log = BTreeMap::<String, Vec<String>>::new();

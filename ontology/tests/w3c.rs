@@ -1,5 +1,5 @@
-//! The test cases of the W3C's OWL working group under the Direct Semantics: consistency, inconsistency and entailment. They
-//! lie beside the project; without them nothing is checked, with a message.
+//! The test cases of the W3C's OWL working group under the Direct Semantics: consistency, inconsistency and
+//! entailment. The files are outside of the project; the test prints a message if they do not exist.
 
 #![allow(clippy::print_stdout, clippy::format_push_string)]
 
@@ -15,8 +15,8 @@ use rules::{Engine, Symbols};
 
 const TEST: &str = "http://www.w3.org/2007/OWL/testOntology#";
 
-/// What is not decided as the W3C has it, each with its reason. Nothing else may differ in the profile RL, and nowhere may
-/// something be said to follow that does not.
+/// Cases with another result than the W3C's, with the reason. No other case of the profile RL may differ, and
+/// in no case may a statement be entailed that is not.
 const OPEN: [(&str, &str, &str); 3] = [
     ("WebOnt-I4.6-005-Direct", "entailed", ANNOTATIONS),
     ("WebOnt-equivalentClass-008-Direct", "entailed", ANNOTATIONS),
@@ -29,15 +29,15 @@ const OPEN: [(&str, &str, &str); 3] = [
 const ANNOTATIONS: &str = "a conclusion has an annotation, which was not stated; the same case with the opposite answer \
     is there for the RDF-based semantics, and is right";
 
-/// Everything that the suite says of its cases: subject, local name of the predicate, objects.
+/// The properties of the test cases: subject, local name of the predicate, objects.
 struct Suite(BTreeMap<String, BTreeMap<String, Vec<String>>>);
 
 impl Suite {
-    /// Reads the suite. Its own entities stand in single quotes, which the parser of RDF/XML does not know.
+    /// Reads the suite. It declares entities in single quotes, which the RDF/XML parser does not support.
     fn read(text: &str) -> Self {
-        let mut said: BTreeMap<String, BTreeMap<String, Vec<String>>> = BTreeMap::new();
-        let (head, rest) = text.split_once("]>").expect("a document type");
-        let text = head.replace('\'', "\"") + "]>" + rest;
+        let mut properties: BTreeMap<String, BTreeMap<String, Vec<String>>> = BTreeMap::new();
+        let (head, tail) = text.split_once("]>").expect("a document type");
+        let text = head.replace('\'', "\"") + "]>" + tail;
         for triple in oxrdfxml::RdfXmlParser::new().for_slice(text.as_bytes()) {
             let triple = triple.expect("well-formed");
             let subject = match &triple.subject {
@@ -50,16 +50,16 @@ impl Suite {
                 Term::Literal(literal) => literal.value().to_owned(),
             };
             let predicate = triple.predicate.as_str().rsplit('#').next().unwrap_or_default().to_owned();
-            said.entry(subject).or_default().entry(predicate).or_default().push(object);
+            properties.entry(subject).or_default().entry(predicate).or_default().push(object);
         }
-        Self(said)
+        Self(properties)
     }
 
     fn all(&self, case: &str, predicate: &str) -> &[String] {
-        self.0.get(case).and_then(|said| said.get(predicate)).map_or(&[], Vec::as_slice)
+        self.0.get(case).and_then(|properties| properties.get(predicate)).map_or(&[], Vec::as_slice)
     }
 
-    /// A document of a case, in RDF/XML or else in functional-style syntax.
+    /// Returns a document of a case in RDF/XML, otherwise in functional-style syntax.
     fn text(&self, case: &str, kind: &str) -> Option<&String> {
         let forms = [format!("rdfXml{kind}Ontology"), format!("fs{kind}Ontology")];
         forms.iter().find_map(|form| self.all(case, form).first())
@@ -92,20 +92,20 @@ fn engine(ontology: &Ontology) -> Result<Engine, String> {
     Engine::new(symbols, lowered.program, lowered.facts).map_err(|errors| errors[0].to_string())
 }
 
-/// The premises of all cases, by identifier; none where the suite is not there.
+/// The premises of all cases by identifier; empty if the suite does not exist.
 pub fn premises() -> Vec<(String, String)> {
     let path = Path::new(common::SHARED).join("real/owl_w3c/semantics-direct.rdf");
     let Ok(text) = std::fs::read_to_string(&path) else { return Vec::new() };
     let suite = Suite::read(&text);
-    let cases = suite.0.iter().filter(|(_, said)| said.contains_key("identifier"));
-    let premises = cases.filter_map(|(case, said)| {
+    let cases = suite.0.iter().filter(|(_, properties)| properties.contains_key("identifier"));
+    let premises = cases.filter_map(|(case, properties)| {
         let text = suite.text(case, "Premise").or_else(|| suite.text(case, "Input"))?;
-        Some((said["identifier"][0].replace('/', "-"), text.clone()))
+        Some((properties["identifier"][0].replace('/', "-"), text.clone()))
     });
     premises.collect()
 }
 
-/// What is found for each of the case's questions: its kind, and whether that is as the W3C has it.
+/// Evaluates the questions of a case. Returns the kind of each question, and `true` if the result is the W3C's.
 fn decide(suite: &Suite, case: &str) -> Result<Vec<(&'static str, bool)>, String> {
     let kinds: BTreeSet<&str> =
         suite.all(case, "type").iter().filter_map(|kind| kind.strip_prefix(TEST)).collect();
@@ -117,9 +117,9 @@ fn decide(suite: &Suite, case: &str) -> Result<Vec<(&'static str, bool)>, String
     let follows = |kind: &str| -> Result<Option<bool>, String> {
         let Some(text) = suite.text(case, kind) else { return Ok(None) };
         let conclusion = read(suite, case, text, &premise.entities)?;
-        let mut found = entailments(&engine, &conclusion).map_err(|error| error.to_string())?;
-        found.extend(annotations(&engine, &premise.annotations, &conclusion));
-        Ok(Some(found.iter().all(|one| matches!(one.answer, Answer::Follows(_)))))
+        let mut results = entailments(&engine, &conclusion).map_err(|error| error.to_string())?;
+        results.extend(annotations(&engine, &premise.annotations, &conclusion));
+        Ok(Some(results.iter().all(|result| matches!(result.answer, Answer::Follows(_)))))
     };
     let mut answers = Vec::new();
     if kinds.contains("ConsistencyTest") {
@@ -139,7 +139,7 @@ fn decide(suite: &Suite, case: &str) -> Result<Vec<(&'static str, bool)>, String
 
 #[test]
 #[ignore = "takes minutes without optimisation"]
-fn cases_of_the_working_group() {
+fn results_agree_with_the_w3c_test_cases() {
     let path = Path::new(common::SHARED).join("real/owl_w3c/semantics-direct.rdf");
     let Ok(text) = std::fs::read_to_string(&path) else {
         println!("skipped: {} is not there", path.display());
@@ -148,9 +148,9 @@ fn cases_of_the_working_group() {
     let suite = Suite::read(&text);
     let mut open: BTreeSet<(&str, &str)> = OPEN.iter().map(|(name, kind, _)| (*name, *kind)).collect();
     let (mut counts, mut wrong) = (BTreeMap::<(bool, &str, bool), usize>::new(), Vec::new());
-    let cases = suite.0.iter().filter(|(_, said)| said.contains_key("identifier"));
-    for (case, said) in cases {
-        let name = &said["identifier"][0];
+    let cases = suite.0.iter().filter(|(_, properties)| properties.contains_key("identifier"));
+    for (case, properties) in cases {
+        let name = &properties["identifier"][0];
         let rl = suite.all(case, "profile").iter().any(|profile| profile == &format!("{TEST}RL"));
         match decide(&suite, case) {
             Ok(answers) => {
@@ -180,6 +180,6 @@ fn cases_of_the_working_group() {
         println!("{profile}, {kind}, {verdict}: {count}");
     }
     assert_eq!(wrong, [""; 0]);
-    // What is decided as the W3C has it is not an exception any more.
+    // Exceptions that now have the W3C's result must be removed from `OPEN`.
     assert_eq!(open, BTreeSet::new());
 }

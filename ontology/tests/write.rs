@@ -1,4 +1,4 @@
-//! What is written is read again as the same knowledge, in every syntax.
+//! Documents in every output syntax have the same consequences as the original when they are read again.
 
 #![allow(clippy::print_stdout)] // a skipped test says so
 
@@ -21,7 +21,7 @@ const ALL: [OutputSyntax; 5] = [
     OutputSyntax::Functional,
 ];
 
-/// All that follows, as text; anonymous individuals are left out, since their names may change.
+/// All conclusions as text, without those about anonymous individuals, whose names may change.
 fn conclusions(ontology: &Ontology) -> BTreeSet<String> {
     let mut symbols = Symbols::new();
     let lowered = lower_with(ontology, Equality::Owl, &mut symbols);
@@ -30,12 +30,13 @@ fn conclusions(ontology: &Ontology) -> BTreeSet<String> {
     facts.filter(|fact| !fact.contains("urn:metaplan:")).collect()
 }
 
-/// The rules, each once: OWL/XML does not say which ontology states a rule, so that equal ones become one.
+/// The rules without duplicates: OWL/XML does not record the ontology of a rule, so that equal rules become
+/// one.
 fn rules(ontology: &Ontology) -> BTreeSet<String> {
     ontology.rules.iter().map(ToString::to_string).collect()
 }
 
-/// Writes a file with its imports in each syntax, and reads that alone.
+/// Writes a file with its imports in each syntax, and reads the result without imports.
 fn check(file: &Path) {
     let options = ReadOptions { directories: vec![REAL.into(), OURS.into()], ..ReadOptions::default() };
     let original = read_files(&[file], &options).expect("readable");
@@ -46,26 +47,26 @@ fn check(file: &Path) {
         assert!(text == again, "{syntax:?} of {} differs from run to run", file.display());
         let copy = tempfile::NamedTempFile::new().expect("temporary file");
         std::fs::write(copy.path(), &text).expect("written");
-        // Nothing is imported any more.
-        let read = read_files(&[copy.path()], &ReadOptions::default())
+        // The written document has no imports.
+        let copy_read = read_files(&[copy.path()], &ReadOptions::default())
             .unwrap_or_else(|errors| panic!("{syntax:?} of {}: {errors:?}", file.display()));
-        assert_eq!(read.iri(), original.iri(), "{syntax:?} of {}", file.display());
-        assert_eq!(self::rules(&read), rules, "rules in {syntax:?} of {}", file.display());
-        let found = conclusions(&read);
-        let differences: Vec<_> = axioms.symmetric_difference(&found).take(3).collect();
+        assert_eq!(copy_read.iri(), original.iri(), "{syntax:?} of {}", file.display());
+        assert_eq!(self::rules(&copy_read), rules, "rules in {syntax:?} of {}", file.display());
+        let copied_axioms = conclusions(&copy_read);
+        let differences: Vec<_> = axioms.symmetric_difference(&copied_axioms).take(3).collect();
         assert!(differences.is_empty(), "{syntax:?} of {}: {differences:#?}", file.display());
     }
 }
 
 #[test]
-fn our_own_knowledge_bases() {
+fn embedded_knowledge_bases_survive_conversion() {
     for name in ["tomasys", "ugv", "uuv"] {
         check(&Path::new(OURS).join(format!("{name}.ttl")));
     }
 }
 
 #[test]
-fn knowledge_bases_in_real_use() {
+fn real_knowledge_bases_survive_conversion() {
     for file in [
         "suave/suave.owl",
         "suave_planta/suave.owl",
@@ -83,7 +84,7 @@ fn knowledge_bases_in_real_use() {
 }
 
 #[test]
-fn inferred_triples_as_turtle() {
+fn ntriples_are_converted_to_turtle() {
     let ntriples = "<http://metacontrol.org/tomasys#a> <http://www.w3.org/1999/02/22-rdf-syntax-ns#type> \
                     <http://metacontrol.org/tomasys#B> .\n";
     let text = turtle(ntriples).expect("N-Triples");
@@ -95,7 +96,7 @@ fn inferred_triples_as_turtle() {
     assert!(turtle("no triple").is_err());
 }
 
-/// What is said about an annotation, such as its source, is written with the annotation.
+/// Annotations of an annotation, such as its source, are written together with it.
 #[test]
 fn annotations_of_annotations_are_kept() {
     let directory = tempfile::tempdir().expect("a folder");
@@ -120,7 +121,8 @@ fn annotations_of_annotations_are_kept() {
     }
 }
 
-/// Axioms about annotation properties stay axioms, and an axiom about a single individual, which says nothing, is left out.
+/// Axioms about annotation properties are written as axioms. An n-ary axiom about a single individual has no
+/// form and is omitted.
 #[test]
 fn functional_documents_are_legal() {
     let directory = tempfile::tempdir().expect("a folder");
@@ -136,7 +138,7 @@ fn functional_documents_are_legal() {
             assert!(text.contains(axiom), "{axiom}: {text}");
         }
         assert!(!text.contains("DifferentIndividuals") && !text.contains("AnnotationAssertion"), "{text}");
-        let known = read_text(&text, "again", &ReadOptions::default()).expect("legal");
-        assert_eq!(known.annotations.len(), 3, "{known:?}");
+        let again = read_text(&text, "again", &ReadOptions::default()).expect("legal");
+        assert_eq!(again.annotations.len(), 3, "{again:?}");
     }
 }

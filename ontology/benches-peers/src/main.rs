@@ -1,9 +1,11 @@
-//! What follows from ontologies of our own making, by metaplan and by `reasonable` (OWL 2 RL in Rust), side by side: processor time
-//! and peak memory of a process for each, from the file to the number of all conclusions; what parsing alone takes; and both with all
-//! conclusions written as sorted N-Triples (where `reasonable` spends most on the system, since it does not buffer its output).
+//! Compares metaplan with `reasonable` (OWL 2 RL in Rust) on generated ontologies: processor time and peak
+//! memory of a process, from the file to the number of conclusions. Also measures parsing alone, and both
+//! programs with all conclusions written as sorted N-Triples. Most of the writing time of `reasonable` is
+//! system time, because its output is unbuffered.
 //!
-//! `cargo run --release` runs all; with files in Turtle (`.ttl`) or N-Triples (`.n3`) as arguments, these. `--write DIRECTORY` leaves the ontologies there, and the universities as one document in
-//! RDF/XML for each department.
+//! `cargo run --release` runs everything. With Turtle (`.ttl`) or N-Triples (`.n3`) files as arguments, it runs
+//! these. With `--write DIRECTORY`, it writes the ontologies to the directory, and in addition five
+//! universities with one RDF/XML file per department.
 
 mod shapes;
 mod university;
@@ -14,11 +16,11 @@ use std::process::Command;
 use metaplan_rules::{Engine, Symbols};
 use ontology::{ReadOptions, lower, ntriples, read_files};
 
-/// Xorshift; the same numbers in each run.
+/// Pseudorandom numbers (xorshift), the same in each run.
 pub struct Random(pub u64);
 
 impl Random {
-    /// Below a bound.
+    /// Returns a number below `bound`.
     pub fn below(&mut self, bound: u32) -> u32 {
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 7;
@@ -27,7 +29,7 @@ impl Random {
     }
 }
 
-/// From so many names on, equal individuals are listed by pairs with the first.
+/// Number of equal names from which equalities are listed only as pairs with the first name.
 const MANY_NAMES: usize = 32;
 
 fn metaplan(files: &[PathBuf], write: bool) -> usize {
@@ -58,7 +60,7 @@ fn reasonable(files: &[PathBuf], write: bool) -> usize {
     reasoner.view_output().len().saturating_sub(before)
 }
 
-/// What parsing alone costs with the parsers that metaplan uses (oxttl): all that is left is for reasoning, if metaplan reads by them.
+/// Parses the files with the parsers of metaplan (oxttl). The remaining time of metaplan is reasoning.
 fn parse(files: &[PathBuf]) -> usize {
     let parse = |file: &PathBuf| {
         let text = std::fs::read(file).expect("readable");
@@ -80,15 +82,16 @@ fn usage() -> (f64, u64) {
     (time, kilobytes / 1024)
 }
 
-/// How often each is run that takes less than a second; the quickest run counts, since whatever else the machine does only makes it
-/// slower.
+/// Number of runs of a program that takes less than a second. The fastest run counts, because other load on the
+/// machine only makes runs slower.
 const RUNS: usize = 3;
 
-/// Processor time, memory and number of conclusions in a process of its own.
+/// Runs a program in a separate process. Returns processor time in seconds, peak memory in MB and the number of
+/// conclusions.
 fn measure(peer: &str, files: &[PathBuf]) -> Option<(f64, u64, usize)> {
-    let me = std::env::current_exe().expect("a program");
+    let program = std::env::current_exe().expect("a program");
     let run = || {
-        let output = Command::new(&me).arg("--child").arg(peer).args(files).output().expect("started");
+        let output = Command::new(&program).arg("--child").arg(peer).args(files).output().expect("started");
         let text = String::from_utf8_lossy(&output.stdout).into_owned();
         let mut words = text.split_whitespace();
         Some((words.next()?.parse().ok()?, words.next()?.parse().ok()?, words.next()?.parse().ok()?))
@@ -142,7 +145,7 @@ fn main() {
     }
 }
 
-/// The ontologies that are compared, with their files.
+/// Writes the ontologies to compare. Returns their names and files.
 fn write_all(directory: &Path) -> Vec<(String, PathBuf)> {
     let (one, five) = (university::universities(1), university::universities(5));
     let mut cases = vec![
@@ -162,29 +165,43 @@ fn write_all(directory: &Path) -> Vec<(String, PathBuf)> {
 fn compare(cases: Vec<(String, PathBuf)>) {
     println!("| ontology | metaplan | of which parsing | reasonable | ratio | written, too | conclusions |");
     println!("|---|---|---|---|---|---|---|");
-    let (mut ratios, mut written) = (Vec::new(), Vec::new());
+    let (mut ratios, mut ratios_with_writing) = (Vec::new(), Vec::new());
     for (name, file) in cases {
         let files = [file];
         let peers = ["metaplan", "parse", "reasonable", "metaplan-writes", "reasonable-writes"];
-        let [Some(own), Some(parsing), Some(other), Some(own_all), Some(other_all)] =
-            peers.map(|peer| measure(peer, &files))
+        let [
+            Some(metaplan_run),
+            Some(parse_run),
+            Some(reasonable_run),
+            Some(metaplan_writing),
+            Some(reasonable_writing),
+        ] = peers.map(|peer| measure(peer, &files))
         else {
             println!("| {name} | failed | | | | | |");
             continue;
         };
-        let (ratio, ratio_all) = (other.0 / own.0, other_all.0 / own_all.0);
+        let (ratio, ratio_all) =
+            (reasonable_run.0 / metaplan_run.0, reasonable_writing.0 / metaplan_writing.0);
         ratios.push(ratio);
-        written.push(ratio_all);
+        ratios_with_writing.push(ratio_all);
         println!(
             "| {name} | {:.3} s, {} MB | {:.3} s | {:.3} s, {} MB | {ratio:.1} | {:.3} / {:.3} s: {ratio_all:.1} | {} / {} |",
-            own.0, own.1, parsing.0, other.0, other.1, own_all.0, other_all.0, own.2, other.2
+            metaplan_run.0,
+            metaplan_run.1,
+            parse_run.0,
+            reasonable_run.0,
+            reasonable_run.1,
+            metaplan_writing.0,
+            reasonable_writing.0,
+            metaplan_run.2,
+            reasonable_run.2
         );
     }
     println!(
         "median of {}: {:.1}, with writing {:.1}",
         ratios.len(),
         median(&mut ratios),
-        median(&mut written)
+        median(&mut ratios_with_writing)
     );
 }
 

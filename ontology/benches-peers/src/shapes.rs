@@ -1,4 +1,5 @@
-//! Ontologies of one shape each: hierarchies, restrictions, properties and equality, in Turtle.
+//! Generated ontologies in Turtle, each with one kind of axiom: hierarchies, restrictions, properties,
+//! equality.
 
 use std::fmt::Write;
 
@@ -20,7 +21,7 @@ macro_rules! line {
     };
 }
 
-/// Their names and texts.
+/// Names and texts of the ontologies.
 pub fn all() -> Vec<(&'static str, String)> {
     vec![
         ("a deep hierarchy", text(deep)),

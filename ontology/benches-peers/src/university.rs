@@ -1,6 +1,6 @@
-//! Universities in the shape and proportions of the Lehigh University Benchmark ([1]), of our own making: departments with
-//! professors, students, courses and publications, under a schema of class and property hierarchies, inverses, a transitive
-//! property, domains, ranges, and classes defined by intersections with existential restrictions.
+//! Generates universities in the shape and proportions of the Lehigh University Benchmark [1]: departments with
+//! professors, students, courses and publications, and a schema with class and property hierarchies, inverses,
+//! a transitive property, domains, ranges, and classes defined by intersections with existential restrictions.
 //!
 //! [1] Guo, Pan, Heflin: LUBM: A benchmark for OWL knowledge base systems, J. Web Semantics 2005.
 
@@ -48,7 +48,7 @@ const CLASSES: [(&str, &str); 34] = [
     ("VisitingProfessor", "Professor"),
 ];
 
-/// Classes that are persons with some value in a class.
+/// Classes of persons with a property value in a class: class, property, filler.
 const DEFINED: [(&str, &str, &str); 6] = [
     ("Chair", "headOf", "Department"),
     ("Dean", "headOf", "College"),
@@ -96,7 +96,7 @@ pub enum Object {
     Blank(String),
 }
 
-/// Subject (in brackets, or a blank node), predicate, object.
+/// Subject (an IRI or a blank node), predicate, object.
 pub type Triple = (String, String, Object);
 
 fn iri(name: &str) -> String {
@@ -116,19 +116,19 @@ pub fn schema() -> Vec<Triple> {
     for class in classes.chain(["Person", "Organization", "Publication", "Work"]) {
         add(&iri(class), &kind, Object::Iri(format!("{OWL}Class")));
     }
-    for (class, above) in CLASSES {
-        add(&iri(class), &format!("{RDFS}subClassOf"), named(above));
+    for (class, superclass) in CLASSES {
+        add(&iri(class), &format!("{RDFS}subClassOf"), named(superclass));
     }
     for (class, property, filler) in DEFINED {
-        let [whole, list, rest, restriction] = ["c", "l", "m", "r"].map(|kind| format!("_:{kind}{class}"));
+        let [whole, list, tail, restriction] = ["c", "l", "m", "r"].map(|kind| format!("_:{kind}{class}"));
         let blank = |name: &str| Object::Blank(name.to_owned());
         add(&iri(class), &format!("{OWL}equivalentClass"), blank(&whole));
         add(&whole, &kind, Object::Iri(format!("{OWL}Class")));
         add(&whole, &format!("{OWL}intersectionOf"), blank(&list));
         add(&list, &format!("{RDF}first"), named("Person"));
-        add(&list, &format!("{RDF}rest"), blank(&rest));
-        add(&rest, &format!("{RDF}first"), blank(&restriction));
-        add(&rest, &format!("{RDF}rest"), Object::Iri(format!("{RDF}nil")));
+        add(&list, &format!("{RDF}rest"), blank(&tail));
+        add(&tail, &format!("{RDF}first"), blank(&restriction));
+        add(&tail, &format!("{RDF}rest"), Object::Iri(format!("{RDF}nil")));
         add(&restriction, &kind, Object::Iri(format!("{OWL}Restriction")));
         add(&restriction, &format!("{OWL}onProperty"), named(property));
         add(&restriction, &format!("{OWL}someValuesFrom"), named(filler));
@@ -144,8 +144,8 @@ pub fn schema() -> Vec<Triple> {
     for property in DATA {
         add(&iri(property), &kind, Object::Iri(format!("{OWL}DatatypeProperty")));
     }
-    for (property, above) in SUB_PROPERTIES {
-        add(&iri(property), &format!("{RDFS}subPropertyOf"), named(above));
+    for (property, superproperty) in SUB_PROPERTIES {
+        add(&iri(property), &format!("{RDFS}subPropertyOf"), named(superproperty));
     }
     add(&iri("degreeFrom"), &format!("{OWL}inverseOf"), named("hasAlumnus"));
     add(&iri("memberOf"), &format!("{OWL}inverseOf"), named("member"));
@@ -153,7 +153,7 @@ pub fn schema() -> Vec<Triple> {
     triples
 }
 
-/// Makes what one department says.
+/// Generates the triples of a department.
 struct Department<'r> {
     place: String,
     random: &'r mut Random,
@@ -196,7 +196,7 @@ impl Department<'_> {
     }
 
     fn faculty(&mut self) -> Vec<String> {
-        let mut all = Vec::new();
+        let mut members = Vec::new();
         let (mut course, mut graduate) = (0, 0);
         for (kind, count) in
             [("FullProfessor", 10), ("AssociateProfessor", 14), ("AssistantProfessor", 10), ("Lecturer", 7)]
@@ -221,12 +221,12 @@ impl Department<'_> {
                     graduate += 1;
                     self.relate(&person, "teacherOf", &subject);
                 }
-                all.push(person);
+                members.push(person);
             }
         }
-        let (head, place) = (all[0].clone(), self.place.clone());
+        let (head, place) = (members[0].clone(), self.place.clone());
         self.relate(&head, "headOf", &place);
-        all
+        members
     }
 
     fn students(&mut self, professors: &[String]) -> Vec<String> {
@@ -240,12 +240,12 @@ impl Department<'_> {
                 self.contact(&person);
                 self.relate(&person, "memberOf", &place);
                 for _ in 0..2 + self.random.below(3) {
-                    let taken = self.random.below(courses);
-                    let taken = self.local(course, taken);
-                    self.relate(&person, "takesCourse", &taken);
+                    let course_taken = self.random.below(courses);
+                    let course_taken = self.local(course, course_taken);
+                    self.relate(&person, "takesCourse", &course_taken);
                 }
-                let advised = kind == "GraduateStudent" || number % 5 == 0;
-                if advised {
+                let has_advisor = kind == "GraduateStudent" || number % 5 == 0;
+                if has_advisor {
                     let advisor = self.random.below(34) as usize;
                     self.relate(&person, "advisor", &professors[advisor]);
                 }
@@ -253,10 +253,10 @@ impl Department<'_> {
                     self.degree(&person, "undergraduateDegreeFrom");
                     match number % 5 {
                         0 => {
-                            let taught = self.random.below(60);
-                            let taught = self.local("Course", taught);
+                            let course_taught = self.random.below(60);
+                            let course_taught = self.local("Course", course_taught);
                             self.is(&person, "TeachingAssistant");
-                            self.relate(&person, "teachingAssistantOf", &taught);
+                            self.relate(&person, "teachingAssistantOf", &course_taught);
                         }
                         1 => self.is(&person, "ResearchAssistant"),
                         _ => {}
@@ -281,7 +281,7 @@ impl Department<'_> {
     }
 }
 
-/// What one department of a university says.
+/// Generates a department of a university.
 pub fn department(university: u32, number: u32, random: &mut Random) -> Vec<Triple> {
     let whole = format!("http://www.University{university}.example.org");
     let place = format!("http://www.Department{number}.University{university}.example.org");
@@ -301,7 +301,8 @@ pub fn department(university: u32, number: u32, random: &mut Random) -> Vec<Trip
     department.triples
 }
 
-/// So many universities, each document a department; the schema comes first. Five have about 625,000 triples.
+/// Generates universities. The first document is the schema, each other one a department. Five universities
+/// have about 625,000 triples.
 pub fn universities(count: u32) -> Vec<Vec<Triple>> {
     let mut random = Random(1);
     let mut documents = vec![schema()];
@@ -312,7 +313,7 @@ pub fn universities(count: u32) -> Vec<Vec<Triple>> {
     documents
 }
 
-/// A document in N-Triples.
+/// Formats triples as N-Triples.
 pub fn ntriples(triples: &[Triple]) -> String {
     let mut text = String::new();
     for (subject, predicate, object) in triples {
@@ -329,7 +330,7 @@ pub fn ntriples(triples: &[Triple]) -> String {
     text
 }
 
-/// A document in RDF/XML.
+/// Formats triples as RDF/XML.
 pub fn rdf_xml(triples: &[Triple]) -> String {
     let mut text = format!(
         "<?xml version=\"1.0\"?>\n<rdf:RDF xmlns:rdf=\"{RDF}\" xmlns:rdfs=\"{RDFS}\" xmlns:owl=\"{OWL}\" xmlns:u=\"{NS}\">\n"

@@ -1,4 +1,4 @@
-//! Recorded cases, which lie beside the project.
+//! Recorded cases in the directory `shared`, which is outside of the project.
 
 #![allow(clippy::print_stdout)]
 
@@ -9,7 +9,8 @@ use serde_json::Value;
 
 pub const SHARED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared");
 
-/// The JSON documents of a directory by name; none, with a message, where it is absent.
+/// Returns the JSON documents of a directory, ordered by file name. Prints a message if the directory does not
+/// exist.
 #[allow(dead_code)] // not every suite reads recorded cases
 pub fn recorded(directory: &str) -> Vec<Value> {
     let directory = Path::new(SHARED).join(directory);
@@ -23,13 +24,13 @@ pub fn recorded(directory: &str) -> Vec<Value> {
     files.into_iter().map(read).collect()
 }
 
-/// The design that MROS selects for an objective: the greatest utility among the designs that nothing rules out; of equals, the
-/// first by IRI.
+/// Returns the design that MROS selects for an objective: the design with the greatest utility among those
+/// without a rejection. The first one by IRI wins a tie.
 #[allow(dead_code)] // not every suite selects
 pub fn selected(runtime: &Runtime, objective: &str) -> Option<String> {
     let mut candidates = runtime.candidates(objective, None).expect("known");
     candidates.retain(|candidate| candidate.rejections.is_empty());
-    // Of equals, `max_by` returns the last.
-    let best = candidates.into_iter().rev().max_by(|one, other| one.utility.cmp(&other.utility));
+    // `max_by` returns the last of several maxima.
+    let best = candidates.into_iter().rev().max_by(|first, second| first.utility.cmp(&second.utility));
     best.map(|candidate| candidate.design.name)
 }
