@@ -10,7 +10,7 @@ use ontology::runtime::Runtime;
 use ontology::tomasys::change::Status;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let own = concat!(env!("CARGO_MANIFEST_DIR"), "/kb/ugv.ttl");
+    let default = concat!(env!("CARGO_MANIFEST_DIR"), "/kb/ugv.ttl");
     let file =
         std::env::args().nth(1).filter(|word| !word.starts_with('-')).unwrap_or_else(|| default.to_owned());
     let (runtime, warnings) = Runtime::builder().file(file).build()?;

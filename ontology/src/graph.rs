@@ -115,7 +115,7 @@ impl Graph {
             list.items.push(self.object(&subject, rdf::FIRST)?.clone());
             let tail = self.object(&subject, rdf::REST)?.clone();
             list.spine.extend(self.of(&subject).map(|(index, _)| index));
-            node = rest;
+            node = tail;
         }
     }
 

@@ -282,32 +282,29 @@ fn check(seeds: std::ops::Range<u64>, equalities: bool) {
         let mut revised = Revised::new(&document(&stated, true));
         for step in 0..2 {
             let number = random.below(5);
-            let mut asserted: Vec<String> = (0..number).map(|_| random.statement()).collect();
+            let mut new: Vec<String> = (0..number).map(|_| random.statement()).collect();
             let number = random.below(5);
-            let mut retracted: Vec<String> = (0..number)
+            let mut old: Vec<String> = (0..number)
                 .filter(|_| !stated.is_empty())
                 .map(|_| stated[random.below(stated.len())].clone())
                 .collect();
             if equalities {
-                asserted.push(random.equality());
-                retracted
-                    .extend(stated.iter().find(|statement| statement.starts_with("SameIndividual")).cloned());
+                new.push(random.equality());
+                old.extend(stated.iter().find(|statement| statement.starts_with("SameIndividual")).cloned());
             }
             if random.below(4) == 0 {
-                retracted.push(random.statement());
+                old.push(random.statement());
             }
             // Another spelling of a stated fact is not retracted: the change would remove the fact, but the
             // oracle compares text.
-            retracted.retain(|item| {
-                !stated.iter().chain(&asserted).any(|other| other != item && alike(other, item))
-            });
+            old.retain(|item| !stated.iter().chain(&new).any(|other| other != item && alike(other, item)));
             let before = stated.clone();
-            stated.retain(|statement| !retracted.contains(statement));
-            stated.extend(asserted.iter().cloned());
+            stated.retain(|statement| !old.contains(statement));
+            stated.extend(new.iter().cloned());
             stated.sort();
             stated.dedup();
             let declares = random.below(2) == 0;
-            let warnings = revised.change(&document(&asserted, declares), &document(&retracted, declares));
+            let warnings = revised.change(&document(&new, declares), &document(&old, declares));
             let (_, scratch) = from_scratch(&document(&stated, true));
             let (actual, expected) = (answers(&revised.engine), answers(&scratch));
             let shown = || {
@@ -317,13 +314,13 @@ fn check(seeds: std::ops::Range<u64>, equalities: bool) {
                     "seed {seed}, step {step}\nbefore:\n{}\ncome:\n{}\ngo:\n{}\nmissing {missing:#?}\nspurious {spurious:#?}\n\
                      consistent: {} instead of {}\n{warnings:?}",
                     before.join("\n"),
-                    asserted.join("\n"),
-                    retracted.join("\n"),
+                    new.join("\n"),
+                    old.join("\n"),
                     actual.1,
                     expected.1
                 )
             };
-            assert!(found == expected, "{}", shown());
+            assert!(actual == expected, "{}", shown());
         }
     }
 }

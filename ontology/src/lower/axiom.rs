@@ -243,7 +243,7 @@ impl Lowering<'_, '_> {
         if classes.len() > groups::MAX_PAIRED_MEMBERS {
             // Linear in the number of classes; pairs would be quadratic.
             let member = groups::relation(self.context, axiom);
-            for (place, class) in classes.iter().enumerate() {
+            for (index, class) in classes.iter().enumerate() {
                 let mut variables = Variables::default();
                 let x = variables.fresh("x");
                 let number = Term::Constant(groups::number(self.context, index));
@@ -254,7 +254,7 @@ impl Lowering<'_, '_> {
             groups::forbid(self.context, &self.identity, member);
             return;
         }
-        for (place, first) in classes.iter().enumerate() {
+        for (index, first) in classes.iter().enumerate() {
             for second in &classes[index + 1..] {
                 let mut variables = Variables::default();
                 let x = variables.fresh("x");
