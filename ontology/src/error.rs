@@ -27,6 +27,7 @@ impl Position {
         Self {
             file: file.to_owned(),
             line: before.split(|&byte| byte == b'\n').count() as u64,
+            // Columns count characters, and the offset may be inside of a character.
             column: String::from_utf8_lossy(&before[start..]).chars().count() as u64 + 1,
         }
     }

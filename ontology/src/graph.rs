@@ -1,4 +1,4 @@
-//! A set of triples in document order, with an index by subject. Triples can be removed.
+//! Triples in document order, with an index by subject. Triples can be removed.
 
 use oxrdf::{BlankNode, NamedNode, NamedOrBlankNode, Term, Triple};
 use rustc_hash::{FxHashMap as HashMap, FxHashSet as HashSet};

@@ -79,6 +79,7 @@ impl Names {
     /// Ranks of all names in alphabetical order. The keys are the addresses of the shared texts.
     pub(crate) fn ranks(&self) -> FxHashMap<*const u8, u32> {
         let mut sorted: Vec<&Iri> = self.texts.iter().collect();
+        // Interned texts are distinct, so an unstable sort is deterministic.
         sorted.sort_unstable();
         sorted.into_iter().zip(0..).map(|(iri, rank)| (iri.as_ptr(), rank)).collect()
     }

@@ -51,6 +51,7 @@ impl<'a> Terms<'a> {
         let name = |symbol| self.symbols.value(symbol).as_name();
         let predicate = name(fact.predicate).filter(|name| !name.starts_with(INTERNAL))?;
         match fact.arguments[..] {
+            // Every individual is a thing.
             [_] if predicate == owl::THING => None,
             [subject] => Some([self.node(subject)?, TYPE, self.term(fact.predicate)?]),
             [subject, object] if subject == object && predicate == owl::SAME_AS => None,

@@ -155,6 +155,7 @@ impl Stated {
                 target.dedup();
             }
         }
+        // The lists of an ontology are sorted sets.
         merge(&mut self.ontology.axioms, &assertions.axioms);
         merge(&mut self.ontology.entities, &assertions.entities);
         merge(&mut self.ontology.annotations, &assertions.annotations);
@@ -224,6 +225,8 @@ impl Stated {
                 };
                 removed.extend(self.ontology.axioms.extract_if(.., states));
             }
+            // A fact can be asserted without an axiom (by an update of the engine). It is then withdrawn
+            // without a warning.
             let is_stated =
                 !retracted_facts.is_empty() && retracted_facts.iter().all(|fact| engine.is_asserted(fact));
             if removed.len() == before && !is_stated {
@@ -329,6 +332,7 @@ fn revised_program(program: &Program, before: &Program, after: &Program) -> Opti
     let content = |rule: &EngineRule| {
         let mut copy = rule.clone();
         if *copy.identity.source == *AXIOM_SOURCE {
+            // Another axiom may have been inserted in front of this one.
             copy.identity.position = 0;
         }
         copy

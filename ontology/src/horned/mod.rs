@@ -41,6 +41,7 @@ pub(crate) fn build(
     plain: Parts,
     names: Names,
 ) -> Result<Parts, String> {
+    // horned-owl recurses into lists and expressions, and can panic.
     with_stack(|| build_here(ntriples, about, origins, plain, names))?
 }
 
@@ -69,6 +70,7 @@ fn build_here(
     }
     let unread = builder.leftovers(&incomplete);
     let Builder { mut parts, mut rules, names, .. } = builder;
+    // Document order.
     rules.sort_by_key(|(index, _)| *index);
     parts.rules =
         rules.into_iter().filter_map(|(index, rule)| Some(located(rule, origins.get(index)?))).collect();
@@ -158,6 +160,7 @@ impl Builder {
             })
         };
         let (label, enabled) = (text(rdfs::LABEL), text(swrla::IS_RULE_ENABLED));
+        // The lexical forms of false in `xsd:boolean`.
         let enabled = enabled.map(|value| !["false", "0"].contains(&&*value));
         let (origins, annotations): (Vec<_>, Vec<_>) =
             annotations.into_iter().partition(|annotation| &*annotation.property == ORIGIN);
@@ -218,6 +221,7 @@ impl Builder {
         if let Some(individual) = name.strip_prefix(INDIVIDUAL) {
             return Argument::Individual(self.iri(individual));
         }
+        // Normalised variables contain the index of their rule: `VARIABLE`, index, colon, original name.
         let numbered = name.strip_prefix(VARIABLE).and_then(|suffix| suffix.split_once(':'));
         Argument::Variable(self.iri(numbered.map_or(name, |(_, original)| original)))
     }
@@ -251,6 +255,7 @@ impl Builder {
             ho::ObjectPropertyExpression::ObjectProperty(iri)
             | ho::ObjectPropertyExpression::InverseObjectProperty(iri) => iri,
         };
+        // `normalize::forms` names inverse properties where horned-owl requires a name.
         if let Some(inverse) = name.strip_prefix(INVERSE) {
             return ObjectPropertyExpression::Inverse(self.iri(inverse));
         }
@@ -449,6 +454,7 @@ impl Builder {
 fn entity(component: &Component<RcStr>) -> Option<(EntityKind, &str)> {
     Some(match component {
         Component::DeclareClass(d) => (EntityKind::Class, &*d.0),
+        // Auxiliary names of inverse properties are not entities of the ontology.
         Component::DeclareObjectProperty(d) if d.0.starts_with(INVERSE) => return None,
         Component::DeclareObjectProperty(d) => (EntityKind::ObjectProperty, &*d.0),
         Component::DeclareDataProperty(d) => (EntityKind::DataProperty, &*d.0),

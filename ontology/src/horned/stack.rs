@@ -8,6 +8,7 @@ pub(super) fn with_stack<T: Send>(run: impl FnOnce() -> T + Send) -> Result<T, S
     std::thread::scope(|scope| {
         let thread = std::thread::Builder::new().stack_size(STACK_BYTES).spawn_scoped(scope, run);
         let thread = thread.map_err(|error| format!("there is no room for the OWL reader: {error}"))?;
+        // `join` fails if horned-owl panicked.
         thread.join().map_err(|_| "the OWL reader failed on it".to_owned())
     })
 }

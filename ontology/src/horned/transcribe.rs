@@ -21,6 +21,7 @@ pub(crate) struct Fault {
 /// Describes an error without its location.
 fn message(error: &HornedError) -> String {
     match error {
+        // The reader reports a missing child element as an unexpected end of the file.
         HornedError::ValidityError(message, _) if message == "Unexpected EoF" => {
             "an element ends here that lacks a part, or has one that OWL does not know".to_owned()
         }

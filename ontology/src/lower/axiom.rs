@@ -25,6 +25,7 @@ pub(crate) fn lower_rules(axioms: &[AnnotatedAxiom], context: &mut Context) {
         if is_assertion(axiom) {
             continue;
         }
+        // An axiom is used in part if it has rules in spite of its gaps.
         let before = context.rules.len();
         context.identity = identity(axiom, position);
         let mut lowering = Lowering { identity: context.identity.clone(), context };
@@ -87,6 +88,7 @@ fn assertion(context: &mut Context, axiom: &Axiom) {
         }
         Axiom::SameIndividual(individuals) => {
             let same_as = context.name(owl::SAME_AS);
+            // Neighbours are sufficient, because `sameAs` is transitive.
             for pair in individuals.windows(2) {
                 let (first, second) = (context.name(&pair[0]), context.name(&pair[1]));
                 context.state(same_as, [first, second]);
@@ -194,6 +196,7 @@ impl Lowering<'_, '_> {
             Axiom::EquivalentDataProperties(properties) => self.equivalent_properties(&data(properties)),
             Axiom::DisjointObjectProperties(properties) => self.disjoint_properties(properties),
             Axiom::DisjointDataProperties(properties) => self.disjoint_properties(&data(properties)),
+            // `first` is equivalent to the inverse of `second`.
             Axiom::InverseObjectProperties(first, second) => {
                 let inverse = Property::Inverse(second.clone());
                 self.equivalent_properties(&[named(first), inverse]);
@@ -317,6 +320,7 @@ impl Lowering<'_, '_> {
         let mut variables = Variables::default();
         let (x, y) = (variables.fresh("x"), variables.fresh("y"));
         let (Property::Property(name) | Property::Inverse(name)) = sup;
+        // Everything is included in the top properties.
         if ![owl::TOP_OBJECT_PROPERTY, owl::TOP_DATA_PROPERTY].contains(&&**name) {
             let body = self.context.property(sub, x, y);
             let head = self.context.property(sup, x, y);

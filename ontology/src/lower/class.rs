@@ -33,6 +33,7 @@ pub(crate) fn condition(
                 .fold(1, |size: usize, (_, alternatives)| size.saturating_mul(alternatives.len()));
             let mut product = vec![Vec::new()];
             for (class, mut alternatives) in factors {
+                // Expansion would be exponential in the number of unions.
                 if size > MAX_ALTERNATIVES {
                     alternatives = abbreviated(context, class, alternatives, x);
                 }
@@ -82,6 +83,8 @@ pub(crate) fn condition(
         }
         C::ComplementOf(_) => context.gap("a complement as a condition"),
         C::AllValuesFrom(..) | C::DataAllValuesFrom(..) => {
+            // Under the open-world assumption, further values are always possible. Only an included
+            // restriction can prove it.
             context.gap::<()>("a universal restriction as a condition");
             let restriction = context.inclusions.condition(class);
             let atom = restriction.map(|restriction| context.relation(&relation_of(&restriction), [x]));

@@ -57,6 +57,7 @@ fn entities(context: &mut Context) {
         let symbols: Vec<Symbol> =
             context.entities_of_kind(kind).iter().map(|iri| context.name(iri)).collect();
         let punned: Vec<Symbol> = symbols.into_iter().filter(|symbol| individuals.contains(symbol)).collect();
+        // The number of rules is quadratic in the number of names.
         if punned.len() > MAX_PUNNED_NAMES {
             let subject = format!("{} names of {kinds} are individuals, too", punned.len());
             let reason = "too many to ask of each pair whether it is one".to_owned();

@@ -27,6 +27,7 @@ impl Inclusions {
     pub(crate) fn new(ontology: &Ontology) -> Self {
         let mut uses = Uses::default();
         uses.collect(ontology);
+        // Most ontologies have no such pairs and skip the rest.
         if uses.conditions.is_empty() || uses.concluded.is_empty() {
             return Self::default();
         }
@@ -262,6 +263,7 @@ impl InclusionGraph {
     }
 
     fn property(&mut self, sub: &Property, sup: &Property) {
+        // `p ⊑ q` implies `p⁻ ⊑ q⁻`.
         for (sub, sup) in [(sub.clone(), sup.clone()), (inverse(sub), inverse(sup))] {
             self.properties.entry(sub.clone()).or_default().push(sup.clone());
             self.subproperties.entry(sup).or_default().push(sub);
@@ -280,9 +282,11 @@ impl InclusionGraph {
         if let Some(including) = memo.including.get(&key) {
             return including.clone();
         }
+        // `∀p.C ⊑ ∀q.D` if `q ⊑ p`: universal restrictions are antitone in the property.
         let is_universal = matches!(restriction, ClassExpression::AllValuesFrom(..));
         let related = if is_universal { &self.subproperties } else { &self.properties };
         let mut properties = reachable(property, related);
+        // Other properties cannot give a condition; this avoids the computation of the classes.
         properties.retain(|property| self.condition_properties.contains(property));
         if properties.is_empty() {
             return BTreeSet::new();

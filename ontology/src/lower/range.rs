@@ -73,6 +73,8 @@ impl Lowering<'_, '_> {
             DataRange::UnionOf(ranges) => self.all(ranges, inside, depth),
             DataRange::ComplementOf(range) => self.tests(range, !inside, depth - 1),
             DataRange::Restriction(iri, facets) => {
+                // Outside means: outside of the datatype, or within the previous facets and beyond this one.
+                // Facets compare only values of the datatype.
                 let mut within = self.datatype(iri, true)?;
                 let mut outside = self.datatype(iri, false)?;
                 for (facet, bound) in facets {

@@ -111,6 +111,7 @@ fn lower_rule(rule: &Rule, identity: &RuleIdentity, context: &mut Context) -> Re
         }
     }
     for body in &bodies {
+        // An empty head in the document is an integrity constraint.
         if !heads.is_empty() || rule.head.is_empty() {
             context.rule(identity, heads.clone(), body.clone(), &variables);
         }

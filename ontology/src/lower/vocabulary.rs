@@ -105,6 +105,7 @@ fn things(ontology: &Ontology, thing: Symbol, context: &mut Context) {
         _ => Vec::new(),
     });
     names.extend(terms.filter_map(|term| match term {
+        // Literals are not individuals.
         Term::Constant(symbol) => context.symbols.value(symbol).as_name().map(|_| symbol),
         Term::Variable(_) => None,
     }));

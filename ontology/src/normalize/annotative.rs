@@ -27,6 +27,7 @@ pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) {
     let mut annotative = named(owl::ANNOTATION_PROPERTY);
     for kind in [owl::OBJECT_PROPERTY, owl::DATATYPE_PROPERTY] {
         let logical = named(kind);
+        // A property that is also declared as a logical property may have logical axioms.
         annotative.retain(|iri| !logical.contains(iri));
     }
     if annotative.is_empty() {

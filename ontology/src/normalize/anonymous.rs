@@ -19,6 +19,7 @@ pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) {
     let mut removed = Vec::new();
     let mut stray: BTreeMap<String, usize> = BTreeMap::new();
     for index in 0..graph.len() {
+        // Indices of removed triples remain in use.
         let Some(triple) = graph.get_mut(index) else { continue };
         if let NamedOrBlankNode::BlankNode(node) = &triple.subject {
             if individuals.contains(node) {

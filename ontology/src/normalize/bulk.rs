@@ -87,6 +87,7 @@ impl Usage {
     pub(super) fn is_bulk(&self, triple: &Compact) -> bool {
         let uses = |number: u32| self.uses[number as usize];
         let subject = uses(triple.subject);
+        // Such a triple may be part of an axiom, or of a statement about a property.
         if subject.special || subject.reserved || triple.subject == triple.predicate {
             return false;
         }
@@ -94,6 +95,7 @@ impl Usage {
         match triple.object {
             Object::Node(class) if Some(triple.predicate) == self.kind => {
                 let class = uses(class);
+                // An undeclared name in this position becomes a class.
                 (class.class || !class.declared) && !class.reserved
             }
             _ if property.reserved || property.annotation => false,

@@ -59,6 +59,7 @@ pub(crate) fn declare(graph: &mut Graph, mut classes: BTreeSet<String>, warnings
     if is_used && !declared.annotation_properties.contains(enabled) {
         state(graph, enabled, owl::ANNOTATION_PROPERTY);
     }
+    // `crate::horned` finds the origins of rules in this annotation.
     state(graph, ORIGIN, owl::ANNOTATION_PROPERTY);
 }
 
@@ -130,6 +131,7 @@ impl Kinds<'_> {
             }
         }
         for (index, first, second) in pairs {
+            // Without any information, object property is the default.
             let kinds = [&first, &second].map(|property| self.of(property).unwrap_or(owl::OBJECT_PROPERTY));
             if kinds[0] == kinds[1] {
                 self.assume(&first, kinds[0]);
@@ -261,6 +263,7 @@ fn record_classes(triple: &Triple, declared: &Declared, classes: &mut BTreeSet<S
     match triple.predicate.as_str() {
         rdf::TYPE | rdfs::DOMAIN | swrl::CLASS_PREDICATE => record(object),
         rdfs::RANGE => {
+            // The range of a data property is a data range, not a class.
             let object_property =
                 named(&triple.subject).is_some_and(|iri| declared.object_properties.contains(iri));
             record(object.filter(|_| object_property));

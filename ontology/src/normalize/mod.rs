@@ -109,6 +109,7 @@ pub(crate) fn normalize(
     let mut warnings = Vec::new();
     // Later passes are recursive.
     if let Some((index, about)) = depth::too_deep(&graph) {
+        // The document that contains the triple.
         let part = parts.partition_point(|(start, _)| *start <= index).saturating_sub(1);
         return Err(Error::TooDeep {
             file: files[part].clone(),

@@ -119,6 +119,7 @@ impl Pass {
                 continue;
             }
             described.insert(Term::from(triple.subject.clone()));
+            // The object of a type triple is a class.
             if triple.predicate.as_str() != rdf::TYPE {
                 described.insert(triple.object.clone());
             }
@@ -146,6 +147,7 @@ impl Pass {
         part: &'static str,
     ) -> Result<Vec<Atom>, String> {
         let Some(list) = graph.objects(rule, part).next() else { return Ok(Vec::new()) };
+        // A rule with several bodies or heads is malformed.
         graph.object(rule, part)?;
         let list = graph.list(list)?;
         self.replaced.extend(list.spine);

@@ -75,6 +75,7 @@ pub(crate) fn parse(
             && matches!(triple.object, Object::Node(class) if class == ontology)
             && !names.is_blank(triple.subject)
     };
+    // A document may contain headers of other ontologies; the first header counts.
     let header = triples.iter().find(is_header).map(|triple| names.text(triple.subject).clone());
     let objects = |predicate: u32| {
         let matching = triples.iter().filter(move |triple| triple.predicate == predicate);
@@ -117,6 +118,7 @@ impl Sink<'_> {
 pub(crate) fn ontology_iri(head: &[u8]) -> Option<String> {
     let base = "file:///";
     let head = encoding::decoded(head).ok()?;
+    // The ontology IRI may contain an entity.
     let head = entities::expanded(&head).ok()?.text.into_owned();
     let head = head.as_slice();
     let is_header = |triple: &Triple| {

@@ -84,6 +84,7 @@ pub(super) fn expanded(text: &[u8]) -> Result<Flattened<'_>, Fault> {
 /// Parses the entity reference at the start of a text. Returns the name of the entity and the length of the
 /// reference.
 fn reference(text: &[u8]) -> Option<(&[u8], usize)> {
+    // Names of entities are short; a longer text is not a reference.
     let end = text.iter().take(256).position(|&byte| byte == b';')?;
     let name = &text[1..end];
     let plain = |byte: &u8| byte.is_ascii_alphanumeric() || *byte >= 0x80 || b"_-.:".contains(byte);
@@ -104,6 +105,7 @@ impl<'a> Expansion<'a> {
         let Some((&name, &value)) = self.entities.get_key_value(name) else {
             return Err(format!("the entity `&{};` is not declared", display_name()));
         };
+        // This also stops cycles.
         if depth == MAX_ENTITY_DEPTH {
             return Err(format!(
                 "the entity `&{};` contains itself, or others more than {MAX_ENTITY_DEPTH} deep",
@@ -115,6 +117,7 @@ impl<'a> Expansion<'a> {
             self.cache.insert(name, resolved);
         }
         let value = &self.cache[name];
+        // Checked before copying, so that memory stays bounded.
         if value.len() > self.budget {
             let limit = format!("more than {MAX_GROWTH_FACTOR} times the document and {EXTRA_BYTES} bytes");
             return Err(format!(

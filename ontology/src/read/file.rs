@@ -14,6 +14,7 @@ pub(super) fn regular_file(path: &Path) -> std::io::Result<Vec<u8>> {
         return Err(std::io::Error::other("it is not a regular file"));
     }
     let mut bytes = Vec::with_capacity(metadata.len().min(MAX_BYTES) as usize + 1);
+    // The file may grow while it is read.
     std::fs::File::open(path)?.take(MAX_BYTES + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > MAX_BYTES {
         return Err(std::io::Error::other(format!("it has more than {MAX_BYTES} bytes")));

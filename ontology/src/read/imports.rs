@@ -194,6 +194,7 @@ fn is_ontology_file(path: &Path) -> bool {
 fn candidates(directory: &Path, depth: usize) -> Vec<Candidate> {
     let Ok(entries) = std::fs::read_dir(directory) else { return Vec::new() };
     let mut entries: Vec<_> = entries.filter_map(Result::ok).collect();
+    // The order of directory entries depends on the file system.
     entries.sort_by_key(std::fs::DirEntry::path);
     let mut files = Vec::new();
     for entry in entries {

@@ -109,6 +109,7 @@ fn read(roots: VecDeque<Pending>, options: &ReadOptions) -> Result<Ontology, Err
     })?;
     warnings.extend(parts.warnings);
     spelling::locate(&mut warnings, &texts);
+    // Warnings of several stages may be equal.
     warnings.sort();
     warnings.dedup();
     Ok(Ontology {
@@ -143,6 +144,8 @@ fn closure(
     let (mut visited, mut errors, mut warnings) = (Visited::default(), Vec::new(), Vec::new());
     let mut next = 0;
     loop {
+        // All pending documents are read before the next imports are resolved, because an import may mean
+        // one of them.
         while let Some(item) = pending.pop_front() {
             match load(item, options.documents_before + documents.len(), &mut visited, options, names) {
                 Ok(Some((document, path, text))) => {
@@ -206,6 +209,7 @@ fn load(
             let unreadable = |error: std::io::Error| {
                 vec![Error::Unreadable { file: file.clone(), reason: error.to_string() }]
             };
+            // Symbolic links and relative paths must not cause a second reading.
             let path = file.canonicalize().map_err(unreadable)?;
             if !visited.paths.insert(path.clone()) {
                 return Ok(None);

@@ -21,6 +21,7 @@ pub(super) fn locate(warnings: &mut [Warning], texts: &[(String, Text)]) {
         unlocated.retain_mut(|warning| {
             let Warning::Undeclared { iri, position, .. } = &mut **warning else { return false };
             *position = offset(iri, words).map(|offset| Position::of_offset(name, &text, offset));
+            // Located warnings leave the search.
             position.is_none()
         });
     }

@@ -131,6 +131,7 @@ pub(super) fn mismatched_tag(text: &[u8], max_depth: usize) -> Result<Option<usi
         match inside.first() {
             Some(b'/') if open.pop() != Some(inside[1..].trim_ascii()) => return Ok(Some(start)),
             Some(b'/' | b'!' | b'?') => {}
+            // An empty element.
             _ if inside.ends_with(b"/") => {}
             _ => open.push(&inside[..name(inside)]),
         }

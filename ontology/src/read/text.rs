@@ -46,6 +46,7 @@ impl Visited {
     /// Adds a text. Returns `None` if an equal text was added before.
     pub(super) fn text(&mut self, text: Vec<u8>, file: Option<&Path>) -> Option<Text> {
         let same_hash = self.texts.entry(self.hash.hash_one(&text)).or_default();
+        // Equal hashes do not imply equal texts.
         if same_hash.iter().any(|other| *other.get() == *text) {
             return None;
         }

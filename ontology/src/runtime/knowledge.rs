@@ -44,6 +44,7 @@ impl Runtime {
         let relations = facts.iter().map(|fact| (fact.predicate, fact.arguments.len())).collect();
         let pending = match mode {
             Mode::Retract => BTreeSet::new(),
+            // The initial conclusions become assertions at the end of the first cycle.
             Mode::Latch => facts.into_iter().filter(|fact| !engine.is_asserted(fact)).collect(),
         };
         Self { engine, mode, pending, reasons: BTreeMap::new(), relations }
@@ -112,6 +113,7 @@ impl Runtime {
         let violations = self.engine.violations();
         if self.mode == Mode::Latch && violations.is_empty() {
             let pending = std::mem::take(&mut self.pending).into_iter();
+            // Only facts that changed since the last cycle are examined.
             let insert: Vec<Fact> = pending.filter(|fact| self.is_latched(fact)).collect();
             let reasons: Vec<_> =
                 insert.iter().filter_map(|fact| Some((fact.clone(), self.engine.why(fact)?))).collect();
@@ -162,6 +164,7 @@ impl Runtime {
         let facts = self.facts();
         let (component, _) = self.all_facts().find("component", terms::COMPONENT, component)?;
         let is_fault_status = |status: &String| change::is_failed(status) || change::is_recovered(status);
+        // As in MROS: designs are available again until rules conclude the opposite.
         if self.mode == Mode::Latch && facts.texts(component, terms::STATUS).iter().any(is_fault_status) {
             for design in self.all_facts().members(terms::FUNCTION_DESIGN) {
                 delta.delete.extend(self.statements(design, terms::REALISABILITY));

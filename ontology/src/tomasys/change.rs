@@ -57,6 +57,7 @@ pub fn component_status(engine: &mut Engine, component: &str, status: Status) ->
     let property = engine.symbols_mut().name(term_for(terms::STATUS, class));
     let spellings: Vec<Symbol> =
         spellings(status).into_iter().map(|literal| engine.symbols_mut().literal(literal)).collect();
+    // Without a constraint, the spelling of MROS is used.
     let fitting = spellings.iter().copied().find(|&value| allows(engine, property, value));
     let value = fitting.unwrap_or(spellings[0]);
     Ok(replace(engine, property, subject, Some(value)))
@@ -115,6 +116,7 @@ pub fn measured_value(engine: &mut Engine, attribute: &str, value: Literal) -> R
     if holders.is_empty() {
         let iri = facts.name(kind).unwrap_or_default();
         let name = local_name(iri);
+        // The namespace of the attribute type, and the prefix of MROS.
         let holder = format!("{}obs_{name}", &iri[..iri.len() - name.len()]);
         let holder = engine.symbols_mut().name(&holder);
         delta.insert = observation(engine.symbols_mut(), holder, kind, class);

@@ -239,6 +239,7 @@ impl<'a> View<'a> {
         let requirements = requirements.iter().filter_map(|value| self.requirement(value)).collect();
         let denied = |term| self.literals(iri, term).contains(&&Literal::Boolean(false));
         let mut components = self.objects(iri, terms::REQUIRES_C);
+        // MROS states the relation from the component to the design.
         components.extend(self.subjects(iri, terms::REQUIRED_BY));
         FunctionDesign {
             solves: self.objects(iri, terms::SOLVES_F),
