@@ -45,7 +45,6 @@ impl Graph {
         self.triples.len()
     }
 
-    /// Removes a triple.
     pub(crate) fn take(&mut self, index: usize) -> Option<Triple> {
         self.triples.get_mut(index).and_then(Option::take)
     }
@@ -136,7 +135,6 @@ impl Graph {
         head
     }
 
-    /// Returns a new blank node.
     pub(crate) fn fresh(&mut self) -> BlankNode {
         self.fresh += 1;
         BlankNode::new_unchecked(format!("n{}", self.fresh))

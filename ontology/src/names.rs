@@ -71,7 +71,6 @@ impl Names {
         self.text(number).starts_with(BLANK)
     }
 
-    /// Number of interned names.
     pub(crate) fn len(&self) -> usize {
         self.texts.len()
     }
@@ -103,7 +102,6 @@ impl Names {
         Compact { subject, predicate, object }
     }
 
-    /// Converts an RDF literal.
     pub(crate) fn literal(&mut self, literal: oxrdf::Literal) -> Literal {
         let (lexical, datatype, language) = literal.destruct();
         Literal {

@@ -3,8 +3,8 @@
 //!
 //! [`Stated`] keeps the stated axioms and rules. They are lowered before and after the change with the code
 //! that lowers a new knowledge base ([`lower_together`]), and the engine receives the differences between the
-//! two results. Assertions of named classes and properties on which no rule depends are not lowered that way,
-//! because their facts are known.
+//! two results. A change that consists of assertions about named classes and properties skips these lowerings,
+//! unless rules depend on the set of stated names.
 //!
 //! Axioms form a set: an axiom of two documents is stated once, and one retraction removes it. Declarations are
 //! never retracted, because many documents repeat them.
@@ -102,7 +102,7 @@ impl Stated {
             assertions.warnings.iter().chain(&retractions.warnings).cloned().collect();
         let loaded_iris: HashSet<&Iri> =
             self.ontology.sources.iter().filter_map(|source| source.iri.as_ref()).collect();
-        // The import of a document that the knowledge base contains is not missing.
+        // An import that the knowledge base contains need not be followed.
         warnings.retain(|warning| match warning {
             Warning::ImportOfUpdate { import, .. } => !loaded_iris.contains(&Iri::from(import.as_str())),
             _ => true,

@@ -102,7 +102,6 @@ impl Prover {
         Ok(explain_or_refute(&copy, &goal))
     }
 
-    /// Assumes edges between fresh individuals.
     fn assumed(&self, body: &[(&Property, usize, usize)]) -> Result<Engine, Error> {
         let mut copy = self.base.clone();
         let facts: Vec<Fact> = body

@@ -54,7 +54,7 @@ pub fn entailments(engine: &Engine, conclusions: &Ontology) -> Result<Vec<Entail
     if !open.is_empty() {
         let answer = match &inconsistency {
             Some(reason) => Answer::Follows(format!("everything does, because {reason}\n")),
-            None => prover.pattern(&open)?,
+            None => prover.conjunctive_query(&open)?,
         };
         let statement = open.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
         entailments.push(Entailment { statement, answer });

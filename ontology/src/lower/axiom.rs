@@ -114,7 +114,6 @@ fn assertion(context: &mut Context, axiom: &Axiom) {
     }
 }
 
-/// The lowering of one axiom.
 struct Lowering<'c, 'a> {
     identity: RuleIdentity,
     context: &'c mut Context<'a>,
@@ -184,7 +183,6 @@ impl Lowering<'_, '_> {
         }
     }
 
-    /// Lowers axioms about properties.
     fn properties(&mut self, axiom: &Axiom) -> LoweringResult {
         let data = |iris: &[Iri]| -> Vec<Property> { iris.iter().cloned().map(Property::Property).collect() };
         let named = |iri: &Iri| Property::Property(iri.clone());

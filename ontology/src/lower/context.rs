@@ -17,13 +17,13 @@ pub const INTERNAL: &str = "urn:metaplan:";
 /// functional-style syntax.
 pub const AXIOM_SOURCE: &str = "http://www.w3.org/2002/07/owl";
 
-/// Decides if two names can denote the same individual.
+/// Semantics of names.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Equality {
-    /// Names can denote the same individual: the semantics of OWL.
+    /// Two names can denote the same individual: the semantics of OWL.
     #[default]
     Owl,
-    /// Every name denotes another individual: the semantics of databases and of PDDL.
+    /// Different names denote different individuals: the semantics of databases and of PDDL.
     UniqueNames,
 }
 
@@ -59,7 +59,6 @@ pub(crate) struct Context<'a> {
     shared: FxHashMap<*const u8, Symbol>,
 }
 
-/// The variables of one rule.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Variables {
     /// Names by variable number; IRIs for variables of SWRL rules.
@@ -222,12 +221,10 @@ impl<'a> Context<'a> {
         self.symbols.name(&format!("{INTERNAL}range:{range}"))
     }
 
-    /// Adds a fact.
     pub(crate) fn state<const N: usize>(&mut self, predicate: Symbol, arguments: [Symbol; N]) {
         self.facts.push(Fact::new(predicate, arguments));
     }
 
-    /// Adds a rule.
     pub(crate) fn rule(
         &mut self,
         identity: &RuleIdentity,

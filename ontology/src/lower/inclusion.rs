@@ -36,7 +36,7 @@ impl Inclusions {
         let mut inclusions = Self::default();
         for restriction in uses.concluded {
             let mut including = graph.including(&restriction, graph.depth, &mut memo);
-            // Condition and conclusion of one definition need no relation between each other.
+            // If only one axiom or rule contains the restriction, its inclusion in itself derives nothing new.
             if !uses.shared.contains(&restriction) {
                 including.remove(&restriction);
             }
@@ -199,7 +199,6 @@ struct InclusionGraph {
     conditions: HashSet<ClassExpression>,
     /// Nesting depth to which restrictions are compared; 0 if no condition contains another restriction.
     depth: usize,
-    /// Properties of the conditions.
     condition_properties: HashSet<Property>,
     thing: ClassExpression,
 }

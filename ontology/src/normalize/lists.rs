@@ -18,7 +18,7 @@ pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) -> Vec<Ann
     groups
 }
 
-/// Number of members up to which horned-owl reads a group, or the group becomes pairs.
+/// Limit on the members of a group that is left to horned-owl or expanded to pairs.
 const MAX_PAIRED_MEMBERS: usize = 16;
 
 /// Removes and returns axioms about many disjoint named classes or many different named individuals. Pairs

@@ -38,7 +38,6 @@ use crate::owl::{EntityKind, Iri};
 use crate::triples::Document;
 use crate::vocab::{owl, rdf};
 
-/// Result of the normalisation.
 #[derive(Debug)]
 pub(crate) struct Normal {
     /// The N-Triples document for horned-owl.

@@ -19,7 +19,6 @@ use crate::vocab::{is_reserved, owl, rdf, rdfs};
 /// Annotation properties that need no declaration.
 const DESCRIPTIONS: [&str; 4] = [rdfs::LABEL, rdfs::COMMENT, rdfs::SEE_ALSO, rdfs::IS_DEFINED_BY];
 
-/// Kind of a plain statement.
 #[derive(Clone, Copy)]
 enum Statement {
     Individual,

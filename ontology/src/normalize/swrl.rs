@@ -15,7 +15,6 @@ use crate::graph::{Graph, iri_of, subject_of};
 use crate::owl::{ANONYMOUS, Iri};
 use crate::vocab::{owl, rdf, swrl};
 
-/// Origin of a rule.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Origin {
     /// IRI of the ontology that states the rule; the document's name if the ontology has no IRI.

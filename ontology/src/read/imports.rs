@@ -7,14 +7,12 @@
 //! 1. as a file, if it is a `file:` IRI or was written relative to its document;
 //! 2. among the documents already read, by ontology or version IRI;
 //! 3. in the given catalogs, then in `catalog-v001.xml` in the directory of the importing document (OASIS XML
-//! Catalogs);
+//!    Catalogs);
 //! 4. in the directory of the importing document, then in the given directories and their subdirectories: by
-//! ontology IRI, then
-//!    by the last segment of the URL; among several files with this name, the one whose path has most segments
-//! of the URL;
-//! 5. in a directory with the name of a segment of the URL next to an ancestor directory of the importing
-//! document: repositories
-//!    are often checked out side by side;
+//!    ontology IRI, then by the last segment of the URL; among several files with this name, the one whose path
+//!    has most segments of the URL;
+//! 5. in a directory that is named like a segment of the URL and lies next to a directory of the importing
+//!    document, because repositories are often checked out side by side;
 //! 6. among the documents already read, by file name;
 //! 7. among the embedded knowledge bases ([`crate::kb`]), by IRI or by the URL of their publication.
 
@@ -40,7 +38,6 @@ const MAX_ANCESTORS: usize = 3;
 /// Number of bytes at the start of a file that are searched for its ontology IRI.
 const HEAD_BYTES: usize = 1 << 16;
 
-/// Result of resolving an import.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Resolution {
     /// A document that has already been read.

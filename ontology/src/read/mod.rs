@@ -84,7 +84,6 @@ pub(crate) fn merged<P: AsRef<Path>>(
     Ok((normalize::merge(documents, &names, keep_all).graph.into_triples(), warnings))
 }
 
-/// A document to be read.
 enum Pending {
     File(PathBuf),
     Text(String, Vec<u8>),

@@ -30,7 +30,6 @@ impl Structural<'_> {
         Error::TooDeep { file, about: None, position, deepest: MAX_NESTING }.into()
     }
 
-    /// Converts OWL/XML to N-Triples.
     pub(super) fn owl_xml(&self) -> Result<Vec<u8>, Errors> {
         let expanded =
             entities::expanded(self.text).map_err(|fault| self.malformed(fault.offset, &fault.message))?;
@@ -49,7 +48,6 @@ impl Structural<'_> {
         horned::transcribe(&flat.text, self.syntax).map(relabelled).map_err(fault)
     }
 
-    /// Converts functional-style syntax to N-Triples.
     pub(super) fn functional(&self) -> Result<Vec<u8>, Errors> {
         let words = Words { text: self.text, cursor: 0 };
         let mut depth = 0_usize;

@@ -10,7 +10,6 @@ use std::sync::Arc;
 use super::document;
 use super::file::regular_file;
 
-/// The text of a document.
 #[derive(Clone, Debug)]
 pub(super) enum Text {
     /// The text is in a file.

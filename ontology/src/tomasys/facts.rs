@@ -7,7 +7,7 @@ use super::terms::Term;
 use crate::error::Error;
 use crate::vocab::local_name;
 
-/// Queries an engine with the terms of the vocabulary table.
+/// Queries an engine with the terms of the vocabulary table. A query combines the facts of all IRIs of a term.
 #[derive(Clone, Copy)]
 pub(crate) struct Facts<'a> {
     engine: &'a Engine,
@@ -15,7 +15,6 @@ pub(crate) struct Facts<'a> {
     only_stated: bool,
 }
 
-// A term can have several IRIs; queries combine the facts of all of them.
 impl<'a> Facts<'a> {
     /// Queries all facts that hold.
     pub(crate) fn new(engine: &'a Engine) -> Self {
