@@ -28,7 +28,7 @@ pub(crate) fn lower_rules(axioms: &[AnnotatedAxiom], context: &mut Context) {
         // An axiom is used in part if it has rules in spite of its gaps.
         let before = context.rules.len();
         context.identity = identity(axiom, position);
-        let mut lowering = Lowering { identity: context.identity.clone(), context };
+        let mut lowering = AxiomLowering { identity: context.identity.clone(), context };
         let result = lowering.axiom(axiom);
         if let Err(reason) = context.take_gaps().and(result) {
             let partly = context.rules.len() > before;
@@ -114,12 +114,12 @@ fn assertion(context: &mut Context, axiom: &Axiom) {
     }
 }
 
-struct Lowering<'c, 'a> {
+struct AxiomLowering<'c, 'a> {
     identity: RuleIdentity,
     context: &'c mut Context<'a>,
 }
 
-impl Lowering<'_, '_> {
+impl AxiomLowering<'_, '_> {
     fn rule(&mut self, body: Conjunction, head: Vec<Atom>, variables: &Variables) {
         self.context.rule(&self.identity, head, body, variables);
     }

@@ -102,11 +102,11 @@ fn difference(axioms: &[AnnotatedAxiom], context: &mut Context) {
     for (position, annotated) in axioms.iter().enumerate() {
         let identity = super::context::identity(&annotated.axiom, position);
         match &annotated.axiom {
-            Axiom::DisjointClasses(classes) if classes.len() > groups::PAIRS => {
+            Axiom::DisjointClasses(classes) if classes.len() > groups::MAX_PAIRED_MEMBERS => {
                 let member = groups::relation(context, &annotated.axiom.to_string());
                 groups::differ(context, &identity, member);
             }
-            Axiom::DifferentIndividuals(individuals) if individuals.len() > groups::PAIRS => {
+            Axiom::DifferentIndividuals(individuals) if individuals.len() > groups::MAX_PAIRED_MEMBERS => {
                 let member = groups::relation(context, &annotated.axiom.to_string());
                 groups::differ(context, &identity, member);
             }

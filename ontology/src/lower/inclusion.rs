@@ -137,7 +137,7 @@ impl Uses {
         }
     }
 
-    fn note(&mut self, restriction: &ClassExpression) {
+    fn record(&mut self, restriction: &ClassExpression) {
         if *self.positions.entry(restriction.clone()).or_insert(self.position) != self.position {
             self.shared.insert(restriction.clone());
         }
@@ -146,7 +146,7 @@ impl Uses {
     fn condition(&mut self, class: &ClassExpression) {
         use ClassExpression as C;
         if let Some(restriction) = restriction(class, false) {
-            self.note(&restriction);
+            self.record(&restriction);
             self.conditions.insert(restriction);
         }
         match class {
@@ -163,7 +163,7 @@ impl Uses {
     fn conclusion(&mut self, class: &ClassExpression) {
         use ClassExpression as C;
         if let Some(restriction) = restriction(class, true) {
-            self.note(&restriction);
+            self.record(&restriction);
             self.concluded.insert(restriction);
         }
         match class {

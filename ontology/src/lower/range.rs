@@ -27,21 +27,21 @@ type Tests = Result<Vec<Conjunction>, &'static str>;
 
 /// Returns alternatives; `value` is in `range` if one of them holds.
 pub(crate) fn condition(context: &mut Context, range: &DataRange, value: Term) -> Tests {
-    Lowering { context, value }.tests(range, true, MAX_DEFINITION_DEPTH)
+    RangeLowering { context, value }.tests(range, true, MAX_DEFINITION_DEPTH)
 }
 
 /// Returns the bodies that hold if all `edges` hold and `value` is outside `range`.
 pub(crate) fn violations(context: &mut Context, range: &DataRange, edges: &[Atom], value: Term) -> Tests {
-    let outside = Lowering { context, value }.tests(range, false, MAX_DEFINITION_DEPTH)?;
+    let outside = RangeLowering { context, value }.tests(range, false, MAX_DEFINITION_DEPTH)?;
     Ok(outside.into_iter().map(|tests| edges.iter().cloned().chain(tests).collect()).collect())
 }
 
-struct Lowering<'c, 'a> {
+struct RangeLowering<'c, 'a> {
     context: &'c mut Context<'a>,
     value: Term,
 }
 
-impl Lowering<'_, '_> {
+impl RangeLowering<'_, '_> {
     /// Returns alternatives; the value is in `range` (`inside`) or outside it if one of them holds.
     fn tests(&mut self, range: &DataRange, inside: bool, depth: usize) -> Tests {
         if depth == 0 {
@@ -67,10 +67,10 @@ impl Lowering<'_, '_> {
                 Ok(vec![vec![Atom::relation(predicate, [self.value])]])
             }
             // De Morgan: outside an intersection means outside one of the ranges.
-            DataRange::IntersectionOf(ranges) if inside => self.all(ranges, inside, depth),
-            DataRange::IntersectionOf(ranges) => self.any(ranges, inside, depth),
-            DataRange::UnionOf(ranges) if inside => self.any(ranges, inside, depth),
-            DataRange::UnionOf(ranges) => self.all(ranges, inside, depth),
+            DataRange::IntersectionOf(ranges) if inside => self.conjunction(ranges, inside, depth),
+            DataRange::IntersectionOf(ranges) => self.disjunction(ranges, inside, depth),
+            DataRange::UnionOf(ranges) if inside => self.disjunction(ranges, inside, depth),
+            DataRange::UnionOf(ranges) => self.conjunction(ranges, inside, depth),
             DataRange::ComplementOf(range) => self.tests(range, !inside, depth - 1),
             DataRange::Restriction(iri, facets) => {
                 // Outside means: outside of the datatype, or within the previous facets and beyond this one.
@@ -87,7 +87,7 @@ impl Lowering<'_, '_> {
         }
     }
 
-    fn all(&mut self, ranges: &[DataRange], inside: bool, depth: usize) -> Tests {
+    fn conjunction(&mut self, ranges: &[DataRange], inside: bool, depth: usize) -> Tests {
         let mut product = vec![Vec::new()];
         for range in ranges {
             product = cross(&product, &self.tests(range, inside, depth - 1)?);
@@ -98,7 +98,7 @@ impl Lowering<'_, '_> {
         Ok(product)
     }
 
-    fn alternatives(&mut self, ranges: &[DataRange], inside: bool, depth: usize) -> Tests {
+    fn disjunction(&mut self, ranges: &[DataRange], inside: bool, depth: usize) -> Tests {
         let mut alternatives = Vec::new();
         for range in ranges {
             alternatives.extend(self.tests(range, inside, depth - 1)?);

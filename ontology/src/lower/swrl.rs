@@ -89,7 +89,7 @@ fn lower_rule(rule: &Rule, identity: &RuleIdentity, context: &mut Context) -> Re
     for atom in &rule.body {
         let mut alternatives = condition(context, atom, &mut variables)?;
         if let Atom::Class(class, argument) = atom
-            && bodies.len() * alternatives.len() > class::ALTERNATIVES
+            && bodies.len() * alternatives.len() > class::MAX_ALTERNATIVES
         {
             let x = term(context, argument, &mut variables);
             alternatives = class::abbreviated(context, class, alternatives, x);

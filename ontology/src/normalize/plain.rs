@@ -30,7 +30,7 @@ enum Statement {
 
 /// Declared kinds of an IRI.
 #[derive(Clone, Copy, Default)]
-struct Kinds {
+struct DeclaredKinds {
     class: bool,
     /// Kind of the statements with the IRI as predicate. `Err` if the IRI is declared as several kinds of
     /// property.
@@ -41,7 +41,7 @@ struct Kinds {
 /// with the `bulk` statements.
 pub(crate) fn take(graph: &mut Graph, bulk: Vec<Compact>, names: &mut Names) -> Parts {
     let mut parts = Parts::default();
-    let (statements, declared) = (statements(graph), Declared::of(graph, names));
+    let (statements, declared) = (statements(graph), KindsByNumber::of(graph, names));
     parts.axioms.reserve(bulk.len() + statements.len());
     for triple in bulk {
         if declared.contains(&triple) {
@@ -93,12 +93,12 @@ fn statements(graph: &Graph) -> Vec<(usize, Statement)> {
 }
 
 /// Declared kinds by the number of a name.
-struct Declared {
-    kinds: FxHashMap<u32, Kinds>,
+struct KindsByNumber {
+    kinds: FxHashMap<u32, DeclaredKinds>,
     rdf_type: Option<u32>,
 }
 
-impl Declared {
+impl KindsByNumber {
     fn of(graph: &Graph, names: &Names) -> Self {
         let declarations = kinds(graph).into_iter();
         let kinds = declarations.filter_map(|(iri, kinds)| Some((names.find(iri)?, kinds))).collect();
@@ -143,8 +143,8 @@ fn named(triple: &Triple) -> Option<&str> {
     }
 }
 
-fn kinds(graph: &Graph) -> FxHashMap<&str, Kinds> {
-    let mut kinds = FxHashMap::<&str, Kinds>::default();
+fn kinds(graph: &Graph) -> FxHashMap<&str, DeclaredKinds> {
+    let mut kinds = FxHashMap::<&str, DeclaredKinds>::default();
     for (_, triple) in graph.iter().filter(|(_, triple)| triple.predicate.as_str() == rdf::TYPE) {
         let (Some(subject), Some(class)) = (named(triple), iri_of(&triple.object)) else { continue };
         let property = match class {

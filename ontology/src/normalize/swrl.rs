@@ -76,7 +76,7 @@ pub(crate) fn rewrite(graph: &mut Graph, parts: &[(usize, Iri)], warnings: &mut 
 }
 
 /// An atom: its type and its arguments as (predicate, object), in the order that horned-owl requires.
-struct Atom {
+struct RdfAtom {
     class: &'static str,
     arguments: Vec<(&'static str, Term)>,
     /// Arguments of a built-in.
@@ -134,7 +134,11 @@ impl Pass {
         }
     }
 
-    fn read(&mut self, graph: &Graph, rule: &NamedOrBlankNode) -> Result<(Vec<Atom>, Vec<Atom>), String> {
+    fn read(
+        &mut self,
+        graph: &Graph,
+        rule: &NamedOrBlankNode,
+    ) -> Result<(Vec<RdfAtom>, Vec<RdfAtom>), String> {
         self.unknown.clear();
         Ok((self.atoms(graph, rule, swrl::BODY)?, self.atoms(graph, rule, swrl::HEAD)?))
     }
@@ -144,7 +148,7 @@ impl Pass {
         graph: &Graph,
         rule: &NamedOrBlankNode,
         part: &'static str,
-    ) -> Result<Vec<Atom>, String> {
+    ) -> Result<Vec<RdfAtom>, String> {
         let Some(list) = graph.objects(rule, part).next() else { return Ok(Vec::new()) };
         // A rule with several bodies or heads is malformed.
         graph.object(rule, part)?;
@@ -153,7 +157,7 @@ impl Pass {
         list.items.iter().map(|item| self.atom(graph, item)).collect()
     }
 
-    fn atom(&mut self, graph: &Graph, item: &Term) -> Result<Atom, String> {
+    fn atom(&mut self, graph: &Graph, item: &Term) -> Result<RdfAtom, String> {
         let node =
             subject_of(item).ok_or_else(|| format!("the literal {item} stands where an atom should"))?;
         self.replaced.extend(graph.of(&node).map(|(index, _)| index));
@@ -164,11 +168,11 @@ impl Pass {
         if typed(swrl::CLASS_ATOM) {
             let class = (swrl::CLASS_PREDICATE, object(swrl::CLASS_PREDICATE)?);
             let argument = self.individual(&object(argument_iris[0])?)?;
-            Ok(Atom::new(swrl::CLASS_ATOM, vec![(argument_iris[0], argument), class]))
+            Ok(RdfAtom::new(swrl::CLASS_ATOM, vec![(argument_iris[0], argument), class]))
         } else if typed(swrl::DATA_RANGE_ATOM) {
             let range = (swrl::DATA_RANGE, object(swrl::DATA_RANGE)?);
             let argument = self.data(&object(argument_iris[0])?)?;
-            Ok(Atom::new(swrl::DATA_RANGE_ATOM, vec![(argument_iris[0], argument), range]))
+            Ok(RdfAtom::new(swrl::DATA_RANGE_ATOM, vec![(argument_iris[0], argument), range]))
         } else if typed(swrl::INDIVIDUAL_PROPERTY_ATOM) || typed(swrl::DATAVALUED_PROPERTY_ATOM) {
             self.property_atom(
                 object(swrl::PROPERTY_PREDICATE)?,
@@ -181,13 +185,13 @@ impl Pass {
             let class = if is_same { swrl::SAME_INDIVIDUAL_ATOM } else { swrl::DIFFERENT_INDIVIDUALS_ATOM };
             let first = self.individual(&object(argument_iris[0])?)?;
             let second = self.individual(&object(argument_iris[1])?)?;
-            Ok(Atom::new(class, vec![(argument_iris[0], first), (argument_iris[1], second)]))
+            Ok(RdfAtom::new(class, vec![(argument_iris[0], first), (argument_iris[1], second)]))
         } else if typed(swrl::BUILTIN_ATOM) || object(swrl::BUILTIN).is_ok() {
             let list = graph.list(&object(swrl::ARGUMENTS)?)?;
             self.replaced.extend(list.spine);
             let arguments = list.items.iter().map(|item| self.data(item)).collect::<Result<_, _>>()?;
             let builtin = (swrl::BUILTIN, object(swrl::BUILTIN)?);
-            Ok(Atom { class: swrl::BUILTIN_ATOM, arguments: vec![builtin], list: Some(arguments) })
+            Ok(RdfAtom { class: swrl::BUILTIN_ATOM, arguments: vec![builtin], list: Some(arguments) })
         } else {
             Err(format!("{node} is not an atom of a known type"))
         }
@@ -201,7 +205,7 @@ impl Pass {
         first: &Term,
         second: &Term,
         typed: &dyn Fn(&str) -> bool,
-    ) -> Result<Atom, String> {
+    ) -> Result<RdfAtom, String> {
         let is_data = typed(swrl::DATAVALUED_PROPERTY_ATOM)
             || self.data_properties.contains(&property)
             || matches!(second, Term::Literal(_));
@@ -213,7 +217,7 @@ impl Pass {
         };
         let arguments =
             vec![(swrl::ARGUMENT1, subject), (swrl::ARGUMENT2, value), (swrl::PROPERTY_PREDICATE, property)];
-        Ok(Atom::new(class, arguments))
+        Ok(RdfAtom::new(class, arguments))
     }
 
     /// Converts an argument that is an individual or an individual variable.
@@ -275,12 +279,12 @@ impl Pass {
     }
 
     /// Adds the canonical form of a rule, with the annotations of the original rule.
-    fn write(&mut self, graph: &mut Graph, original: &NamedOrBlankNode, body: &[Atom], head: &[Atom]) {
+    fn write(&mut self, graph: &mut Graph, original: &NamedOrBlankNode, body: &[RdfAtom], head: &[RdfAtom]) {
         let rule = NamedOrBlankNode::from(graph.fresh());
         graph.state(&rule, rdf::TYPE, NamedNode::new_unchecked(swrl::IMP));
         for (part, atoms) in [(swrl::BODY, body), (swrl::HEAD, head)] {
             let nodes: Vec<Term> = if atoms.is_empty() {
-                vec![Atom::truth().write(graph)]
+                vec![RdfAtom::truth().write(graph)]
             } else {
                 atoms.iter().map(|atom| atom.write(graph)).collect()
             };
@@ -310,7 +314,7 @@ impl Pass {
     }
 }
 
-impl Atom {
+impl RdfAtom {
     fn new(class: &'static str, arguments: Vec<(&'static str, Term)>) -> Self {
         Self { class, arguments, list: None }
     }

@@ -17,7 +17,7 @@ const PREDEFINED: [&[u8]; 5] = [b"lt", b"gt", b"amp", b"quot", b"apos"];
 
 /// An entity that cannot be expanded.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) struct Fault {
+pub(super) struct EntityError {
     /// Byte offset in the document.
     pub offset: usize,
     pub message: String,
@@ -33,7 +33,7 @@ struct Declarations<'a> {
 }
 
 /// Returns the document without the document type declaration and with expanded entity references.
-pub(super) fn expanded(text: &[u8]) -> Result<Flattened<'_>, Fault> {
+pub(super) fn expanded(text: &[u8]) -> Result<Flattened<'_>, EntityError> {
     let Some(declarations) = declarations(text) else { return Ok(Flattened::unchanged(text)) };
     let mut expansion = Expansion {
         entities: &declarations.entities,
@@ -71,7 +71,7 @@ pub(super) fn expanded(text: &[u8]) -> Result<Flattened<'_>, Fault> {
         } else {
             let message = expansion.append(name, &mut flat, 0).err();
             if let Some(message) = message {
-                return Err(Fault { offset: cursor, message });
+                return Err(EntityError { offset: cursor, message });
             }
             offsets.push((flat.len(), cursor + length));
         }

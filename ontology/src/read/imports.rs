@@ -50,11 +50,11 @@ pub(crate) enum Resolution {
 pub(crate) struct Resolver {
     catalogs: Vec<horned_catalog::Catalog>,
     /// Ontology files under the given directories; collected on first use.
-    files: OnceCell<Vec<Candidate>>,
+    files: OnceCell<Vec<OntologyFile>>,
     directories: Vec<PathBuf>,
 }
 
-struct Candidate {
+struct OntologyFile {
     path: PathBuf,
     iri: Option<String>,
 }
@@ -116,7 +116,7 @@ impl Resolver {
         Ok(catalog.resolve(import).filter(|path| path.is_file()))
     }
 
-    fn files(&self) -> &[Candidate] {
+    fn files(&self) -> &[OntologyFile] {
         self.files
             .get_or_init(|| self.directories.iter().flat_map(|root| candidates(root, MAX_DEPTH)).collect())
     }
@@ -188,7 +188,7 @@ fn is_ontology_file(path: &Path) -> bool {
 
 /// Returns the ontology files in a directory and `depth` levels of subdirectories, sorted by path. Skips
 /// unreadable directories, and symbolic links to directories, which could form a cycle.
-fn candidates(directory: &Path, depth: usize) -> Vec<Candidate> {
+fn candidates(directory: &Path, depth: usize) -> Vec<OntologyFile> {
     let Ok(entries) = std::fs::read_dir(directory) else { return Vec::new() };
     let mut entries: Vec<_> = entries.filter_map(Result::ok).collect();
     // The order of directory entries depends on the file system.
@@ -202,7 +202,7 @@ fn candidates(directory: &Path, depth: usize) -> Vec<Candidate> {
             }
         } else if is_ontology_file(&path) && path.is_file() {
             let iri = declared_iri(&path);
-            files.push(Candidate { path, iri });
+            files.push(OntologyFile { path, iri });
         }
     }
     files
@@ -221,7 +221,7 @@ fn declared_iri(path: &Path) -> Option<String> {
 
 /// Returns the file that matches an import best: by ontology IRI, otherwise by file name; ties are resolved by
 /// the number of common path segments.
-fn best_match(import: &str, files: &[Candidate]) -> Option<PathBuf> {
+fn best_match(import: &str, files: &[OntologyFile]) -> Option<PathBuf> {
     let by_iri: Vec<_> =
         files.iter().filter(|file| file.iri.as_deref().is_some_and(|iri| same_iri(iri, import))).collect();
     let name = last_segment(import);
@@ -229,11 +229,11 @@ fn best_match(import: &str, files: &[Candidate]) -> Option<PathBuf> {
         || files.iter().filter(|file| file.path.file_name().is_some_and(|file_name| file_name == name));
     let matching: Vec<_> = if by_iri.is_empty() { by_name().collect() } else { by_iri };
     let segments: Vec<&str> = import.split('/').filter(|segment| !segment.is_empty()).collect();
-    let shared = |file: &Candidate| {
+    let shared = |file: &OntologyFile| {
         let parts = file.path.iter().filter_map(|part| part.to_str());
         parts.filter(|part| segments.contains(part)).count()
     };
-    let mut best: Option<(usize, &Candidate)> = None;
+    let mut best: Option<(usize, &OntologyFile)> = None;
     for file in matching {
         let count = shared(file);
         if best.is_none_or(|(max_count, _)| count > max_count) {
