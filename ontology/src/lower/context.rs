@@ -35,7 +35,7 @@ pub(crate) fn cross(left: &[Conjunction], right: &[Conjunction]) -> Vec<Conjunct
     left.iter().flat_map(|l| right.iter().map(move |r| l.iter().chain(r).cloned().collect())).collect()
 }
 
-/// Rules, facts and warnings so far.
+/// State of the lowering: the results, and the axiom or rule that is being lowered.
 pub(crate) struct Context<'a> {
     pub symbols: &'a mut Symbols,
     pub rules: Vec<Rule>,
