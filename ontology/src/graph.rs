@@ -78,8 +78,8 @@ impl Graph {
             .map(|(_, triple)| &triple.object)
     }
 
-    /// Returns the only object of `subject predicate`; the error says if there is none, or if there are
-    /// several.
+    /// Returns the only object of `subject predicate`; the error says if it is missing, or if there
+    /// are several.
     pub(crate) fn object<'a>(
         &'a self,
         subject: &NamedOrBlankNode,

@@ -5,7 +5,8 @@
 //!   and 18).
 //! - Expressions without a type, or with a wrong one, get a type from their properties.
 //! - N-ary axioms with an IRI become blank nodes.
-//! - Inverse properties in cardinality restrictions get a name, which `crate::horned` translates back.
+//! - Inverse properties in qualified cardinality restrictions get a name, which `crate::horned` translates
+//!   back.
 //! - Headers of ontologies without an IRI are removed.
 //!
 //! [1] OWL 2 Web Ontology Language, Mapping to RDF Graphs, W3C 2012.

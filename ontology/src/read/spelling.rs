@@ -4,7 +4,7 @@
 use super::text::Text;
 use crate::error::{Error, Position, Warning};
 
-/// Number of warnings that are located: each one costs a search through all documents.
+/// Number of warnings, from the first one, that are located: each one costs a search through all documents.
 const MAX_SEARCHES: usize = 100;
 
 /// Sets the positions of undeclared names to their first occurrence.
