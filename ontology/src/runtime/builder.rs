@@ -81,7 +81,7 @@ impl RuntimeBuilder {
     /// Reads all documents and rules and derives the consequences. Also returns the warnings.
     ///
     /// # Errors
-    /// Returns all errors of all documents and rules: the errors of [`read_files`](crate::read_files), and
+    /// Returns all errors of all documents and rules: the errors of [`read_files`], and
     /// [`Error::Engine`] for errors of rules and of the engine.
     pub fn build(self) -> Result<(Runtime, Vec<Warning>), Errors> {
         let mut symbols = Symbols::new();
