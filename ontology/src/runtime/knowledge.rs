@@ -25,6 +25,7 @@ pub enum Mode {
     Latch,
 }
 
+/// An engine with the reports of a robot, and the state that [`Mode::Latch`] requires.
 #[derive(Clone, Debug)]
 pub struct Runtime {
     pub(super) engine: Engine,

@@ -170,10 +170,12 @@ impl<'a> View<'a> {
         values
     }
 
+    /// All functions, sorted by IRI.
     pub fn functions(&self) -> Vec<Individual> {
         self.members(terms::FUNCTION)
     }
 
+    /// All quality attribute types, sorted by IRI.
     pub fn attribute_types(&self) -> Vec<Individual> {
         self.members(terms::ATTRIBUTE_TYPE)
     }
