@@ -365,7 +365,7 @@ pub enum Warning {
     /// O404: a functional property has several stated values.
     #[error(
         "warning[O404]: <{subject}> has {} values of <{property}>, which is functional: {}; {consequence}",
-        values.len(), in_short(values)
+        values.len(), abbreviated(values)
     )]
     SeveralValues {
         /// IRI of the individual.
@@ -449,7 +449,7 @@ fn label_suffix(label: Option<&str>) -> String {
 
 /// Joins the values; beyond `MAX_LISTED_VALUES` + 1 of them, only the first `MAX_LISTED_VALUES` and the number
 /// of the others.
-fn in_short(values: &[String]) -> String {
+fn abbreviated(values: &[String]) -> String {
     match values.get(..MAX_LISTED_VALUES).filter(|_| values.len() > MAX_LISTED_VALUES + 1) {
         Some(first) => format!("{} and {} more", first.join(", "), values.len() - MAX_LISTED_VALUES),
         None => values.join(", "),

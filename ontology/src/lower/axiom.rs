@@ -199,9 +199,9 @@ impl AxiomLowering<'_, '_> {
                 let inverse = Property::Inverse(second.clone());
                 self.equivalent_properties(&[named(first), inverse]);
             }
-            Axiom::ObjectPropertyDomain(property, class) => self.end(property, class, true),
-            Axiom::ObjectPropertyRange(property, class) => self.end(property, class, false),
-            Axiom::DataPropertyDomain(property, class) => self.end(&named(property), class, true),
+            Axiom::ObjectPropertyDomain(property, class) => self.domain_or_range(property, class, true),
+            Axiom::ObjectPropertyRange(property, class) => self.domain_or_range(property, class, false),
+            Axiom::DataPropertyDomain(property, class) => self.domain_or_range(&named(property), class, true),
             Axiom::DataPropertyRange(property, range) => return self.data_range(property, range),
             Axiom::FunctionalDataProperty(property) => {
                 let mut v = Variables::default();
@@ -357,7 +357,7 @@ impl AxiomLowering<'_, '_> {
     }
 
     /// Lowers the domain of a property (`subject` is true) or its range.
-    fn end(&mut self, property: &Property, class: &ClassExpression, subject: bool) {
+    fn domain_or_range(&mut self, property: &Property, class: &ClassExpression, subject: bool) {
         let mut variables = Variables::default();
         let (x, y) = (variables.fresh("x"), variables.fresh("y"));
         // A top property relates all individuals, so its domain or range applies to every individual.

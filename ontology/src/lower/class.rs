@@ -257,7 +257,7 @@ fn all_values(
     let y = variables.fresh("y");
     let edge = context.property(property, x, y);
     let inner = conclusions(context, filler, y, variables);
-    inner.into_iter().map(|(body, head)| (with(edge.clone(), body), head)).collect()
+    inner.into_iter().map(|(body, head)| (with_atom(edge.clone(), body), head)).collect()
 }
 
 /// Concludes the auxiliary relation of a restriction, if a condition includes the restriction.
@@ -317,7 +317,7 @@ fn at_most(
     bodies.into_iter().map(|body| (body, Vec::new())).collect()
 }
 
-fn with(atom: Atom, mut body: Conjunction) -> Conjunction {
+fn with_atom(atom: Atom, mut body: Conjunction) -> Conjunction {
     body.insert(0, atom);
     body
 }
