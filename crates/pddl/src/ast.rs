@@ -1,7 +1,7 @@
-//! The syntax tree of PDDL: what the parser makes of a file, before names are resolved.
+//! The abstract syntax tree of PDDL. The parser builds it; names are not resolved in it.
 //!
-//! The tree keeps the source position of everything that a message may have to point at. Names keep
-//! the spelling of the file and compare without regard to case, as PDDL wants it \[1\].
+//! The tree keeps the source position of every element that a message may have to point at. Names keep the
+//! spelling of the file and are compared without regard to case, as PDDL requires \[1\].
 //!
 //! \[1\] M. Fox, D. Long: PDDL2.1, an extension to PDDL for expressing temporal planning domains, JAIR 20, 2003.
 
@@ -14,23 +14,23 @@ use num_rational::BigRational;
 /// A region of one source text, in bytes from its beginning; `end` is exclusive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Span {
-    /// First byte.
+    /// Offset of the first byte.
     pub start: u32,
-    /// One past the last byte.
+    /// Offset of the byte after the last one.
     pub end: u32,
 }
 
-/// A PDDL name as written; equality, order and hash ignore ASCII case.
+/// A PDDL name as written. Equality, order and hash ignore ASCII case.
 #[derive(Clone)]
 pub struct Name(Arc<str>);
 
 impl Name {
-    /// The name with the given spelling.
+    /// Creates a name with the given spelling.
     pub fn new(written: &str) -> Self {
         Self(written.into())
     }
 
-    /// The spelling in the source.
+    /// Returns the spelling in the source.
     pub fn as_str(&self) -> &str {
         &self.0
     }
@@ -50,12 +50,14 @@ impl Eq for Name {}
 
 impl Hash for Name {
     fn hash<H: Hasher>(&self, state: &mut H) {
-        // Eight bytes at a time: files of megabytes consist of little but names.
+        // Eight bytes at a time: in files of megabytes, most of the text is names and hashing them is a hot
+        // spot.
         for chunk in self.0.as_bytes().chunks(8) {
             let mut word = [0; 8];
             word[..chunk.len()].copy_from_slice(chunk);
             state.write_u64(u64::from_le_bytes(word.map(|byte| byte.to_ascii_lowercase())));
         }
+        // End marker, as in the `Hash` implementation of `str`: names in a tuple must not run together.
         state.write_u8(0xff);
     }
 }
@@ -84,35 +86,36 @@ impl fmt::Display for Name {
     }
 }
 
-/// A name at a place.
+/// A name with its position in the source.
 #[derive(Debug, Clone)]
 pub struct Identifier {
     /// The name.
     pub name: Name,
-    /// Where it stands.
+    /// Position of the name.
     pub span: Span,
 }
 
-/// A name that stands in no file.
+/// Identifier that occurs in no file. Its span is empty.
 impl From<Name> for Identifier {
     fn from(name: Name) -> Self {
         Self { name, span: Span::default() }
     }
 }
 
-/// The type of a typed-list entry: one name, or `either` of several; empty means `object`, written or not.
+/// Type of a typed-list entry: one name, or `either` with several. Empty means `object`, whether written or
+/// implied.
 #[derive(Debug, Clone, Default)]
 pub struct TypeExpression {
-    /// The alternatives.
+    /// Names of the alternative types.
     pub alternatives: Vec<Identifier>,
 }
 
 /// An entry of a typed list. Variables are stored without their question mark.
 #[derive(Debug, Clone)]
 pub struct TypedName {
-    /// The variable, object or type that is introduced.
+    /// Declared variable, object or type.
     pub identifier: Identifier,
-    /// Its type.
+    /// Type of the entry.
     pub r#type: TypeExpression,
 }
 
@@ -121,7 +124,7 @@ pub struct TypedName {
 pub struct Domain {
     /// `(domain NAME)`.
     pub name: Identifier,
-    /// The requirement flags, without their colon.
+    /// Requirement flags, without the colon.
     pub requirements: Vec<Identifier>,
     /// `:types`.
     pub types: Vec<TypedName>,
@@ -129,9 +132,9 @@ pub struct Domain {
     pub constants: Vec<TypedName>,
     /// `:predicates`.
     pub predicates: Vec<Declaration>,
-    /// The numeric ones of `:functions`.
+    /// Numeric functions of `:functions`.
     pub functions: Vec<Declaration>,
-    /// Those of the predicates that stand for functions with objects as values: the value is their last argument.
+    /// Names of predicates that represent functions with objects as values. The last argument is the value.
     pub object_fluents: Vec<Name>,
     /// `:derived` axioms, in the order of the file.
     pub derived: Vec<Derived>,
@@ -144,111 +147,115 @@ pub struct Domain {
 /// The declaration of a predicate or of a numeric function.
 #[derive(Debug, Clone)]
 pub struct Declaration {
-    /// Its name.
+    /// Name of the predicate or function.
     pub identifier: Identifier,
-    /// Its parameters.
+    /// Typed parameters.
     pub parameters: Vec<TypedName>,
 }
 
 /// `(:derived (HEAD PARAMETERS) CONDITION)`.
 #[derive(Debug, Clone)]
 pub struct Derived {
-    /// The derived predicate with the variables that the body may use.
+    /// Derived predicate, with the variables that the body may use.
     pub head: Declaration,
-    /// When it holds.
+    /// Condition under which the predicate holds.
     pub condition: Condition,
-    /// The whole axiom.
+    /// Extent of the whole axiom.
     pub span: Span,
 }
 
 /// An action schema.
 #[derive(Debug, Clone)]
 pub struct Action {
-    /// Its name; two schemas may share one.
+    /// Name of the schema. Several schemas may share one.
     pub identifier: Identifier,
-    /// Its parameters.
+    /// Typed parameters.
     pub parameters: Vec<TypedName>,
-    /// What it needs and does.
+    /// Conditions and effects.
     pub body: ActionBody,
-    /// The preferences among its conditions.
+    /// Preferences among the conditions.
     pub preferences: Vec<Preference>,
-    /// The whole schema.
+    /// Extent of the whole schema.
     pub span: Span,
 }
 
-/// `(preference NAME CONDITION)` among the conditions of an action: that the condition does not hold is counted, and no more.
+/// `(preference NAME CONDITION)` among the conditions of an action. A violation is counted; it does not
+/// prevent the action.
 #[derive(Debug, Clone)]
 pub struct Preference {
-    /// The variables of the quantifiers that it stands below; each of their instances counts by itself.
+    /// Variables of the enclosing quantifiers. Each instance is counted separately.
     pub variables: Vec<TypedName>,
-    /// Its name; others may have the same one.
+    /// Name of the preference. Several preferences may share one.
     pub name: Identifier,
-    /// When it should hold; `AtStart` in an instantaneous action.
+    /// Time at which the condition should hold. `AtStart` in an instantaneous action.
     pub time: ConditionTime,
-    /// What should hold.
+    /// Desired condition.
     pub condition: Condition,
-    /// The whole preference.
+    /// Extent of the whole preference.
     pub span: Span,
 }
 
-/// A constraint on the trajectory of a plan: on all its states, rather than on the last one.
+/// Constraint on the trajectory of a plan, that is, on all its states and not only on the last one.
 #[derive(Debug, Clone)]
 pub struct Constraint {
-    /// The variables of the quantifiers that it stands below; as a preference, each of their instances counts by itself.
+    /// Variables of the enclosing quantifiers. If the constraint is a preference, each instance is counted
+    /// separately.
     pub variables: Vec<TypedName>,
-    /// The name, if it is a preference: the number of its instances that are violated is `(is-violated NAME)`. Others may have
-    /// the same name. A constraint without one has to hold.
+    /// Name, if the constraint is a preference. Several preferences may share one. `(is-violated NAME)` is
+    /// the number of violated instances. A constraint without a name is mandatory.
     pub preference: Option<Identifier>,
-    /// What it says. A preference in the goal is about the last state.
+    /// Modal formula. A preference in the goal refers to the last state.
     pub trajectory: Trajectory,
-    /// The whole constraint.
+    /// Extent of the whole constraint.
     pub span: Span,
 }
 
-/// What a constraint says of the states that a plan goes through (A. Gerevini, P. Haslum, D. Long, A. Saetti, Y. Dimopoulos:
-/// Deterministic planning in the fifth international planning competition: PDDL3, Artificial Intelligence 173, 2009).
+/// Modal formula over the trajectory of a plan (A. Gerevini, P. Haslum, D. Long, A. Saetti, Y. Dimopoulos:
+/// Deterministic planning in the fifth international planning competition: PDDL3, Artificial Intelligence
+/// 173, 2009).
 #[derive(Debug, Clone)]
 pub enum Trajectory {
     /// `(and …)`.
     And(Vec<Trajectory>),
     /// `(forall (…) …)`.
     ForAll(Vec<TypedName>, Box<Trajectory>),
-    /// `(at end A)`: A in the last state.
+    /// `(at end A)`: A holds in the last state.
     AtEnd(Condition),
-    /// `(always A)`: A in every state.
+    /// `(always A)`: A holds in every state.
     Always(Condition),
-    /// `(sometime A)`: A in some state.
+    /// `(sometime A)`: A holds in some state.
     Sometime(Condition),
-    /// `(at-most-once A)`: the states with A, if any, follow each other.
+    /// `(at-most-once A)`: the states in which A holds, if any, are consecutive.
     AtMostOnce(Condition),
-    /// `(sometime-after A B)`: B in every state with A, or later.
+    /// `(sometime-after A B)`: for every state with A, B holds in this or a later state.
     SometimeAfter(Condition, Condition),
-    /// `(sometime-before A B)`: B before every state with A.
+    /// `(sometime-before A B)`: for every state with A, B holds in an earlier state.
     SometimeBefore(Condition, Condition),
-    /// `(within T A)`: A in a state that is reached at time T at the latest.
+    /// `(within T A)`: A holds in a state that is reached by time T.
     Within(BigRational, Condition),
-    /// `(always-within T A B)`: B in every state with A, or T later at most.
+    /// `(always-within T A B)`: for every state with A, B holds in this or a later state at most T time units
+    /// later.
     AlwaysWithin(BigRational, Condition, Condition),
-    /// `(hold-during T U A)`: A from time T on until time U.
+    /// `(hold-during T U A)`: A holds from time T until time U.
     HoldDuring(BigRational, BigRational, Condition),
-    /// `(hold-after T A)`: A from time T on.
+    /// `(hold-after T A)`: A holds from time T on.
     HoldAfter(BigRational, Condition),
 }
 
-/// What an action needs and does.
+/// Conditions, effects and duration of an action.
 #[derive(Debug, Clone)]
 #[expect(clippy::large_enum_variant, reason = "a domain has few actions, and patterns stay flat")]
 pub enum ActionBody {
     /// `:action`.
     Instantaneous {
-        /// `:precondition`; an empty conjunction where the file has none.
+        /// `:precondition`; an empty conjunction if the file has none.
         precondition: Condition,
         /// `:effect`.
         effect: Effect,
     },
     /// `:durative-action`.
     Durative {
-        /// `:duration`: all of these bound `?duration`.
+        /// `:duration`: constraints on `?duration`. All of them must hold.
         duration: Vec<DurationConstraint>,
         /// `:condition`, flattened: a conjunction of conditions, each at its time.
         conditions: Vec<(ConditionTime, Condition)>,
@@ -260,17 +267,17 @@ pub enum ActionBody {
 /// `([at start|at end] (OPERATOR ?duration EXPRESSION))`.
 #[derive(Debug, Clone)]
 pub struct DurationConstraint {
-    /// When the expression is evaluated; `AtStart` unless the file says otherwise.
+    /// Time at which the expression is evaluated. Default: `AtStart`.
     pub time: EffectTime,
-    /// How `?duration` compares with the expression.
+    /// Relation between `?duration` and the expression.
     pub operator: Comparison,
-    /// The bound, in the domain's time unit.
+    /// Bound, in the domain's time unit.
     pub expression: Expression,
-    /// The whole constraint.
+    /// Extent of the whole constraint.
     pub span: Span,
 }
 
-/// When a condition of a durative action must hold.
+/// Time at which a condition of a durative action must hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ConditionTime {
     /// In the state in which the action starts.
@@ -281,12 +288,12 @@ pub enum ConditionTime {
     AtEnd,
 }
 
-/// When an effect of a durative action takes place.
+/// Time at which an effect of a durative action takes place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum EffectTime {
     /// At the start of the action.
     AtStart,
-    /// At its end.
+    /// At the end of the action.
     AtEnd,
 }
 
@@ -302,15 +309,15 @@ pub enum Term {
 /// A predicate or a numeric function applied to terms.
 #[derive(Debug, Clone)]
 pub struct Atom {
-    /// The predicate or the function.
+    /// Predicate or function.
     pub predicate: Identifier,
-    /// Its arguments.
+    /// Arguments.
     pub arguments: Vec<Term>,
-    /// The whole atom, with its parentheses if it has any.
+    /// Extent of the whole atom, including its parentheses if present.
     pub span: Span,
 }
 
-/// A goal description.
+/// Goal description (GD) in the grammar of PDDL.
 #[derive(Debug, Clone)]
 pub enum Condition {
     /// `(and …)`; the empty conjunction is true.
@@ -333,7 +340,7 @@ pub enum Condition {
     Compare(Comparison, Expression, Expression, Span),
 }
 
-/// How two numbers compare.
+/// Relation between two numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Comparison {
     /// `<`
@@ -349,7 +356,7 @@ pub enum Comparison {
 }
 
 impl Comparison {
-    /// The comparison as PDDL writes it.
+    /// Returns the PDDL token.
     #[must_use]
     pub fn symbol(self) -> &'static str {
         match self {
@@ -361,7 +368,7 @@ impl Comparison {
         }
     }
 
-    /// The comparison with its sides exchanged.
+    /// Returns the relation with its sides exchanged: `a < b` becomes `b > a`.
     pub(crate) fn mirrored(self) -> Self {
         match self {
             Self::Less => Self::Greater,
@@ -378,13 +385,13 @@ impl Comparison {
 pub enum Expression {
     /// A number, exactly as written.
     Number(BigRational, Span),
-    /// A numeric function. In a metric, also `(is-violated NAME)`, whose argument is the name of a preference.
+    /// Numeric function. In a metric also `(is-violated NAME)`, whose argument is the name of a preference.
     Fluent(Atom),
     /// `?duration`, inside durative actions.
     Duration(Span),
     /// `total-time`, inside the metric.
     TotalTime(Span),
-    /// `(+ …)`, `(* …)` with one or more operands; `(- a)` and `(- a b)`; `(/ a b)`.
+    /// `(+ …)` and `(* …)` with one or more operands; `(- a)`, `(- a b)` and `(/ a b)`.
     Operation(Arithmetic, Vec<Expression>, Span),
 }
 
@@ -412,13 +419,14 @@ pub enum Effect {
     Delete(Atom),
     /// `(forall (…) …)`.
     ForAll(Vec<TypedName>, Box<Effect>),
-    /// `(when CONDITION EFFECT)`; in a durative action both at the time of the entry they stand in.
+    /// `(when CONDITION EFFECT)`. In a durative action, condition and effect have the time of the enclosing
+    /// entry.
     When(Condition, Box<Effect>),
     /// A numeric effect.
     Assign(Assignment, Atom, Expression, Span),
 }
 
-/// What a numeric effect does.
+/// Operator of a numeric effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Assignment {
     /// `assign`
@@ -440,7 +448,7 @@ pub struct Problem {
     pub name: Identifier,
     /// `(:domain NAME)`.
     pub domain: Identifier,
-    /// The requirement flags, without their colon.
+    /// Requirement flags, without the colon.
     pub requirements: Vec<Identifier>,
     /// `:objects`.
     pub objects: Vec<TypedName>,
@@ -459,20 +467,20 @@ pub struct Problem {
 pub enum InitialElement {
     /// An atom that holds.
     Fact(Atom),
-    /// `(not ATOM)`: says again what the closed world says already.
+    /// `(not ATOM)`: redundant, because the initial state is closed.
     NegatedFact(Atom),
     /// `(= FUNCTION NUMBER)`.
     Value(Atom, BigRational, Span),
-    /// `(at TIME LITERAL)`: a timed initial literal; the flag is false for a negated one.
+    /// `(at TIME LITERAL)`: a timed initial literal. The flag is `false` if the literal is negated.
     Timed(BigRational, Atom, bool, Span),
 }
 
 impl InitialElement {
-    /// Returns the predicate and the arguments of a fact; none for other elements.
+    /// Returns the predicate and the arguments of a fact, and `None` for other elements.
     pub fn fact(&self) -> Option<(Name, Vec<Name>)> {
         let Self::Fact(atom) = self else { return None };
         let name = |term: &Term| match term {
-            Term::Variable(own) | Term::Constant(own) => own.name.clone(),
+            Term::Variable(identifier) | Term::Constant(identifier) => identifier.name.clone(),
         };
         Some((atom.predicate.name.clone(), atom.arguments.iter().map(name).collect()))
     }
@@ -481,15 +489,15 @@ impl InitialElement {
 /// `(:metric DIRECTION EXPRESSION)`.
 #[derive(Debug, Clone)]
 pub struct Metric {
-    /// Whether less or more is better.
+    /// Direction of optimisation.
     pub direction: Direction,
-    /// What is measured in the final state.
+    /// Expression that is evaluated in the final state.
     pub expression: Expression,
-    /// The whole metric.
+    /// Extent of the whole metric.
     pub span: Span,
 }
 
-/// Whether less or more is better.
+/// Direction of optimisation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Direction {
     /// Less is better.

@@ -1,6 +1,6 @@
-//! What is wrong with a file, and how it is shown: the source line, a caret, what would be right.
+//! Diagnostics and their display: the source line, a caret, and a suggested correction.
 //!
-//! Codes are stable. P100 to P119 are about the form of a file, P120 to P149 about names and types.
+//! Codes are stable. P100 to P119 concern the form of a file, P120 to P149 names and types.
 
 use std::error::Error;
 use std::fmt;
@@ -9,10 +9,10 @@ use super::ast::Span;
 use super::excerpt::{Excerpt, Shown};
 use super::source::Source;
 
-/// Everything that is wrong with PDDL files or a plan, warnings among it.
+/// All diagnostics about PDDL files or a plan, including warnings.
 pub type Errors = diagnostics::Errors<Diagnostic>;
 
-/// How bad it is.
+/// Severity of a diagnostic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Severity {
     /// The file can be used.
@@ -37,31 +37,31 @@ impl Severity {
     }
 }
 
-/// Something wrong or questionable at a place of a file.
+/// Error or warning at a position of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Diagnostic {
-    /// `P1xx`, stable.
+    /// Stable code `P1xx`.
     pub code: &'static str,
-    /// How bad it is.
+    /// Severity of a diagnostic.
     pub severity: Severity,
-    /// What is wrong, one sentence without full stop.
+    /// Description of the problem: one sentence without full stop.
     pub message: String,
-    /// The name of the source.
+    /// Name of the source.
     pub file: String,
-    /// Where, in bytes.
+    /// Extent, in bytes.
     pub span: Span,
-    /// Where: the line, from 1.
+    /// Line, from 1.
     pub line: usize,
-    /// Where: the character in the line, from 1.
+    /// Column in characters, from 1.
     pub column: usize,
-    /// What would be right.
+    /// Suggested correction.
     pub help: Option<String>,
-    /// Another place that matters, for example an earlier declaration.
+    /// Related position, for example an earlier declaration.
     pub related: Option<Related>,
 }
 
 impl fmt::Display for Diagnostic {
-    /// One line: place, severity, code, message, and what would be right.
+    /// Writes one line: position, severity, code, message, and suggested correction.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { file, line, column, severity, code, message, .. } = self;
         write!(f, "{file}:{line}:{column}: {severity}[{code}]: {message}")?;
@@ -71,23 +71,23 @@ impl fmt::Display for Diagnostic {
 
 impl Error for Diagnostic {}
 
-/// A second place of a diagnostic.
+/// Related position of a diagnostic.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Related {
-    /// What stands there.
+    /// Description of the related position.
     pub message: String,
-    /// The name of the source.
+    /// Name of the source.
     pub file: String,
-    /// Where, in bytes.
+    /// Extent, in bytes.
     pub span: Span,
-    /// Where: the line, from 1.
+    /// Line, from 1.
     pub line: usize,
-    /// Where: the character in the line, from 1.
+    /// Column in characters, from 1.
     pub column: usize,
 }
 
 impl Diagnostic {
-    /// A diagnostic at `span` of `source`.
+    /// Creates a diagnostic at `span` of `source`.
     pub fn new(
         source: &Source,
         span: Span,
@@ -109,26 +109,27 @@ impl Diagnostic {
         }
     }
 
-    /// The lines that it shows: its own, and that of its related place, as far as their files are among the sources.
+    /// Returns the excerpts to display: the line of the diagnostic and that of its related position, if their
+    /// files are among `sources`.
     pub fn excerpts(&self, sources: &[&Source]) -> Vec<Excerpt> {
         let excerpt = |file: &str, span: Span, message: &str| {
             let source = sources.iter().find(|source| source.name() == file)?;
             let line = source.position(span.start).line;
             Excerpt::new(file, source.text(), line, span.start as usize..span.end as usize, message)
         };
-        let own = excerpt(&self.file, self.span, "");
+        let primary = excerpt(&self.file, self.span, "");
         let related = self.related.as_ref();
         let related = related.and_then(|place| excerpt(&place.file, place.span, &place.message));
-        own.into_iter().chain(related).collect()
+        primary.into_iter().chain(related).collect()
     }
 
-    /// Says what would be right.
+    /// Sets the suggested correction.
     pub(crate) fn help(&mut self, help: impl Into<String>) -> &mut Self {
         self.help = Some(help.into());
         self
     }
 
-    /// Points at a second place.
+    /// Sets the related position.
     pub(crate) fn related(&mut self, source: &Source, span: Span, message: impl Into<String>) -> &mut Self {
         let place = source.position(span.start);
         let file = source.name().to_owned();
@@ -138,8 +139,8 @@ impl Diagnostic {
     }
 }
 
-/// The most diagnostics that are kept for one file; a file that is not PDDL at all has no use for more.
-const LIMIT: usize = 200;
+/// Maximum number of diagnostics per file. A file that is not PDDL at all produces countless ones.
+const MAX_DIAGNOSTICS: usize = 200;
 
 /// Collects the diagnostics of one source.
 #[derive(Debug)]
@@ -180,8 +181,8 @@ impl<'s> Sink<'s> {
         span: Span,
         message: String,
     ) -> &mut Diagnostic {
-        // Beyond the limit all share the last slot, whose message `finish` replaces.
-        let index = self.diagnostics.len().min(LIMIT);
+        // Beyond the limit all diagnostics share the last slot, whose message `finish` replaces.
+        let index = self.diagnostics.len().min(MAX_DIAGNOSTICS);
         if self.is_full() {
             self.beyond_limit += 1;
             return &mut self.diagnostics[index];
@@ -194,25 +195,25 @@ impl<'s> Sink<'s> {
         self.source
     }
 
-    /// How many there were so far.
+    /// Number of diagnostics so far, including those beyond the limit.
     #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(crate) fn len(&self) -> usize {
         self.diagnostics.len() + self.beyond_limit
     }
 
-    /// Whether more messages would only be counted, so that no work should go into them.
+    /// Returns `true` if further diagnostics are only counted, so that suggestions need not be computed.
     pub(crate) fn is_full(&self) -> bool {
-        self.diagnostics.len() > LIMIT
+        self.diagnostics.len() > MAX_DIAGNOSTICS
     }
 
     pub(crate) fn has_errors(&self) -> bool {
         self.beyond_limit > 0 || has_errors(&self.diagnostics)
     }
 
-    /// All that was collected, in the order of the file.
+    /// Returns the collected diagnostics in the order of the file.
     #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(crate) fn finish(mut self) -> Vec<Diagnostic> {
-        if let (Some(last), true) = (self.diagnostics.get_mut(LIMIT), self.beyond_limit > 0) {
+        if let (Some(last), true) = (self.diagnostics.get_mut(MAX_DIAGNOSTICS), self.beyond_limit > 0) {
             *last = Diagnostic::new(
                 self.source,
                 last.span,
@@ -222,19 +223,19 @@ impl<'s> Sink<'s> {
             );
         }
         self.diagnostics.sort_by_key(|diagnostic| (diagnostic.span.start, diagnostic.code));
-        // What is compiled to several forms is checked in each.
+        // Constructs that are compiled to several forms are checked in each form.
         self.diagnostics.dedup();
         self.diagnostics
     }
 }
 
-/// Whether one of them is an error.
+/// Returns `true` if at least one diagnostic is an error.
 pub fn has_errors(diagnostics: &[Diagnostic]) -> bool {
     diagnostics.iter().any(|diagnostic| diagnostic.severity == Severity::Error)
 }
 
-/// The diagnostics as text for a terminal, `color` with ANSI escapes. A diagnostic whose file is not among
-/// the sources is shown without its source line.
+/// Formats diagnostics for a terminal, with ANSI escapes if `color` is set. A diagnostic whose file is not
+/// among `sources` has no source line.
 pub fn render(diagnostics: &[Diagnostic], sources: &[&Source], color: bool) -> String {
     let text = |diagnostic: &Diagnostic| {
         let place = format!("{}:{}:{}", diagnostic.file, diagnostic.line, diagnostic.column);

@@ -1,5 +1,5 @@
-//! What a message shows: its sentence, the source line with a mark at the place in question, what would be right. All messages of all
-//! languages have this form.
+//! Layout of a message: its text, the source line with the marked position, and the suggested correction.
+//! Messages about all input languages have this form.
 
 use std::fmt::Write as _;
 use std::ops::Range;
@@ -8,7 +8,7 @@ use codespan_reporting::diagnostic::{self as codespan, Label, LabelStyle};
 use codespan_reporting::files::{Error as FilesError, Files};
 use codespan_reporting::term::{self, termcolor};
 
-/// One line of a text, cut around the place in question: generated files have lines of megabytes.
+/// One line of a text, truncated around the marked range because generated files have lines of megabytes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Excerpt {
     file: String,
@@ -19,7 +19,7 @@ pub struct Excerpt {
     message: String,
 }
 
-/// How many bytes of a long line are shown before and after the place in question.
+/// Number of bytes of a long line that are shown before and after the marked position.
 const CONTEXT: usize = 150;
 
 #[expect(
@@ -27,7 +27,8 @@ const CONTEXT: usize = 150;
     reason = "positions in a text in memory; a mark starts in the part that is shown"
 )]
 impl Excerpt {
-    /// The line of a text in which a range of bytes begins, and the number of this line; nothing where the text has no such place.
+    /// Creates an excerpt of the line in which a byte range begins. `line` is the number of this line.
+    /// Returns `None` if the range does not fit the text.
     pub(crate) fn new(
         file: &str,
         text: &str,
@@ -53,23 +54,24 @@ impl Excerpt {
         })
     }
 
-    /// The line of a text with a mark below the word that begins at a column; both count from 1, columns in characters. Nothing where the
-    /// text has no such line.
+    /// Creates an excerpt with a mark below the word that begins at a column. Line and column count from 1,
+    /// columns in characters. Returns `None` if the text has no such line.
     pub fn at(file: &str, text: &str, line: usize, column: usize) -> Option<Self> {
         let begin: usize = text.split_inclusive('\n').take(line.checked_sub(1)?).map(str::len).sum();
-        let own = text.get(begin..).filter(|rest| !rest.is_empty())?.lines().next()?;
-        let place = own.char_indices().nth(column.saturating_sub(1)).map_or(own.len(), |(at, _)| at);
+        let content = text.get(begin..).filter(|remainder| !remainder.is_empty())?.lines().next()?;
+        let place = content.char_indices().nth(column.saturating_sub(1)).map_or(content.len(), |(at, _)| at);
         let is_part = |c: char| c.is_alphanumeric() || c == '_' || c == '-';
-        let word = own[place..].find(|c| !is_part(c)).unwrap_or(own.len() - place);
-        let first = own[place..].chars().next().map_or(0, char::len_utf8);
+        let word = content[place..].find(|c| !is_part(c)).unwrap_or(content.len() - place);
+        let first = content[place..].chars().next().map_or(0, char::len_utf8);
         Self::new(file, text, line, begin + place..begin + place + word.max(first), "")
     }
 
-    /// The same with its text and its names changed, part by part, so that the mark stays where it is.
+    /// Applies `change` to the file name, the message, and each part of the text separately, so that the mark
+    /// stays on its part.
     #[must_use]
     pub fn map(&self, change: impl Fn(&str) -> String) -> Self {
-        let (before, rest) = self.text.split_at(self.range.start);
-        let (marked, after) = rest.split_at(self.range.len());
+        let (before, remainder) = self.text.split_at(self.range.start);
+        let (marked, after) = remainder.split_at(self.range.len());
         let (before, marked, after) = (change(before), change(marked), change(after));
         Self {
             file: change(&self.file),
@@ -81,30 +83,31 @@ impl Excerpt {
     }
 }
 
-/// A message with all that it shows.
+/// A message with everything that is displayed.
 #[derive(Debug, Clone, Copy)]
 pub struct Shown<'a> {
-    /// Whether it is an error, or else a warning.
+    /// Whether the message is an error; otherwise it is a warning.
     pub is_error: bool,
-    /// The stable code of the cause.
+    /// Stable code of the cause.
     pub code: &'a str,
-    /// What is wrong, in a sentence.
+    /// Description of the problem, in one sentence.
     pub message: &'a str,
-    /// The file, or `FILE:LINE:COLUMN`; shown where there is no source line.
+    /// File, or `FILE:LINE:COLUMN`. Shown if there is no source line.
     pub place: Option<&'a str>,
-    /// What would be right.
+    /// Suggested correction.
     pub help: Option<&'a str>,
-    /// The source lines; the first one is what the message is about.
+    /// Source lines. The first one is the location of the problem.
     pub excerpts: &'a [Excerpt],
 }
 
 impl Shown<'_> {
-    /// As a terminal shows it, `color` with ANSI escapes; a line break stands at its end.
+    /// Formats the message for a terminal, with ANSI escapes if `color` is set. The text ends with a line
+    /// break.
     pub fn text(&self, color: bool) -> String {
         let config = term::Config::default();
         let mut buffer = if color { termcolor::Buffer::ansi() } else { termcolor::Buffer::no_color() };
         let excerpts = Excerpts(self.excerpts);
-        // Writing to memory does not fail, and the labels lie in the excerpts by construction.
+        // Writing to memory does not fail, and the labels lie within the excerpts by construction.
         let _ = term::emit_to_write_style(&mut buffer, &config, &excerpts, &self.diagnostic());
         let mut text = String::from_utf8_lossy(buffer.as_slice()).into_owned();
         if self.excerpts.is_empty() {
@@ -136,7 +139,7 @@ impl Shown<'_> {
     }
 }
 
-/// Excerpts as the files that labels refer to.
+/// Adapter: each excerpt is a file for `codespan_reporting`.
 struct Excerpts<'e>(&'e [Excerpt]);
 
 impl<'a> Files<'a> for Excerpts<'_> {
@@ -205,13 +208,13 @@ mod tests {
     }
 
     #[test]
-    fn without_a_line_there_is_a_place() {
+    fn a_message_without_a_source_line_shows_its_position() {
         check("one", (2, 1), "error[X100]: wrong\n  ┌─ f:1:1\n  = help: right\n");
         check("", (0, 0), "error[X100]: wrong\n  ┌─ f:1:1\n  = help: right\n");
     }
 
     #[test]
-    fn marks_stay_where_parts_grow() {
+    fn marks_stay_on_their_part_when_the_text_before_them_grows() {
         let excerpt = Excerpt::at("f", "a\u{1b} b c", 1, 4).expect("a place");
         let grown = excerpt.map(|part| part.replace('\u{1b}', "<escape>"));
         assert_eq!((&grown.text[..], &grown.text[grown.range.clone()]), ("a<escape> b c", "b"));

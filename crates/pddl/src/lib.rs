@@ -1,8 +1,10 @@
-//! The language: PDDL text to syntax tree and back, and what a plan does by its definition.
+//! PDDL parser, checker and printer, and a plan validator.
 //!
-//! Everything that real files contain is read, with a warning where they leave the standard; whatever is
-//! wrong is reported at its place, all of it at once. [`validate`] executes plans on the syntax tree, with exact numbers.
-//! No grounding, no solver and no file system here.
+//! The parser accepts the extensions of real files, with a warning where they deviate from the standard, and
+//! reports all errors of a file at once. [`validate`] executes plans on the syntax tree with exact rational
+//! numbers.
+//!
+//! Absent: grounding, solvers, and the file system.
 //!
 #![doc = include_str!("../README.md")]
 #![warn(
@@ -47,11 +49,11 @@ pub use validator::Validator;
 
 use ast::{Direction, Domain, Metric, Problem};
 
-/// An objective from the text of its expression, checked against a domain and a problem.
+/// Parses an objective and checks it against a domain and a problem.
 ///
 /// # Errors
 ///
-/// All that is wrong with it.
+/// Returns all errors and warnings about the objective if there is an error.
 pub fn read_objective(
     direction: Direction,
     expression: &Source,
@@ -70,7 +72,7 @@ pub fn read_objective(
     Err(parsed.diagnostics.into())
 }
 
-/// A domain and a problem from their texts, with the warnings about both.
+/// Parses and checks a domain and a problem. Returns them with the warnings about both.
 ///
 /// ```
 /// use metaplan_pddl::{Source, read};
@@ -83,34 +85,35 @@ pub fn read_objective(
 ///
 /// # Errors
 ///
-/// All that is wrong, together with the warnings: the domain's messages first, each file's in its order.
+/// Returns all errors and warnings: those about the domain first, each file's in the order of the file.
 pub fn read(domain: &Source, problem: &Source) -> Result<(Domain, Problem, Vec<Diagnostic>), Errors> {
     let parsed_domain = parse::domain(domain);
     let parsed_problem = match &parsed_domain.tree {
         Some(tree) => parse::problem_of(tree, problem),
         None => parse::problem(problem),
     };
-    let mut found = Vec::new();
-    // Names are checked where what declares them was read; otherwise each error would be followed by many.
+    let mut name_diagnostics = Vec::new();
+    // Names are checked only if all declarations were read. Otherwise each syntax error would cause many
+    // errors about undeclared names.
     if parsed_domain.declarations_intact {
-        found = match (&parsed_domain.tree, &parsed_problem.tree) {
-            (Some(tree), Some(other)) if parsed_problem.declarations_intact => {
-                check(tree, domain, other, problem)
+        name_diagnostics = match (&parsed_domain.tree, &parsed_problem.tree) {
+            (Some(tree), Some(problem_tree)) if parsed_problem.declarations_intact => {
+                check(tree, domain, problem_tree, problem)
             }
             (Some(tree), _) => check_domain(tree, domain),
             (None, _) => Vec::new(),
         };
     }
-    let (mut of_domain, mut of_problem) = (parsed_domain.diagnostics, parsed_problem.diagnostics);
-    for diagnostic in found {
+    let (mut messages, mut problem_messages) = (parsed_domain.diagnostics, parsed_problem.diagnostics);
+    for diagnostic in name_diagnostics {
         let same_file = diagnostic.file == domain.name();
-        (if same_file { &mut of_domain } else { &mut of_problem }).push(diagnostic);
+        (if same_file { &mut messages } else { &mut problem_messages }).push(diagnostic);
     }
-    of_domain.sort_by_key(|diagnostic| diagnostic.span.start);
-    of_problem.sort_by_key(|diagnostic| diagnostic.span.start);
-    of_domain.append(&mut of_problem);
+    messages.sort_by_key(|diagnostic| diagnostic.span.start);
+    problem_messages.sort_by_key(|diagnostic| diagnostic.span.start);
+    messages.append(&mut problem_messages);
     match (parsed_domain.tree, parsed_problem.tree) {
-        (Some(tree), Some(other)) if !has_errors(&of_domain) => Ok((tree, other, of_domain)),
-        _ => Err(of_domain.into()),
+        (Some(tree), Some(problem_tree)) if !has_errors(&messages) => Ok((tree, problem_tree, messages)),
+        _ => Err(messages.into()),
     }
 }

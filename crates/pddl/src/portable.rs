@@ -1,7 +1,8 @@
-//! A domain and a problem to the same in a form that other planners accept.
+//! Normalises a domain and a problem to a form that other planners accept.
 //!
-//! Requirements name what is used, what is used is declared, nothing is said twice, the problem names its domain. What
-//! no other form could say (two actions of one name, names that begin with a digit) stays as it is.
+//! Requirements list the used features, used symbols are declared, duplicates are removed, and the problem
+//! names its domain. Features without an equivalent (two actions of one name, names that begin with a digit)
+//! stay as they are.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -12,13 +13,13 @@ use super::ast::{
 use super::types::TypeHierarchy;
 use super::visit::{Node, Visit};
 
-/// A domain and a problem as other planners want them; both have passed [`check`](super::check()).
+/// Returns the portable form of a domain and a problem that have passed [`check`](super::check()).
 pub fn portable(domain: &Domain, problem: &Problem) -> (Domain, Problem) {
     let (mut domain, mut problem) = (domain.clone(), problem.clone());
     declare_types(&mut domain);
     declare_total_cost(&mut domain, &problem);
     move_constants(&mut domain, &mut problem);
-    say_once(&domain, &mut problem);
+    remove_duplicates(&domain, &mut problem);
     problem.domain = domain.name.clone();
     problem.requirements.clear();
     require(&mut domain, &problem);
@@ -29,7 +30,8 @@ fn identifier(name: &str) -> Identifier {
     Identifier { name: Name::new(name), span: Span::default() }
 }
 
-/// Declares supertypes that are only mentioned; types that nothing declares restrict nothing.
+/// Declares supertypes that are only mentioned. In parameters of predicates and functions, undeclared types
+/// restrict nothing and are dropped.
 fn declare_types(domain: &mut Domain) {
     let hierarchy = TypeHierarchy::of(domain);
     for declaration in domain.predicates.iter_mut().chain(&mut domain.functions) {
@@ -37,18 +39,18 @@ fn declare_types(domain: &mut Domain) {
             parameter.r#type.alternatives.retain(|r#type| hierarchy.contains(&r#type.name));
         }
     }
-    let mut known: FxHashSet<Name> = FxHashSet::default();
-    known.insert(Name::new("object"));
-    known.extend(domain.types.iter().map(|entry| entry.identifier.name.clone()));
+    let mut declared: FxHashSet<Name> = FxHashSet::default();
+    declared.insert(Name::new("object"));
+    declared.extend(domain.types.iter().map(|entry| entry.identifier.name.clone()));
     let parents: Vec<_> = domain.types.iter().flat_map(|entry| entry.r#type.alternatives.clone()).collect();
     for identifier in parents {
-        if known.insert(identifier.name.clone()) {
+        if declared.insert(identifier.name.clone()) {
             domain.types.push(TypedName { identifier, r#type: TypeExpression::default() });
         }
     }
 }
 
-/// Declares `total-cost` where it is only used.
+/// Declares `total-cost` if it is used but not declared.
 fn declare_total_cost(domain: &mut Domain, problem: &Problem) {
     let name = Name::new("total-cost");
     let is_declared = domain.functions.iter().any(|function| function.identifier.name == name);
@@ -61,7 +63,7 @@ fn declare_total_cost(domain: &mut Domain, problem: &Problem) {
     }
 }
 
-/// Makes constants of the problem's objects that the domain uses.
+/// Moves objects of the problem that the domain uses to the constants of the domain.
 fn move_constants(domain: &mut Domain, problem: &mut Problem) {
     let mut used: FxHashSet<Name> = FxHashSet::default();
     domain.walk(&mut |node| match node {
@@ -91,22 +93,23 @@ fn constant(term: &Term) -> Option<Name> {
     }
 }
 
-/// Drops objects that are constants already, repeated facts and values, and what the closed world says anyway.
-fn say_once(domain: &Domain, problem: &mut Problem) {
+/// Removes objects that are also constants, repeated facts and values, and negated facts, which the
+/// closed-world assumption implies.
+fn remove_duplicates(domain: &Domain, problem: &mut Problem) {
     let constants: FxHashSet<Name> =
         domain.constants.iter().map(|constant| constant.identifier.name.clone()).collect();
     problem.objects.retain(|object| !constants.contains(&object.identifier.name));
     merge_types(&mut problem.objects);
-    let mut said: FxHashSet<(bool, Name, Vec<Name>)> = FxHashSet::default();
+    let mut stated: FxHashSet<(bool, Name, Vec<Name>)> = FxHashSet::default();
     problem.init.retain(|element| match element {
-        InitialElement::Fact(atom) => said.insert((false, atom.predicate.name.clone(), names(atom))),
-        InitialElement::Value(atom, ..) => said.insert((true, atom.predicate.name.clone(), names(atom))),
+        InitialElement::Fact(atom) => stated.insert((false, atom.predicate.name.clone(), names(atom))),
+        InitialElement::Value(atom, ..) => stated.insert((true, atom.predicate.name.clone(), names(atom))),
         InitialElement::NegatedFact(_) => false,
         InitialElement::Timed(..) => true,
     });
 }
 
-/// Objects that are declared twice are of both types.
+/// Merges repeated declarations of an object, which then has all their types.
 fn merge_types(objects: &mut Vec<TypedName>) {
     let mut merged: Vec<TypedName> = Vec::with_capacity(objects.len());
     let mut places: FxHashMap<Name, usize> = FxHashMap::default();
@@ -116,10 +119,11 @@ fn merge_types(objects: &mut Vec<TypedName>) {
             merged.push(object);
             continue;
         };
-        let known = &mut merged[*place].r#type.alternatives;
-        let is_new = |one: &Identifier| known.iter().all(|other| other.name != one.name);
-        let more: Vec<_> = object.r#type.alternatives.into_iter().filter(is_new).collect();
-        known.extend(more);
+        let alternatives = &mut merged[*place].r#type.alternatives;
+        let is_new =
+            |alternative: &Identifier| alternatives.iter().all(|present| present.name != alternative.name);
+        let new_alternatives: Vec<_> = object.r#type.alternatives.into_iter().filter(is_new).collect();
+        alternatives.extend(new_alternatives);
     }
     *objects = merged;
 }
@@ -131,7 +135,7 @@ fn names(atom: &Atom) -> Vec<Name> {
     atom.arguments.iter().map(name).collect()
 }
 
-/// Requirements that stand for others.
+/// Requirements that imply others: (implied, implying).
 const IMPLIED: [(&str, &str); 12] = [
     ("typing", "adl"),
     ("negative-preconditions", "adl"),
@@ -147,13 +151,17 @@ const IMPLIED: [(&str, &str); 12] = [
     ("action-costs", "numeric-fluents"),
 ];
 
-/// Adds the requirements that are used and not stated.
+/// Adds the requirements that are used but not stated.
 fn require(domain: &mut Domain, problem: &Problem) {
     let mut needed: FxHashSet<&'static str> = FxHashSet::default();
     needed.insert("strips");
     walk(domain, problem, &mut |node| needed.extend(needs(node)));
     let mut insert = |flag, is_used: bool| is_used && needed.insert(flag);
-    let soft = domain.constraints.iter().chain(&problem.constraints).any(|own| own.preference.is_some());
+    let soft = domain
+        .constraints
+        .iter()
+        .chain(&problem.constraints)
+        .any(|constraint| constraint.preference.is_some());
     insert("preferences", soft);
     insert("typing", !domain.types.is_empty());
     insert("derived-predicates", !domain.derived.is_empty());
@@ -161,18 +169,19 @@ fn require(domain: &mut Domain, problem: &Problem) {
     insert("timed-initial-literals", problem.init.iter().any(is_timed));
     let is_durative = domain.actions.iter().any(|action| matches!(action.body, ActionBody::Durative { .. }));
     insert("durative-actions", is_durative);
-    // The older name is the one that planners for durative actions know.
+    // Planners for durative actions know the older name.
     if is_durative && needed.remove("numeric-fluents") {
         needed.insert("fluents");
     }
+    // Numeric fluents include action costs.
     if needed.contains("numeric-fluents") || needed.contains("fluents") {
         needed.remove("action-costs");
     }
     let mut stated = FxHashSet::default();
     domain.requirements.retain(|flag| stated.insert(flag.name.clone()));
     let is_stated = |flag: &&str| {
-        let by = IMPLIED.iter().filter(|(implied, _)| implied == flag).map(|(_, by)| *by);
-        by.chain([*flag]).any(|flag| stated.contains(&Name::new(flag)))
+        let implying = IMPLIED.iter().filter(|(implied, _)| implied == flag).map(|(_, implying)| *implying);
+        implying.chain([*flag]).any(|flag| stated.contains(&Name::new(flag)))
     };
     let mut missing: Vec<_> = needed.into_iter().filter(|flag| !is_stated(flag)).collect();
     missing.sort_unstable();
@@ -184,7 +193,7 @@ fn walk<'t>(domain: &'t Domain, problem: &'t Problem, visit: Visit<'_, 't>) {
     problem.walk(visit);
 }
 
-/// The function in an expression or the target of an effect.
+/// Function in an expression, or target of a numeric effect.
 fn function(node: Node<'_>) -> Option<&Atom> {
     match node {
         Node::Effect(Effect::Assign(_, target, ..)) => Some(target),
@@ -192,7 +201,7 @@ fn function(node: Node<'_>) -> Option<&Atom> {
     }
 }
 
-/// The requirement of a node, without those of the nodes within.
+/// Requirement of a node, without those of its children.
 fn needs(node: Node<'_>) -> Option<&'static str> {
     match node {
         Node::Preference(_) => Some("preferences"),

@@ -1,18 +1,18 @@
-//! Text to a tree of parenthesised lists, with recovery from parentheses that do not match.
+//! Reads text into a tree of S-expressions, with recovery from unbalanced parentheses.
 //!
-//! The tree is one flat vector in the order of the text: a list is followed by its items and knows where
-//! they end. Reading is iterative and nothing is freed recursively, so no text can overflow the stack.
+//! The tree is one flat vector in the order of the text: a list is followed by its items and stores the index
+//! behind them. Reading is iterative, and no destructor recurses, so no text can overflow the stack.
 
 use super::ast::Span;
 use super::diagnostic::Sink;
 use crate::number::dense;
 
-/// The deepest nesting that is read. Everything behind the reader may recurse this far,
-/// also without optimisation in a thread of 2 MB; real files stay below 30.
+/// Maximum nesting depth. Later stages may recurse to this depth, also without optimisation in a thread with
+/// a stack of 2 MB. Real files stay below 30.
 const DEPTH_LIMIT: usize = 200;
 
-/// The keywords that open a section of a file. Where one stands deeper than a section can, the section
-/// before it was not closed.
+/// Keywords that open a section of a file. At a greater depth they show that the preceding section was not
+/// closed.
 pub(super) const SECTIONS: [&str; 20] = [
     ":requirements",
     ":types",
@@ -39,12 +39,12 @@ pub(super) const SECTIONS: [&str; 20] = [
 #[derive(Debug, Clone, Copy)]
 struct Node {
     span: Span,
-    /// The index of the first node after this one and all its items.
+    /// Index of the first node after this one and all its items.
     next: u32,
     is_list: bool,
 }
 
-/// The lists and symbols of a text.
+/// Tree of the lists and symbols of a text.
 #[derive(Debug)]
 pub(super) struct Tree<'s> {
     text: &'s str,
@@ -63,7 +63,7 @@ impl<'t> Item<'t> {
         self.tree.nodes[self.index as usize]
     }
 
-    /// Where it stands, a list with its parentheses.
+    /// Extent in the text, including the parentheses of a list.
     pub(super) fn span(self) -> Span {
         self.node().span
     }
@@ -72,29 +72,29 @@ impl<'t> Item<'t> {
         self.node().is_list
     }
 
-    /// The text of a symbol; nothing for a list.
+    /// Text of a symbol; `None` for a list.
     pub(super) fn symbol(self) -> Option<&'t str> {
         let Node { span, is_list, .. } = self.node();
         (!is_list).then(|| &self.tree.text[span.start as usize..span.end as usize])
     }
 
-    /// The items of a list; none for a symbol.
+    /// Items of a list; empty for a symbol.
     #[expect(clippy::arithmetic_side_effects, reason = "an index in the list of nodes")]
     pub(super) fn items(self) -> Items<'t> {
         Items { tree: self.tree, next: self.index + 1, end: self.node().next }
     }
 
-    /// The first item of a list, if it is a symbol.
+    /// First item of a list, if it is a symbol.
     pub(super) fn head(self) -> Option<&'t str> {
         self.items().next().and_then(Item::symbol)
     }
 
-    /// Whether this is a list whose first item is `keyword` in any case.
+    /// Returns `true` if the item is a list whose first item is `keyword`, ignoring case.
     pub(super) fn is_headed(self, keyword: &str) -> bool {
         self.head().is_some_and(|head| head.eq_ignore_ascii_case(keyword))
     }
 
-    /// The items of a list behind its first.
+    /// Items of a list after the first one.
     pub(super) fn rest(self) -> Items<'t> {
         let mut items = self.items();
         items.next();
@@ -102,7 +102,7 @@ impl<'t> Item<'t> {
     }
 }
 
-/// Walks over the items of a list.
+/// Iterator over the items of a list.
 #[derive(Debug, Clone)]
 pub(super) struct Items<'t> {
     tree: &'t Tree<'t>,
@@ -124,19 +124,20 @@ impl<'t> Iterator for Items<'t> {
 }
 
 impl<'s> Tree<'s> {
-    /// The lists and symbols that stand in no list.
+    /// Top-level lists and symbols.
     pub(super) fn top(&'s self) -> Items<'s> {
         Items { tree: self, next: 0, end: dense(self.nodes.len()) }
     }
 }
 
-/// Reads a text, or reports why it cannot be read at all.
+/// Reads a text. Returns `None`, with a reported error, if the text is too large or nested too deeply.
 pub(super) fn read<'s>(text: &'s str, sink: &mut Sink<'_>) -> Option<Tree<'s>> {
     if u32::try_from(text.len()).is_err() {
         sink.error("P100", Span::default(), "the file is larger than 4 GB");
         return None;
     }
     let mut reader =
+        // Real files have about one node per six bytes.
         Reader { nodes: Vec::with_capacity(text.len() / 6), open: Vec::new(), sink, last_close: 0 };
     let mut at = 0;
     while let Some((start, end)) = next_token(text, at) {
@@ -156,7 +157,8 @@ pub(super) fn read<'s>(text: &'s str, sink: &mut Sink<'_>) -> Option<Tree<'s>> {
     Some(Tree { text, nodes })
 }
 
-/// The next parenthesis or symbol from byte `at` on.
+/// Returns the extent of the next parenthesis or symbol at or after byte `at`. Skips white space and
+/// comments.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "positions in a text in memory, which are at most its length"
@@ -176,7 +178,7 @@ fn next_token(text: &str, mut at: usize) -> Option<(usize, usize)> {
         }
     }
     let ends = |(place, character): &(usize, char)| {
-        // As other planners have it, a variable begins with its question mark, with or without a space before it.
+        // As in other planners, a variable begins at its question mark, even without a preceding space.
         !in_a_word(*character)
             || (*character == '?' && *place > 0 && text[at + place + 1..].starts_with(in_a_word))
     };
@@ -184,12 +186,13 @@ fn next_token(text: &str, mut at: usize) -> Option<(usize, usize)> {
     Some((at, at + length))
 }
 
-/// Whether a character continues a word.
+/// Returns `true` if a character can be part of a word.
 fn in_a_word(character: char) -> bool {
     !matches!(character, '(' | ')' | ';') && !is_space(character)
 }
 
-/// White space in the wide sense: text copied from documents brings no-break spaces and byte order marks.
+/// Returns `true` for all Unicode white space. Text copied from documents contains no-break spaces and byte
+/// order marks.
 fn is_space(character: char) -> bool {
     character.is_whitespace() || character == '\u{feff}'
 }
@@ -197,10 +200,10 @@ fn is_space(character: char) -> bool {
 /// The state of [`read`].
 struct Reader<'r, 's> {
     nodes: Vec<Node>,
-    /// The lists that are open, outermost first.
+    /// Indices of the open lists, outermost first.
     open: Vec<u32>,
     sink: &'r mut Sink<'s>,
-    /// The end of the last parenthesis that was closed.
+    /// End of the last closing parenthesis.
     last_close: u32,
 }
 
@@ -218,7 +221,7 @@ impl Reader<'_, '_> {
 
     #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     fn symbol(&mut self, span: Span, text: &str) {
-        // Only the first item of a list opens a section, and only right below `(define`.
+        // Only the first item of a list opens a section, and only directly below `(define`.
         let is_first = self.open.last().is_some_and(|list| *list as usize + 1 == self.nodes.len());
         if is_first && text.starts_with(':') && SECTIONS.iter().any(|name| name.eq_ignore_ascii_case(text)) {
             match self.open.len() {
@@ -230,17 +233,17 @@ impl Reader<'_, '_> {
         self.nodes.push(Node { span, next: dense(self.nodes.len()) + 1, is_list: false });
     }
 
-    /// A variable behind a word without a space.
+    /// Warns about a variable that follows a word without a space.
     fn glued_variable(&mut self, span: Span, text: &str) {
         self.sink
             .warning("P116", span, format!("`{text}` is read as a word of its own"))
             .help("put a space before the question mark");
     }
 
-    /// A section at top level: the `(define` before it was closed too early, so it goes on.
+    /// Handles a section at top level: the preceding `(define` was closed too early and is reopened.
     #[expect(clippy::arithmetic_side_effects, reason = "the definition was closed before, by a parenthesis")]
     fn reopen_define(&mut self, span: Span, text: &str) {
-        // Only a definition that came first and is closed again can go on.
+        // Only the first definition of the file can be reopened, and only if it is closed.
         if self.open[0] == 0 || !self.nodes[0].is_list {
             return;
         }
@@ -253,7 +256,7 @@ impl Reader<'_, '_> {
         self.open.insert(0, 0);
     }
 
-    /// A section inside another one: what is open of that is closed here.
+    /// Handles a section inside another one: closes all lists of the enclosing section here.
     fn close_section_before(&mut self, span: Span, text: &str) {
         let Some(list) = self.open.pop() else { return };
         let unclosed = self.nodes[self.open[1] as usize].span;

@@ -1,4 +1,4 @@
-//! The front door: the text of a plan to a verdict.
+//! Validation of plan texts.
 
 use num_rational::BigRational;
 
@@ -7,8 +7,8 @@ use crate::diagnostic::Errors;
 use crate::source::Source;
 use crate::validate::{Options, PlanText, Verdict, validate};
 
-/// Executes plans for a domain and a problem that have passed [`check`](crate::check()), as those that [`read`](crate::read()) returns
-/// have.
+/// Validator for plans of one domain and problem. Both must have passed [`check`](crate::check()), as the
+/// results of [`read`](crate::read()) have.
 ///
 /// ```
 /// use metaplan_pddl::{Source, Validator, read};
@@ -32,27 +32,28 @@ pub struct Validator<'a> {
 }
 
 impl<'a> Validator<'a> {
-    /// For plans whose actions are executed one after another, with exact durations.
+    /// Creates a validator for sequential plans with exact durations.
     pub fn new(domain: &'a Domain, problem: &'a Problem) -> Self {
         Self { domain, problem, options: Options::default() }
     }
 
-    /// How plans are to be read.
+    /// Sets the execution semantics and the tolerance.
     #[must_use]
     pub fn options(self, options: Options) -> Self {
         Self { options, ..self }
     }
 
-    /// Actions may overlap, by the rules of PDDL 2.1; those that interfere have to lie `separation` apart, in the domain's time unit.
+    /// Allows actions to overlap, by the rules of PDDL 2.1. Interfering happenings must be at least
+    /// `separation` apart, in the domain's time unit.
     #[must_use]
     pub fn concurrent(self, separation: BigRational) -> Self {
         self.options(Options { concurrent: true, tolerance: separation })
     }
 
-    /// Executes a plan. A plan that is not valid is not an error: see [`Verdict::violation`].
+    /// Executes a plan. An invalid plan is not an error: see [`Verdict::violation`].
     ///
     /// # Errors
-    /// All lines that are not steps of a plan.
+    /// Returns an error for each line that is not a step of a plan.
     pub fn validate(&self, plan: &Source) -> Result<Verdict, Errors> {
         Ok(validate(self.domain, self.problem, &PlanText::parse(plan)?, &self.options))
     }

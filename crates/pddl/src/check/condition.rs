@@ -1,4 +1,4 @@
-//! Conditions, expressions and atoms.
+//! Checks conditions, expressions and atoms.
 
 use crate::ast::{Atom, Condition, Declaration, Expression, Identifier, Term, TypeExpression, TypedName};
 
@@ -7,7 +7,7 @@ use crate::print::{signature, type_text};
 use super::soft::is_violation;
 use super::{Checker, Scope, did_you_mean};
 
-/// Which space of names an atom belongs to.
+/// Namespace of an atom's symbol.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
     Predicate,
@@ -42,7 +42,7 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// Checks what stands below a quantifier, with its variables in scope.
+    /// Checks the body of a quantifier, with its variables in scope.
     pub(super) fn quantified(
         &mut self,
         variables: &'a [TypedName],
@@ -82,11 +82,11 @@ impl<'a> Checker<'a> {
     pub(super) fn atom(&mut self, atom: &'a Atom, kind: Kind, scope: &Scope<'a>) {
         let Identifier { name, span } = &atom.predicate;
         let symbols = self.symbols;
-        let known = match kind {
+        let declarations = match kind {
             Kind::Predicate => &symbols.predicates,
             Kind::Function => &symbols.functions,
         };
-        if let Some(declaration) = known.get(name) {
+        if let Some(declaration) = declarations.get(name) {
             self.arguments(atom, declaration, kind, scope);
         } else {
             self.unknown_symbol(&atom.predicate, kind);
@@ -105,7 +105,7 @@ impl<'a> Checker<'a> {
     fn unknown_symbol(&mut self, identifier: &'a Identifier, kind: Kind) {
         let Identifier { name, span } = identifier;
         let symbols = self.symbols;
-        let (own, other, other_noun) = match kind {
+        let (declared, other_namespace, other_noun) = match kind {
             Kind::Predicate => (&symbols.predicates, &symbols.functions, "function"),
             Kind::Function => (&symbols.functions, &symbols.predicates, "predicate"),
         };
@@ -118,12 +118,12 @@ impl<'a> Checker<'a> {
         if name.as_str().to_ascii_lowercase().starts_with("inferred-") {
             self.undeclared_inferred.insert(name);
         }
-        let (is_other, in_domain) = (other.contains_key(name), self.in_domain);
+        let (is_in_other_namespace, in_domain) = (other_namespace.contains_key(name), self.in_domain);
         let diagnostic = match kind {
-            Kind::Predicate => self.undeclared("P121", *span, kind.noun(), name, own.keys().copied()),
-            Kind::Function => self.undeclared("P122", *span, kind.noun(), name, own.keys().copied()),
+            Kind::Predicate => self.undeclared("P121", *span, kind.noun(), name, declared.keys().copied()),
+            Kind::Function => self.undeclared("P122", *span, kind.noun(), name, declared.keys().copied()),
         };
-        if is_other {
+        if is_in_other_namespace {
             diagnostic.help(format!("`{name}` is a {other_noun}"));
         } else if !in_domain && diagnostic.help.is_none() {
             let section = if kind == Kind::Predicate { ":predicates" } else { ":functions" };
@@ -133,84 +133,93 @@ impl<'a> Checker<'a> {
     }
 
     fn arguments(&mut self, atom: &'a Atom, declaration: &'a Declaration, kind: Kind, scope: &Scope<'a>) {
-        let (wanted, found) = (declaration.parameters.len(), atom.arguments.len());
-        if wanted != found {
-            let plural = if wanted == 1 { "" } else { "s" };
+        let (arity, count) = (declaration.parameters.len(), atom.arguments.len());
+        if arity != count {
+            let plural = if arity == 1 { "" } else { "s" };
             let name = &atom.predicate.name;
             let message =
-                format!("the {} `{name}` takes {wanted} argument{plural}, found {found}", kind.noun());
+                format!("the {} `{name}` takes {arity} argument{plural}, found {count}", kind.noun());
             let form = signature(declaration);
             self.sink.error("P125", atom.span, message).help(format!("it is declared as `{form}`"));
         }
         for (index, term) in atom.arguments.iter().enumerate() {
-            let fits = self.term(term, scope);
-            let (Some(given), Some(parameter)) = (fits, declaration.parameters.get(index)) else { continue };
-            if wanted == found && !self.argument_fits(&given, &parameter.r#type) {
-                self.argument_type(atom, index, &given, parameter);
+            let info = self.term(term, scope);
+            let (Some(actual), Some(parameter)) = (info, declaration.parameters.get(index)) else { continue };
+            // With a wrong number of arguments, positions do not correspond.
+            if arity == count && !self.argument_fits(&actual, &parameter.r#type) {
+                self.argument_type(atom, index, &actual, parameter);
             }
         }
     }
 
-    /// A variable that becomes the value of a function is of its type: there is nothing that would narrow it.
+    /// Checks that an assigned variable has the value type of the function. A wider type is an error, because
+    /// no further condition narrows it.
     pub(super) fn assigned_value(&mut self, atom: &'a Atom, scope: &Scope<'a>) {
         let symbols = self.symbols;
         let declaration = symbols.predicates.get(&atom.predicate.name);
         let (Some(value), Some(parameter)) =
-            (atom.arguments.last(), declaration.and_then(|own| own.parameters.last()))
+            (atom.arguments.last(), declaration.and_then(|declaration| declaration.parameters.last()))
         else {
             return;
         };
         let Term::Variable(identifier) = value else { return };
-        let Some(variable) = scope.iter().rev().find(|own| own.identifier.name == identifier.name) else {
+        let Some(variable) = scope.iter().rev().find(|entry| entry.identifier.name == identifier.name) else {
             return;
         };
-        let is_known = |own: &Identifier| symbols.types.contains(&own.name);
-        let (given, wanted) = (&variable.r#type, &parameter.r#type);
-        let is_wider = |own: &Identifier| {
-            !wanted.alternatives.iter().any(|upper| symbols.types.is_a(&own.name, &upper.name))
+        let is_declared = |alternative: &Identifier| symbols.types.contains(&alternative.name);
+        let (actual, expected) = (&variable.r#type, &parameter.r#type);
+        let is_wider = |lower: &Identifier| {
+            !expected.alternatives.iter().any(|upper| symbols.types.is_a(&lower.name, &upper.name))
         };
-        if symbols.types.overlap(given, wanted)
-            && wanted.alternatives.iter().all(is_known)
-            && !wanted.alternatives.is_empty()
-            && (given.alternatives.is_empty() || given.alternatives.iter().any(is_wider))
+        if symbols.types.overlap(actual, expected)
+            && expected.alternatives.iter().all(is_declared)
+            && !expected.alternatives.is_empty()
+            && (actual.alternatives.is_empty() || actual.alternatives.iter().any(is_wider))
         {
-            let (name, wanted, given) = (&atom.predicate.name, describe(wanted), describe(given));
-            let message = format!("the value of `{name}` is {wanted}, but what is assigned is {given}");
+            let (name, expected, actual) = (&atom.predicate.name, describe(expected), describe(actual));
+            let message = format!("the value of `{name}` is {expected}, but what is assigned is {actual}");
             self.sink.error("P126", identifier.span, message).help("give the variable the narrower type");
         }
     }
 
-    fn argument_fits(&self, given: &Given<'a>, wanted: &TypeExpression) -> bool {
-        // A variable of a wider type is only narrowed; an object has exactly its types.
-        match given {
-            Given::Variable(r#type) => self.symbols.types.overlap(r#type, wanted),
-            Given::Object(types) => types.iter().any(|r#type| {
-                self.symbols.types.fits(r#type, wanted)
+    fn argument_fits(&self, argument: &ArgumentType<'a>, expected: &TypeExpression) -> bool {
+        // A variable of a wider type is narrowed by the atom. An object has exactly its declared types.
+        match argument {
+            ArgumentType::Variable(r#type) => self.symbols.types.overlap(r#type, expected),
+            ArgumentType::Object(types) => types.iter().any(|r#type| {
+                self.symbols.types.fits(r#type, expected)
                     || r#type.alternatives.iter().any(|r#type| !self.symbols.types.contains(&r#type.name))
             }),
         }
     }
 
     #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
-    fn argument_type(&mut self, atom: &Atom, index: usize, given: &Given<'_>, wanted: &TypedName) {
+    fn argument_type(
+        &mut self,
+        atom: &Atom,
+        index: usize,
+        argument: &ArgumentType<'_>,
+        parameter: &TypedName,
+    ) {
         let (span, shown) = match &atom.arguments[index] {
             Term::Variable(identifier) => (identifier.span, format!("?{}", identifier.name)),
             Term::Constant(identifier) => (identifier.span, identifier.name.to_string()),
         };
-        // Files without types, generated ones above all, use such objects everywhere.
-        let is_untyped = match given {
-            Given::Variable(_) => false,
-            Given::Object(types) => types.iter().all(|r#type| is_object(r#type)),
+        // Untyped files, in particular generated ones, use untyped objects everywhere.
+        let is_untyped = match argument {
+            ArgumentType::Variable(_) => false,
+            ArgumentType::Object(types) => types.iter().all(|r#type| is_object(r#type)),
         };
-        let given = match given {
-            Given::Variable(r#type) => describe(r#type),
-            Given::Object(types) => types.first().map_or_else(String::new, |r#type| describe(r#type)),
+        let argument = match argument {
+            ArgumentType::Variable(r#type) => describe(r#type),
+            ArgumentType::Object(types) => types.first().map_or_else(String::new, |r#type| describe(r#type)),
         };
-        let (name, wanted) = (&atom.predicate.name, describe(&wanted.r#type));
+        let (name, parameter) = (&atom.predicate.name, describe(&parameter.r#type));
         let is_value = index + 1 == atom.arguments.len() && self.symbols.object_fluents.contains(name);
-        let what = if is_value { "the value".to_owned() } else { format!("argument {}", index + 1) };
-        let message = format!("{what} of `{name}` is {wanted}, but `{shown}` is {given}");
-        // An object that is not a value of its type would be a second one that no quantifier finds.
+        let subject = if is_value { "the value".to_owned() } else { format!("argument {}", index + 1) };
+        let message = format!("{subject} of `{name}` is {parameter}, but `{shown}` is {argument}");
+        // As the value of an object fluent, an untyped object would violate functionality: the deletions of
+        // an assignment range over the declared type only.
         if is_untyped && !is_value {
             self.sink.warning("P126", span, message).help("give it a type in `:objects` or `:constants`");
         } else {
@@ -218,15 +227,15 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// The type of a term, if it is declared.
-    pub(super) fn term(&mut self, term: &'a Term, scope: &Scope<'a>) -> Option<Given<'a>> {
+    /// Type of a term; reports undeclared variables and objects.
+    pub(super) fn term(&mut self, term: &'a Term, scope: &Scope<'a>) -> Option<ArgumentType<'a>> {
         match term {
             Term::Variable(Identifier { name, span }) => {
                 if let Some(variable) = scope.iter().rev().find(|entry| entry.identifier.name == *name) {
-                    return Some(Given::Variable(&variable.r#type));
+                    return Some(ArgumentType::Variable(&variable.r#type));
                 }
-                let known = scope.iter().map(|entry| &entry.identifier.name);
-                let help = did_you_mean(name.as_str(), known).map(|help| help.replacen('`', "`?", 1));
+                let variables = scope.iter().map(|entry| &entry.identifier.name);
+                let help = did_you_mean(name.as_str(), variables).map(|help| help.replacen('`', "`?", 1));
                 self.sink.error("P124", *span, format!("unknown variable `?{name}`")).help = help;
                 None
             }
@@ -234,7 +243,7 @@ impl<'a> Checker<'a> {
         }
     }
 
-    fn constant(&mut self, identifier: &'a Identifier, scope: &Scope<'a>) -> Option<Given<'a>> {
+    fn constant(&mut self, identifier: &'a Identifier, scope: &Scope<'a>) -> Option<ArgumentType<'a>> {
         let Identifier { name, span } = identifier;
         let symbols = self.symbols;
         if let Some(object) = symbols.objects.get(name) {
@@ -243,7 +252,7 @@ impl<'a> Checker<'a> {
                     .warning("P138", *span, format!("the domain uses the object `{name}` of the problem"))
                     .help("declare it in `:constants`; other planners reject the domain");
             }
-            return Some(Given::Object(&object.types));
+            return Some(ArgumentType::Object(&object.types));
         }
         let is_variable = scope.iter().any(|entry| entry.identifier.name == *name);
         let diagnostic = self.undeclared("P123", *span, "object", name, symbols.objects.keys().copied());
@@ -254,21 +263,21 @@ impl<'a> Checker<'a> {
     }
 }
 
-/// What is known of an argument.
+/// Type information about an argument.
 #[derive(Debug)]
-pub(super) enum Given<'a> {
-    /// A variable of a type.
+pub(super) enum ArgumentType<'a> {
+    /// Variable with its declared type.
     Variable(&'a TypeExpression),
-    /// An object with the types of all its declarations.
+    /// Object with the types of all its declarations.
     Object(&'a [&'a TypeExpression]),
 }
 
-/// Whether a type leaves everything open.
+/// Returns `true` if a type is `object` or absent.
 fn is_object(r#type: &TypeExpression) -> bool {
-    r#type.alternatives.iter().all(|one| one.name.as_str().eq_ignore_ascii_case("object"))
+    r#type.alternatives.iter().all(|alternative| alternative.name.as_str().eq_ignore_ascii_case("object"))
 }
 
-/// A type for people.
+/// Text of a type for messages.
 fn describe(r#type: &TypeExpression) -> String {
     format!("of type `{}`", type_text(r#type))
 }

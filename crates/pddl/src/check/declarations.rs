@@ -1,4 +1,4 @@
-//! Requirements, types, constants and objects, predicates and functions.
+//! Checks requirements, types, constants, objects, predicates and functions.
 
 use rustc_hash::FxHashMap;
 
@@ -7,7 +7,7 @@ use crate::source::Source;
 
 use super::Checker;
 
-/// The requirement flags of PDDL 1.2 to 3.1, PDDL+ and HDDL, and what planners accept besides.
+/// Requirement flags of PDDL 1.2 to 3.1, PDDL+ and HDDL, and those that planners accept in addition.
 const REQUIREMENTS: [&str; 31] = [
     "strips",
     "typing",
@@ -45,10 +45,10 @@ const REQUIREMENTS: [&str; 31] = [
 impl<'a> Checker<'a> {
     pub(super) fn requirements(&mut self, flags: &[Identifier]) {
         for flag in flags {
-            let known = REQUIREMENTS.iter().any(|known| known.eq_ignore_ascii_case(flag.name.as_str()));
-            if !known {
+            let is_known = REQUIREMENTS.iter().any(|name| name.eq_ignore_ascii_case(flag.name.as_str()));
+            if !is_known {
                 let proposal = diagnostics::nearest(flag.name.as_str(), REQUIREMENTS);
-                let help = proposal.map(|known| format!("did you mean `:{known}`?"));
+                let help = proposal.map(|name| format!("did you mean `:{name}`?"));
                 let message = format!("unknown requirement `:{}`", flag.name);
                 self.sink.warning("P132", flag.span, message).help = help;
             }
@@ -56,7 +56,7 @@ impl<'a> Checker<'a> {
     }
 
     pub(super) fn domain_name(&mut self, domain: &Domain, source: &Source, problem: &Problem) {
-        // A file without the name was reported already.
+        // A missing domain name was reported by the parser.
         if domain.name.name == problem.domain.name || problem.domain.span == problem.name.span {
             return;
         }
@@ -68,10 +68,10 @@ impl<'a> Checker<'a> {
     }
 
     pub(super) fn types(&mut self, domain: &'a Domain) {
-        let mut seen: FxHashMap<&Name, Span> = FxHashMap::default();
+        let mut declared: FxHashMap<&Name, Span> = FxHashMap::default();
         for entry in &domain.types {
             let Identifier { name, span } = &entry.identifier;
-            if let Some(earlier) = seen.insert(name, *span) {
+            if let Some(earlier) = declared.insert(name, *span) {
                 self.repeated(*span, &format!("the type `{name}`"), earlier);
             }
             if self.symbols.types.is_cyclic(name) {
@@ -80,7 +80,7 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// Warns of a second declaration that changes nothing.
+    /// Warns about a redundant second declaration.
     fn repeated(&mut self, span: Span, what: &str, earlier: Span) {
         let source = self.sink.source();
         self.sink.warning("P127", span, format!("{what} is declared twice")).related(
@@ -91,19 +91,19 @@ impl<'a> Checker<'a> {
     }
 
     pub(super) fn constants(&mut self, domain: &'a Domain) {
-        let mut seen = FxHashMap::default();
+        let mut declared = FxHashMap::default();
         for entry in &domain.constants {
-            self.object(entry, "constant", &mut seen);
+            self.object(entry, "constant", &mut declared);
         }
     }
 
     pub(super) fn objects(&mut self, domain: &'a Domain, domain_source: &Source, problem: &'a Problem) {
-        let mut seen = FxHashMap::default();
+        let mut declared = FxHashMap::default();
         let constants: FxHashMap<&Name, &TypedName> =
             domain.constants.iter().map(|entry| (&entry.identifier.name, entry)).collect();
         for entry in &problem.objects {
             let Identifier { name, span } = &entry.identifier;
-            self.object(entry, "object", &mut seen);
+            self.object(entry, "object", &mut declared);
             let Some(constant) = constants.get(name) else { continue };
             let place = constant.identifier.span;
             if self.symbols.types.overlap(&constant.r#type, &entry.r#type) {
@@ -122,10 +122,15 @@ impl<'a> Checker<'a> {
         }
     }
 
-    fn object(&mut self, entry: &'a TypedName, what: &str, seen: &mut FxHashMap<&'a Name, &'a TypedName>) {
+    fn object(
+        &mut self,
+        entry: &'a TypedName,
+        what: &str,
+        declared: &mut FxHashMap<&'a Name, &'a TypedName>,
+    ) {
         let Identifier { name, span } = &entry.identifier;
-        self.type_is_declared(&entry.r#type);
-        let Some(earlier) = seen.insert(name, entry) else { return };
+        self.check_type(&entry.r#type);
+        let Some(earlier) = declared.insert(name, entry) else { return };
         if self.symbols.types.overlap(&earlier.r#type, &entry.r#type) {
             self.repeated(*span, &format!("the {what} `{name}`"), earlier.identifier.span);
         } else {
@@ -140,12 +145,12 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// Reports the undeclared types of something that is typed by them.
-    pub(super) fn type_is_declared(&mut self, r#type: &TypeExpression) {
+    /// Reports undeclared types in a type expression.
+    pub(super) fn check_type(&mut self, r#type: &TypeExpression) {
         for alternative in &r#type.alternatives {
             if !self.symbols.types.contains(&alternative.name) {
-                let known = self.symbols.types.names();
-                self.undeclared("P120", alternative.span, "type", &alternative.name, known);
+                let types = self.symbols.types.names();
+                self.undeclared("P120", alternative.span, "type", &alternative.name, types);
             }
         }
     }
@@ -156,14 +161,14 @@ impl<'a> Checker<'a> {
     }
 
     fn declarations(&mut self, declarations: &'a [Declaration], what: &str) {
-        let mut seen: FxHashMap<&Name, &Declaration> = FxHashMap::default();
+        let mut first_declarations: FxHashMap<&Name, &Declaration> = FxHashMap::default();
         for declaration in declarations {
             let Identifier { name, span } = &declaration.identifier;
             for parameter in &declaration.parameters {
                 self.lenient_type(&parameter.r#type, what);
             }
-            let Some(earlier) = seen.get(name) else {
-                seen.insert(name, declaration);
+            let Some(earlier) = first_declarations.get(name) else {
+                first_declarations.insert(name, declaration);
                 continue;
             };
             let place = earlier.identifier.span;
@@ -182,7 +187,8 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// An undeclared type in the declaration of a predicate restricts nothing; generated files have them.
+    /// Warns about an undeclared type in the declaration of a predicate or a function. It restricts nothing;
+    /// generated files contain such types.
     fn lenient_type(&mut self, r#type: &TypeExpression, what: &str) {
         for alternative in &r#type.alternatives {
             if !self.symbols.types.contains(&alternative.name) {
@@ -197,13 +203,13 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// The parameters of an action, an axiom or a quantifier.
+    /// Checks the parameters of an action, an axiom or a quantifier.
     pub(super) fn parameters(&mut self, parameters: &[TypedName]) {
-        let mut seen: FxHashMap<&Name, Span> = FxHashMap::default();
+        let mut declared: FxHashMap<&Name, Span> = FxHashMap::default();
         for parameter in parameters {
-            self.type_is_declared(&parameter.r#type);
+            self.check_type(&parameter.r#type);
             let Identifier { name, span } = &parameter.identifier;
-            if let Some(earlier) = seen.get(name) {
+            if let Some(earlier) = declared.get(name) {
                 let source = self.sink.source();
                 self.sink.error("P127", *span, format!("the variable `?{name}` is declared twice")).related(
                     source,
@@ -211,7 +217,7 @@ impl<'a> Checker<'a> {
                     "the first declaration is here",
                 );
             } else {
-                seen.insert(name, *span);
+                declared.insert(name, *span);
             }
         }
     }

@@ -1,4 +1,4 @@
-//! No two values for one term: what an action has to ask of the state so that its assignments agree.
+//! Consistency of assignments to object fluents: conditions under which no term receives two values.
 
 use rustc_hash::FxHashMap;
 
@@ -7,21 +7,21 @@ use crate::ast::{Atom, Condition, EffectTime, Expression, Identifier, Name, Term
 use super::Parser;
 use super::fluents::Assigned;
 
-/// What variables are called instead.
+/// Replacement for each renamed variable.
 type Renaming = FxHashMap<Name, Identifier>;
 
 impl Parser<'_> {
-    /// What has to hold so that no two assignments give different values to one term.
+    /// Returns the conditions under which no two assignments give different values to one term.
     pub(super) fn one_value_each(&mut self, assigned: &[Assigned]) -> Vec<(EffectTime, Condition)> {
         let mut needs = Vec::new();
-        for (place, first) in assigned.iter().enumerate() {
-            // Its variables must not capture those of another one.
+        for (position, first) in assigned.iter().enumerate() {
+            // Renaming apart: the variables must not capture those of the other assignment.
             let first = &if first.variables.is_empty() { first.clone() } else { self.copy(first) };
             if !first.gives_one_value() {
                 let second = self.copy(first);
                 needs.extend(agree(first, &second).map(|need| (first.time, need)));
             }
-            for second in &assigned[place..][1..] {
+            for second in &assigned[position..][1..] {
                 if first.time == second.time && first.function.name == second.function.name {
                     let second = self.copy(second);
                     needs.extend(agree(first, &second).map(|need| (first.time, need)));
@@ -31,27 +31,31 @@ impl Parser<'_> {
         needs
     }
 
-    /// The same assignment with variables of its own.
+    /// Returns a copy of an assignment with fresh variables.
     fn copy(&mut self, assigned: &Assigned) -> Assigned {
         let mut renaming = Renaming::default();
         let mut renamed = |variables: &[TypedName]| -> Vec<TypedName> {
-            let rename = |own: &TypedName| {
-                let identifier = self.new_variable(own.identifier.span);
-                renaming.insert(own.identifier.name.clone(), identifier.clone());
-                TypedName { identifier, r#type: own.r#type.clone() }
+            let rename = |typed_name: &TypedName| {
+                let identifier = self.new_variable(typed_name.identifier.span);
+                renaming.insert(typed_name.identifier.name.clone(), identifier.clone());
+                TypedName { identifier, r#type: typed_name.r#type.clone() }
             };
             variables.iter().map(rename).collect()
         };
         let (variables, values) = (renamed(&assigned.variables), renamed(&assigned.values));
         let mut copy = Assigned { variables, values, ..assigned.clone() };
-        copy.arguments.iter_mut().chain(&mut copy.value).for_each(|own| term(own, &renaming));
-        copy.conditions.iter_mut().for_each(|own| condition(own, &renaming));
+        copy.arguments
+            .iter_mut()
+            .chain(&mut copy.value)
+            .for_each(|argument| rename_term(argument, &renaming));
+        copy.conditions.iter_mut().for_each(|condition| rename_condition(condition, &renaming));
         copy
     }
 }
 
 impl Assigned {
-    /// Whether no two of its instances concern one term: each variable is an argument.
+    /// Returns `true` if different instances concern different terms: each quantified variable is an
+    /// argument.
     fn gives_one_value(&self) -> bool {
         let is_argument = |variable: &TypedName| {
             self.arguments.iter().any(
@@ -62,13 +66,14 @@ impl Assigned {
     }
 }
 
-/// That two assignments do not take place together, concern different terms, or give the same value; none if that is plain.
+/// Condition that two assignments do not take place together, concern different terms, or assign the same
+/// value. `None` if this holds trivially.
 fn agree(first: &Assigned, second: &Assigned) -> Option<Condition> {
     let equal =
         |left: &Term, right: &Term| Condition::Equal(left.clone(), right.clone(), first.function.span);
     let mut premises: Vec<_> = first.conditions.iter().chain(&second.conditions).cloned().collect();
     for (left, right) in first.arguments.iter().zip(&second.arguments) {
-        match same(left, right) {
+        match known_equality(left, right) {
             Some(true) => {}
             Some(false) => return None,
             None => premises.push(equal(left, right)),
@@ -76,18 +81,18 @@ fn agree(first: &Assigned, second: &Assigned) -> Option<Condition> {
     }
     let conclusion = match (&first.value, &second.value) {
         (None, None) => return None,
-        (Some(left), Some(right)) if same(left, right) == Some(true) => return None,
+        (Some(left), Some(right)) if known_equality(left, right) == Some(true) => return None,
         (Some(left), Some(right)) => equal(left, right),
         _ => Condition::Or(Vec::new()),
     };
     let need = Condition::Imply(Box::new(Condition::And(premises)), Box::new(conclusion));
-    let all = [&first.variables, &first.values, &second.variables, &second.values];
-    let variables: Vec<_> = all.into_iter().flatten().cloned().collect();
+    let bound_variables = [&first.variables, &first.values, &second.variables, &second.values];
+    let variables: Vec<_> = bound_variables.into_iter().flatten().cloned().collect();
     Some(if variables.is_empty() { need } else { Condition::ForAll(variables, Box::new(need)) })
 }
 
-/// Whether two terms are the same object, if that is known.
-fn same(left: &Term, right: &Term) -> Option<bool> {
+/// Equality of two terms, if it is statically known.
+fn known_equality(left: &Term, right: &Term) -> Option<bool> {
     match (left, right) {
         (Term::Constant(left), Term::Constant(right)) => Some(left.name == right.name),
         (Term::Variable(left), Term::Variable(right)) if left.name == right.name => Some(true),
@@ -95,55 +100,55 @@ fn same(left: &Term, right: &Term) -> Option<bool> {
     }
 }
 
-fn term(own: &mut Term, renaming: &Renaming) {
-    if let Term::Variable(identifier) = own
+fn rename_term(term: &mut Term, renaming: &Renaming) {
+    if let Term::Variable(identifier) = term
         && let Some(new) = renaming.get(&identifier.name)
     {
         *identifier = new.clone();
     }
 }
 
-fn atom(own: &mut Atom, renaming: &Renaming) {
-    own.arguments.iter_mut().for_each(|argument| term(argument, renaming));
+fn rename_atom(atom: &mut Atom, renaming: &Renaming) {
+    atom.arguments.iter_mut().for_each(|argument| rename_term(argument, renaming));
 }
 
-fn condition(own: &mut Condition, renaming: &Renaming) {
-    match own {
+fn rename_condition(target: &mut Condition, renaming: &Renaming) {
+    match target {
         Condition::And(parts) | Condition::Or(parts) => {
             for part in parts {
-                condition(part, renaming);
+                rename_condition(part, renaming);
             }
         }
-        Condition::Not(inner) => condition(inner, renaming),
+        Condition::Not(inner) => rename_condition(inner, renaming),
         Condition::Imply(premise, conclusion) => {
-            condition(premise, renaming);
-            condition(conclusion, renaming);
+            rename_condition(premise, renaming);
+            rename_condition(conclusion, renaming);
         }
         Condition::Exists(variables, body) | Condition::ForAll(variables, body) => {
             let mut renaming = renaming.clone();
-            for own in variables {
-                renaming.remove(&own.identifier.name);
+            for variable in variables {
+                renaming.remove(&variable.identifier.name);
             }
-            condition(body, &renaming);
+            rename_condition(body, &renaming);
         }
-        Condition::Atom(own) => atom(own, renaming),
+        Condition::Atom(atom) => rename_atom(atom, renaming),
         Condition::Equal(left, right, _) => {
-            term(left, renaming);
-            term(right, renaming);
+            rename_term(left, renaming);
+            rename_term(right, renaming);
         }
         Condition::Compare(_, left, right, _) => {
-            expression(left, renaming);
-            expression(right, renaming);
+            rename_expression(left, renaming);
+            rename_expression(right, renaming);
         }
     }
 }
 
-fn expression(own: &mut Expression, renaming: &Renaming) {
-    match own {
-        Expression::Fluent(own) => atom(own, renaming),
+fn rename_expression(target: &mut Expression, renaming: &Renaming) {
+    match target {
+        Expression::Fluent(atom) => rename_atom(atom, renaming),
         Expression::Operation(_, operands, _) => {
             for operand in operands {
-                expression(operand, renaming);
+                rename_expression(operand, renaming);
             }
         }
         Expression::Number(..) | Expression::Duration(_) | Expression::TotalTime(_) => {}

@@ -1,4 +1,4 @@
-//! Domains and their actions.
+//! Parses domains and their actions.
 
 use diagnostics::nearest;
 
@@ -29,17 +29,17 @@ impl Parser<'_> {
             constraints: Vec::new(),
             actions: Vec::new(),
         };
-        // What an action says depends on which functions have objects as values.
-        let (declarations, others): (Vec<_>, Vec<_>) =
+        // The meaning of an action depends on the set of object fluents, so declarations are read first.
+        let (declarations, remaining): (Vec<_>, Vec<_>) =
             sections.partition(|section| DECLARATIONS.iter().any(|keyword| section.is_headed(keyword)));
-        for section in declarations.into_iter().chain(others) {
+        for section in declarations.into_iter().chain(remaining) {
             self.domain_section(section, &mut domain);
         }
         self.object_fluents_clash(&domain);
         Some(domain)
     }
 
-    /// The name behind `(define (KIND NAME)` and the sections that follow.
+    /// Returns the name in `(define (KIND NAME)` and the sections that follow.
     pub(super) fn header<'t>(
         &mut self,
         define: Item<'t>,
@@ -69,7 +69,7 @@ impl Parser<'_> {
     }
 
     fn domain_section(&mut self, section: Item<'_>, domain: &mut Domain) {
-        let before = self.sink.len();
+        let message_count = self.sink.len();
         let keyword = section.head().unwrap_or_default().to_ascii_lowercase();
         match keyword.as_str() {
             ":requirements" => self.requirements(section, &mut domain.requirements),
@@ -89,16 +89,16 @@ impl Parser<'_> {
             ":durative-action" => return domain.actions.extend(self.durative_action(section)),
             _ => return self.other_section(section, "domain"),
         }
-        // Warnings count, too: a false alarm here costs only later messages of a file with errors.
-        if self.sink.len() > before && self.sink.has_errors() {
+        // Warnings count as well. A false alarm only suppresses later messages of a file with errors.
+        if self.sink.len() > message_count && self.sink.has_errors() {
             self.declarations_intact = false;
         }
     }
 
-    pub(super) fn requirements(&mut self, section: Item<'_>, found: &mut Vec<Identifier>) {
+    pub(super) fn requirements(&mut self, section: Item<'_>, flags: &mut Vec<Identifier>) {
         for item in section.rest() {
             match item.symbol().and_then(|symbol| symbol.strip_prefix(':')) {
-                Some(flag) => found.push(self.identifier(flag, item.span())),
+                Some(flag) => flags.push(self.identifier(flag, item.span())),
                 None => {
                     self.expected(item, "a requirement such as `:typing`");
                 }
@@ -106,7 +106,7 @@ impl Parser<'_> {
         }
     }
 
-    /// A section that is refused or not known.
+    /// Reports a section that is unsupported or unknown.
     pub(super) fn other_section(&mut self, section: Item<'_>, kind: &str) {
         let keyword = section.head().unwrap_or_default().to_ascii_lowercase();
         let refused = match keyword.as_str() {
@@ -123,8 +123,8 @@ impl Parser<'_> {
             }
             _ => None,
         };
-        if let Some((what, instead)) = refused {
-            self.refuse(section, what).help(instead);
+        if let Some((construct, alternative)) = refused {
+            self.refuse(section, construct).help(alternative);
             return;
         }
         if keyword == ":length" {
@@ -138,7 +138,7 @@ impl Parser<'_> {
         self.declarations_intact = false;
         self.has_unknown_section = true;
         let help = match nearest(&keyword, SECTIONS) {
-            Some(known) => format!("did you mean `{known}`?"),
+            Some(suggestion) => format!("did you mean `{suggestion}`?"),
             None => "known sections are those of PDDL 2.1".to_owned(),
         };
         let message = format!("a {kind} has no section `{keyword}`");
@@ -159,7 +159,7 @@ impl Parser<'_> {
         for (keyword, value) in fields {
             match keyword {
                 ":parameters" => parameters = self.parameters(value),
-                // PDDL 1.2: variables that the precondition binds, and the effect uses.
+                // PDDL 1.2: variables that the precondition binds and the effect uses.
                 ":vars" => {
                     self.sink
                         .warning("P109", at_start(value), "`:vars` are read as further parameters")
@@ -207,7 +207,7 @@ impl Parser<'_> {
         Some(Action { identifier, parameters, body, preferences, span: section.span() })
     }
 
-    /// The name of an action and its keywords with their values, each keyword one of `keys`.
+    /// Returns the name of an action and its keywords with their values. Each keyword is one of `keys`.
     fn action_fields<'t>(
         &mut self,
         section: Item<'t>,
@@ -233,7 +233,7 @@ impl Parser<'_> {
                 continue;
             };
             match keys.iter().find(|key| key.eq_ignore_ascii_case(symbol)) {
-                Some(key) if fields.iter().any(|(known, _)| known == key) => {
+                Some(key) if fields.iter().any(|(present, _)| present == key) => {
                     self.sink.error("P111", item.span(), format!("`{symbol}` is repeated"));
                 }
                 Some(key) => fields.push((*key, value)),

@@ -1,6 +1,7 @@
-//! Trees of lists to the syntax tree, reporting every problem and going on behind each.
+//! Builds the abstract syntax tree from S-expressions. The parser reports every problem and continues after
+//! it.
 //!
-//! A part that cannot be read is left out, so the tree that comes back together with errors is incomplete.
+//! Parts that cannot be read are omitted, so a tree with errors is incomplete.
 
 mod assigned;
 mod condition;
@@ -25,26 +26,26 @@ use super::sexp::{self, Item};
 use super::source::Source;
 use fluents::Objects;
 
-/// Reads a domain. With errors the tree lacks what could not be read; it is absent where the text has no
+/// Parses a domain. In case of errors the tree lacks the unreadable parts. It is absent if the text has no
 /// `(define (domain …) …)`.
 pub fn parse_domain(source: &Source) -> (Option<Domain>, Vec<Diagnostic>) {
     let parsed = domain(source);
     (parsed.tree, parsed.diagnostics)
 }
 
-/// Reads a problem, as [`parse_domain`] does a domain.
+/// Parses a problem, with the same treatment of errors as [`parse_domain`].
 pub fn parse_problem(source: &Source) -> (Option<Problem>, Vec<Diagnostic>) {
     let parsed = problem(source);
     (parsed.tree, parsed.diagnostics)
 }
 
-/// Reads a problem, as [`parse_problem`] does, of a domain that may have functions with objects as values.
+/// Parses a problem of a domain that may have object fluents (functions with objects as values).
 pub fn parse_problem_of(domain: &Domain, source: &Source) -> (Option<Problem>, Vec<Diagnostic>) {
     let parsed = problem_of(domain, source);
     (parsed.tree, parsed.diagnostics)
 }
 
-/// Reads a single expression, as it stands in a metric: `total-time`, `(energy)`, `(+ (energy) (* 2 total-time))`.
+/// Parses a single expression of a metric: `total-time`, `(energy)`, `(+ (energy) (* 2 total-time))`.
 pub(super) fn expression(source: &Source) -> Parsed<Expression> {
     parse_top(source, |parser, top| {
         let mut items: Vec<_> = top.collect();
@@ -59,12 +60,12 @@ pub(super) fn expression(source: &Source) -> Parsed<Expression> {
     })
 }
 
-/// What came out of a text.
+/// Result of parsing a text.
 #[derive(Debug)]
 pub(super) struct Parsed<T> {
     pub(super) tree: Option<T>,
     pub(super) diagnostics: Vec<Diagnostic>,
-    /// Whether the declarations were read without errors, so that a name not found in them is an error of its own.
+    /// Whether all declarations were read. Only then is an undeclared name an error of its own.
     pub(super) declarations_intact: bool,
 }
 
@@ -108,32 +109,32 @@ fn parse_top<'s, T>(
     Parsed { tree, declarations_intact: parser.declarations_intact, diagnostics: parser.sink.finish() }
 }
 
-/// What the parts of the parser share.
+/// Parser state.
 struct Parser<'s> {
     sink: Sink<'s>,
-    /// One allocation for each spelling.
+    /// Interned names: one allocation per spelling.
     names: FxHashMap<Box<str>, Name>,
     declarations_intact: bool,
-    /// Whether a section was reported as unknown, so that a missing one may be just that.
+    /// Whether a section was reported as unknown. A missing section may then be a misspelt one.
     has_unknown_section: bool,
     objects: Objects,
 }
 
 impl Parser<'_> {
-    /// The `(define …)` of a text.
+    /// Returns the `(define …)` of a text.
     fn define<'t>(&mut self, top: sexp::Items<'t>) -> Option<Item<'t>> {
         let mut define = None;
         for item in top {
             match define {
                 None if item.is_headed("define") => define = Some(item),
-                // Files of 1998 were Lisp.
+                // Files of the first planning competition (1998) are Lisp sources.
                 None if item.is_headed("in-package") => {
                     self.sink.warning("P104", at_start(item), "`in-package` is ignored");
                 }
                 _ => {
-                    let what = if item.is_list() { "this list" } else { "this word" };
+                    let subject = if item.is_list() { "this list" } else { "this word" };
                     self.sink
-                        .error("P104", at_start(item), format!("{what} stands outside of the definition"))
+                        .error("P104", at_start(item), format!("{subject} stands outside of the definition"))
                         .help("a file has one `(define …)` and nothing else");
                 }
             }
@@ -159,7 +160,7 @@ impl Parser<'_> {
         Identifier { name: self.name(written), span }
     }
 
-    /// A name; `what` says of what, for the message.
+    /// Reads a name. `what` describes the expected thing in messages.
     fn name_item(&mut self, item: Item<'_>, what: &str) -> Option<Identifier> {
         match item.symbol() {
             Some(symbol) if !symbol.starts_with(['?', ':']) => Some(self.identifier(symbol, item.span())),
@@ -174,7 +175,7 @@ impl Parser<'_> {
         }
     }
 
-    /// A syntax error at the beginning of an item: what was found there is not what is expected.
+    /// Reports a syntax error at the beginning of an item: expected `what`, found the item.
     fn expected(&mut self, item: Item<'_>, what: &str) -> &mut Diagnostic {
         let found = match item.symbol() {
             Some(symbol) => format!("`{symbol}`"),
@@ -190,12 +191,12 @@ impl Parser<'_> {
         diagnostic
     }
 
-    /// A construct that is known and not planned with.
+    /// Reports a construct that is recognised but not supported.
     fn refuse(&mut self, item: Item<'_>, what: &str) -> &mut Diagnostic {
         self.sink.error("P113", at_start(item), format!("{what} are not supported"))
     }
 
-    /// Exactly `N` operands of a list, or an error that shows the form that is right.
+    /// Returns the `N` operands of a list. Any other number is an error that shows the correct form.
     fn operands<'t, const N: usize>(&mut self, list: Item<'t>, form: &str) -> Option<[Item<'t>; N]> {
         let operands: Vec<_> = list.rest().collect();
         let count = operands.len();
@@ -210,7 +211,7 @@ impl Parser<'_> {
         operands
     }
 
-    /// The number that a symbol is.
+    /// Reads a number.
     fn number(&mut self, item: Item<'_>) -> Option<num_rational::BigRational> {
         match item.symbol().map(literal) {
             Some(Literal::Number(value)) => Some(value),
@@ -226,7 +227,7 @@ impl Parser<'_> {
     }
 }
 
-/// Where the eye should go for an item: a symbol whole, of a list its parenthesis and its head.
+/// Extent to underline for an item: the whole symbol, or the parenthesis and the head of a list.
 fn at_start(item: Item<'_>) -> Span {
     if item.is_list() { list_start(item) } else { item.span() }
 }

@@ -1,8 +1,12 @@
-//! Functions with objects as values (PDDL 3.1), compiled away while they are read.
+//! Compiles away object fluents (functions with objects as values, PDDL 3.1) during parsing.
 //!
-//! `(place-of ?x - tool) - place` becomes a predicate with one more argument, which holds for the value and for no other. A term in
-//! a condition becomes a variable below `exists`, one in an effect a variable below `forall` and `when`. An assignment adds its value
-//! and deletes all, where additions count over deletions. What an effect asks of the state becomes a condition of its action.
+//! `(place-of ?x - tool) - place` becomes a predicate with one more argument: the value. The predicate holds
+//! for at most one value.
+//! - A term in a condition becomes a variable below `exists`.
+//! - A term in an effect becomes a variable below `forall` and `when`.
+//! - An assignment adds the atom with the new value and deletes the atoms with all values. Additions override
+//!   deletions.
+//! - Requirements of an effect on the state become conditions of its action.
 
 use crate::ast::{
     Atom, Condition, ConditionTime, Declaration, Domain, Effect, EffectTime, Identifier, InitialElement,
@@ -14,11 +18,11 @@ use crate::sexp::Item;
 use super::fluents::{Assigned, Mark, Value};
 use super::{Parser, at_start};
 
-/// What stands for no value.
+/// Symbol for the absence of a value.
 const UNDEFINED: &str = "undefined";
 
 impl Parser<'_> {
-    /// Declares a function with objects as values.
+    /// Declares an object fluent as a predicate with an additional parameter for the value.
     pub(super) fn object_fluent(
         &mut self,
         mut declaration: Declaration,
@@ -42,32 +46,46 @@ impl Parser<'_> {
         domain.predicates.push(declaration);
     }
 
-    /// Reports names that stand for such a function and for something else.
+    /// Reports names that denote both an object fluent and another predicate or function.
     pub(super) fn object_fluents_clash(&mut self, domain: &Domain) {
         for name in &domain.object_fluents {
-            let others = domain.predicates.iter().filter(|own| own.identifier.name == *name);
-            let predicate = others.map(|own| &own.identifier).find(|own| {
-                self.objects.functions.get(name).is_some_and(|known| known.identifier.span != own.span)
+            let namesakes = domain.predicates.iter().filter(|candidate| candidate.identifier.name == *name);
+            let predicate = namesakes.map(|candidate| &candidate.identifier).find(|candidate| {
+                self.objects
+                    .functions
+                    .get(name)
+                    .is_some_and(|declaration| declaration.identifier.span != candidate.span)
             });
-            let function = domain.functions.iter().map(|own| &own.identifier).find(|own| own.name == *name);
-            let derived = domain.derived.iter().map(|own| &own.head.identifier).find(|own| own.name == *name);
-            for (other, what) in [(predicate, "predicate"), (function, "function"), (derived, "predicate")] {
-                let Some(other) = other else { continue };
-                let message = format!("`{name}` is a function with an object as its value, and this {what}");
+            let function = domain
+                .functions
+                .iter()
+                .map(|candidate| &candidate.identifier)
+                .find(|candidate| candidate.name == *name);
+            let derived = domain
+                .derived
+                .iter()
+                .map(|candidate| &candidate.head.identifier)
+                .find(|candidate| candidate.name == *name);
+            for (duplicate, kind) in
+                [(predicate, "predicate"), (function, "function"), (derived, "predicate")]
+            {
+                let Some(duplicate) = duplicate else { continue };
+                let message = format!("`{name}` is a function with an object as its value, and this {kind}");
                 self.sink
-                    .error("P127", other.span, message)
+                    .error("P127", duplicate.span, message)
                     .help("it becomes a predicate of its name; give one of them another name");
                 self.declarations_intact = false;
             }
         }
     }
 
-    /// A variable that the text does not have.
+    /// Returns a variable whose name does not occur in the text.
     #[expect(clippy::arithmetic_side_effects, reason = "a file has fewer terms than bytes")]
     pub(super) fn new_variable(&mut self, span: Span) -> Identifier {
         if self.objects.prefix.is_none() {
             let text = self.sink.source().text().to_ascii_lowercase();
             let mut prefix = "value".to_owned();
+            // A prefix that no variable of the file begins with makes all names with it unused.
             while text.contains(&format!("?{prefix}")) {
                 prefix.push('-');
             }
@@ -78,24 +96,24 @@ impl Parser<'_> {
         self.identifier(&name, span)
     }
 
-    /// A new variable for the values of a function.
+    /// Returns a new variable of the function's value type.
     fn value_variable(&mut self, function: &Name, span: Span) -> TypedName {
         let declaration = self.objects.functions.get(function);
         let mut r#type = declaration
-            .and_then(|own| own.parameters.last())
-            .map_or_else(TypeExpression::default, |own| own.r#type.clone());
-        // A type that is unknown was reported where it is declared, and restricts nothing.
-        r#type.alternatives.retain(|one| self.objects.types.contains(&one.name));
-        r#type.alternatives.iter_mut().for_each(|one| one.span = span);
+            .and_then(|declaration| declaration.parameters.last())
+            .map_or_else(TypeExpression::default, |parameter| parameter.r#type.clone());
+        // An undeclared type was reported at its occurrence and restricts nothing.
+        r#type.alternatives.retain(|alternative| self.objects.types.contains(&alternative.name));
+        r#type.alternatives.iter_mut().for_each(|alternative| alternative.span = span);
         TypedName { identifier: self.new_variable(span), r#type }
     }
 
-    /// Whether an item is a function with an object as its value, applied to terms.
+    /// Returns `true` if an item is an object fluent applied to terms.
     pub(super) fn is_object_fluent(&self, item: Item<'_>) -> bool {
         item.head().is_some_and(|head| self.objects.contains(&Name::new(head)))
     }
 
-    /// Such a function where a predicate or a number is to stand.
+    /// Reports an object fluent in place of a predicate or a number.
     pub(super) fn misplaced_object_fluent<T>(&mut self, item: Item<'_>, name: &Name) -> Option<T> {
         self.sink
             .error("P106", at_start(item), format!("`{name}` is a function with an object as its value"))
@@ -105,7 +123,7 @@ impl Parser<'_> {
         None
     }
 
-    /// The variable that stands for the value of a term.
+    /// Replaces a term by a new variable for its value and records the atom that binds the variable.
     pub(super) fn value_of(&mut self, item: Item<'_>) -> Option<Term> {
         if !self.is_object_fluent(item) {
             self.expected(item, "a variable or an object").help(
@@ -128,32 +146,32 @@ impl Parser<'_> {
         Some(term)
     }
 
-    /// The function of a term and its arguments.
+    /// Returns the function of a term and its arguments; reports a wrong number of arguments.
     fn object_term(&mut self, item: Item<'_>) -> Option<(Identifier, Vec<Term>)> {
         let function = self.name_item(item.items().next()?, "a function")?;
-        let before = self.sink.len();
+        let message_count = self.sink.len();
         let arguments: Vec<_> = item.rest().filter_map(|item| self.term(item)).collect();
-        if self.sink.len() != before {
+        if self.sink.len() != message_count {
             return None;
         }
         let declaration = self.objects.functions.get(&function.name)?;
         let (value, parameters) = declaration.parameters.split_last()?;
         if parameters.len() != arguments.len() {
-            let (wanted, found) = (parameters.len(), arguments.len());
+            let (expected, actual) = (parameters.len(), arguments.len());
             let identifier = declaration.identifier.clone();
             let parameters = parameters.to_vec();
             let form = crate::print::signature(&Declaration { identifier, parameters });
             let form = format!("{form} - {}", crate::print::type_text(&value.r#type));
-            let plural = if wanted == 1 { "" } else { "s" };
+            let plural = if expected == 1 { "" } else { "s" };
             let message =
-                format!("the function `{}` takes {wanted} argument{plural}, found {found}", function.name);
+                format!("the function `{}` takes {expected} argument{plural}, found {actual}", function.name);
             self.sink.error("P125", item.span(), message).help(format!("it is declared as `{form}`"));
             return None;
         }
         Some((function, arguments))
     }
 
-    /// An object, or a term for one.
+    /// Reads an object or a term that denotes one.
     fn object(&mut self, item: Item<'_>) -> Option<Term> {
         let is_number =
             |symbol: &str| literal(symbol) != Literal::Name || symbol.eq_ignore_ascii_case("?duration");
@@ -164,17 +182,18 @@ impl Parser<'_> {
         self.term(item)
     }
 
-    /// Reads something in which terms can stand, and gives the values that it asks for.
+    /// Runs a reader that may meet terms. Returns its result and the values that the terms refer to.
     fn with_terms<T>(&mut self, read: impl FnOnce(&mut Self) -> Option<T>) -> Option<(T, Vec<Value>)> {
         let was_open = std::mem::replace(&mut self.objects.is_open, true);
         let outer = std::mem::take(&mut self.objects.values);
-        let found = read(self);
+        let result = read(self);
         let values = std::mem::replace(&mut self.objects.values, outer);
         self.objects.is_open = was_open;
-        Some((found?, values))
+        Some((result?, values))
     }
 
-    /// A condition of the values that it asks for. Where there is no value, it is false.
+    /// Reads a condition and binds the values of its terms by `exists`. A condition about a missing value is
+    /// therefore false.
     pub(super) fn with_values(
         &mut self,
         read: impl FnOnce(&mut Self) -> Option<Condition>,
@@ -183,12 +202,12 @@ impl Parser<'_> {
         if values.is_empty() {
             return Some(condition);
         }
-        let (variables, mut parts) = apart(values);
+        let (variables, mut parts) = variables_and_atoms(values);
         parts.push(condition);
         Some(Condition::Exists(variables, Box::new(Condition::And(parts))))
     }
 
-    /// `(= (place-of ?x) ?y)`, in either order, also with a term for `?y` or `undefined`.
+    /// Reads `(= (place-of ?x) ?y)`, in either order. `?y` may also be a term or `undefined`.
     pub(super) fn equal_objects(&mut self, left: Item<'_>, right: Item<'_>) -> Option<Condition> {
         let (term, other) = if self.is_object_fluent(left) { (left, right) } else { (right, left) };
         if is_undefined(other) {
@@ -200,7 +219,7 @@ impl Parser<'_> {
         Some(Condition::Atom(Atom { predicate, arguments, span: term.span() }))
     }
 
-    /// `(assign (place-of ?x) ?y)`.
+    /// Reads `(assign (place-of ?x) ?y)`.
     pub(super) fn object_assignment(&mut self, target: Item<'_>, value: Item<'_>) -> Option<Effect> {
         let (function, arguments) = self.object_term(target)?;
         let value = if is_undefined(value) { None } else { Some(self.object(value)?) };
@@ -208,9 +227,9 @@ impl Parser<'_> {
             let arguments = arguments.iter().cloned().chain([value]).collect();
             Atom { predicate: function.clone(), arguments, span: target.span() }
         };
-        let any = self.value_variable(&function.name, target.span());
-        let delete = Effect::Delete(atom(Term::Variable(any.identifier.clone())));
-        let deletes = Effect::ForAll(vec![any], Box::new(delete));
+        let previous = self.value_variable(&function.name, target.span());
+        let delete = Effect::Delete(atom(Term::Variable(previous.identifier.clone())));
+        let deletes = Effect::ForAll(vec![previous], Box::new(delete));
         let effect = match &value {
             Some(value) => Effect::And(vec![Effect::Add(atom(value.clone())), deletes]),
             None => deletes,
@@ -229,25 +248,27 @@ impl Parser<'_> {
         Some(effect)
     }
 
-    /// An effect for the values that it asks for, which there must be.
+    /// Reads an effect and binds the values of its terms by `forall` and `when`. A missing value makes the
+    /// action inexecutable.
     pub(super) fn for_values(&mut self, read: impl FnOnce(&mut Self) -> Option<Effect>) -> Option<Effect> {
         let mark = self.mark_effects();
         let (effect, values) = self.with_terms(read)?;
         if values.is_empty() {
             return Some(effect);
         }
-        let (variables, parts) = apart(values);
-        let all = conjunction(parts);
+        let (variables, parts) = variables_and_atoms(values);
+        let values_hold = conjunction(parts);
         for assigned in &mut self.objects.assigned[mark.assigned..] {
             assigned.values.extend(variables.iter().cloned());
-            assigned.conditions.push(all.clone());
+            assigned.conditions.push(values_hold.clone());
         }
-        let need = Condition::Exists(variables.clone(), Box::new(all.clone()));
+        let need = Condition::Exists(variables.clone(), Box::new(values_hold.clone()));
+        // Without this condition, an effect without a value would silently have no instance.
         self.objects.needs.push((self.objects.time(), need));
-        Some(Effect::ForAll(variables, Box::new(Effect::When(all, Box::new(effect)))))
+        Some(Effect::ForAll(variables, Box::new(Effect::When(values_hold, Box::new(effect)))))
     }
 
-    /// Nothing is asked of the state before the effects of an action.
+    /// Clears the data that is collected over the effects of one action.
     pub(super) fn begin_effects(&mut self) {
         self.objects.time = None;
         self.objects.needs.clear();
@@ -258,7 +279,7 @@ impl Parser<'_> {
         Mark { needs: self.objects.needs.len(), assigned: self.objects.assigned.len() }
     }
 
-    /// What effects behind a mark ask stands below these variables.
+    /// Quantifies the requirements of all effects since `mark` over `variables`.
     pub(super) fn effects_below(&mut self, mark: Mark, variables: &[TypedName]) {
         for (_, need) in &mut self.objects.needs[mark.needs..] {
             let inner = std::mem::replace(need, Condition::And(Vec::new()));
@@ -269,7 +290,7 @@ impl Parser<'_> {
         }
     }
 
-    /// What effects behind a mark ask is asked only under a condition.
+    /// Makes the requirements of all effects since `mark` conditional on `condition`.
     pub(super) fn effects_when(&mut self, mark: Mark, condition: &Condition) {
         for (_, need) in &mut self.objects.needs[mark.needs..] {
             let inner = std::mem::replace(need, Condition::And(Vec::new()));
@@ -280,7 +301,8 @@ impl Parser<'_> {
         }
     }
 
-    /// What the effects of an action ask of the state: values that they read, and no two values for one term.
+    /// Returns the conditions that the effects of an action impose: the values that they read exist, and no
+    /// term receives two values.
     pub(super) fn needs_of_effects(&mut self) -> Vec<(ConditionTime, Condition)> {
         let mut needs = std::mem::take(&mut self.objects.needs);
         let assigned = std::mem::take(&mut self.objects.assigned);
@@ -292,7 +314,7 @@ impl Parser<'_> {
         needs.into_iter().map(|(time, need)| (at(time), need)).collect()
     }
 
-    /// `(= (place-of tool) here)` in the initial state.
+    /// Reads `(= (place-of tool) here)` in the initial state.
     pub(super) fn initial_object(&mut self, left: Item<'_>, right: Item<'_>) -> Option<InitialElement> {
         let (term, other) = if self.is_object_fluent(left) { (left, right) } else { (right, left) };
         let (predicate, mut arguments) = self.object_term(term)?;
@@ -301,15 +323,15 @@ impl Parser<'_> {
             Term::Variable(identifier) | Term::Constant(identifier) => identifier.name.clone(),
         };
         let key = (predicate.name.clone(), arguments.iter().map(name).collect());
-        let (known, span) = (
+        let (value_name, span) = (
             value.as_ref().map(name),
             Span {
                 start: term.span().start.min(other.span().start),
                 end: term.span().end.max(other.span().end),
             },
         );
-        if let Some((earlier, place)) = self.objects.initial.insert(key, (known.clone(), span))
-            && earlier != known
+        if let Some((earlier, place)) = self.objects.initial.insert(key, (value_name.clone(), span))
+            && earlier != value_name
         {
             let source = self.sink.source();
             self.sink.error("P127", span, "this function has another value already").related(
@@ -328,14 +350,14 @@ fn is_undefined(item: Item<'_>) -> bool {
     item.symbol().is_some_and(|symbol| symbol.eq_ignore_ascii_case(UNDEFINED))
 }
 
-/// The variables of values, and the atoms that give them.
-fn apart(values: Vec<Value>) -> (Vec<TypedName>, Vec<Condition>) {
+/// Splits values into their variables and the atoms that bind them.
+fn variables_and_atoms(values: Vec<Value>) -> (Vec<TypedName>, Vec<Condition>) {
     values.into_iter().map(|value| (value.variable, Condition::Atom(value.atom))).unzip()
 }
 
-/// That terms have values.
+/// Condition that all terms have values.
 fn has_value(values: Vec<Value>) -> Condition {
-    let (variables, parts) = apart(values);
+    let (variables, parts) = variables_and_atoms(values);
     Condition::Exists(variables, Box::new(conjunction(parts)))
 }
 
@@ -343,7 +365,7 @@ fn conjunction(mut parts: Vec<Condition>) -> Condition {
     if parts.len() == 1 { parts.swap_remove(0) } else { Condition::And(parts) }
 }
 
-/// A condition together with what the effects of its action ask.
+/// Conjoins a condition with the requirements of the action's effects.
 pub(super) fn with_needs(condition: Condition, needs: Vec<Condition>) -> Condition {
     if needs.is_empty() {
         return condition;

@@ -1,7 +1,8 @@
-//! A plan to the course of its numbers: what each function is after each happening, and what conditions demand of it.
+//! Numeric trace of a plan: the value of each function after each happening, and the bounds that conditions
+//! impose.
 //!
-//! For pictures of a plan that [`validate`](super::validate()) has found right. Effects take place by the same rules; whether conditions hold
-//! is not judged again.
+//! Used for charts of plans that [`validate`](super::validate()) has accepted. Effects are applied by the
+//! same rules; conditions are not checked again.
 
 use num_rational::BigRational;
 use rustc_hash::FxHashSet;
@@ -21,47 +22,47 @@ use super::targets::{changeable, changeable_values};
 use super::verdict::Violation;
 use super::world::{Symbol, World};
 
-/// The course of all numbers that actions can change.
+/// Trace of all numeric functions that actions can change.
 #[derive(Debug, Clone, Default)]
 pub struct Course {
-    /// What they are before the plan, by function, sorted: `(battery)`.
+    /// Values before the plan, sorted by function: `(battery)`.
     pub initial: Vec<(String, BigRational)>,
-    /// Starts and ends of actions, in the order of time.
+    /// Starts and ends of actions, in chronological order.
     pub moments: Vec<CourseMoment>,
-    /// What the goal demands of them.
+    /// Bounds in the goal.
     pub goal: Vec<NumberBound>,
 }
 
-/// The start or the end of an action, or both of one that takes no time.
+/// Start or end of an action, or both if the action takes no time.
 #[derive(Debug, Clone)]
 pub struct CourseMoment {
-    /// The step of the plan, from 0.
+    /// Index of the step in the plan, from 0.
     pub step: usize,
-    /// In the domain's time unit.
+    /// Time, in the domain's time unit.
     pub time: BigRational,
-    /// Whether the action ends here.
+    /// Whether the action ends at this moment.
     pub is_end: bool,
-    /// The functions that it changes, and what they are now, sorted.
+    /// Changed functions with their new values, sorted.
     pub values: Vec<(String, BigRational)>,
-    /// What its conditions demand of numbers, here and until it ends.
+    /// Bounds in the conditions at this moment. At the start they include the conditions over all.
     pub bounds: Vec<NumberBound>,
-    /// The value of the problem's metric if the plan ended now. `None` without a metric, or where it is undefined.
-    /// For example, a metric that counts violated preferences is undefined before the end.
+    /// Metric value if the plan ended now. `None` without a metric or if the value is undefined. For example,
+    /// a metric that counts violated preferences is undefined before the end.
     pub metric: Option<BigRational>,
 }
 
-/// What a condition demands of a number.
+/// Bound that a condition imposes on a numeric function.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NumberBound {
     /// The function: `(battery)`.
     pub number: String,
-    /// How it has to compare with the bound.
+    /// Required relation between the function and the bound.
     pub relation: Comparison,
-    /// The bound.
+    /// Value of the bound.
     pub bound: BigRational,
 }
 
-/// Follows the numbers through a plan. A step without a start begins when the one before it ends.
+/// Executes a plan and records the numbers. A step without a start time begins when the preceding step ends.
 ///
 /// # Errors
 /// A step is not an action of the domain, or an effect is undefined.
@@ -82,21 +83,21 @@ pub fn course(domain: &Domain, problem: &Problem, plan: &PlanText) -> Result<Cou
     follower.course.initial = changeable_values(&world, &follower.execution.state);
     let mut running: Vec<(usize, Running<'_, '_>)> = Vec::new();
     loop {
-        let ending =
+        let next_end =
             (0..running.len()).min_by(|left, right| running[*left].1.end.cmp(&running[*right].1.end));
-        let end = ending.map(|at| &running[at].1.end);
-        let ends_first = match (end, starts.last().map(|next| &steps[*next].text.start)) {
+        let end = next_end.map(|position| &running[position].1.end);
+        let ends_first = match (end, starts.last().map(|next_step| &steps[*next_step].text.start)) {
             (None, None) => break,
             (None, Some(_)) => false,
             (Some(_), None) => true,
             (Some(end), Some(start)) => start.as_ref().is_none_or(|start| end <= start),
         };
-        if let Some(at) = ending.filter(|_| ends_first) {
-            let (index, ended) = running.remove(at);
-            follower.end(index, &ended)?;
-        } else if let Some(next) = starts.pop() {
-            let started = follower.start(next, &steps[next])?;
-            running.extend(started.map(|started| (next, started)));
+        if let Some(position) = next_end.filter(|_| ends_first) {
+            let (index, running_action) = running.remove(position);
+            follower.end(index, &running_action)?;
+        } else if let Some(next_step) = starts.pop() {
+            let new_action = follower.start(next_step, &steps[next_step])?;
+            running.extend(new_action.map(|new_action| (next_step, new_action)));
         }
     }
     follower.goal(problem);
@@ -111,12 +112,12 @@ struct Follower<'e, 'p> {
 }
 
 impl<'e, 'p> Follower<'e, 'p> {
-    /// Starts a step; none where it has ended at once.
+    /// Starts a step. Returns `None` if the action has already ended because it takes no time.
     fn start(&mut self, index: usize, step: &'e Step<'p>) -> Result<Option<Running<'e, 'p>>, Box<Violation>> {
         let time = step.text.start.clone().unwrap_or_else(|| self.clock.clone());
         self.execution.pass(&time, true);
-        let begun = self.execution.begin(step, &time);
-        let running = begun.or_else(|_| self.execution.begin_anyway(step, &time))?;
+        let checked = self.execution.begin(step, &time);
+        let running = checked.or_else(|_| self.execution.begin_anyway(step, &time))?;
         let mut bounds = self.bounds(&running, ConditionTime::AtStart);
         bounds.extend(self.bounds(&running, ConditionTime::OverAll));
         let mut values = self.happen(&running, EffectTime::AtStart, &time)?;
@@ -142,13 +143,13 @@ impl<'e, 'p> Follower<'e, 'p> {
         Ok(())
     }
 
-    /// Adds a moment, after its effects, with the metric then.
+    /// Appends a moment after its effects were applied, together with the metric.
     fn note(&mut self, moment: CourseMoment) {
         let metric = metric(self.execution.world, &self.execution.state, &moment.time);
         self.course.moments.push(CourseMoment { metric, ..moment });
     }
 
-    /// Lets effects take place; the numbers that they change.
+    /// Applies effects. Returns the changed functions with their new values.
     fn happen(
         &mut self,
         running: &Running<'e, 'p>,
@@ -169,36 +170,37 @@ impl<'e, 'p> Follower<'e, 'p> {
 
     fn bounds(&self, running: &Running<'e, 'p>, when: ConditionTime) -> Vec<NumberBound> {
         let evaluator = self.execution.evaluator(Some(&running.duration));
-        let mut found = Vec::new();
+        let mut bounds = Vec::new();
         for condition in conditions(&running.instance, when) {
-            self.demands(&evaluator, condition, &running.instance.bindings, &mut found);
+            self.collect_bounds(&evaluator, condition, &running.instance.bindings, &mut bounds);
         }
-        found
+        bounds
     }
 
     fn goal(&mut self, problem: &'p Problem) {
-        let mut found = Vec::new();
+        let mut bounds = Vec::new();
         let evaluator = self.execution.evaluator(None);
-        self.demands(&evaluator, &problem.goal, &Bindings::default(), &mut found);
-        self.course.goal = found;
+        self.collect_bounds(&evaluator, &problem.goal, &Bindings::default(), &mut bounds);
+        self.course.goal = bounds;
     }
 
-    /// What a condition demands by itself of functions that actions change: comparisons, by themselves or in conjunctions.
-    fn demands(
+    /// Collects the comparisons with changeable functions that a condition implies: the condition itself or
+    /// its conjuncts.
+    fn collect_bounds(
         &self,
         evaluator: &Evaluator<'_, 'p>,
         condition: &'p Condition,
         bindings: &Bindings<'p>,
-        found: &mut Vec<NumberBound>,
+        bounds: &mut Vec<NumberBound>,
     ) {
         let mut parts = vec![condition];
         while let Some(part) = parts.pop() {
             match part {
-                Condition::And(more) => parts.extend(more.iter().rev()),
+                Condition::And(conjuncts) => parts.extend(conjuncts.iter().rev()),
                 Condition::Compare(relation, left, right, _) => {
-                    let own = self.demand(evaluator, left, *relation, right, bindings);
-                    found.extend(
-                        own.or_else(|| self.demand(evaluator, right, relation.mirrored(), left, bindings)),
+                    let bound = self.bound(evaluator, left, *relation, right, bindings);
+                    bounds.extend(
+                        bound.or_else(|| self.bound(evaluator, right, relation.mirrored(), left, bindings)),
                     );
                 }
                 _ => {}
@@ -206,7 +208,7 @@ impl<'e, 'p> Follower<'e, 'p> {
         }
     }
 
-    fn demand(
+    fn bound(
         &self,
         evaluator: &Evaluator<'_, 'p>,
         number: &Expression,

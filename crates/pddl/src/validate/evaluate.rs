@@ -1,7 +1,7 @@
-//! Conditions and expressions in a state, by their definition.
+//! Evaluates conditions and expressions in a state, directly on the syntax tree.
 //!
-//! A function without a value makes a comparison neither true nor false (Kleene's logic): the whole is
-//! undefined only where its truth depends on it.
+//! A comparison with an undefined function is neither true nor false (Kleene's three-valued logic). A
+//! compound condition is undefined only if its truth depends on such a comparison.
 
 use num_rational::BigRational;
 use num_traits::Zero;
@@ -14,24 +14,24 @@ use crate::ast::{
 use super::trace::Trace;
 use super::world::{Arguments, State, Symbol, World};
 
-/// Why a condition or an expression has no value.
+/// Reason why a condition or an expression has no value.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Undefined {
-    /// A function that was never set.
+    /// A function without a value, as text.
     Function(String),
     /// A division by zero.
     Division,
-    /// A number that has grown beyond all measure.
+    /// A number with more than [`BITS_LIMIT`] bits.
     Size,
-    /// `?duration` or `total-time` where it has no meaning.
+    /// `?duration` or `total-time` in a context that does not define it.
     Place,
 }
 
-/// The variables of the surrounding action, axiom or quantifiers, innermost last.
+/// Variables of the enclosing action, axiom and quantifiers, innermost last.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Bindings<'p>(pub(super) Vec<Binding<'p>>);
 
-/// One variable with its type, and its object once it has one.
+/// One variable with its type, and its object if it is bound.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Binding<'p> {
     pub(super) variable: &'p Name,
@@ -57,26 +57,27 @@ impl<'p> Bindings<'p> {
     }
 }
 
-/// The most bits of a number: a plan that multiplies a value with itself a hundred times is not a plan.
+/// Maximum number of bits of a numerator or denominator. Repeated squaring in a malformed plan would
+/// otherwise exhaust memory.
 const BITS_LIMIT: u64 = 100_000;
 
-/// Evaluates in one state.
+/// Evaluator for one state.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Evaluator<'e, 'p> {
     pub(super) world: &'e World<'p>,
     pub(super) state: &'e State,
-    /// `?duration` of the action in question.
+    /// Value of `?duration`.
     pub(super) duration: Option<&'e BigRational>,
-    /// `total-time`, in the metric.
+    /// Value of `total-time`, in the metric only.
     pub(super) total_time: Option<&'e BigRational>,
-    /// Parts of conditions, by address, that count as true in a search for bindings.
+    /// Subconditions, by address, that count as true in a search for bindings.
     pub(super) ignored: Option<&'e FxHashSet<*const Condition>>,
-    /// Where missing facts are noted.
+    /// Recorder of missing facts, if any.
     pub(super) trace: Option<&'e Trace<'e, 'p>>,
 }
 
 impl<'e, 'p> Evaluator<'e, 'p> {
-    /// Evaluates conditions outside of actions.
+    /// Evaluator for conditions outside of actions.
     pub(super) fn new(world: &'e World<'p>, state: &'e State) -> Self {
         Self { world, state, duration: None, total_time: None, ignored: None, trace: None }
     }
@@ -212,11 +213,11 @@ impl<'e, 'p> Evaluator<'e, 'p> {
             Expression::Operation(operation, operands, _) => {
                 let mut operands = operands.iter().map(|operand| self.value(operand, bindings));
                 let first = operands.next().unwrap_or_else(|| Ok(BigRational::zero()))?;
-                let mut rest = operands.peekable();
-                if *operation == Arithmetic::Subtract && rest.peek().is_none() {
+                let mut remaining = operands.peekable();
+                if *operation == Arithmetic::Subtract && remaining.peek().is_none() {
                     return Ok(-first);
                 }
-                rest.try_fold(first, |left, right| apply(*operation, &left, &right?))
+                remaining.try_fold(first, |left, right| apply(*operation, &left, &right?))
             }
         }
     }
@@ -230,7 +231,8 @@ impl<'e, 'p> Evaluator<'e, 'p> {
 }
 
 impl<'p> World<'p> {
-    /// Calls `visit` with each way to give objects to some variables, until it returns `false`. Returns `true` if it never did.
+    /// Calls `visit` for each assignment of objects to variables until it returns `false`. Returns `true` if
+    /// all assignments were visited.
     #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     pub(super) fn each(
         &self,
@@ -238,33 +240,34 @@ impl<'p> World<'p> {
         bindings: &mut Bindings<'p>,
         visit: &mut dyn FnMut(&mut Bindings<'p>) -> bool,
     ) -> bool {
+        // An empty type leaves no assignment.
         if variables.iter().any(|entry| self.objects_of(&entry.r#type).next().is_none()) {
             return true;
         }
         let first = bindings.0.len();
         bindings.declare(variables);
-        // Objects that a variable has not had yet, for the variables that have one.
-        let mut rest = Vec::with_capacity(variables.len());
+        // Untried objects of each bound variable.
+        let mut untried = Vec::with_capacity(variables.len());
         let is_complete = loop {
-            for entry in &variables[rest.len()..] {
+            for entry in &variables[untried.len()..] {
                 let mut objects = self.objects_of(&entry.r#type);
-                bindings.0[first + rest.len()].object = objects.next();
-                rest.push(objects);
+                bindings.0[first + untried.len()].object = objects.next();
+                untried.push(objects);
             }
             if self.budget.is_spent() || !visit(bindings) {
                 break false;
             }
             let next = loop {
-                let Some(objects) = rest.last_mut() else { break None };
+                let Some(objects) = untried.last_mut() else { break None };
                 match objects.next() {
                     Some(object) => break Some(object),
-                    None => rest.pop(),
+                    None => untried.pop(),
                 };
             };
             if next.is_none() {
                 break true;
             }
-            bindings.0[first + rest.len() - 1].object = next;
+            bindings.0[first + untried.len() - 1].object = next;
         };
         bindings.0.truncate(first);
         is_complete

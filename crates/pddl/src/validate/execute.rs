@@ -1,4 +1,4 @@
-//! The parts of which an execution consists: starts, ends, and what must hold between them.
+//! Building blocks of plan execution: start and end of actions, their conditions, durations and effects.
 
 use num_rational::BigRational;
 use num_traits::{Signed, Zero};
@@ -18,15 +18,15 @@ use super::step::{Instance, Step, unresolved};
 use super::verdict::{Violation, ViolationKind};
 use super::world::{State, World};
 
-/// An execution as far as it has come.
+/// A partially executed plan.
 #[derive(Debug)]
 pub(super) struct Execution<'e, 'p> {
     pub(super) world: &'e World<'p>,
     pub(super) options: &'e Options,
     pub(super) state: State,
-    /// The timed initial literals that are still to come, the last one first.
+    /// Future timed initial literals, in descending order of time: the next one is last.
     pub(super) pending: Vec<(BigRational, Ground, bool)>,
-    /// The last events that took place, with their time.
+    /// Time and footprint of the last events.
     pub(super) last_event: Option<(BigRational, Footprint)>,
     pub(super) record: Record,
 }
@@ -46,7 +46,8 @@ impl<'e, 'p> Execution<'e, 'p> {
                 _ => None,
             })
             .collect();
-        // Of two literals of one time about one atom, the later one in the file prevails.
+        // Of two literals for one atom and one time, the later one in the file takes effect. The sort is
+        // stable.
         pending.reverse();
         pending.sort_by(|left, right| right.0.cmp(&left.0));
         let record = Record::new(world, &state);
@@ -57,12 +58,12 @@ impl<'e, 'p> Execution<'e, 'p> {
         Evaluator { duration, ..Evaluator::new(self.world, &self.state) }
     }
 
-    /// When the next timed initial literal takes place.
+    /// Time of the next timed initial literal.
     pub(super) fn next_timed(&self) -> Option<&BigRational> {
         self.pending.last().map(|(time, ..)| time)
     }
 
-    /// Chooses the schema of a step, checks what must hold at its start, and finds its duration.
+    /// Starts a step: chooses the first schema whose start conditions hold, and determines the duration.
     pub(super) fn begin(
         &self,
         step: &'e Step<'p>,
@@ -81,7 +82,7 @@ impl<'e, 'p> Execution<'e, 'p> {
         Err(first_violation.unwrap_or_else(|| unresolved(self.world, step, time)))
     }
 
-    /// As [`Execution::begin`], whether or not its conditions hold.
+    /// Starts a step as the first matching schema, without checking conditions.
     pub(super) fn begin_anyway(
         &self,
         step: &'e Step<'p>,
@@ -102,7 +103,8 @@ impl<'e, 'p> Execution<'e, 'p> {
         time: &BigRational,
     ) -> Result<Running<'e, 'p>, Box<Violation>> {
         let duration = self.duration(step, instance, time)?;
-        // An action that takes time does not lose it by rounding, nor does another one gain it.
+        // The duration stated in the plan may be rounded. It must not turn a positive duration into zero, or
+        // zero into a positive one.
         let is_rounded =
             |stated: &&BigRational| is_durative(instance) && stated.is_zero() == duration.is_zero();
         let rounded = step.text.duration.as_ref().filter(is_rounded).unwrap_or(&duration);
@@ -112,7 +114,8 @@ impl<'e, 'p> Execution<'e, 'p> {
         Ok(running)
     }
 
-    /// The duration of a step: what the plan says, within the tolerance of what the domain demands.
+    /// Determines the duration of a step: the exact value if the domain fixes it, else the value stated in
+    /// the plan. The stated value must satisfy all constraints at start within the tolerance.
     fn duration(
         &self,
         step: &Step<'p>,
@@ -132,7 +135,7 @@ impl<'e, 'p> Execution<'e, 'p> {
                 exact = Some(bound.clone());
             }
             if let Some(stated) = &step.text.duration {
-                self.duration_is(step, time, constraint.operator, stated, &bound)?;
+                self.check_duration(step, time, constraint.operator, stated, &bound)?;
             }
         }
         let duration = exact.or_else(|| step.text.duration.clone());
@@ -150,8 +153,8 @@ impl<'e, 'p> Execution<'e, 'p> {
         Ok(duration)
     }
 
-    /// Checks a duration against one bound, within the tolerance.
-    fn duration_is(
+    /// Checks a duration against one constraint, within the tolerance.
+    fn check_duration(
         &self,
         step: &Step<'p>,
         time: &BigRational,
@@ -175,7 +178,7 @@ impl<'e, 'p> Execution<'e, 'p> {
         Err(step.violation(time, ViolationKind::Duration, message))
     }
 
-    /// Checks the conditions that an action has at a time.
+    /// Checks the conditions of an action for start, end or over all.
     pub(super) fn check(
         &self,
         running: &Running<'e, 'p>,
@@ -210,6 +213,7 @@ impl<'e, 'p> Execution<'e, 'p> {
         let reason =
             undefined.as_ref().map(|reason| format!(": {}", undefined_text(reason))).unwrap_or_default();
         let message = format!("a {place} of {} does not hold{reason}", step.show());
+        // An undefined function is the cause rather than the condition that reads it.
         let kind = if undefined.is_some() { ViolationKind::Undefined } else { kind };
         Err(Box::new(Violation { unmet: missing, ..*step.violation(time, kind, message) }))
     }
@@ -227,12 +231,12 @@ impl<'e, 'p> Execution<'e, 'p> {
                 .evaluator(Some(&running.duration))
                 .value(&constraint.expression, &running.instance.bindings)
                 .map_err(|undefined| undefined_violation(running.step, time, &undefined))?;
-            self.duration_is(running.step, time, constraint.operator, &running.duration, &bound)?;
+            self.check_duration(running.step, time, constraint.operator, &running.duration, &bound)?;
         }
         Ok(())
     }
 
-    /// What an action changes at its start or its end.
+    /// Evaluates the effects of an action at its start or its end in the current state.
     pub(super) fn changes(
         &self,
         running: &Running<'e, 'p>,
@@ -250,7 +254,7 @@ impl<'e, 'p> Execution<'e, 'p> {
         Ok(changes)
     }
 
-    /// Changes the state, and draws the conclusions.
+    /// Applies changes to the state and recomputes derived facts if the changes concern them.
     pub(super) fn apply(
         &mut self,
         step: &Step<'p>,

@@ -1,4 +1,4 @@
-//! When two happenings interfere: the mutex rule of PDDL 2.1 ("no moving targets").
+//! Interference of happenings: the mutex rule of PDDL 2.1 ("no moving targets").
 
 use std::rc::Rc;
 
@@ -14,19 +14,20 @@ use super::evaluate::Bindings;
 use super::running::{Running, conditions, effects};
 use super::world::{Symbol, World};
 
-/// A fact or a function, with gaps where a quantifier runs through its objects.
+/// Atom or numeric function in which quantified arguments are left open.
 #[derive(Debug, Clone)]
 struct Pattern {
     symbol: Symbol,
-    /// Nothing: whatever the arguments are.
+    /// `None` matches all arguments.
     arguments: Option<SmallVec<[Slot; 4]>>,
 }
 
-/// An argument of a pattern.
+/// Argument of a pattern.
 #[derive(Debug, Clone)]
 enum Slot {
     Object(Symbol),
-    /// One of the objects that a quantifier runs through, by its position among those around: the same wherever it stands.
+    /// Any object of a quantifier's type. The number identifies the quantified variable: equal numbers in one
+    /// pattern mean equal objects.
     Each(usize, Rc<FxHashSet<Symbol>>),
 }
 
@@ -34,12 +35,14 @@ impl Pattern {
     fn matches(&self, (symbol, arguments): &Ground) -> bool {
         let Some(pattern) = &self.arguments else { return self.symbol == *symbol };
         let mut bound: SmallVec<[(usize, Symbol); 4]> = SmallVec::new();
-        let mut fits = |(wanted, given): (&Slot, &Symbol)| match wanted {
-            Slot::Object(wanted) => wanted == given,
+        let mut fits = |(slot, argument): (&Slot, &Symbol)| match slot {
+            Slot::Object(object) => object == argument,
             Slot::Each(variable, objects) => {
-                bound.push((*variable, *given));
-                let same = bound.iter().all(|(other, object)| other != variable || object == given);
-                same && objects.contains(given)
+                bound.push((*variable, *argument));
+                let is_consistent = bound
+                    .iter()
+                    .all(|(bound_variable, object)| bound_variable != variable || object == argument);
+                is_consistent && objects.contains(argument)
             }
         };
         self.symbol == *symbol
@@ -48,19 +51,20 @@ impl Pattern {
     }
 }
 
-/// What a start or an end of an action reads and writes.
+/// Read and write sets of the start or the end of an action.
 #[derive(Debug, Default)]
 pub(super) struct Footprint {
     facts_read: Vec<Pattern>,
     values_read: Vec<Pattern>,
     added: Vec<Ground>,
     deleted: Vec<Ground>,
-    /// With the way in which it changes: two additions commute, two scalings as well.
+    /// Changed functions with the kind of change (0 assign, 1 add, 2 scale). Two additions commute, and so do
+    /// two scalings.
     values_written: Vec<(Ground, u8)>,
 }
 
 impl Footprint {
-    /// The footprint of the start or the end of an action that makes these changes.
+    /// Computes the footprint of the start or the end of an action with the given changes.
     pub(super) fn of<'p>(
         world: &World<'p>,
         running: &Running<'_, 'p>,
@@ -70,7 +74,7 @@ impl Footprint {
         let mut footprint = Self::default();
         let mut predicates = Vec::new();
         let bindings = &running.instance.bindings;
-        let mut found = |found: Use<'p>, hidden: &[&'p TypedName]| match found {
+        let mut record = |usage: Use<'p>, hidden: &[&'p TypedName]| match usage {
             Use::Fact(atom) => {
                 predicates.push(&atom.predicate.name);
                 footprint.facts_read.push(pattern(world, bindings, atom, hidden));
@@ -83,37 +87,37 @@ impl Footprint {
         };
         let mut hidden = Vec::new();
         for condition in conditions(&running.instance, condition_time) {
-            uses_of_condition(condition, &mut hidden, &mut found);
+            uses_of_condition(condition, &mut hidden, &mut record);
         }
         for effect in effects(&running.instance, when) {
-            uses_of_effect(effect, &mut hidden, &mut found);
+            uses_of_effect(effect, &mut hidden, &mut record);
         }
         if let ActionBody::Durative { duration, .. } = &running.instance.action.body {
             for constraint in duration.iter().filter(|constraint| constraint.time == when) {
-                uses_of_expression(&constraint.expression, &[], &mut found);
+                uses_of_expression(&constraint.expression, &[], &mut record);
             }
         }
         read_through_axioms(world, predicates, &mut footprint);
         footprint.added.extend(changes.added.iter().cloned());
         footprint.deleted.extend(changes.deleted.iter().cloned());
         footprint.values_written.extend(changes.numeric.iter().map(|(target, change)| {
-            let way = match change {
+            let kind = match change {
                 Change::Assign(_) => 0,
                 Change::Add(_) => 1,
                 Change::Scale(_) => 2,
             };
-            (target.clone(), way)
+            (target.clone(), kind)
         }));
         footprint
     }
 
-    /// The footprint of timed initial literals, which read nothing.
+    /// Footprint of timed initial literals, which read nothing.
     pub(super) fn of_event(changes: &Changes) -> Self {
         let (added, deleted) = (changes.added.iter().cloned(), changes.deleted.iter().cloned());
         Self { added: added.collect(), deleted: deleted.collect(), ..Self::default() }
     }
 
-    /// Adds what another happening of the same action reads and writes.
+    /// Adds the read and write sets of another happening of the same action.
     pub(super) fn join(&mut self, other: Self) {
         self.facts_read.extend(other.facts_read);
         self.values_read.extend(other.values_read);
@@ -122,21 +126,22 @@ impl Footprint {
         self.values_written.extend(other.values_written);
     }
 
-    /// Something that both touch, one of them writing, so that their order would matter.
+    /// Returns a fact or function that makes the order of the two happenings matter, if any.
     pub(super) fn interferes(&self, other: &Self) -> Option<Ground> {
-        let one_way = self.disturbs(other).or_else(|| other.disturbs(self));
-        one_way.or_else(|| {
-            let clash = |(target, way): &&(Ground, u8)| {
+        let read_or_deleted = self.disturbs(other).or_else(|| other.disturbs(self));
+        read_or_deleted.or_else(|| {
+            let clash = |(target, kind): &&(Ground, u8)| {
                 other
                     .values_written
                     .iter()
-                    .any(|(written, other_way)| written == target && (way != other_way || *way == 0))
+                    .any(|(written, other_kind)| written == target && (kind != other_kind || *kind == 0))
             };
             self.values_written.iter().find(clash).map(|(target, _)| target.clone())
         })
     }
 
-    /// Something that `self` writes and `other` reads, or `self` adds and `other` deletes.
+    /// Returns a fact or function that `self` writes and `other` reads, or that `self` adds and `other`
+    /// deletes.
     fn disturbs(&self, other: &Self) -> Option<Ground> {
         let is_read = |fact: &&Ground| other.facts_read.iter().any(|pattern| pattern.matches(fact));
         let changed = self.added.iter().chain(&self.deleted).find(is_read);
@@ -148,52 +153,52 @@ impl Footprint {
     }
 }
 
-/// A fact or a function that something reads.
+/// Fact or function that a condition, effect or expression reads.
 #[derive(Clone, Copy)]
 enum Use<'c> {
     Fact(&'c Atom),
     Value(&'c Atom),
 }
 
-/// Is told of each use, with the variables of the quantifiers around it.
-type Found<'f, 'c> = &'f mut dyn FnMut(Use<'c>, &[&'c TypedName]);
+/// Callback for each use, with the variables of the enclosing quantifiers.
+type OnUse<'f, 'c> = &'f mut dyn FnMut(Use<'c>, &[&'c TypedName]);
 
-fn uses_of_condition<'c>(condition: &'c Condition, hidden: &mut Vec<&'c TypedName>, found: Found<'_, 'c>) {
+fn uses_of_condition<'c>(condition: &'c Condition, hidden: &mut Vec<&'c TypedName>, on_use: OnUse<'_, 'c>) {
     match condition {
         Condition::Exists(variables, body) | Condition::ForAll(variables, body) => {
             let outer = hidden.len();
             hidden.extend(variables);
-            uses_of_condition(body, hidden, found);
+            uses_of_condition(body, hidden, on_use);
             hidden.truncate(outer);
         }
-        Condition::Atom(atom) => found(Use::Fact(atom), hidden),
+        Condition::Atom(atom) => on_use(Use::Fact(atom), hidden),
         Condition::Compare(_, left, right, _) => {
-            uses_of_expression(left, hidden, found);
-            uses_of_expression(right, hidden, found);
+            uses_of_expression(left, hidden, on_use);
+            uses_of_expression(right, hidden, on_use);
         }
-        other => other.parts().for_each(|part| uses_of_condition(part, hidden, found)),
+        other => other.parts().for_each(|part| uses_of_condition(part, hidden, on_use)),
     }
 }
 
-fn uses_of_effect<'c>(effect: &'c Effect, hidden: &mut Vec<&'c TypedName>, found: Found<'_, 'c>) {
+fn uses_of_effect<'c>(effect: &'c Effect, hidden: &mut Vec<&'c TypedName>, on_use: OnUse<'_, 'c>) {
     match effect {
         Effect::ForAll(variables, body) => {
             let outer = hidden.len();
             hidden.extend(variables);
-            uses_of_effect(body, hidden, found);
+            uses_of_effect(body, hidden, on_use);
             hidden.truncate(outer);
         }
         Effect::When(condition, body) => {
-            uses_of_condition(condition, hidden, found);
-            uses_of_effect(body, hidden, found);
+            uses_of_condition(condition, hidden, on_use);
+            uses_of_effect(body, hidden, on_use);
         }
-        Effect::Assign(_, _, value, _) => uses_of_expression(value, hidden, found),
-        other => other.parts().iter().for_each(|part| uses_of_effect(part, hidden, found)),
+        Effect::Assign(_, _, value, _) => uses_of_expression(value, hidden, on_use),
+        other => other.parts().iter().for_each(|part| uses_of_effect(part, hidden, on_use)),
     }
 }
 
-fn uses_of_expression<'c>(expression: &'c Expression, hidden: &[&'c TypedName], found: Found<'_, 'c>) {
-    expression.walk_fluents(&mut |atom| found(Use::Value(atom), hidden));
+fn uses_of_expression<'c>(expression: &'c Expression, hidden: &[&'c TypedName], on_use: OnUse<'_, 'c>) {
+    expression.walk_fluents(&mut |atom| on_use(Use::Value(atom), hidden));
 }
 
 fn pattern(world: &World<'_>, bindings: &Bindings<'_>, atom: &Atom, hidden: &[&TypedName]) -> Pattern {
@@ -211,19 +216,19 @@ fn pattern(world: &World<'_>, bindings: &Bindings<'_>, atom: &Atom, hidden: &[&T
     Pattern { symbol: world.symbol(&atom.predicate.name), arguments: Some(arguments.collect()) }
 }
 
-/// Adds all that derived predicates depend on, whatever their arguments are.
+/// Adds everything that derived predicates depend on, with all arguments.
 fn read_through_axioms(world: &World<'_>, read: Vec<&Name>, into: &mut Footprint) {
-    let mut seen: FxHashSet<&Name> = FxHashSet::default();
+    let mut visited: FxHashSet<&Name> = FxHashSet::default();
     let mut todo = read;
     while let Some(name) = todo.pop() {
-        if !seen.insert(name) {
+        if !visited.insert(name) {
             continue;
         }
         for axiom in world.domain.derived.iter().filter(|axiom| axiom.head.identifier.name == *name) {
-            uses_of_condition(&axiom.condition, &mut Vec::new(), &mut |found, _| {
-                let (Use::Fact(atom) | Use::Value(atom)) = found;
+            uses_of_condition(&axiom.condition, &mut Vec::new(), &mut |usage, _| {
+                let (Use::Fact(atom) | Use::Value(atom)) = usage;
                 let pattern = Pattern { symbol: world.symbol(&atom.predicate.name), arguments: None };
-                match found {
+                match usage {
                     Use::Fact(_) => {
                         todo.push(&atom.predicate.name);
                         into.facts_read.push(pattern);

@@ -1,8 +1,8 @@
-//! A plan to a verdict: executes it by the definition below, with exact numbers.
+//! Plan validator: executes a plan by the definition below, with exact rational numbers.
 //!
-//! Nothing here is shared with grounding and encoding: conditions are evaluated on the syntax tree.
-//! Derived predicates are the least fixpoint of their axioms, layer by layer (S. Thiébaux, J. Hoffmann, B. Nebel: In
-//! defense of PDDL axioms, AIJ 168, 2005).
+//! The validator shares no code with grounding and encoding: conditions are evaluated on the syntax tree.
+//! Derived predicates are the least fixpoint of their axioms, stratum by stratum (S. Thiébaux, J. Hoffmann,
+//! B. Nebel: In defense of PDDL axioms, AIJ 168, 2005).
 //!
 #![doc = include_str!("definition.md")]
 
@@ -52,23 +52,24 @@ use step::Step;
 use targets::changeable_values;
 use world::{State, World};
 
-/// How many ways to read a plan are tried where schemas share a name.
-const READINGS: usize = 4096;
+/// Maximum number of readings of a plan (choices of a schema for each ambiguous step) that are tried.
+const MAX_READINGS: usize = 4096;
 
-/// Executes a plan. Domain and problem must have passed [`check`](crate::check()); names that are declared
-/// nowhere hold for nothing.
+/// Executes a plan. Domain and problem must have passed [`check`](crate::check()); atoms with undeclared
+/// names are false.
 ///
-/// A step whose name and objects fit several schemas stands for any of them: a plan is valid if some reading of it is, and
-/// the best one counts. Beyond 4,096 readings each such step is the first schema that can start.
+/// A step whose name and objects fit several schemas can be an instance of any of them. A plan is valid if
+/// some reading of it is valid, and the best reading counts. If there are more than 4,096 readings, each
+/// ambiguous step is an instance of the first schema that can start.
 pub fn validate(domain: &Domain, problem: &Problem, plan: &PlanText, options: &Options) -> Verdict {
     judge_readings(&World::new(domain, problem, &|| false), plan, options)
 }
 
-/// Executes a plan as [`validate`] does, unless `stop` returns `true` before the end. It is called every few hundred steps of each
-/// loop.
+/// Executes a plan like [`validate`], unless `stop` returns `true` before the end. `stop` is called every few
+/// hundred steps of each loop.
 ///
 /// # Errors
-/// `stop` has returned `true`.
+/// Returns [`Interrupted`] if `stop` has returned `true`.
 pub fn validate_within(
     domain: &Domain,
     problem: &Problem,
@@ -84,13 +85,13 @@ pub fn validate_within(
     world.budget.check(verdict)
 }
 
-/// The verdict on the best reading of a plan.
+/// Returns the verdict on the best reading of a plan.
 #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
 fn judge_readings(world: &World<'_>, plan: &PlanText, options: &Options) -> Verdict {
     let steps: Vec<_> =
         plan.steps.iter().enumerate().map(|(index, step)| step::resolve(world, index + 1, step)).collect();
     let mut best = judge(world, &steps, options);
-    for steps in step::readings(&steps, READINGS) {
+    for steps in step::readings(&steps, MAX_READINGS) {
         if world.budget.poll() {
             break;
         }
@@ -111,28 +112,29 @@ fn judge<'p>(world: &World<'p>, steps: &[Step<'p>], options: &Options) -> Verdic
         sequential::run(&mut execution, steps, &mut total_time)
     };
     let result = result.and_then(|()| goal_holds(world, &execution.state, &total_time));
-    let judged = result.and_then(|()| execution.judge(&total_time));
-    let metric = judged
+    let violations = result.and_then(|()| execution.judge(&total_time));
+    let metric = violations
         .as_ref()
         .ok()
         .and_then(|violated| metric_value(world, &execution.state, violated, &total_time));
-    let violation = judged.err();
+    let violation = violations.err();
     let values = changeable_values(world, &execution.state);
     Verdict { valid: violation.is_none(), total_time, metric, values, violation }
 }
 
-/// Whether one reading of a plan is better than another: valid, and by the metric, or by time without one.
-fn is_better(problem: &Problem, own: &Verdict, other: &Verdict) -> bool {
-    if !own.valid || !other.valid {
-        return own.valid && !other.valid;
+/// Returns `true` if one reading of a plan is better than another. Valid readings come first; then the metric
+/// decides, or the total time if there is no metric.
+fn is_better(problem: &Problem, candidate: &Verdict, incumbent: &Verdict) -> bool {
+    if !candidate.valid || !incumbent.valid {
+        return candidate.valid && !incumbent.valid;
     }
-    match (&problem.metric, &own.metric, &other.metric) {
-        (Some(metric), Some(own), Some(other)) => match metric.direction {
-            Direction::Minimize => own < other,
-            Direction::Maximize => own > other,
+    match (&problem.metric, &candidate.metric, &incumbent.metric) {
+        (Some(metric), Some(candidate), Some(incumbent)) => match metric.direction {
+            Direction::Minimize => candidate < incumbent,
+            Direction::Maximize => candidate > incumbent,
         },
-        (Some(_), own, other) => own.is_some() && other.is_none(),
-        (None, ..) => own.total_time < other.total_time,
+        (Some(_), candidate, incumbent) => candidate.is_some() && incumbent.is_none(),
+        (None, ..) => candidate.total_time < incumbent.total_time,
     }
 }
 

@@ -1,40 +1,44 @@
-//! How a plan is to be read.
+//! Execution semantics and tolerance.
 
 use num_bigint::BigInt;
 use num_rational::BigRational;
 
-/// How a plan is to be read. Each `with_` changes one thing.
+/// Execution semantics and tolerance for plans.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Options {
-    /// Whether actions may overlap, by the rules of PDDL 2.1; otherwise each begins when the one before
-    /// it has ended.
+    /// Whether actions may overlap, by the rules of PDDL 2.1. Otherwise each action begins when the preceding
+    /// one has ended.
     pub concurrent: bool,
-    /// In the domain's time unit, not negative. In sequence it is for plans that were rounded: how far a stated
-    /// duration may lie from the exact one, and how far a step may reach into the next. Concurrently it is the separation: how far
-    /// apart happenings that interfere must be; a stated duration may then lie as far from the exact one, but at most a
-    /// thousandth. Events are never forgiven for anything.
+    /// Tolerance, in the domain's time unit; not negative.
+    ///
+    /// In sequence, it accommodates rounded plans: the maximum deviation of a stated duration from the exact
+    /// one, and the maximum overlap of a step with the next one.
+    ///
+    /// Concurrently, it is the separation (epsilon): the minimum distance of interfering happenings. A stated
+    /// duration may then deviate by the same amount, but at most by 0.001.
+    ///
+    /// The times of events are exact in both cases.
     pub tolerance: BigRational,
 }
 
 impl Options {
-    /// Whether actions may overlap, by the rules of PDDL 2.1.
+    /// Sets whether actions may overlap, by the rules of PDDL 2.1.
     #[must_use]
     pub fn with_concurrent(self, concurrent: bool) -> Self {
         Self { concurrent, ..self }
     }
 
-    /// How far a stated duration may lie from the exact one, or, where actions may overlap, how far apart happenings that interfere
-    /// must be; in the domain's time unit.
+    /// Sets the tolerance, in the domain's time unit: see [`Options::tolerance`].
     #[must_use]
     pub fn with_tolerance(self, tolerance: BigRational) -> Self {
         Self { tolerance, ..self }
     }
 
-    /// How far a stated duration may lie from the exact one.
+    /// Maximum deviation of a stated duration from the exact one.
     pub(super) fn slack(&self) -> BigRational {
-        let own = self.tolerance.clone();
-        if self.concurrent { own.min(Self::default().tolerance) } else { own }
+        let tolerance = self.tolerance.clone();
+        if self.concurrent { tolerance.min(Self::default().tolerance) } else { tolerance }
     }
 }
 

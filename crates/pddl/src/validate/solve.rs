@@ -1,43 +1,45 @@
-//! All bindings under which a condition holds: the facts propose the objects, so that quantifiers over
-//! many variables do not run through all their combinations.
+//! Enumerates all bindings that satisfy a condition: a conjunctive query over the facts of a state.
 //!
-//! The search is depth-first with a stack of its own, since a quantifier may bind more variables than the call stack has frames.
+//! Facts propose the objects of unbound variables, so that quantifiers over many variables do not enumerate
+//! all combinations. The depth-first search has an explicit stack, because a quantifier may bind more
+//! variables than the call stack has frames.
 
 use crate::ast::{Atom, Condition, Expression, Name, Term, TypedName};
 
 use super::evaluate::{Bindings, Evaluator, Undefined};
 use super::world::{Arguments, Symbol};
 
-/// Receives each solution, with what made it undefined if it is. Returns `false` to end the search.
-pub(super) type Found<'f, 'p> = &'f mut dyn FnMut(&Bindings<'p>, Option<&Undefined>) -> bool;
+/// Callback for each solution. If the truth of the condition is undefined, it also receives the reason.
+/// Returns `false` to end the search.
+pub(super) type OnSolution<'f, 'p> = &'f mut dyn FnMut(&Bindings<'p>, Option<&Undefined>) -> bool;
 
-/// Conditions that are left to be solved, with the first undefined one among those that were evaluated.
+/// Unsolved conditions, and the first undefined condition among the evaluated ones.
 type Goals<'p> = (Vec<&'p Condition>, Option<Undefined>);
 
-/// A choice of the search, with the options that are left.
+/// A branching point of the search, with its untried options.
 struct Branch<'e, 'p> {
-    /// The conditions that are left, whichever option is chosen.
+    /// Conditions that remain unsolved, independent of the chosen option.
     open: Vec<&'p Condition>,
     undefined: Option<Undefined>,
-    /// The number of variables that were declared before the choice.
+    /// Number of variables declared before the choice.
     declared: usize,
     options: Choices<'e, 'p>,
-    /// The variables that the present option has bound.
+    /// Positions of the variables that the current option has bound.
     bound: Vec<usize>,
 }
 
-/// The options of a choice.
+/// Options at a branching point.
 enum Choices<'e, 'p> {
-    /// The objects of a variable.
+    /// Candidate objects of the variable at a position.
     Objects(usize, Box<dyn Iterator<Item = Symbol> + 'e>),
-    /// The facts that an atom can match.
+    /// Facts that may match an atom.
     Facts(&'p Atom, Box<dyn Iterator<Item = &'e Arguments> + 'e>),
-    /// The parts of a disjunction.
+    /// Parts of a disjunction.
     Alternatives(std::slice::Iter<'p, Condition>),
 }
 
 impl Branch<'_, '_> {
-    /// Takes back the present option.
+    /// Undoes the bindings of the current option.
     fn undo(&mut self, bindings: &mut Bindings<'_>) {
         for place in self.bound.drain(..) {
             bindings.0[place].object = None;
@@ -47,18 +49,19 @@ impl Branch<'_, '_> {
 }
 
 impl<'e, 'p> Evaluator<'e, 'p> {
-    /// Finds the objects for the unbound variables from place `first` on with which all parts hold. Returns whether to go on.
+    /// Finds all objects for the unbound variables from position `first` on that satisfy all parts. Returns
+    /// `false` if the search was ended early.
     pub(super) fn solve(
         &self,
         parts: Vec<&'p Condition>,
         first: usize,
         bindings: &mut Bindings<'p>,
-        found: Found<'_, 'p>,
+        on_solution: OnSolution<'_, 'p>,
     ) -> bool {
         let outer = bindings.0.len();
         let mut stack: Vec<Branch<'e, 'p>> = Vec::new();
         let mut goals = Some((parts, None));
-        let go_on = loop {
+        let completed = loop {
             if let Some(goals) = goals.take()
                 && let Some((open, undefined)) = self.settle(goals, bindings)
             {
@@ -67,7 +70,7 @@ impl<'e, 'p> Evaluator<'e, 'p> {
                         let declared = bindings.0.len();
                         stack.push(Branch { open, undefined, declared, options, bound: Vec::new() });
                     }
-                    None if found(bindings, undefined.as_ref()) => {}
+                    None if on_solution(bindings, undefined.as_ref()) => {}
                     None => break false,
                 }
             }
@@ -84,10 +87,10 @@ impl<'e, 'p> Evaluator<'e, 'p> {
             branch.undo(bindings);
         }
         bindings.0.truncate(outer);
-        go_on
+        completed
     }
 
-    /// Declares the variables of a quantifier, and binds those with one object only.
+    /// Declares the variables of a quantifier and binds each variable whose type has exactly one object.
     pub(super) fn declare(&self, variables: &'p [TypedName], bindings: &mut Bindings<'p>) {
         let first = bindings.0.len();
         bindings.declare(variables);
@@ -96,37 +99,40 @@ impl<'e, 'p> Evaluator<'e, 'p> {
         }
     }
 
-    /// Evaluates the conditions whose variables all have objects, and declares the variables of quantifiers. Returns the
-    /// conditions that are left, or `None` if one does not hold.
+    /// Evaluates the conditions whose variables are all bound and opens quantifiers. Returns the remaining
+    /// conditions, or `None` if a condition does not hold.
     fn settle(&self, (mut todo, mut undefined): Goals<'p>, bindings: &mut Bindings<'p>) -> Option<Goals<'p>> {
-        let mut open = Vec::new();
-        while let Some(part) = todo.pop() {
-            match part {
+        let mut unsolved = Vec::new();
+        while let Some(condition) = todo.pop() {
+            match condition {
                 Condition::And(inner) => todo.extend(inner),
-                // Its variables become ours, if none of them hides another.
+                // A quantifier whose variables shadow no other ones is opened: its body joins the
+                // conjunction.
                 Condition::Exists(variables, body)
                     if variables.iter().all(|entry| bindings.place(&entry.identifier.name).is_none()) =>
                 {
                     self.declare(variables, bindings);
                     todo.push(body);
                 }
-                _ if self.ignored.is_some_and(|ignored| ignored.contains(&std::ptr::from_ref(part))) => {}
-                _ if is_bound(part, bindings) => match self.holds(part, bindings) {
+                _ if self.ignored.is_some_and(|ignored| ignored.contains(&std::ptr::from_ref(condition))) => {
+                }
+                _ if is_bound(condition, bindings) => match self.holds(condition, bindings) {
                     Ok(true) => {}
                     Ok(false) => return None,
                     Err(reason) => undefined = undefined.or(Some(reason)),
                 },
-                _ => open.push(part),
+                _ => unsolved.push(condition),
             }
             if self.world.budget.is_spent() {
                 return None;
             }
         }
-        Some((open, undefined))
+        Some((unsolved, undefined))
     }
 
-    /// Chooses what to bind next: the options that an open condition allows, and the conditions that are left then. Returns `None`
-    /// if all variables have objects.
+    /// Chooses the next branching point: forced objects first, then the atom with the fewest facts, then a
+    /// disjunction, then the first unbound variable. Returns its options with the remaining conditions, or
+    /// `None` if all variables are bound.
     fn choice(
         &self,
         mut open: Vec<&'p Condition>,
@@ -161,10 +167,11 @@ impl<'e, 'p> Evaluator<'e, 'p> {
         Some((open, Choices::Objects(place, world.objects_of(bindings.0[place].r#type))))
     }
 
-    /// Takes the next option of a choice. Returns the conditions that are left then, or `None` after the last option.
+    /// Tries the next option of a branching point. Returns the conditions to solve next, or `None` after the
+    /// last option.
     fn next(&self, branch: &mut Branch<'e, 'p>, bindings: &mut Bindings<'p>) -> Option<Goals<'p>> {
         branch.undo(bindings);
-        let mut open = branch.open.clone();
+        let mut conditions = branch.open.clone();
         match &mut branch.options {
             Choices::Objects(place, objects) => {
                 bindings.0[*place].object = Some(objects.next()?);
@@ -180,19 +187,19 @@ impl<'e, 'p> Evaluator<'e, 'p> {
                     }
                 }
             }
-            Choices::Alternatives(alternatives) => open.push(alternatives.next()?),
+            Choices::Alternatives(alternatives) => conditions.push(alternatives.next()?),
         }
-        Some((open, branch.undefined.clone()))
+        Some((conditions, branch.undefined.clone()))
     }
 
-    /// The number of facts that [`Evaluator::rows`] returns.
+    /// Number of facts that [`Evaluator::rows`] returns.
     fn row_count(&self, atom: &Atom, bindings: &Bindings<'p>) -> usize {
-        let all = || self.state.count(self.world.symbol(&atom.predicate.name));
-        self.indexed_rows(atom, bindings).map_or_else(all, <[Arguments]>::len)
+        let unindexed = || self.state.count(self.world.symbol(&atom.predicate.name));
+        self.indexed_rows(atom, bindings).map_or_else(unindexed, <[Arguments]>::len)
     }
 
-    /// The facts that an atom can match: of a predicate that never changes those with one of the objects that the atom has, and
-    /// otherwise all.
+    /// Facts that an atom may match. For a fixed predicate, only the facts that contain one of the bound
+    /// arguments at its position.
     fn rows(&self, atom: &Atom, bindings: &Bindings<'p>) -> Box<dyn Iterator<Item = &'e Arguments> + 'e> {
         match self.indexed_rows(atom, bindings) {
             Some(rows) => Box::new(rows.iter()),
@@ -200,8 +207,8 @@ impl<'e, 'p> Evaluator<'e, 'p> {
         }
     }
 
-    /// The facts with one of the objects that an atom has, those with the rarest one; `None` if it has none, or if its predicate
-    /// can change.
+    /// Facts that contain one of the bound arguments at its position, for the argument with the fewest facts.
+    /// `None` if no argument is bound or if the predicate can change.
     fn indexed_rows(&self, atom: &Atom, bindings: &Bindings<'p>) -> Option<&'e [Arguments]> {
         let predicate = self.world.symbol(&atom.predicate.name);
         let columns = atom.arguments.iter().enumerate();
@@ -210,7 +217,7 @@ impl<'e, 'p> Evaluator<'e, 'p> {
         rows.min_by_key(|rows| rows.len())
     }
 
-    /// The object that an equation with one unbound side forces.
+    /// Variable and object that an equation with one unbound side determines.
     fn forced(&self, part: &Condition, bindings: &Bindings<'p>) -> Option<(usize, Symbol)> {
         let Condition::Equal(left, right, _) = part else { return None };
         let unbound = |term: &Term| match term {
@@ -226,8 +233,8 @@ impl<'e, 'p> Evaluator<'e, 'p> {
         }
     }
 
-    /// Binds the variables of an atom as a fact proposes. Returns `false` if the fact does not match; the variables in `bound` are
-    /// bound then, too.
+    /// Unifies an atom with a fact. Returns `false` if they do not match; the variables in `bound` are bound
+    /// even then.
     pub(super) fn unify(
         &self,
         atom: &Atom,
@@ -239,8 +246,8 @@ impl<'e, 'p> Evaluator<'e, 'p> {
             return false;
         }
         for (term, object) in atom.arguments.iter().zip(tuple) {
-            if let Some(known) = self.term(term, bindings) {
-                if known != *object {
+            if let Some(value) = self.term(term, bindings) {
+                if value != *object {
                     return false;
                 }
                 continue;
@@ -257,7 +264,7 @@ impl<'e, 'p> Evaluator<'e, 'p> {
     }
 }
 
-/// Whether all variables that a condition takes from outside have an object.
+/// Returns `true` if all free variables of a condition are bound.
 fn is_bound(condition: &Condition, bindings: &Bindings<'_>) -> bool {
     fn walk<'c>(condition: &'c Condition, bindings: &Bindings<'_>, inner: &mut Vec<&'c Name>) -> bool {
         match condition {

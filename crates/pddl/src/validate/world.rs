@@ -1,4 +1,4 @@
-//! What does not change during a plan, and the states it goes through.
+//! The constant part of an execution (names, types, objects, axioms, fixed facts) and the states of a plan.
 
 use num_rational::BigRational;
 use num_traits::Zero;
@@ -15,20 +15,20 @@ use super::axioms::{Stratum, read_by_axioms, strata};
 use super::budget::Budget;
 use super::changeable::changeable_predicates;
 
-/// The function that counts the violations of a preference.
+/// Function that counts the violations of a preference.
 const IS_VIOLATED: &str = "is-violated";
 
-/// A name as a number: equal names, equal numbers.
+/// Interned name: equal names have equal numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(super) struct Symbol(u32);
 
-/// The objects that a predicate or function is applied to.
+/// Arguments of a predicate or function.
 pub(super) type Arguments = SmallVec<[Symbol; 4]>;
 
-/// The column of a predicate and the object in it.
+/// Predicate, argument position (column), and object at this position.
 type ColumnKey = (Symbol, usize, Symbol);
 
-/// A domain with a problem, its names numbered.
+/// A domain with a problem, with interned names.
 #[derive(Debug)]
 pub(super) struct World<'p> {
     pub(super) budget: Budget<'p>,
@@ -37,32 +37,34 @@ pub(super) struct World<'p> {
     types: TypeHierarchy,
     symbols: FxHashMap<Name, Symbol>,
     names: Vec<Name>,
-    /// All objects with their types, constants first.
+    /// All objects with their declared types, constants first.
     objects: Vec<(Symbol, Vec<&'p TypeExpression>)>,
+    /// Index of each object in `objects`.
     place: FxHashMap<Symbol, usize>,
-    /// The objects of each type that is declared, in order, and as a set.
+    /// Objects of each declared type, in order and as a set.
     members: FxHashMap<Name, (Vec<Symbol>, FxHashSet<Symbol>)>,
-    /// The axioms, lowest stratum first.
+    /// Axioms, lowest stratum first.
     pub(super) strata: Vec<Stratum<'p>>,
-    /// The predicates and functions in conditions of axioms.
+    /// Predicates and functions that occur in conditions of axioms.
     pub(super) read_by_axioms: FxHashSet<Symbol>,
-    /// The predicates that a plan can change, or that follow from others.
+    /// Predicates that a plan can change, and derived predicates.
     changeable: FxHashSet<Symbol>,
-    /// The facts of all other predicates, by each object in them.
+    /// Index of the facts of all other predicates by argument position and object.
     fixed: FxHashMap<ColumnKey, Vec<Arguments>>,
 }
 
-/// The facts and values at one time.
+/// Facts and numeric values at one time.
 #[derive(Debug, Clone, Default)]
 pub(super) struct State {
     pub(super) facts: FxHashMap<Symbol, FxHashSet<Arguments>>,
-    /// What follows from the facts by the axioms.
+    /// Facts derived by the axioms.
     pub(super) derived: FxHashMap<Symbol, FxHashSet<Arguments>>,
     pub(super) values: FxHashMap<(Symbol, Arguments), BigRational>,
 }
 
 impl<'p> World<'p> {
-    /// Numbers the names. Loops end when `stop` returns `true`, and what they have found means nothing then.
+    /// Interns the names and builds the indices. When `stop` returns `true`, loops end early with meaningless
+    /// results.
     pub(super) fn new(domain: &'p Domain, problem: &'p Problem, stop: &'p dyn Fn() -> bool) -> Self {
         let mut world = Self {
             budget: Budget::new(stop),
@@ -95,10 +97,10 @@ impl<'p> World<'p> {
             let identifier = Identifier { name: name.clone(), span: Span::default() };
             let wanted = TypeExpression { alternatives: vec![identifier] };
             let fits = |types: &[&TypeExpression]| types.iter().any(|given| world.types.fits(given, &wanted));
-            let own = world.objects.iter().filter(|(_, types)| fits(types)).map(|(object, _)| *object);
-            let own: Vec<Symbol> = own.collect();
-            let set = own.iter().copied().collect();
-            world.members.insert(name, (own, set));
+            let members = world.objects.iter().filter(|(_, types)| fits(types)).map(|(object, _)| *object);
+            let members: Vec<Symbol> = members.collect();
+            let set = members.iter().copied().collect();
+            world.members.insert(name, (members, set));
         }
         world.read_by_axioms = read_by_axioms(domain).into_iter().map(|name| world.symbol(name)).collect();
         world.changeable =
@@ -107,26 +109,26 @@ impl<'p> World<'p> {
         world
     }
 
-    /// Indexes the initial facts that never change.
+    /// Indexes the initial facts of fixed predicates.
     fn index_fixed(&mut self) {
         let mut fixed: FxHashMap<ColumnKey, Vec<Arguments>> = FxHashMap::default();
-        let mut seen = FxHashSet::default();
+        let mut indexed = FxHashSet::default();
         for element in &self.problem.init {
             let InitialElement::Fact(atom) = element else { continue };
             let (predicate, arguments) = self.ground(atom);
-            if self.changeable.contains(&predicate) || !seen.insert((predicate, arguments.clone())) {
+            if self.changeable.contains(&predicate) || !indexed.insert((predicate, arguments.clone())) {
                 continue;
             }
             for (column, object) in arguments.iter().enumerate() {
                 let rows = fixed.entry((predicate, column, *object)).or_default();
-                // An object that a fact has twice is in two columns.
+                // An object that occurs twice in a fact has an entry for each of its two columns.
                 rows.push(arguments.clone());
             }
         }
         self.fixed = fixed;
     }
 
-    /// The facts with an object in a column; `None` if those of the predicate can change.
+    /// Facts of a fixed predicate with an object in a column; `None` if the predicate can change.
     pub(super) fn fixed_rows(
         &self,
         predicate: Symbol,
@@ -157,15 +159,15 @@ impl<'p> World<'p> {
         }
     }
 
-    /// The names of all preferences, some of them more than once.
+    /// Names of all preferences, possibly with repetitions.
     fn preferences(&self) -> impl Iterator<Item = &'p Name> + use<'p> {
         let constraints = self.domain.constraints.iter().chain(&self.problem.constraints);
-        let named = constraints.filter_map(|constraint| constraint.preference.as_ref());
-        let of_actions = self.domain.actions.iter().flat_map(|action| &action.preferences);
-        named.chain(of_actions.map(|preference| &preference.name)).map(|name| &name.name)
+        let constraint_names = constraints.filter_map(|constraint| constraint.preference.as_ref());
+        let action_preferences = self.domain.actions.iter().flat_map(|action| &action.preferences);
+        constraint_names.chain(action_preferences.map(|preference| &preference.name)).map(|name| &name.name)
     }
 
-    /// The state with the number of violations of each preference, as a metric asks for it.
+    /// Copy of a state in which `(is-violated NAME)` has its value, for the metric.
     pub(super) fn counted(&self, violated: &[Name], state: &State) -> State {
         let mut state = state.clone();
         let function = self.symbol(&Name::new(IS_VIOLATED));
@@ -177,12 +179,12 @@ impl<'p> World<'p> {
         state
     }
 
-    /// The number of a name; one that no fact has for a name that is declared nowhere.
+    /// Symbol of a name. An undeclared name has a symbol that occurs in no fact.
     pub(super) fn symbol(&self, name: &Name) -> Symbol {
         self.symbols.get(name).copied().unwrap_or(Symbol(u32::MAX))
     }
 
-    /// The name with a number.
+    /// Name of a symbol, if the name is declared.
     pub(super) fn name_of(&self, symbol: Symbol) -> Option<&Name> {
         self.names.get(symbol.0 as usize)
     }
@@ -191,20 +193,20 @@ impl<'p> World<'p> {
         self.names.get(symbol.0 as usize).map_or("?", Name::as_str)
     }
 
-    /// The object with a name.
+    /// Object with the given name.
     pub(super) fn object(&self, name: &Name) -> Option<Symbol> {
         self.symbols.get(name).copied().filter(|symbol| self.place.contains_key(symbol))
     }
 
-    /// Whether an object is of a type.
+    /// Returns `true` if an object is of a type.
     pub(super) fn is_of(&self, object: Symbol, wanted: &TypeExpression) -> bool {
-        if let [one] = &wanted.alternatives[..]
-            && let Some((_, members)) = self.members.get(&one.name)
+        if let [alternative] = &wanted.alternatives[..]
+            && let Some((_, members)) = self.members.get(&alternative.name)
         {
             return members.contains(&object);
         }
         let types = self.place.get(&object).map(|place| &self.objects[*place].1);
-        types.is_some_and(|types| types.iter().any(|given| self.types.fits(given, wanted)))
+        types.is_some_and(|types| types.iter().any(|declared| self.types.fits(declared, wanted)))
     }
 
     /// All objects of a type.
@@ -212,28 +214,28 @@ impl<'p> World<'p> {
         &'w self,
         wanted: &'w TypeExpression,
     ) -> Box<dyn Iterator<Item = Symbol> + 'w> {
-        if let [one] = &wanted.alternatives[..]
-            && let Some((members, _)) = self.members.get(&one.name)
+        if let [alternative] = &wanted.alternatives[..]
+            && let Some((members, _)) = self.members.get(&alternative.name)
         {
             return Box::new(members.iter().copied());
         }
         Box::new(self.objects.iter().map(|(object, _)| *object).filter(|object| self.is_of(*object, wanted)))
     }
 
-    /// The object of a type, if it has only one.
+    /// The only object of a type; `None` if there are none or several.
     pub(super) fn only_object(&self, wanted: &TypeExpression) -> Option<Symbol> {
         let mut objects = self.objects_of(wanted);
         objects.next().filter(|_| objects.next().is_none())
     }
 
-    /// A fact or a function with its arguments as written.
+    /// Text of a fact or a function in PDDL syntax.
     pub(super) fn show(&self, symbol: Symbol, arguments: &[Symbol]) -> String {
         let words: Vec<_> =
             std::iter::once(&symbol).chain(arguments).map(|symbol| self.name(*symbol)).collect();
         format!("({})", words.join(" "))
     }
 
-    /// An atom of the initial state.
+    /// Symbols of an atom without variables.
     pub(super) fn ground(&self, atom: &Atom) -> (Symbol, Arguments) {
         let arguments = atom.arguments.iter().map(|term| match term {
             Term::Variable(identifier) | Term::Constant(identifier) => self.symbol(&identifier.name),
@@ -241,7 +243,7 @@ impl<'p> World<'p> {
         (self.symbol(&atom.predicate.name), arguments.collect())
     }
 
-    /// The state before the plan, without what follows by axioms.
+    /// Initial state, without derived facts.
     pub(super) fn initial_state(&self) -> State {
         let mut state = State::default();
         state.values.insert((self.symbol(&Name::new("total-cost")), Arguments::new()), BigRational::zero());
@@ -268,13 +270,13 @@ impl State {
             .any(|facts| facts.get(&predicate).is_some_and(|tuples| tuples.contains(arguments)))
     }
 
-    /// All arguments for which a predicate holds.
+    /// All argument tuples for which a predicate holds.
     pub(super) fn tuples(&self, predicate: Symbol) -> impl Iterator<Item = &Arguments> {
         let derived = self.derived.get(&predicate).into_iter().flatten();
         self.facts.get(&predicate).into_iter().flatten().chain(derived)
     }
 
-    /// For how many arguments a predicate holds.
+    /// Number of argument tuples for which a predicate holds.
     #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(super) fn count(&self, predicate: Symbol) -> usize {
         let count =
