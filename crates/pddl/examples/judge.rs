@@ -1,4 +1,4 @@
-//! Reads a domain and a problem, reports what is wrong with them, and says what a plan does.
+//! Parses a domain and a problem, reports errors and warnings, and validates a plan.
 //!
 //! `cargo run -p metaplan-pddl --example judge -- DOMAIN PROBLEM PLAN`
 #![expect(clippy::print_stdout, reason = "an example prints")]
@@ -7,7 +7,7 @@ use std::error::Error;
 
 use metaplan_pddl::{Source, Validator, read};
 
-const OWN: [(&str, &str); 3] = [
+const DEFAULT_FILES: [(&str, &str); 3] = [
     (
         "domain.pddl",
         "(define (domain ferry) (:requirements :typing) (:types port)
@@ -27,9 +27,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let files: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
     let source = |index: usize| match files.get(index) {
         Some(file) => std::fs::read_to_string(file).map(|text| Source::new(file, text)),
-        None => Ok(Source::new(OWN[index].0, OWN[index].1)),
+        None => Ok(Source::new(DEFAULT_FILES[index].0, DEFAULT_FILES[index].1)),
     };
-    // All errors of both files come as one, each with its line and column.
+    // All errors of both files are in one value, each with its line and column.
     let (domain, problem, warnings) = read(&source(0)?, &source(1)?)?;
     for warning in &warnings {
         println!("{warning}");

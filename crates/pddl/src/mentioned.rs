@@ -1,11 +1,11 @@
-//! Names that a domain and a problem mention, whether or not anything declares them.
+//! Names that occur in a domain and a problem, declared or not.
 
 use std::collections::BTreeSet;
 
 use crate::ast::{Atom, Condition, Domain, Effect, InitialElement, Name, Problem, Term};
 use crate::visit::Node;
 
-/// Names that a domain and a problem mention.
+/// Names that occur in a domain and a problem.
 #[derive(Debug, Clone, Default)]
 pub struct Mentioned {
     /// Predicates in conditions, effects, preferences and constraints.
@@ -19,14 +19,14 @@ pub struct Mentioned {
 }
 
 impl Mentioned {
-    /// Returns what a domain mentions.
+    /// Returns the names that occur in a domain.
     pub fn by_domain(domain: &Domain) -> Self {
         let mut mentioned = Self::default();
         domain.walk(&mut |node| mentioned.node(node));
         mentioned
     }
 
-    /// Adds what a problem mentions.
+    /// Adds the names that occur in a problem.
     #[must_use]
     pub fn and_problem(mut self, problem: &Problem) -> Self {
         problem.walk(&mut |node| self.node(node));
@@ -56,7 +56,7 @@ impl Mentioned {
         }));
     }
 
-    /// Adds what a condition mentions.
+    /// Adds the names that occur in a condition.
     pub fn condition(&mut self, condition: &Condition) {
         condition.walk(&mut |node| self.node(node));
     }

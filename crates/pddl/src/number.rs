@@ -1,25 +1,25 @@
-//! Decimal literals to exact rationals and back.
+//! Conversion between decimal literals and exact rationals.
 
 use num_bigint::BigInt;
 use num_rational::BigRational;
 use num_traits::{One, Pow, Signed, Zero};
 
-/// The most digits of a number when it is written without exponent: nobody measures finer, and a short
-/// text cannot ask for a number that fills the memory.
-const DIGITS_LIMIT: usize = 400;
+/// Maximum number of digits of a number written without exponent. It exceeds any measurement precision and
+/// prevents a short text from requesting a number that fills the memory.
+const MAX_DIGITS: usize = 400;
 
-/// What a symbol is, read as a number.
+/// Result of reading a symbol as a number.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Literal {
-    /// Not of the form of a number.
+    /// A name: the symbol does not have the form of a number.
     Name,
     /// A number.
     Number(BigRational),
-    /// A number beyond the limits.
+    /// A number with more than [`MAX_DIGITS`] digits.
     TooLong,
 }
 
-/// Reads `5`, `-0.5`, `100.`, `.5`, `1e-3`; anything else, for example `0.8_decimal`, is a name.
+/// Reads `5`, `-0.5`, `100.`, `.5`, `1e-3`. Any other symbol is a name, for example `0.8_decimal`.
 pub(crate) fn literal(text: &str) -> Literal {
     let unsigned = text.strip_prefix(['-', '+']).unwrap_or(text);
     let (mantissa, exponent) = match unsigned.split_once(['e', 'E']) {
@@ -37,15 +37,15 @@ pub(crate) fn literal(text: &str) -> Literal {
     }
     let digits = whole.len().saturating_add(fraction.len());
     let exponent = exponent.map_or(Some(0), |exponent| exponent.parse::<i32>().ok());
-    let exponent = exponent.filter(|exponent| written_out(digits, fraction.len(), *exponent) <= DIGITS_LIMIT);
+    let exponent = exponent.filter(|exponent| written_out(digits, fraction.len(), *exponent) <= MAX_DIGITS);
     let Some(exponent) = exponent else { return Literal::TooLong };
     let value = decimal(whole, fraction, exponent);
     Literal::Number(if text.starts_with('-') { -value } else { value })
 }
 
-/// How many digits a number has without its exponent.
+/// Number of digits of a number when it is written without exponent.
 fn written_out(digits: usize, fraction: usize, exponent: i32) -> usize {
-    // What does not fit is beyond the limit, too.
+    // A length that does not fit exceeds the limit in any case.
     let exponent_length = usize::try_from(exponent.unsigned_abs()).unwrap_or(usize::MAX);
     match (exponent >= 0, exponent_length.checked_sub(fraction)) {
         (true, Some(zeros)) => digits.saturating_add(zeros),
@@ -58,10 +58,11 @@ fn all_digits(text: &str) -> bool {
     text.bytes().all(|byte| byte.is_ascii_digit())
 }
 
-/// The value of `whole.fraction` times ten to `exponent`.
+/// Value of `whole.fraction` · 10^`exponent`.
 #[expect(clippy::arithmetic_side_effects, reason = "digits are from 0 to 9, and 18 of them fit")]
 fn decimal(whole: &str, fraction: &str, exponent: i32) -> BigRational {
     let digits = || whole.bytes().chain(fraction.bytes());
+    // Fast path: 18 digits fit into an `i64`.
     let integer = if digits().count() <= 18 {
         let append = |value: i64, digit: u8| value * 10 + i64::from(digit - b'0');
         BigInt::from(digits().fold(0, append))
@@ -79,23 +80,24 @@ fn decimal(whole: &str, fraction: &str, exponent: i32) -> BigRational {
     }
 }
 
-/// A number for people: a decimal where there is one.
+/// Text of a number: a decimal if it has a finite one, else a fraction.
 pub(crate) fn show_number(value: &BigRational) -> String {
     to_decimal(value).unwrap_or_else(|| value.to_string())
 }
 
-/// The shortest decimal that is exactly `value`; nothing where there is none.
+/// Shortest decimal that equals `value`; `None` if the decimal expansion is infinite.
 pub fn to_decimal(value: &BigRational) -> Option<String> {
-    let mut rest = value.denom().clone();
+    let mut denominator = value.denom().clone();
+    // A reduced fraction has a finite decimal if its denominator has no prime factors except 2 and 5.
     let mut count = [0_u32; 2];
     for (prime, count) in [2, 5].into_iter().zip(&mut count) {
         let prime = BigInt::from(prime);
-        while (&rest % &prime).is_zero() {
-            rest /= &prime;
+        while (&denominator % &prime).is_zero() {
+            denominator /= &prime;
             *count = count.saturating_add(1);
         }
     }
-    if !rest.is_one() {
+    if !denominator.is_one() {
         return None;
     }
     let places = count[0].max(count[1]);
@@ -108,7 +110,7 @@ pub fn to_decimal(value: &BigRational) -> Option<String> {
     Some(format!("{sign}{whole}{point}{fraction}"))
 }
 
-/// An index as a number of 32 bits: of bytes, names or parameters, of which there are fewer than fit into memory.
+/// Converts an index to 32 bits. It counts bytes, names or parameters in memory, fewer than 2^32.
 pub(crate) fn dense(index: usize) -> u32 {
     u32::try_from(index).expect("invariant: fewer than 2^32 of anything are held in memory")
 }
@@ -145,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn short_texts_cannot_ask_for_huge_numbers() {
+    fn short_texts_cannot_denote_huge_numbers() {
         for text in ["1e999999999", "1e-400", "11e399", "1e99999999999999999999", &"9".repeat(401)] {
             assert_eq!(literal(text), Literal::TooLong, "{text}");
         }

@@ -1,15 +1,16 @@
-//! A source text with its name, and where in it a byte stands.
+//! Source texts, with conversion of byte offsets to lines and columns.
 
 use super::ast::Span;
 
-/// The place of a byte. Texts beyond 4 GB are not read; all that is said of them is where their first bytes are.
+/// Converts a byte offset to 32 bits, saturating. Texts beyond 4 GB are rejected with a message about their
+/// first bytes.
 pub(crate) fn place(at: usize) -> u32 {
     u32::try_from(at).unwrap_or(u32::MAX)
 }
 
 const BYTE_ORDER_MARK: char = '\u{feff}';
 
-/// A text to parse: a file, or what stands for one.
+/// Text to parse with its file name.
 #[derive(Debug, Clone)]
 pub struct Source {
     name: String,
@@ -17,17 +18,17 @@ pub struct Source {
     line_starts: Vec<u32>,
 }
 
-/// A place for people: both numbers start at 1, the column counts characters.
+/// Position for display. Line and column start at 1; the column counts characters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Position {
-    /// The line.
+    /// Line number.
     pub line: usize,
-    /// The column.
+    /// Column number.
     pub column: usize,
 }
 
 impl Source {
-    /// The text `text` of the file `name`, without a byte order mark.
+    /// Creates a source from the text of the file `name`. A byte order mark is removed.
     pub fn new(name: impl Into<String>, text: impl Into<String>) -> Self {
         let mut text = text.into();
         if text.starts_with(BYTE_ORDER_MARK) {
@@ -40,33 +41,33 @@ impl Source {
         Self { name: name.into(), text, line_starts }
     }
 
-    /// Decodes the bytes of the file `name`: as UTF-16 if they begin with its byte order mark, and otherwise as
-    /// UTF-8. `>` of Windows PowerShell writes UTF-16 files. Invalid sequences become U+FFFD, since comments of older
+    /// Decodes the bytes of the file `name`: as UTF-16 if they begin with its byte order mark, else as UTF-8.
+    /// Windows PowerShell's `>` writes UTF-16. Invalid sequences become U+FFFD, because comments of older
     /// files are often Latin-1.
     pub fn from_bytes(name: impl Into<String>, bytes: &[u8]) -> Self {
         match bytes {
-            [0xff, 0xfe, rest @ ..] => Self::new(name, utf16(rest, u16::from_le_bytes)),
-            [0xfe, 0xff, rest @ ..] => Self::new(name, utf16(rest, u16::from_be_bytes)),
+            [0xff, 0xfe, content @ ..] => Self::new(name, utf16(content, u16::from_le_bytes)),
+            [0xfe, 0xff, content @ ..] => Self::new(name, utf16(content, u16::from_be_bytes)),
             _ => Self::new(name, String::from_utf8_lossy(bytes)),
         }
     }
 
-    /// The name of the file.
+    /// Name of the file.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// The whole text.
+    /// Whole text.
     pub fn text(&self) -> &str {
         &self.text
     }
 
-    /// The text at `span`; empty where the span is not one of this text.
+    /// Text at `span`; empty if the span does not belong to this text.
     pub fn slice(&self, span: Span) -> &str {
         self.text.get(span.start as usize..span.end as usize).unwrap_or("")
     }
 
-    /// Line and column of a byte; that of the end for one beyond the end.
+    /// Line and column of a byte offset. An offset beyond the end is treated as the end.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "positions in a text in memory, which are at most its length"
@@ -75,7 +76,7 @@ impl Source {
         let index = self.line_index(byte);
         let start = self.line_starts[index] as usize;
         let before = &self.text.as_bytes()[start..(byte as usize).clamp(start, self.text.len())];
-        // A character begins at each byte that does not continue one (10xxxxxx).
+        // Each UTF-8 byte except continuation bytes (10xxxxxx) begins a character.
         let column = 1 + before.iter().filter(|byte| **byte & 0xc0 != 0x80).count();
         Position { line: index + 1, column }
     }
@@ -111,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn byte_order_marks_are_no_text() {
+    fn byte_order_marks_are_removed() {
         let encoded = |unit: fn(u16) -> [u8; 2]| -> Vec<u8> {
             "\u{feff}(é 𝄞)".encode_utf16().flat_map(unit).collect()
         };

@@ -1,10 +1,10 @@
-//! In which order derived predicates can be evaluated: a predicate that another one negates comes before it.
+//! Stratification of derived predicates: a predicate is evaluated after all predicates that it negates.
 
 use rustc_hash::FxHashMap;
 
 use super::ast::{Condition, Domain, Name};
 
-/// The layers of the derived predicates of a domain.
+/// Stratum of each derived predicate of a domain.
 #[derive(Debug)]
 pub(crate) struct Strata<'d> {
     level: FxHashMap<&'d Name, usize>,
@@ -15,11 +15,11 @@ pub(crate) struct Strata<'d> {
 pub(crate) struct NegativeCycle<'d>(pub(crate) &'d Name);
 
 impl<'d> Strata<'d> {
-    /// Finds the layers.
+    /// Computes the strata.
     ///
     /// # Errors
     ///
-    /// Where a derived predicate depends on its own negation there are none.
+    /// Returns a derived predicate that depends on its own negation, if there is one.
     #[expect(clippy::arithmetic_side_effects, reason = "levels are at most the number of predicates")]
     pub(crate) fn of(domain: &'d Domain) -> Result<Self, NegativeCycle<'d>> {
         let mut level: FxHashMap<&Name, usize> = FxHashMap::default();
@@ -35,17 +35,18 @@ impl<'d> Strata<'d> {
                 }
             });
         }
-        // Longest paths by relaxation; without a cycle through a negation no level reaches their number.
+        // Longest paths by relaxation. Without a cycle through a negation, levels stay below the number of
+        // derived predicates.
         let limit = level.len();
         loop {
             let mut changed = false;
             for (head, body, step) in &edges {
-                let wanted = level[body] + step;
-                if level[head] < wanted {
-                    if wanted > limit {
+                let required = level[body] + step;
+                if level[head] < required {
+                    if required > limit {
                         return Err(NegativeCycle(head));
                     }
-                    level.insert(head, wanted);
+                    level.insert(head, required);
                     changed = true;
                 }
             }
@@ -55,21 +56,21 @@ impl<'d> Strata<'d> {
         }
     }
 
-    /// The layer of a derived predicate; nothing for a basic one.
+    /// Returns the stratum of a derived predicate; `None` for a basic predicate.
     pub(crate) fn level(&self, name: &Name) -> Option<usize> {
         self.level.get(name).copied()
     }
 }
 
-/// Calls `found` with each predicate of a condition and whether it stands under an odd number of negations.
-fn uses<'d>(condition: &'d Condition, negated: bool, found: &mut impl FnMut(&'d Name, bool)) {
+/// Calls `visit` with each predicate of a condition and whether it occurs below an odd number of negations.
+fn uses<'d>(condition: &'d Condition, negated: bool, visit: &mut impl FnMut(&'d Name, bool)) {
     match condition {
-        Condition::Not(inner) => uses(inner, !negated, found),
+        Condition::Not(inner) => uses(inner, !negated, visit),
         Condition::Imply(premise, conclusion) => {
-            uses(premise, !negated, found);
-            uses(conclusion, negated, found);
+            uses(premise, !negated, visit);
+            uses(conclusion, negated, visit);
         }
-        Condition::Atom(atom) => found(&atom.predicate.name, negated),
-        other => other.parts().for_each(|part| uses(part, negated, found)),
+        Condition::Atom(atom) => visit(&atom.predicate.name, negated),
+        other => other.parts().for_each(|part| uses(part, negated, visit)),
     }
 }

@@ -1,10 +1,11 @@
-//! Which type is a subtype of which.
+//! Type hierarchy of a domain.
 
 use rustc_hash::FxHashMap;
 
 use super::ast::{Domain, Name, TypeExpression};
 
-/// The types of a domain. A supertype that is not declared itself counts as declared; `object` is above all.
+/// Types of a domain with their supertypes. Supertypes that are only mentioned count as declared. `object` is
+/// the root.
 #[derive(Debug)]
 pub struct TypeHierarchy {
     index: FxHashMap<Name, usize>,
@@ -12,7 +13,7 @@ pub struct TypeHierarchy {
 }
 
 impl TypeHierarchy {
-    /// The types that a domain declares.
+    /// Builds the hierarchy of a domain's types.
     pub fn of(domain: &Domain) -> Self {
         let mut hierarchy = Self { index: FxHashMap::default(), parents: Vec::new() };
         hierarchy.insert(&Name::new("object"));
@@ -36,19 +37,21 @@ impl TypeHierarchy {
         self.parents.len() - 1
     }
 
-    /// Whether there is such a type.
+    /// Returns `true` if the type exists.
     pub fn contains(&self, name: &Name) -> bool {
         self.index.contains_key(name)
     }
 
-    /// The names of all types, in no order.
+    /// Names of all types, in arbitrary order.
     pub(crate) fn names(&self) -> impl Iterator<Item = &Name> {
         self.index.keys()
     }
 
-    /// Whether everything of type `lower` is of type `upper`. An undeclared upper type counts as `object`.
+    /// Returns `true` if `lower` is a subtype of `upper` or equal to it. An undeclared `upper` counts as
+    /// `object`.
     pub(crate) fn is_a(&self, lower: &Name, upper: &Name) -> bool {
         let Some(upper) = self.index.get(upper) else { return true };
+        // `object` has index 0.
         if *upper == 0 {
             return true;
         }
@@ -59,13 +62,14 @@ impl TypeHierarchy {
         lower == upper || closure(&self.parents, lower)[upper]
     }
 
-    /// Whether an object of type `given` is one of type `wanted`.
-    pub fn fits(&self, given: &TypeExpression, wanted: &TypeExpression) -> bool {
-        let any_wanted = |lower: &Name| wanted.alternatives.iter().any(|upper| self.is_a(lower, &upper.name));
-        wanted.alternatives.is_empty() || given.alternatives.iter().any(|lower| any_wanted(&lower.name))
+    /// Returns `true` if an object of type `subtype` is also of type `supertype`.
+    pub fn fits(&self, subtype: &TypeExpression, supertype: &TypeExpression) -> bool {
+        let is_subtype =
+            |lower: &Name| supertype.alternatives.iter().any(|upper| self.is_a(lower, &upper.name));
+        supertype.alternatives.is_empty() || subtype.alternatives.iter().any(|lower| is_subtype(&lower.name))
     }
 
-    /// Whether something can be of both types.
+    /// Returns `true` if an object can be of both types.
     pub(crate) fn overlap(&self, left: &TypeExpression, right: &TypeExpression) -> bool {
         let common = |left: &Name, right: &Name| {
             self.is_a(left, right) || self.is_a(right, left) || self.have_common_subtype(left, right)
@@ -90,7 +94,7 @@ impl TypeHierarchy {
         below_left.iter().zip(&below_right).any(|(left, right)| *left && *right)
     }
 
-    /// Whether a type is above itself.
+    /// Returns `true` if a type is a proper supertype of itself.
     pub(crate) fn is_cyclic(&self, name: &Name) -> bool {
         let Some(index) = self.index.get(name) else { return false };
         *index != 0
@@ -98,7 +102,7 @@ impl TypeHierarchy {
     }
 }
 
-/// By type: whether links lead to it from a type, which is reached itself.
+/// For each type: whether it is reachable from `from` (reflexive and transitive).
 fn closure(links: &[Vec<usize>], from: usize) -> Vec<bool> {
     let mut reached = vec![false; links.len()];
     reached[from] = true;

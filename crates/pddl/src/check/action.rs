@@ -1,4 +1,4 @@
-//! Actions, effects and derived predicates.
+//! Checks actions, effects and derived predicates.
 
 use rustc_hash::FxHashMap;
 
@@ -28,38 +28,38 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// The head of an axiom agrees with the declaration of its predicate.
+    /// Checks that the head of an axiom agrees with the declaration of its predicate.
     fn axiom_head(&mut self, axiom: &'a crate::ast::Derived) {
         let Identifier { name, span } = &axiom.head.identifier;
         let symbols = self.symbols;
         let Some(declaration) = symbols.predicates.get(name) else {
-            let known = symbols.predicates.keys().copied();
-            self.undeclared("P121", *span, "predicate", name, known);
+            let predicates = symbols.predicates.keys().copied();
+            self.undeclared("P121", *span, "predicate", name, predicates);
             return;
         };
-        let (wanted, found) = (declaration.parameters.len(), axiom.head.parameters.len());
+        let (expected, actual) = (declaration.parameters.len(), axiom.head.parameters.len());
         let source = self.sink.source();
-        if wanted != found {
+        if expected != actual {
             self.sink
                 .error(
                     "P125",
                     *span,
                     format!(
-                        "the predicate `{name}` is declared with {wanted} arguments, here it has {found}"
+                        "the predicate `{name}` is declared with {expected} arguments, here it has {actual}"
                     ),
                 )
                 .related(source, declaration.identifier.span, "it is declared here");
             return;
         }
-        for (here, there) in axiom.head.parameters.iter().zip(&declaration.parameters) {
-            if !symbols.types.overlap(&here.r#type, &there.r#type) {
+        for (parameter, declared) in axiom.head.parameters.iter().zip(&declaration.parameters) {
+            if !symbols.types.overlap(&parameter.r#type, &declared.r#type) {
                 let message = format!(
                     "the type of `?{}` contradicts the declaration of `{name}`",
-                    here.identifier.name
+                    parameter.identifier.name
                 );
-                self.sink.error("P126", here.identifier.span, message).related(
+                self.sink.error("P126", parameter.identifier.span, message).related(
                     source,
-                    there.identifier.span,
+                    declared.identifier.span,
                     "it is declared here",
                 );
             }
@@ -67,10 +67,10 @@ impl<'a> Checker<'a> {
     }
 
     pub(super) fn actions(&mut self, domain: &'a Domain) {
-        let mut seen: FxHashMap<&Name, &Identifier> = FxHashMap::default();
+        let mut by_name: FxHashMap<&Name, &Identifier> = FxHashMap::default();
         for action in &domain.actions {
             self.action(action);
-            let Some(earlier) = seen.insert(&action.identifier.name, &action.identifier) else { continue };
+            let Some(earlier) = by_name.insert(&action.identifier.name, &action.identifier) else { continue };
             let source = self.sink.source();
             self.sink
                 .warning(
@@ -118,7 +118,7 @@ impl<'a> Checker<'a> {
             }
             Effect::Add(atom) | Effect::Delete(atom) => {
                 self.atom(atom, Kind::Predicate, scope);
-                self.is_basic(atom);
+                self.check_basic(atom);
                 if matches!(effect, Effect::Add(_))
                     && self.symbols.object_fluents.contains(&atom.predicate.name)
                 {
@@ -139,8 +139,9 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// A derived predicate follows from its axioms and cannot be changed.
-    pub(super) fn is_basic(&mut self, atom: &'a Atom) {
+    /// Reports a derived predicate in an effect or in the initial state: it follows from its axioms and
+    /// cannot be set.
+    pub(super) fn check_basic(&mut self, atom: &'a Atom) {
         let Identifier { name, span } = &atom.predicate;
         if self.symbols.derived.contains(name) {
             self.sink

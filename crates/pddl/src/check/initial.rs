@@ -1,4 +1,4 @@
-//! The initial state, the goal and the metric.
+//! Checks the initial state, the goal and the metric.
 
 use num_rational::BigRational;
 use num_traits::Signed;
@@ -11,7 +11,7 @@ use super::condition::Kind;
 use super::soft::is_violation;
 use super::{Checker, Scope};
 
-/// An atom without its places.
+/// Atom without source positions.
 type Key<'a> = (&'a Name, SmallVec<[&'a Name; 4]>);
 
 fn key(atom: &Atom) -> Key<'_> {
@@ -27,8 +27,9 @@ impl<'a> Checker<'a> {
         let scope = Scope::new();
         let mut facts: FxHashMap<Key<'a>, (Span, bool)> = FxHashMap::default();
         let mut values: FxHashMap<Key<'a>, (Span, &BigRational)> = FxHashMap::default();
-        let values_in = |element: &&InitialElement| matches!(element, InitialElement::Value(..));
-        let count = init.iter().filter(values_in).count();
+        let is_value = |element: &&InitialElement| matches!(element, InitialElement::Value(..));
+        // Exact capacities: `:init` can have millions of elements.
+        let count = init.iter().filter(is_value).count();
         values.reserve(count);
         facts.reserve(init.len() - count);
         for element in init {
@@ -58,9 +59,9 @@ impl<'a> Checker<'a> {
         }
     }
 
-    fn repeated_fact(&mut self, span: Span, holds: bool, (place, held): (Span, bool)) {
+    fn repeated_fact(&mut self, span: Span, holds: bool, (place, held_before): (Span, bool)) {
         let source = self.sink.source();
-        if holds == held {
+        if holds == held_before {
             self.sink.warning("P127", span, "this fact is repeated").related(
                 source,
                 place,

@@ -1,4 +1,4 @@
-//! Names and types of a domain and a problem: everything used is declared, and used as declared.
+//! Semantic checks of a domain and a problem: symbols are declared and used with the declared types.
 
 mod action;
 mod condition;
@@ -14,11 +14,11 @@ use super::diagnostic::{Diagnostic, Severity, Sink};
 use super::source::Source;
 use symbols::Symbols;
 
-/// The codes of messages about names that are declared nowhere.
-const UNDECLARED: [&str; 5] = ["P120", "P121", "P122", "P123", "P136"];
+/// Codes of messages about undeclared names.
+const UNDECLARED_CODES: [&str; 5] = ["P120", "P121", "P122", "P123", "P136"];
 
-/// How many predicates of `OWLToPDDL` must be undeclared for a domain to be one of its inputs.
-const TEMPLATE_EVIDENCE: usize = 3;
+/// Number of undeclared `inferred-…` predicates from which a domain is regarded as an input of `OWLToPDDL`.
+const MIN_TEMPLATE_PREDICATES: usize = 3;
 
 /// Checks a domain without a problem.
 pub fn check_domain(domain: &Domain, source: &Source) -> Vec<Diagnostic> {
@@ -26,7 +26,7 @@ pub fn check_domain(domain: &Domain, source: &Source) -> Vec<Diagnostic> {
     check_domain_with(domain, source, &symbols).0
 }
 
-/// Checks a domain and a problem, each against its source; the domain's messages come first.
+/// Checks a domain and a problem against their sources. Messages about the domain come first.
 pub fn check(
     domain: &Domain,
     domain_source: &Source,
@@ -45,15 +45,16 @@ pub fn check(
     if let Some(metric) = &problem.metric {
         checker.metric(metric);
     }
-    let mut found = checker.sink.finish();
+    let mut problem_diagnostics = checker.sink.finish();
     if is_template {
-        found.retain(|diagnostic| !UNDECLARED.contains(&diagnostic.code));
+        // The knowledge base declares these names later.
+        problem_diagnostics.retain(|diagnostic| !UNDECLARED_CODES.contains(&diagnostic.code));
     }
-    diagnostics.append(&mut found);
+    diagnostics.append(&mut problem_diagnostics);
     diagnostics
 }
 
-/// The messages about an objective that stands in neither file.
+/// Returns the messages about an objective that is in neither file.
 pub(super) fn objective(
     domain: &Domain,
     problem: &Problem,
@@ -66,7 +67,7 @@ pub(super) fn objective(
     checker.sink.finish()
 }
 
-/// The messages about a domain, and whether it is a template that `OWLToPDDL` still has to complete.
+/// Returns the messages about a domain, and whether it is a template for `OWLToPDDL`.
 fn check_domain_with(domain: &Domain, source: &Source, symbols: &Symbols<'_>) -> (Vec<Diagnostic>, bool) {
     let mut checker = Checker::new(symbols, source);
     checker.in_domain = true;
@@ -77,19 +78,19 @@ fn check_domain_with(domain: &Domain, source: &Source, symbols: &Symbols<'_>) ->
     checker.derived(domain);
     checker.constraints(&domain.constraints);
     checker.actions(domain);
-    let evidence = checker.undeclared_inferred.len();
+    let inferred_count = checker.undeclared_inferred.len();
     let mut diagnostics = checker.sink.finish();
-    let is_template = evidence >= TEMPLATE_EVIDENCE;
+    let is_template = inferred_count >= MIN_TEMPLATE_PREDICATES;
     if is_template {
-        diagnostics.retain(|diagnostic| !UNDECLARED.contains(&diagnostic.code));
-        diagnostics.insert(0, template_message(domain, source, evidence));
+        diagnostics.retain(|diagnostic| !UNDECLARED_CODES.contains(&diagnostic.code));
+        diagnostics.insert(0, template_message(domain, source, inferred_count));
     }
     (diagnostics, is_template)
 }
 
-fn template_message(domain: &Domain, source: &Source, evidence: usize) -> Diagnostic {
+fn template_message(domain: &Domain, source: &Source, inferred_count: usize) -> Diagnostic {
     let message = format!(
-        "this domain asks a knowledge base, as inputs of OWLToPDDL do: {evidence} predicates named `inferred-…` are declared nowhere"
+        "this domain asks a knowledge base, as inputs of OWLToPDDL do: {inferred_count} predicates named `inferred-…` are declared nowhere"
     );
     let mut diagnostic = Diagnostic::new(source, domain.name.span, Severity::Error, "P134", message);
     diagnostic.help(
@@ -98,19 +99,19 @@ fn template_message(domain: &Domain, source: &Source, evidence: usize) -> Diagno
     diagnostic
 }
 
-/// What the parts of the checker share.
+/// Checker state.
 struct Checker<'a> {
     symbols: &'a Symbols<'a>,
     sink: Sink<'a>,
-    /// Predicates that `OWLToPDDL` would add.
+    /// Undeclared predicates that `OWLToPDDL` would add.
     undeclared_inferred: FxHashSet<&'a Name>,
-    /// Whether this is the domain, where only its constants should be used.
+    /// Whether a domain is checked. It should use only its own constants, not objects of a problem.
     in_domain: bool,
-    /// Whether `?duration` has a meaning here.
+    /// Whether `?duration` is defined in the current context.
     in_durative_action: bool,
 }
 
-/// The variables that can be used, innermost last.
+/// Variables in scope, innermost last.
 type Scope<'a> = Vec<&'a TypedName>;
 
 impl<'a> Checker<'a> {
@@ -120,27 +121,28 @@ impl<'a> Checker<'a> {
         Self { symbols, sink, undeclared_inferred, in_domain: false, in_durative_action: false }
     }
 
-    /// Reports a name that is declared nowhere, with the nearest of the known ones.
+    /// Reports an undeclared name and suggests the most similar declared one.
     fn undeclared<'n>(
         &mut self,
         code: &'static str,
         span: Span,
         what: &str,
         name: &Name,
-        known: impl IntoIterator<Item = &'n Name>,
+        candidates: impl IntoIterator<Item = &'n Name>,
     ) -> &mut Diagnostic {
-        let help = if self.sink.is_full() { None } else { did_you_mean(name.as_str(), known) };
+        let help = if self.sink.is_full() { None } else { did_you_mean(name.as_str(), candidates) };
         let diagnostic = self.sink.error(code, span, format!("unknown {what} `{name}`"));
         diagnostic.help = help;
         diagnostic
     }
 }
 
-/// The most names that are compared for a proposal.
-const PROPOSALS_LIMIT: usize = 5_000;
+/// Maximum number of names that are compared for a suggestion.
+const MAX_CANDIDATES: usize = 5_000;
 
-fn did_you_mean<'n>(written: &str, known: impl IntoIterator<Item = &'n Name>) -> Option<String> {
-    let mut known: Vec<&str> = known.into_iter().take(PROPOSALS_LIMIT).map(Name::as_str).collect();
-    known.sort_unstable();
-    diagnostics::nearest(written, known).map(|name| format!("did you mean `{name}`?"))
+fn did_you_mean<'n>(written: &str, candidates: impl IntoIterator<Item = &'n Name>) -> Option<String> {
+    let mut candidates: Vec<&str> = candidates.into_iter().take(MAX_CANDIDATES).map(Name::as_str).collect();
+    // Hash maps have no stable order; messages must be deterministic.
+    candidates.sort_unstable();
+    diagnostics::nearest(written, candidates).map(|name| format!("did you mean `{name}`?"))
 }

@@ -1,13 +1,13 @@
-//! Preferences and constraints on trajectories.
+//! Checks preferences and trajectory constraints.
 
 use crate::ast::{Atom, Constraint, Preference, Term, Trajectory};
 
 use super::{Checker, Scope};
 
-/// The name of the function that counts how often a preference is violated.
+/// Function that counts the violations of a preference.
 const IS_VIOLATED: &str = "is-violated";
 
-/// Whether an atom is `(is-violated …)`.
+/// Returns `true` if an atom is `(is-violated …)`.
 pub(super) fn is_violation(atom: &Atom) -> bool {
     atom.predicate.name.as_str().eq_ignore_ascii_case(IS_VIOLATED)
 }
@@ -32,13 +32,13 @@ impl<'a> Checker<'a> {
             Trajectory::ForAll(variables, body) => {
                 self.quantified(variables, scope, |checker, scope| checker.trajectory(body, scope));
             }
-            Trajectory::AtEnd(what)
-            | Trajectory::Always(what)
-            | Trajectory::Sometime(what)
-            | Trajectory::AtMostOnce(what)
-            | Trajectory::Within(_, what)
-            | Trajectory::HoldDuring(_, _, what)
-            | Trajectory::HoldAfter(_, what) => self.condition(what, scope),
+            Trajectory::AtEnd(body)
+            | Trajectory::Always(body)
+            | Trajectory::Sometime(body)
+            | Trajectory::AtMostOnce(body)
+            | Trajectory::Within(_, body)
+            | Trajectory::HoldDuring(_, _, body)
+            | Trajectory::HoldAfter(_, body) => self.condition(body, scope),
             Trajectory::SometimeAfter(first, second)
             | Trajectory::SometimeBefore(first, second)
             | Trajectory::AlwaysWithin(_, first, second) => {
@@ -56,7 +56,7 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// `(is-violated NAME)` in a metric.
+    /// Checks `(is-violated NAME)` in a metric.
     pub(super) fn violation(&mut self, atom: &'a Atom) {
         let [Term::Constant(name)] = &atom.arguments[..] else {
             self.sink
@@ -66,8 +66,8 @@ impl<'a> Checker<'a> {
         };
         let symbols = self.symbols;
         if !symbols.preferences.contains(&name.name) {
-            let known = symbols.preferences.iter().copied();
-            self.undeclared("P118", name.span, "preference", &name.name, known);
+            let preferences = symbols.preferences.iter().copied();
+            self.undeclared("P118", name.span, "preference", &name.name, preferences);
         }
     }
 }

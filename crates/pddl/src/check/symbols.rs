@@ -1,26 +1,26 @@
-//! What is declared, by name; each kind of name is a space of its own.
+//! Symbol table of a domain and a problem, with one namespace per kind of name.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::ast::{Declaration, Domain, Name, Problem, TypeExpression, TypedName};
 use crate::types::TypeHierarchy;
 
-/// An object or constant.
+/// Object or constant.
 #[derive(Debug, Default)]
 pub(super) struct Object<'a> {
-    /// The types of all its declarations.
+    /// Types of all its declarations.
     pub(super) types: Vec<&'a TypeExpression>,
     /// Whether it is a constant of the domain.
     pub(super) is_constant: bool,
 }
 
-/// All declarations; of repeated ones the first.
+/// Declarations by name. Of repeated declarations the first one counts.
 #[derive(Debug)]
 pub(super) struct Symbols<'a> {
     pub(super) types: TypeHierarchy,
     pub(super) predicates: FxHashMap<&'a Name, &'a Declaration>,
     pub(super) functions: FxHashMap<&'a Name, &'a Declaration>,
-    /// The predicates that stand for functions with objects as values.
+    /// Predicates that represent object fluents.
     pub(super) object_fluents: FxHashSet<&'a Name>,
     pub(super) derived: FxHashSet<&'a Name>,
     pub(super) objects: FxHashMap<&'a Name, Object<'a>>,
@@ -34,12 +34,14 @@ impl<'a> Symbols<'a> {
         if let Some(problem) = problem {
             insert_objects(&mut objects, &problem.objects, false);
         }
-        let of_actions = domain.actions.iter().flat_map(|action| &action.preferences).map(|own| &own.name);
+        let action_preferences =
+            domain.actions.iter().flat_map(|action| &action.preferences).map(|preference| &preference.name);
         let constraints =
-            domain.constraints.iter().chain(problem.into_iter().flat_map(|own| &own.constraints));
-        let named = of_actions.chain(constraints.filter_map(|own| own.preference.as_ref()));
+            domain.constraints.iter().chain(problem.into_iter().flat_map(|problem| &problem.constraints));
+        let names =
+            action_preferences.chain(constraints.filter_map(|constraint| constraint.preference.as_ref()));
         Self {
-            preferences: named.map(|own| &own.name).collect(),
+            preferences: names.map(|identifier| &identifier.name).collect(),
             types: TypeHierarchy::of(domain),
             predicates: by_name(&domain.predicates),
             functions: by_name(&domain.functions),

@@ -1,4 +1,4 @@
-//! Conditions: preconditions, goals, bodies of derived predicates.
+//! Parses conditions: preconditions, goals, bodies of derived predicates.
 
 use crate::ast::{Comparison, Condition};
 use crate::number::{Literal, literal};
@@ -8,7 +8,7 @@ use super::expression::comparison;
 use super::{Parser, at_start, list_start};
 
 impl Parser<'_> {
-    /// A condition without time specifiers.
+    /// Parses a condition without time specifiers.
     pub(super) fn condition(&mut self, item: Item<'_>) -> Option<Condition> {
         if !item.is_list() {
             let help = item.symbol().map(|symbol| format!("a condition is in parentheses: `({symbol})`"));
@@ -79,7 +79,7 @@ impl Parser<'_> {
         self.atom(item, "a predicate").map(Condition::Atom)
     }
 
-    /// A comparison of numbers, or `=` between terms.
+    /// Parses a comparison of numbers, or `=` between terms.
     fn comparison_condition(&mut self, item: Item<'_>, operator: Comparison) -> Option<Condition> {
         let head = item.head().unwrap_or_default();
         let [left, right] = self.operands(item, &format!("({head} a b)"))?;
@@ -91,7 +91,7 @@ impl Parser<'_> {
             return Some(Condition::Equal(left?, right?, item.span()));
         }
         for side in [left, right] {
-            // `?duration` is the only variable that is a number.
+            // `?duration` is the only numeric variable.
             if side.symbol().is_some_and(is_term_variable) {
                 self.sink.error("P106", at_start(side), "expected a number, found a variable");
                 return None;
@@ -106,7 +106,7 @@ fn is_term_variable(symbol: &str) -> bool {
     symbol.starts_with('?') && !symbol.eq_ignore_ascii_case("?duration")
 }
 
-/// Whether `=` compares terms: a variable is one, and so are two names.
+/// Returns `true` if `=` compares terms: at least one side is a variable, or both are names.
 fn is_term_pair(left: Item<'_>, right: Item<'_>) -> bool {
     let (Some(left), Some(right)) = (left.symbol(), right.symbol()) else { return false };
     let is_name =
@@ -114,14 +114,15 @@ fn is_term_pair(left: Item<'_>, right: Item<'_>) -> bool {
     is_term_variable(left) || is_term_variable(right) || (is_name(left) && is_name(right))
 }
 
-/// Whether a list is `(at start (…))`, `(at end (…))` or `(over all (…))`, and not an atom that looks similar.
+/// Returns `true` if a list is `(at start (…))`, `(at end (…))` or `(over all (…))`, and not an atom that
+/// looks similar.
 pub(super) fn is_timed(item: Item<'_>) -> bool {
     let mut operands = item.rest();
-    let (Some(when), Some(what), None) = (operands.next(), operands.next(), operands.next()) else {
+    let (Some(when), Some(body), None) = (operands.next(), operands.next(), operands.next()) else {
         return false;
     };
     let Some(when) = when.symbol() else { return false };
     let is = |keyword: &str| when.eq_ignore_ascii_case(keyword);
-    what.is_list()
+    body.is_list()
         && ((item.is_headed("at") && (is("start") || is("end"))) || (item.is_headed("over") && is("all")))
 }

@@ -1,4 +1,5 @@
-//! Durative actions: time specifiers are moved outwards until each condition and effect stands at one time.
+//! Parses durative actions. Time specifiers are moved outwards until each condition and each effect has
+//! exactly one.
 
 use crate::ast::{Condition, ConditionTime, DurationConstraint, Effect, EffectTime, Expression};
 use crate::sexp::Item;
@@ -10,7 +11,7 @@ use super::{Parser, list_start};
 type TimedConditions = Vec<(ConditionTime, Condition)>;
 type TimedEffects = Vec<(EffectTime, Effect)>;
 
-/// The time and the content of `(at start (…))`, `(over all (…))` or `(at end (…))`.
+/// Returns the time and the content of `(at start (…))`, `(over all (…))` or `(at end (…))`.
 pub(super) fn timed(item: Item<'_>) -> Option<(ConditionTime, Item<'_>)> {
     if !is_timed(item) {
         return None;
@@ -36,32 +37,32 @@ pub(super) fn is_conjunction(item: Item<'_>) -> bool {
     item.is_headed("and") || (item.is_list() && item.items().next().is_none())
 }
 
-/// Gives each conjunct its time.
-fn spread_condition(time: ConditionTime, condition: Condition, found: &mut TimedConditions) {
+/// Assigns the time to each conjunct.
+fn spread_condition(time: ConditionTime, condition: Condition, conditions: &mut TimedConditions) {
     match condition {
-        Condition::And(parts) => parts.into_iter().for_each(|part| spread_condition(time, part, found)),
-        condition => found.push((time, condition)),
+        Condition::And(parts) => parts.into_iter().for_each(|part| spread_condition(time, part, conditions)),
+        condition => conditions.push((time, condition)),
     }
 }
 
-/// Gives each conjunct its time.
-fn spread_effect(time: EffectTime, effect: Effect, found: &mut TimedEffects) {
+/// Assigns the time to each conjunct.
+fn spread_effect(time: EffectTime, effect: Effect, effects: &mut TimedEffects) {
     match effect {
-        Effect::And(parts) => parts.into_iter().for_each(|part| spread_effect(time, part, found)),
-        effect => found.push((time, effect)),
+        Effect::And(parts) => parts.into_iter().for_each(|part| spread_effect(time, part, effects)),
+        effect => effects.push((time, effect)),
     }
 }
 
 impl Parser<'_> {
-    /// `:condition` of a durative action.
-    pub(super) fn timed_conditions(&mut self, item: Item<'_>, found: &mut TimedConditions) {
+    /// Parses `:condition` of a durative action.
+    pub(super) fn timed_conditions(&mut self, item: Item<'_>, conditions: &mut TimedConditions) {
         if is_conjunction(item) {
             for item in item.rest() {
-                self.timed_conditions(item, found);
+                self.timed_conditions(item, conditions);
             }
         } else if let Some((time, inner)) = timed(item) {
             if let Some(condition) = self.condition(inner) {
-                spread_condition(time, condition, found);
+                spread_condition(time, condition, conditions);
             }
         } else if item.is_headed("forall") {
             let Some([variables, body]) = self.operands(item, "(forall (?x - type) (at start (p ?x)))")
@@ -72,9 +73,9 @@ impl Parser<'_> {
             let mut inner = Vec::new();
             self.timed_conditions(body, &mut inner);
             let quantify = |(time, part)| (time, Condition::ForAll(variables.clone(), Box::new(part)));
-            found.extend(inner.into_iter().map(quantify));
+            conditions.extend(inner.into_iter().map(quantify));
         } else if item.is_headed("preference") {
-            // It is none where it can stand.
+            // A preference at this position is an error, which `condition` reports.
             self.condition(item);
         } else {
             self.without_time(item, "condition", "`(at start (…))`, `(over all (…))` or `(at end (…))`");
@@ -95,14 +96,14 @@ impl Parser<'_> {
             .help(format!("write {forms}"));
     }
 
-    /// `:effect` of a durative action.
-    pub(super) fn timed_effects(&mut self, item: Item<'_>, found: &mut TimedEffects) {
+    /// Parses `:effect` of a durative action.
+    pub(super) fn timed_effects(&mut self, item: Item<'_>, effects: &mut TimedEffects) {
         if is_conjunction(item) {
             for item in item.rest() {
-                self.timed_effects(item, found);
+                self.timed_effects(item, effects);
             }
         } else if let Some((time, inner)) = timed(item) {
-            self.effect_at(item, time, inner, found);
+            self.effect_at(item, time, inner, effects);
         } else if item.is_headed("forall") {
             let Some([variables, body]) = self.operands(item, "(forall (?x - type) (at end (p ?x)))") else {
                 return;
@@ -113,9 +114,9 @@ impl Parser<'_> {
             self.timed_effects(body, &mut inner);
             self.effects_below(mark, &variables);
             let quantify = |(time, part)| (time, Effect::ForAll(variables.clone(), Box::new(part)));
-            found.extend(inner.into_iter().map(quantify));
+            effects.extend(inner.into_iter().map(quantify));
         } else if item.is_headed("when") {
-            self.timed_when(item, found);
+            self.timed_when(item, effects);
         } else if item.items().any(mentions_continuous_time) {
             self.refuse(item, "continuous effects (`#t`)").help(CONTINUOUS);
         } else {
@@ -123,7 +124,13 @@ impl Parser<'_> {
         }
     }
 
-    fn effect_at(&mut self, item: Item<'_>, time: ConditionTime, inner: Item<'_>, found: &mut TimedEffects) {
+    fn effect_at(
+        &mut self,
+        item: Item<'_>,
+        time: ConditionTime,
+        inner: Item<'_>,
+        effects: &mut TimedEffects,
+    ) {
         let Some(time) = effect_time(time) else {
             self.sink
                 .error("P115", list_start(item), "effects cannot take place over all")
@@ -132,12 +139,12 @@ impl Parser<'_> {
         };
         self.objects.time = Some(time);
         if let Some(effect) = self.effect(inner) {
-            spread_effect(time, effect, found);
+            spread_effect(time, effect, effects);
         }
     }
 
-    /// `(when (at T (p)) (at T (q)))`, both at the same time.
-    fn timed_when(&mut self, item: Item<'_>, found: &mut TimedEffects) {
+    /// Parses `(when (at T (p)) (at T (q)))`. Both times must be equal.
+    fn timed_when(&mut self, item: Item<'_>, timed_effects: &mut TimedEffects) {
         let Some([condition, effect]) = self.operands(item, "(when (at end (p)) (at end (q)))") else {
             return;
         };
@@ -145,23 +152,23 @@ impl Parser<'_> {
         self.timed_conditions(condition, &mut conditions);
         let mark = self.mark_effects();
         self.timed_effects(effect, &mut effects);
-        let all = Condition::And(conditions.iter().map(|(_, part)| part.clone()).collect());
-        self.effects_when(mark, &all);
+        let conjunction = Condition::And(conditions.iter().map(|(_, part)| part.clone()).collect());
+        self.effects_when(mark, &conjunction);
         for (time, effect) in effects {
             if conditions.iter().any(|(condition_time, _)| effect_time(*condition_time) != Some(time)) {
                 self.refuse(item, "conditional effects that take place at another time than their condition")
                     .help("remember the condition in an atom: `(when (at start (p)) (at start (q)))` and `(when (at end (q)) …)`");
                 return;
             }
-            found.push((time, Effect::When(all.clone(), Box::new(effect))));
+            timed_effects.push((time, Effect::When(conjunction.clone(), Box::new(effect))));
         }
     }
 
-    /// `:duration`.
-    pub(super) fn duration(&mut self, item: Item<'_>, found: &mut Vec<DurationConstraint>) {
+    /// Parses `:duration`.
+    pub(super) fn duration(&mut self, item: Item<'_>, constraints: &mut Vec<DurationConstraint>) {
         if is_conjunction(item) {
             for item in item.rest() {
-                self.duration(item, found);
+                self.duration(item, constraints);
             }
             return;
         }
@@ -185,11 +192,11 @@ impl Parser<'_> {
             }
             _ => return,
         };
-        found.push(DurationConstraint { time, operator, expression, span: constraint.span() });
+        constraints.push(DurationConstraint { time, operator, expression, span: constraint.span() });
     }
 }
 
-/// Whether `#t` occurs in an item.
+/// Returns `true` if `#t` occurs in an item.
 fn mentions_continuous_time(item: Item<'_>) -> bool {
     item.symbol().is_some_and(|symbol| symbol.eq_ignore_ascii_case("#t"))
         || item.items().any(mentions_continuous_time)

@@ -1,4 +1,4 @@
-//! Effects without time specifiers.
+//! Parses effects without time specifiers.
 
 use crate::ast::{Assignment, Effect};
 use crate::sexp::Item;
@@ -7,7 +7,7 @@ use super::condition::is_timed;
 use super::expression::comparison;
 use super::{Parser, list_start};
 
-/// The assignment that a symbol stands for.
+/// Returns the assignment operator with the given name.
 fn assignment(symbol: &str) -> Option<Assignment> {
     Some(match symbol {
         "assign" => Assignment::Assign,
@@ -20,7 +20,7 @@ fn assignment(symbol: &str) -> Option<Assignment> {
 }
 
 impl Parser<'_> {
-    /// An effect that takes place at one time.
+    /// Parses an effect without time specifiers.
     pub(super) fn effect(&mut self, item: Item<'_>) -> Option<Effect> {
         if !item.is_list() {
             self.expected(item, "an effect");

@@ -1,4 +1,4 @@
-//! Numeric expressions, atoms and terms.
+//! Parses numeric expressions, atoms and terms.
 
 use num_rational::BigRational;
 use num_traits::Zero;
@@ -9,7 +9,7 @@ use crate::sexp::Item;
 
 use super::{Parser, at_start, list_start};
 
-/// The comparison that a symbol stands for.
+/// Returns the comparison with the given symbol.
 pub(super) fn comparison(symbol: &str) -> Option<Comparison> {
     Some(match symbol {
         "<" => Comparison::Less,
@@ -31,11 +31,11 @@ fn arithmetic(symbol: &str) -> Option<Arithmetic> {
     })
 }
 
-/// What can stand for a continuous effect.
+/// Suggestion for continuous effects.
 pub(super) const CONTINUOUS: &str = "numbers change at the start and the end of actions only: `(at end (increase (f) (* 2 ?duration)))` for a rate of 2";
 
 impl Parser<'_> {
-    /// `?x` or `name`.
+    /// Parses `?x`, `name` or a term with an object fluent.
     pub(super) fn term(&mut self, item: Item<'_>) -> Option<Term> {
         let Some(symbol) = item.symbol() else { return self.value_of(item) };
         match symbol.strip_prefix('?') {
@@ -48,7 +48,7 @@ impl Parser<'_> {
         }
     }
 
-    /// `(predicate terms)`.
+    /// Parses `(predicate terms)`.
     pub(super) fn atom(&mut self, item: Item<'_>, what: &str) -> Option<Atom> {
         let Some(first) = item.items().next() else {
             self.expected(item, what);
@@ -58,23 +58,24 @@ impl Parser<'_> {
         if self.objects.contains(&predicate.name) {
             return self.misplaced_object_fluent(item, &predicate.name);
         }
-        let before = self.sink.len();
+        let message_count = self.sink.len();
         let arguments = item.rest().filter_map(|item| self.term(item)).collect();
-        // A term that cannot be read is not to be reported again as a wrong number of arguments.
-        (self.sink.len() == before).then_some(Atom { predicate, arguments, span: item.span() })
+        // An unreadable term is already reported. It must not cause a second error about the number of
+        // arguments.
+        (self.sink.len() == message_count).then_some(Atom { predicate, arguments, span: item.span() })
     }
 
-    /// A function as `(f ?x)`, or bare where it has no arguments.
+    /// Parses a function: `(f ?x)`, or a bare name without arguments.
     pub(super) fn fluent(&mut self, item: Item<'_>) -> Option<Atom> {
         if item.is_list() {
             return self.atom(item, "a function");
         }
-        let is_sign = |symbol: &str| {
+        let is_operator = |symbol: &str| {
             comparison(symbol).is_some()
                 || arithmetic(symbol).is_some()
                 || symbol.eq_ignore_ascii_case("is-violated")
         };
-        if item.symbol().is_some_and(is_sign) {
+        if item.symbol().is_some_and(is_operator) {
             self.expected(item, "a function");
             return None;
         }
@@ -85,7 +86,7 @@ impl Parser<'_> {
         Some(Atom { predicate, arguments: Vec::new(), span: item.span() })
     }
 
-    /// A numeric expression.
+    /// Parses a numeric expression.
     pub(super) fn expression(&mut self, item: Item<'_>) -> Option<Expression> {
         let Some(symbol) = item.symbol() else { return self.compound_expression(item) };
         if symbol.eq_ignore_ascii_case("?duration") {
@@ -120,23 +121,23 @@ impl Parser<'_> {
     }
 
     fn operation(&mut self, item: Item<'_>, operation: Arithmetic) -> Option<Expression> {
-        let found = item.rest().count();
+        let count = item.rest().count();
         let (allowed, form) = match operation {
-            Arithmetic::Add => (found >= 1, "(+ a b)"),
-            Arithmetic::Multiply => (found >= 1, "(* a b)"),
-            Arithmetic::Subtract => (found == 1 || found == 2, "(- a b)"),
-            Arithmetic::Divide => (found == 2, "(/ a b)"),
+            Arithmetic::Add => (count >= 1, "(+ a b)"),
+            Arithmetic::Multiply => (count >= 1, "(* a b)"),
+            Arithmetic::Subtract => (count == 1 || count == 2, "(- a b)"),
+            Arithmetic::Divide => (count == 2, "(/ a b)"),
         };
         if !allowed {
-            let message = format!("`{}` cannot have {found} operands", item.head().unwrap_or_default());
+            let message = format!("`{}` cannot have {count} operands", item.head().unwrap_or_default());
             self.sink.error("P108", list_start(item), message).help(format!("write `{form}`"));
             return None;
         }
         let operands: Vec<_> = item.rest().filter_map(|item| self.expression(item)).collect();
-        (operands.len() == found).then_some(Expression::Operation(operation, operands, item.span()))
+        (operands.len() == count).then_some(Expression::Operation(operation, operands, item.span()))
     }
 
-    /// An expression without functions, as `:init` wants it.
+    /// Parses and evaluates an expression without functions, as required in `:init`.
     pub(super) fn constant(&mut self, item: Item<'_>) -> Option<BigRational> {
         let expression = self.expression(item)?;
         let value = evaluate(&expression);
@@ -147,7 +148,7 @@ impl Parser<'_> {
     }
 }
 
-/// The value of an expression without functions.
+/// Evaluates an expression without functions.
 fn evaluate(expression: &Expression) -> Option<BigRational> {
     match expression {
         Expression::Number(value, _) => Some(value.clone()),
@@ -163,8 +164,9 @@ fn evaluate(expression: &Expression) -> Option<BigRational> {
     }
 }
 
-/// The most bits of a number that is computed while reading: it can still be written as a literal.
-const BITS_LIMIT: u64 = 300;
+/// Maximum number of bits of a number computed during parsing. Such a number can still be written as a
+/// literal.
+const MAX_BITS: u64 = 300;
 
 fn apply(operation: Arithmetic, left: &BigRational, right: &BigRational) -> Option<BigRational> {
     let value = match operation {
@@ -174,5 +176,5 @@ fn apply(operation: Arithmetic, left: &BigRational, right: &BigRational) -> Opti
         Arithmetic::Divide if right.is_zero() => return None,
         Arithmetic::Divide => left / right,
     };
-    (value.numer().bits().max(value.denom().bits()) <= BITS_LIMIT).then_some(value)
+    (value.numer().bits().max(value.denom().bits()) <= MAX_BITS).then_some(value)
 }

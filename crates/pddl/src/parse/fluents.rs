@@ -1,40 +1,42 @@
-//! What the parser keeps of functions with objects as values while it reads.
+//! Parser state for object fluents (functions with objects as values).
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::ast::{Atom, Condition, Declaration, Domain, EffectTime, Identifier, Name, Span, Term, TypedName};
 use crate::types::TypeHierarchy;
 
-/// What the parser knows of functions with objects as values, and what it has met of them in the part that it reads.
+/// Declared object fluents, and those that occur in the part that is being read.
 #[derive(Default)]
 pub(super) struct Objects {
-    /// The predicates that stand for them.
+    /// Predicates that represent object fluents.
     pub(super) functions: FxHashMap<Name, Declaration>,
-    /// The declared types.
+    /// Declared types.
     pub(super) types: FxHashSet<Name>,
-    /// What new variables begin with, once there is one, and how many there are.
+    /// Common prefix of new variables, once there is one.
     pub(super) prefix: Option<String>,
+    /// Number of new variables.
     pub(super) count: usize,
-    /// Whether terms can stand where the parser is.
+    /// Whether the current context allows terms with object fluents.
     pub(super) is_open: bool,
-    /// The terms of the condition or effect that is being read.
+    /// Terms of the condition or effect that is being read.
     pub(super) values: Vec<Value>,
-    /// The time of the effect that is being read; none in an instantaneous action.
+    /// Time of the effect that is being read; `None` in an instantaneous action.
     pub(super) time: Option<EffectTime>,
-    /// What the effects of the action that is being read ask of the state.
+    /// Requirements of the current action's effects on the state.
     pub(super) needs: Vec<(EffectTime, Condition)>,
+    /// Assignments to object fluents by the current action.
     pub(super) assigned: Vec<Assigned>,
-    /// The values in `:init`: none for `undefined`.
+    /// Values in `:init`; `None` for `undefined`.
     pub(super) initial: FxHashMap<(Name, Vec<Name>), (Option<Name>, Span)>,
 }
 
-/// A variable for the value of a term, and the atom that says so.
+/// Variable for the value of a term, and the atom that binds it.
 pub(super) struct Value {
     pub(super) variable: TypedName,
     pub(super) atom: Atom,
 }
 
-/// A place among what effects ask of the state.
+/// Position in `needs` and `assigned`: later entries belong to the effects read since.
 #[derive(Clone, Copy)]
 pub(super) struct Mark {
     pub(super) needs: usize,
@@ -42,11 +44,13 @@ pub(super) struct Mark {
 }
 
 impl Objects {
-    /// Those of a domain that was read.
+    /// Collects the object fluents of a domain.
     pub(super) fn of(domain: &Domain) -> Self {
-        let known: FxHashSet<&Name> = domain.object_fluents.iter().collect();
-        let functions = domain.predicates.iter().filter(|own| known.contains(&own.identifier.name));
-        let functions = functions.map(|own| (own.identifier.name.clone(), own.clone())).collect();
+        let names: FxHashSet<&Name> = domain.object_fluents.iter().collect();
+        let functions =
+            domain.predicates.iter().filter(|declaration| names.contains(&declaration.identifier.name));
+        let functions =
+            functions.map(|declaration| (declaration.identifier.name.clone(), declaration.clone())).collect();
         let mut objects = Self { functions, ..Self::default() };
         objects.set_types(domain);
         objects
@@ -65,18 +69,18 @@ impl Objects {
     }
 }
 
-/// An assignment to a function with objects as values.
+/// Assignment to an object fluent.
 #[derive(Clone)]
 pub(super) struct Assigned {
     pub(super) time: EffectTime,
     pub(super) function: Identifier,
     pub(super) arguments: Vec<Term>,
-    /// None for `undefined`.
+    /// `None` for `undefined`.
     pub(super) value: Option<Term>,
-    /// The variables of the quantifiers that it stands below.
+    /// Variables of the enclosing quantifiers.
     pub(super) variables: Vec<TypedName>,
-    /// The variables that stand for values of terms.
+    /// Variables for the values of terms.
     pub(super) values: Vec<TypedName>,
-    /// When it takes place.
+    /// Conditions of the enclosing `when` effects.
     pub(super) conditions: Vec<Condition>,
 }

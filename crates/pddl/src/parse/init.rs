@@ -1,4 +1,4 @@
-//! The initial state and the metric.
+//! Parses the initial state and the metric.
 
 use crate::ast::{Direction, InitialElement, Metric};
 use crate::number::{Literal, literal};
@@ -7,8 +7,8 @@ use crate::sexp::Item;
 use super::{Parser, at_start, list_start};
 
 impl Parser<'_> {
-    /// One entry of `:init`; a conjunction adds several.
-    pub(super) fn initial(&mut self, item: Item<'_>, found: &mut Vec<InitialElement>) {
+    /// Parses one entry of `:init`. A conjunction yields several elements.
+    pub(super) fn initial(&mut self, item: Item<'_>, elements: &mut Vec<InitialElement>) {
         if !item.is_list() {
             self.expected(item, "a fact").help("a fact is in parentheses: `(predicate object)`");
             return;
@@ -18,20 +18,20 @@ impl Parser<'_> {
             return;
         };
         match head {
-            "=" => found.extend(self.initial_value(item)),
+            "=" => elements.extend(self.initial_value(item)),
             _ if head.eq_ignore_ascii_case("not") => {
                 let Some([inner]) = self.operands(item, "(not (predicate object))") else { return };
-                found.extend(self.fact(inner).map(InitialElement::NegatedFact));
+                elements.extend(self.fact(inner).map(InitialElement::NegatedFact));
             }
             _ if head.eq_ignore_ascii_case("and") => {
                 for item in item.rest() {
-                    self.initial(item, found);
+                    self.initial(item, elements);
                 }
             }
             _ if head.eq_ignore_ascii_case("at") && is_timed_literal(item) => {
-                found.extend(self.timed_literal(item));
+                elements.extend(self.timed_literal(item));
             }
-            _ => found.extend(self.fact(item).map(InitialElement::Fact)),
+            _ => elements.extend(self.fact(item).map(InitialElement::Fact)),
         }
     }
 
@@ -64,7 +64,7 @@ impl Parser<'_> {
         Some(InitialElement::Value(function?, value?, item.span()))
     }
 
-    /// `(at 5 (p))`, `(at 5 (not (p)))`.
+    /// Parses `(at 5 (p))` and `(at 5 (not (p)))`.
     fn timed_literal(&mut self, item: Item<'_>) -> Option<InitialElement> {
         let [time, literal] = self.operands(item, "(at 5 (predicate object))")?;
         let time = self.number(time)?;
@@ -83,7 +83,7 @@ impl Parser<'_> {
         Some(InitialElement::Timed(time, atom, holds, item.span()))
     }
 
-    /// `(:metric minimize (f))`.
+    /// Parses `(:metric minimize (f))`.
     pub(super) fn metric(&mut self, section: Item<'_>) -> Option<Metric> {
         let [direction, expression] = self.operands(section, "(:metric minimize (total-cost))")?;
         let word = direction.symbol().unwrap_or_default();
@@ -100,7 +100,7 @@ impl Parser<'_> {
     }
 }
 
-/// Whether `(at a b)` is a timed initial literal and not a fact of a predicate `at`.
+/// Returns `true` if `(at a b)` is a timed initial literal and not a fact of a predicate `at`.
 fn is_timed_literal(item: Item<'_>) -> bool {
     let mut operands = item.rest();
     let time = operands.next().and_then(Item::symbol);

@@ -1,4 +1,4 @@
-//! Problems.
+//! Parses problems.
 
 use crate::ast::{Condition, Constraint, Identifier, Metric, Problem, Span};
 use crate::sexp::Item;
@@ -7,7 +7,7 @@ use super::Parser;
 use super::list_start;
 use super::typed::Entries;
 
-/// The sections that a problem has at most once, as far as they were read.
+/// Sections that a problem has at most once, as far as they were read.
 #[derive(Default)]
 struct Once {
     domain: Option<Identifier>,
@@ -49,13 +49,13 @@ impl Parser<'_> {
     }
 
     fn problem_section(&mut self, section: Item<'_>, problem: &mut Problem, once: &mut Once) {
-        let before = self.sink.len();
+        let message_count = self.sink.len();
         let keyword = section.head().unwrap_or_default().to_ascii_lowercase();
         match keyword.as_str() {
             ":requirements" => self.requirements(section, &mut problem.requirements),
             ":objects" => {
                 problem.objects.extend(self.typed_list(section.rest(), Entries::Names));
-                if self.sink.len() > before && self.sink.has_errors() {
+                if self.sink.len() > message_count && self.sink.has_errors() {
                     self.declarations_intact = false;
                 }
             }
@@ -80,7 +80,7 @@ impl Parser<'_> {
         }
     }
 
-    /// Whether this is the first section of its kind.
+    /// Returns `true` if the section is the first of its kind; otherwise reports the repetition.
     fn first(&mut self, section: Item<'_>, place: &mut Option<Span>) -> bool {
         let span = list_start(section);
         if let Some(earlier) = place.replace(span) {
@@ -106,7 +106,7 @@ impl Parser<'_> {
         self.name_item(item, "a name of a domain")
     }
 
-    /// The goal; several conditions side by side are read as their conjunction.
+    /// Parses the goal. An empty goal is true. More than one condition is an error.
     fn goal(&mut self, section: Item<'_>, constraints: &mut Vec<Constraint>) -> Option<Condition> {
         let mut items = section.rest();
         match (items.next(), items.next()) {

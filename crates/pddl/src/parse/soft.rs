@@ -1,4 +1,4 @@
-//! Preferences in goals and conditions: parts that need not hold. They are taken out of the condition that they stand in.
+//! Separates preferences (soft conditions) from the goals and conditions that contain them.
 
 use crate::ast::{Condition, ConditionTime, Constraint, Identifier, Preference, Trajectory, TypedName};
 use crate::sexp::Item;
@@ -6,8 +6,8 @@ use crate::sexp::Item;
 use super::durative::{is_conjunction, timed};
 use super::{Parser, list_start};
 
-/// A preference as it was found, with what it stands below.
-struct Found<'t> {
+/// Unparsed preference with its context.
+struct RawPreference<'t> {
     variables: Vec<TypedName>,
     time: Option<ConditionTime>,
     name: Identifier,
@@ -15,28 +15,28 @@ struct Found<'t> {
     whole: Item<'t>,
 }
 
-/// What a preference stands below.
+/// Context of a preference: enclosing quantifiers and time specifier.
 #[derive(Clone, Default)]
-struct Above {
+struct Context {
     variables: Vec<TypedName>,
     time: Option<ConditionTime>,
 }
 
-/// Whether a preference stands in an item.
+/// Returns `true` if an item contains a preference.
 fn is_soft(item: Item<'_>) -> bool {
     item.is_headed("preference") || item.items().any(is_soft)
 }
 
 impl Parser<'_> {
-    /// The goal without its preferences, which become constraints on the last state.
+    /// Parses the goal. Its preferences become constraints on the last state.
     pub(super) fn goal_condition(
         &mut self,
         item: Item<'_>,
         constraints: &mut Vec<Constraint>,
     ) -> Option<Condition> {
-        let mut found = Vec::new();
-        let goal = self.hard(item, &Above::default(), &mut found)?;
-        for Found { variables, name, body, whole, .. } in found {
+        let mut raw_preferences = Vec::new();
+        let goal = self.hard(item, &Context::default(), &mut raw_preferences)?;
+        for RawPreference { variables, name, body, whole, .. } in raw_preferences {
             let Some(condition) = self.condition(body) else { continue };
             let trajectory = Trajectory::AtEnd(condition);
             constraints.push(Constraint {
@@ -49,15 +49,15 @@ impl Parser<'_> {
         Some(goal)
     }
 
-    /// The precondition of an instantaneous action without its preferences.
+    /// Parses the precondition of an instantaneous action and separates its preferences.
     pub(super) fn precondition(
         &mut self,
         item: Item<'_>,
         preferences: &mut Vec<Preference>,
     ) -> Option<Condition> {
-        let mut found = Vec::new();
-        let precondition = self.hard(item, &Above::default(), &mut found)?;
-        for Found { variables, name, body, whole, .. } in found {
+        let mut raw_preferences = Vec::new();
+        let precondition = self.hard(item, &Context::default(), &mut raw_preferences)?;
+        for RawPreference { variables, name, body, whole, .. } in raw_preferences {
             let Some(condition) = self.condition(body) else { continue };
             let time = ConditionTime::AtStart;
             preferences.push(Preference { variables, name, time, condition, span: whole.span() });
@@ -65,23 +65,23 @@ impl Parser<'_> {
         Some(precondition)
     }
 
-    /// The condition of a durative action, and its preferences apart.
+    /// Parses the condition of a durative action and separates its preferences.
     pub(super) fn durative_condition(
         &mut self,
         item: Item<'_>,
         conditions: &mut Vec<(ConditionTime, Condition)>,
         preferences: &mut Vec<Preference>,
     ) {
-        let mut found = Vec::new();
-        self.hard_timed(item, &Above::default(), conditions, &mut found);
-        for Found { variables, time, name, body, whole } in found {
+        let mut raw_preferences = Vec::new();
+        self.hard_timed(item, &Context::default(), conditions, &mut raw_preferences);
+        for RawPreference { variables, time, name, body, whole } in raw_preferences {
             let mut inner = Vec::new();
             match time {
                 Some(time) => inner.extend(self.condition(body).map(|condition| (time, condition))),
                 None => self.timed_conditions(body, &mut inner),
             }
             let Some((time, _)) = inner.first().cloned() else { continue };
-            if time == ConditionTime::OverAll || inner.iter().any(|(other, _)| *other != time) {
+            if time == ConditionTime::OverAll || inner.iter().any(|(other_time, _)| *other_time != time) {
                 self.refuse(whole, "preferences for conditions over all, or at several times,")
                     .help("give each condition at start or at end a preference of its own");
                 continue;
@@ -94,24 +94,30 @@ impl Parser<'_> {
         }
     }
 
-    /// What has to hold of a condition; an empty conjunction where only preferences stand.
-    fn hard<'t>(&mut self, item: Item<'t>, above: &Above, found: &mut Vec<Found<'t>>) -> Option<Condition> {
+    /// Parses the hard (mandatory) part of a condition and collects its preferences in `soft`. The result is
+    /// an empty conjunction if the condition consists of preferences only.
+    fn hard<'t>(
+        &mut self,
+        item: Item<'t>,
+        outer: &Context,
+        soft: &mut Vec<RawPreference<'t>>,
+    ) -> Option<Condition> {
         if !is_soft(item) {
             return self.condition(item);
         }
         if item.is_headed("preference") {
-            found.extend(self.preference(item, above));
+            soft.extend(self.preference(item, outer));
             return Some(Condition::And(Vec::new()));
         }
         if item.is_headed("and") {
-            let parts = item.rest().filter_map(|part| self.hard(part, above, found).map(|read| (part, read)));
-            let is_left = |(part, read): &(Item<'_>, Condition)| !is_soft(*part) || !is_empty(read);
-            return Some(Condition::And(parts.filter(is_left).map(|(_, read)| read).collect()));
+            let parts = item.rest().filter_map(|part| self.hard(part, outer, soft).map(|hard| (part, hard)));
+            let is_hard = |(part, hard): &(Item<'_>, Condition)| !is_soft(*part) || !is_empty(hard);
+            return Some(Condition::And(parts.filter(is_hard).map(|(_, hard)| hard).collect()));
         }
         if item.is_headed("forall") {
             let [variables, body] = self.operands(item, "(forall (?x - type) (preference name (p ?x)))")?;
             let variables = self.parameters(variables);
-            let inner = self.hard(body, &above.below(&variables), found)?;
+            let inner = self.hard(body, &outer.below(&variables), soft)?;
             return Some(if is_empty(&inner) {
                 inner
             } else {
@@ -121,32 +127,32 @@ impl Parser<'_> {
         self.condition(item)
     }
 
-    /// As [`Parser::hard`] for the condition of a durative action.
+    /// Like [`Parser::hard`], for the condition of a durative action.
     fn hard_timed<'t>(
         &mut self,
         item: Item<'t>,
-        above: &Above,
+        outer: &Context,
         conditions: &mut Vec<(ConditionTime, Condition)>,
-        found: &mut Vec<Found<'t>>,
+        soft: &mut Vec<RawPreference<'t>>,
     ) {
         if !is_soft(item) {
             self.timed_conditions(item, conditions);
         } else if item.is_headed("preference") {
-            found.extend(self.preference(item, above));
+            soft.extend(self.preference(item, outer));
         } else if is_conjunction(item) {
             for part in item.rest() {
-                self.hard_timed(part, above, conditions, found);
+                self.hard_timed(part, outer, conditions, soft);
             }
         } else if let Some((time, inner)) = timed(item) {
-            let above = Above { time: Some(time), ..above.clone() };
-            let hard = self.hard(inner, &above, found);
+            let outer = Context { time: Some(time), ..outer.clone() };
+            let hard = self.hard(inner, &outer, soft);
             conditions.extend(hard.filter(|hard| !is_empty(hard)).map(|hard| (time, hard)));
         } else if item.is_headed("forall") {
             let form = "(forall (?x - type) (preference name (at start (p ?x))))";
             let Some([variables, body]) = self.operands(item, form) else { return };
             let variables = self.parameters(variables);
             let mut inner = Vec::new();
-            self.hard_timed(body, &above.below(&variables), &mut inner, found);
+            self.hard_timed(body, &outer.below(&variables), &mut inner, soft);
             let quantify = |(time, part)| (time, Condition::ForAll(variables.clone(), Box::new(part)));
             conditions.extend(inner.into_iter().map(quantify));
         } else {
@@ -154,13 +160,13 @@ impl Parser<'_> {
         }
     }
 
-    fn preference<'t>(&mut self, item: Item<'t>, above: &Above) -> Option<Found<'t>> {
+    fn preference<'t>(&mut self, item: Item<'t>, outer: &Context) -> Option<RawPreference<'t>> {
         let (name, body) = self.named_preference(item)?;
-        let Above { variables, time } = above.clone();
-        Some(Found { variables, time, name: name?, body, whole: item })
+        let Context { variables, time } = outer.clone();
+        Some(RawPreference { variables, time, name: name?, body, whole: item })
     }
 
-    /// The name of a preference, if it has one, and what it prefers.
+    /// Returns the name of a preference, if it has one, and its condition.
     pub(super) fn named_preference<'t>(&mut self, item: Item<'t>) -> Option<(Option<Identifier>, Item<'t>)> {
         let mut operands = item.rest();
         match (operands.next(), operands.next(), operands.next()) {
@@ -177,10 +183,10 @@ impl Parser<'_> {
     }
 }
 
-impl Above {
+impl Context {
     fn below(&self, variables: &[TypedName]) -> Self {
-        let all = self.variables.iter().chain(variables).cloned().collect();
-        Self { variables: all, time: self.time }
+        let all_variables = self.variables.iter().chain(variables).cloned().collect();
+        Self { variables: all_variables, time: self.time }
     }
 }
 

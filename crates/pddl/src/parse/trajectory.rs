@@ -1,4 +1,4 @@
-//! Constraints on trajectories: `:constraints`.
+//! Parses trajectory constraints: `:constraints`.
 
 use num_rational::BigRational;
 
@@ -9,31 +9,32 @@ use super::durative::is_conjunction;
 use super::{Parser, list_start};
 
 impl Parser<'_> {
-    /// `(:constraints CONSTRAINT)`; several side by side are read as their conjunction.
-    pub(super) fn constraints(&mut self, section: Item<'_>, found: &mut Vec<Constraint>) {
+    /// Parses `(:constraints CONSTRAINT)`. Several constraints are read as a conjunction.
+    pub(super) fn constraints(&mut self, section: Item<'_>, constraints: &mut Vec<Constraint>) {
         for item in section.rest() {
-            self.constraint(item, &[], found);
+            self.constraint(item, &[], constraints);
         }
     }
 
-    /// Takes a constraint apart: conjunctions and quantifiers outside of preferences only gather.
-    fn constraint(&mut self, item: Item<'_>, above: &[TypedName], found: &mut Vec<Constraint>) {
+    /// Splits a constraint at conjunctions and quantifiers outside of preferences. `outer` contains the
+    /// variables of the enclosing quantifiers.
+    fn constraint(&mut self, item: Item<'_>, outer: &[TypedName], constraints: &mut Vec<Constraint>) {
         if is_conjunction(item) {
-            item.rest().for_each(|part| self.constraint(part, above, found));
+            item.rest().for_each(|part| self.constraint(part, outer, constraints));
         } else if item.is_headed("forall") {
             let Some([variables, body]) = self.operands(item, "(forall (?x - type) (always (p ?x)))") else {
                 return;
             };
-            let variables: Vec<_> = above.iter().cloned().chain(self.parameters(variables)).collect();
-            self.constraint(body, &variables, found);
+            let variables: Vec<_> = outer.iter().cloned().chain(self.parameters(variables)).collect();
+            self.constraint(body, &variables, constraints);
         } else if item.is_headed("preference") {
             let Some((Some(name), body)) = self.named_preference(item) else { return };
             let Some(trajectory) = self.trajectory(body) else { return };
-            let (variables, span) = (above.to_vec(), item.span());
-            found.push(Constraint { variables, preference: Some(name), trajectory, span });
+            let (variables, span) = (outer.to_vec(), item.span());
+            constraints.push(Constraint { variables, preference: Some(name), trajectory, span });
         } else if let Some(trajectory) = self.trajectory(item) {
-            let (variables, span) = (above.to_vec(), item.span());
-            found.push(Constraint { variables, preference: None, trajectory, span });
+            let (variables, span) = (outer.to_vec(), item.span());
+            constraints.push(Constraint { variables, preference: None, trajectory, span });
         }
     }
 
@@ -46,16 +47,16 @@ impl Parser<'_> {
                 Trajectory::ForAll(self.parameters(variables), Box::new(self.trajectory(body)?))
             }
             "at" => {
-                let [when, what] = self.operands(item, "(at end (p))")?;
+                let [when, body] = self.operands(item, "(at end (p))")?;
                 if !when.symbol().is_some_and(|when| when.eq_ignore_ascii_case("end")) {
                     self.expected(when, "`end`");
                     return None;
                 }
-                Trajectory::AtEnd(self.condition(what)?)
+                Trajectory::AtEnd(self.condition(body)?)
             }
-            "always" => Trajectory::Always(self.only(item, "(always (p))")?),
-            "sometime" => Trajectory::Sometime(self.only(item, "(sometime (p))")?),
-            "at-most-once" => Trajectory::AtMostOnce(self.only(item, "(at-most-once (p))")?),
+            "always" => Trajectory::Always(self.single_condition(item, "(always (p))")?),
+            "sometime" => Trajectory::Sometime(self.single_condition(item, "(sometime (p))")?),
+            "at-most-once" => Trajectory::AtMostOnce(self.single_condition(item, "(at-most-once (p))")?),
             "sometime-after" | "sometime-before" => {
                 let [first, second] = self.operands(item, &format!("({head} (p) (q))"))?;
                 let (first, second) = (self.condition(first), self.condition(second));
@@ -66,12 +67,12 @@ impl Parser<'_> {
                 }
             }
             "within" | "hold-after" => {
-                let [time, what] = self.operands(item, &format!("({head} 10 (p))"))?;
-                let (time, what) = (self.time(time), self.condition(what));
+                let [time, body] = self.operands(item, &format!("({head} 10 (p))"))?;
+                let (time, body) = (self.time(time), self.condition(body));
                 if head == "within" {
-                    Trajectory::Within(time?, what?)
+                    Trajectory::Within(time?, body?)
                 } else {
-                    Trajectory::HoldAfter(time?, what?)
+                    Trajectory::HoldAfter(time?, body?)
                 }
             }
             "always-within" => {
@@ -80,9 +81,9 @@ impl Parser<'_> {
                 Trajectory::AlwaysWithin(time?, first?, second?)
             }
             "hold-during" => {
-                let [from, until, what] = self.operands(item, "(hold-during 5 10 (p))")?;
-                let (from, until, what) = (self.time(from), self.time(until), self.condition(what));
-                Trajectory::HoldDuring(from?, until?, what?)
+                let [from, until, body] = self.operands(item, "(hold-during 5 10 (p))")?;
+                let (from, until, body) = (self.time(from), self.time(until), self.condition(body));
+                Trajectory::HoldDuring(from?, until?, body?)
             }
             "preference" => {
                 self.sink.error("P106", list_start(item), "a preference cannot stand in another one");
@@ -96,10 +97,10 @@ impl Parser<'_> {
         })
     }
 
-    /// The condition of a constraint with nothing else.
-    fn only(&mut self, item: Item<'_>, form: &str) -> Option<crate::ast::Condition> {
-        let [what] = self.operands(item, form)?;
-        self.condition(what)
+    /// Parses the condition of a modal operator with one operand.
+    fn single_condition(&mut self, item: Item<'_>, form: &str) -> Option<crate::ast::Condition> {
+        let [body] = self.operands(item, form)?;
+        self.condition(body)
     }
 
     fn time(&mut self, item: Item<'_>) -> Option<BigRational> {

@@ -1,21 +1,22 @@
-//! Typed lists: `?x ?y - place ?z`, objects, types, and the declarations made of them.
+//! Parses typed lists (`?x ?y - place ?z`, objects, types) and declarations with typed lists.
 
 use crate::ast::{Declaration, Domain, Identifier, Span, TypeExpression, TypedName};
 use crate::sexp::{Item, Items};
 
 use super::Parser;
 
-/// What a typed list introduces.
+/// Kind of the entries of a typed list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Entries {
-    /// With question marks.
+    /// Variables, with question marks.
     Variables,
-    /// Objects, constants or types.
+    /// Names of objects, constants or types.
     Names,
 }
 
 impl Parser<'_> {
-    /// The entries of a typed list. A dash that is glued to its neighbour counts as one of its own.
+    /// Parses the entries of a typed list. A dash that is joined to the following word is read as a separate
+    /// dash.
     pub(super) fn typed_list(&mut self, items: Items<'_>, entries: Entries) -> Vec<TypedName> {
         let mut list: Vec<TypedName> = Vec::new();
         let mut untyped_from = 0;
@@ -43,7 +44,7 @@ impl Parser<'_> {
         list
     }
 
-    /// The type behind a dash; `glued` is what follows it without a space.
+    /// Parses the type after a dash. `glued` is the text that follows the dash without a space.
     #[expect(clippy::arithmetic_side_effects, reason = "a dash is a byte of the text")]
     fn type_after_dash(&mut self, dash: Item<'_>, glued: &str, items: &mut Items<'_>) -> TypeExpression {
         if glued.starts_with(['?', ':']) {
@@ -55,7 +56,7 @@ impl Parser<'_> {
             self.sink
                 .warning("P107", dash.span(), format!("`-{glued}` is read as `- {glued}`"))
                 .help("put a space behind the dash: other planners read one name here");
-            return self.one_type(glued, span);
+            return self.named_type(glued, span);
         }
         let Some(item) = items.next() else {
             self.sink.error("P107", dash.span(), "a type is missing behind this `-`");
@@ -64,12 +65,12 @@ impl Parser<'_> {
         self.type_expression(item)
     }
 
-    /// One type or `(either …)`.
+    /// Parses one type or `(either …)`.
     fn type_expression(&mut self, item: Item<'_>) -> TypeExpression {
         if !item.is_headed("either") {
             let name = self.name_item(item, "a type");
             return name
-                .map_or_else(TypeExpression::default, |name| self.one_type(name.name.as_str(), name.span));
+                .map_or_else(TypeExpression::default, |name| self.named_type(name.name.as_str(), name.span));
         }
         if item.rest().next().is_none() {
             self.sink
@@ -80,8 +81,8 @@ impl Parser<'_> {
         TypeExpression { alternatives: alternatives.collect() }
     }
 
-    /// The type with a name; that of everything is the same as none.
-    fn one_type(&mut self, name: &str, span: Span) -> TypeExpression {
+    /// Type with the given name. `object` is represented by an empty list of alternatives.
+    fn named_type(&mut self, name: &str, span: Span) -> TypeExpression {
         if name.eq_ignore_ascii_case("object") {
             return TypeExpression::default();
         }
@@ -95,7 +96,7 @@ impl Parser<'_> {
         self.variable(item, symbol)
     }
 
-    /// A variable, without its question mark.
+    /// Parses a variable. The question mark is not part of the name.
     fn variable(&mut self, item: Item<'_>, symbol: &str) -> Option<Identifier> {
         match symbol.strip_prefix('?') {
             Some(name) if !name.is_empty() => Some(self.identifier(name, item.span())),
@@ -108,7 +109,7 @@ impl Parser<'_> {
         }
     }
 
-    /// The parenthesised parameters of an action or a quantifier.
+    /// Parses the parenthesised parameters of an action or a quantifier.
     pub(super) fn parameters(&mut self, item: Item<'_>) -> Vec<TypedName> {
         if !item.is_list() {
             self.expected(item, "a list of variables").help("write `(?x ?y - type)`");
@@ -117,7 +118,7 @@ impl Parser<'_> {
         self.typed_list(item.items(), Entries::Variables)
     }
 
-    /// `(name ?x ?y - type)`.
+    /// Parses `(name ?x ?y - type)`.
     pub(super) fn declaration(&mut self, item: Item<'_>, what: &str) -> Option<Declaration> {
         let Some(first) = item.items().next() else {
             self.expected(item, what).help("write `(name ?x ?y - type)`");
@@ -128,7 +129,8 @@ impl Parser<'_> {
         Some(Declaration { identifier, parameters })
     }
 
-    /// The declarations of `:functions`, with the types of their values: `(f ?x) - number`, `(place-of ?x) - place`, `(g)`.
+    /// Parses the declarations of `:functions` with the types of their values: `(f ?x) - number`, `(place-of
+    /// ?x) - place`, `(g)`.
     pub(super) fn function_list(&mut self, items: Items<'_>, domain: &mut Domain) {
         let mut untyped = Vec::new();
         let mut items = items;

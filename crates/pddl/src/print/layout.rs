@@ -1,12 +1,13 @@
-//! Nested lists to lines: a list that fits stands on one line, otherwise each of its items on its own.
+//! Pretty printer for nested lists: a list that fits is printed on one line, otherwise each of its items on a
+//! line of its own.
 
-/// The longest line that a list may fill.
+/// Maximum line width, in characters.
 const WIDTH: usize = 100;
 
-/// A list or a word to print.
+/// A list or a word.
 #[derive(Debug)]
 pub(super) struct Doc {
-    /// What stands before the first parenthesis, if anything: the keyword of an action.
+    /// Text before the opening parenthesis: the keyword of an action, or empty.
     keyword: String,
     content: Content,
     width: usize,
@@ -16,11 +17,11 @@ pub(super) struct Doc {
 #[derive(Debug)]
 enum Content {
     Text(String),
-    /// The items, and how many of them stay beside the parenthesis when the list is broken.
+    /// Items, and the number of items that stay on the first line if the list is broken.
     List(Vec<Doc>, usize),
 }
 
-/// A word.
+/// Creates a word.
 pub(super) fn text(text: impl Into<String>) -> Doc {
     let text = text.into();
     Doc {
@@ -31,26 +32,27 @@ pub(super) fn text(text: impl Into<String>) -> Doc {
     }
 }
 
-/// `(head items…)`; broken, the first `beside` of head and items stay on the first line.
+/// Creates the list `(head items…)`. If it is broken, the first `first_line_items` of head and items stay on
+/// the first line.
 #[expect(clippy::arithmetic_side_effects, reason = "widths of what is written in memory")]
-pub(super) fn list(head: &str, beside: usize, items: impl IntoIterator<Item = Doc>) -> Doc {
+pub(super) fn list(head: &str, first_line_items: usize, items: impl IntoIterator<Item = Doc>) -> Doc {
     let items: Vec<_> = std::iter::once(text(head)).chain(items).collect();
     let width = items.iter().map(|item| item.width + 1).sum::<usize>() + 1;
     let is_broken = items.iter().any(|item| item.is_broken);
-    Doc { keyword: String::new(), content: Content::List(items, beside), width, is_broken }
+    Doc { keyword: String::new(), content: Content::List(items, first_line_items), width, is_broken }
 }
 
 impl Doc {
-    /// The same with each item on a line of its own.
+    /// Breaks the list: all items except those of the first line are on lines of their own.
     pub(super) fn broken(mut self) -> Self {
         self.is_broken = match &self.content {
             Content::Text(_) => false,
-            Content::List(items, beside) => items.len() > *beside,
+            Content::List(items, first_line_items) => items.len() > *first_line_items,
         };
         self
     }
 
-    /// The same behind a keyword.
+    /// Puts a keyword before the document.
     #[expect(clippy::arithmetic_side_effects, reason = "widths of what is written in memory")]
     pub(super) fn after(mut self, keyword: &str) -> Self {
         keyword.clone_into(&mut self.keyword);
@@ -58,7 +60,7 @@ impl Doc {
         self
     }
 
-    /// The text without line breaks.
+    /// Text without line breaks.
     pub(super) fn on_one_line(&self) -> String {
         let mut out = String::new();
         self.write_inline(&mut out);
@@ -87,7 +89,7 @@ impl Doc {
 
     #[expect(clippy::arithmetic_side_effects, reason = "widths of what is written in memory")]
     fn write(&self, indent: usize, out: &mut String) {
-        let Content::List(items, beside) = &self.content else { return self.write_inline(out) };
+        let Content::List(items, first_line_items) = &self.content else { return self.write_inline(out) };
         if !self.is_broken && indent + self.width <= WIDTH {
             return self.write_inline(out);
         }
@@ -97,7 +99,7 @@ impl Doc {
         }
         out.push('(');
         for (index, item) in items.iter().enumerate() {
-            if index >= *beside {
+            if index >= *first_line_items {
                 out.push('\n');
                 out.extend(std::iter::repeat_n(' ', indent + 2));
                 item.write(indent + 2, out);
@@ -112,7 +114,7 @@ impl Doc {
     }
 }
 
-/// The whole text, with a line end.
+/// Prints the whole text, with a final line break.
 pub(super) fn layout(doc: &Doc) -> String {
     let mut out = String::new();
     doc.write(0, &mut out);

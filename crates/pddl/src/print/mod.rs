@@ -1,6 +1,7 @@
-//! Syntax tree to text that other planners read, too; printing what was parsed from it changes nothing.
+//! Prints syntax trees as text that other planners accept. Parsing the printed text and printing it again
+//! yields the same text.
 //!
-//! Empty sections and empty preconditions are left out, because several planners reject them.
+//! Empty sections and empty preconditions are omitted, because several planners reject them.
 
 mod layout;
 mod soft;
@@ -14,7 +15,7 @@ use layout::{Doc, layout, list, text};
 pub(crate) use tree::type_text;
 use tree::typed;
 
-/// A domain as text.
+/// Prints a domain.
 pub fn print_domain(domain: &Domain) -> String {
     let mut sections = vec![text(format!("(domain {})", domain.name.name))];
     sections.extend(requirements(&domain.requirements));
@@ -32,7 +33,7 @@ pub fn print_domain(domain: &Domain) -> String {
     layout(&list("define", 2, sections).broken())
 }
 
-/// A problem as text.
+/// Prints a problem.
 pub fn print_problem(problem: &Problem) -> String {
     let mut sections = vec![
         text(format!("(problem {})", problem.name.name)),
@@ -41,14 +42,17 @@ pub fn print_problem(problem: &Problem) -> String {
     sections.extend(requirements(&problem.requirements));
     sections.extend(entries(":objects", &problem.objects));
     sections.push(list(":init", 1, problem.init.iter().map(initial)).broken());
-    let (of_goal, others): (Vec<_>, Vec<_>) =
-        problem.constraints.iter().partition(|one| soft::is_of_goal(one));
+    let (goal_preferences, constraints): (Vec<_>, Vec<_>) =
+        problem.constraints.iter().partition(|constraint| soft::is_of_goal(constraint));
     sections.push(list(
         ":goal",
         1,
-        [soft::with(&problem.goal, of_goal.into_iter().map(|own| soft::constraint(own, true)))],
+        [soft::with(
+            &problem.goal,
+            goal_preferences.into_iter().map(|preference| soft::constraint(preference, true)),
+        )],
     ));
-    sections.extend(soft::constraints(&others));
+    sections.extend(soft::constraints(&constraints));
     sections.extend(problem.metric.as_ref().map(|metric| {
         let direction = match metric.direction {
             Direction::Minimize => "minimize",
@@ -59,17 +63,17 @@ pub fn print_problem(problem: &Problem) -> String {
     layout(&list("define", 2, sections).broken())
 }
 
-/// A condition on one line, for messages.
+/// Prints a condition on one line, for messages.
 pub(crate) fn condition_text(condition: &Condition) -> String {
     tree::condition(condition).on_one_line()
 }
 
-/// A constraint on one line, for messages.
+/// Prints a constraint on one line, for messages.
 pub(crate) fn constraint_text(constraint: &crate::ast::Constraint) -> String {
     soft::constraint(constraint, false).on_one_line()
 }
 
-/// A declaration as written: `(at ?x - robot)`.
+/// Prints a declaration: `(at ?x - robot)`.
 pub(crate) fn signature(declaration: &Declaration) -> String {
     let parameters = typed("?", &declaration.parameters);
     let space = if parameters.is_empty() { "" } else { " " };
@@ -101,7 +105,8 @@ fn action(action: &Action) -> Doc {
             if !matches!(precondition, Condition::And(parts) if parts.is_empty())
                 || !action.preferences.is_empty()
             {
-                let preferences = action.preferences.iter().map(|own| soft::preference(own, false));
+                let preferences =
+                    action.preferences.iter().map(|preference| soft::preference(preference, false));
                 parts.push(field(":precondition", soft::with(precondition, preferences)));
             }
             parts.push(field(":effect", tree::effect(effect)));
@@ -110,7 +115,7 @@ fn action(action: &Action) -> Doc {
         ActionBody::Durative { duration, conditions, effects } => {
             parts.push(field(":duration", tree::duration(duration)));
             let conditions = conditions.iter().map(tree::timed_condition);
-            let preferences = action.preferences.iter().map(|own| soft::preference(own, true));
+            let preferences = action.preferences.iter().map(|preference| soft::preference(preference, true));
             parts.push(field(":condition", list("and", 1, conditions.chain(preferences))));
             parts.push(field(":effect", list("and", 1, effects.iter().map(tree::timed_effect))));
             list(":durative-action", 2, parts).broken()

@@ -1,4 +1,4 @@
-//! Preferences and constraints on trajectories to lists.
+//! Converts preferences and trajectory constraints to lists.
 
 use num_rational::BigRational;
 
@@ -7,12 +7,12 @@ use crate::ast::{Condition, Constraint, Preference, Trajectory, TypedName};
 use super::layout::{Doc, list, text};
 use super::tree::{condition, number, timed_condition, variables};
 
-/// Whether a constraint is printed as a preference of the goal.
+/// Returns `true` if a constraint is printed as a preference of the goal.
 pub(super) fn is_of_goal(constraint: &Constraint) -> bool {
     constraint.preference.is_some() && matches!(constraint.trajectory, Trajectory::AtEnd(_))
 }
 
-/// A condition together with preferences.
+/// Combines a condition with preferences.
 pub(super) fn with(hard: &Condition, soft: impl Iterator<Item = Doc>) -> Doc {
     let mut soft = soft.peekable();
     if soft.peek().is_none() {
@@ -22,33 +22,33 @@ pub(super) fn with(hard: &Condition, soft: impl Iterator<Item = Doc>) -> Doc {
     list("and", 1, parts.iter().map(condition).chain(soft))
 }
 
-/// The section of constraints, if there are any.
+/// Section `:constraints`, if there are any.
 pub(super) fn constraints(constraints: &[&Constraint]) -> Option<Doc> {
-    let all = list("and", 1, constraints.iter().map(|own| constraint(own, false))).broken();
-    (!constraints.is_empty()).then(|| list(":constraints", 2, [all]))
+    let conjunction = list("and", 1, constraints.iter().map(|item| constraint(item, false))).broken();
+    (!constraints.is_empty()).then(|| list(":constraints", 2, [conjunction]))
 }
 
-/// A constraint below its quantifiers; among those of the goal, `at end` is not written.
+/// Converts a constraint with its quantifiers. In the goal, `at end` is omitted.
 pub(super) fn constraint(constraint: &Constraint, in_goal: bool) -> Doc {
     let body = match (&constraint.trajectory, in_goal) {
-        (Trajectory::AtEnd(what), true) => condition(what),
+        (Trajectory::AtEnd(condition_at_end), true) => condition(condition_at_end),
         (other, _) => trajectory(other),
     };
     let body = match &constraint.preference {
         Some(name) => list("preference", 2, [text(name.name.as_str()), body]),
         None => body,
     };
-    below(&constraint.variables, body)
+    quantified(&constraint.variables, body)
 }
 
-/// A preference of an action below its quantifiers.
+/// Converts a preference of an action with its quantifiers.
 pub(super) fn preference(preference: &Preference, is_timed: bool) -> Doc {
-    let Preference { variables, name, time, condition: what, .. } = preference;
-    let body = if is_timed { timed_condition(&(*time, what.clone())) } else { condition(what) };
-    below(variables, list("preference", 2, [text(name.name.as_str()), body]))
+    let Preference { variables, name, time, condition: body, .. } = preference;
+    let body = if is_timed { timed_condition(&(*time, body.clone())) } else { condition(body) };
+    quantified(variables, list("preference", 2, [text(name.name.as_str()), body]))
 }
 
-fn below(entries: &[TypedName], body: Doc) -> Doc {
+fn quantified(entries: &[TypedName], body: Doc) -> Doc {
     if entries.is_empty() { body } else { list("forall", 2, [variables(entries), body]) }
 }
 
@@ -60,15 +60,15 @@ fn trajectory(tree: &Trajectory) -> Doc {
     match tree {
         Trajectory::And(parts) => list("and", 1, parts.iter().map(trajectory)),
         Trajectory::ForAll(entries, body) => list("forall", 2, [variables(entries), trajectory(body)]),
-        Trajectory::AtEnd(what) => list("at", 2, [text("end"), condition(what)]),
-        Trajectory::Always(what) => timed("always", &[], &[what]),
-        Trajectory::Sometime(what) => timed("sometime", &[], &[what]),
-        Trajectory::AtMostOnce(what) => timed("at-most-once", &[], &[what]),
+        Trajectory::AtEnd(body) => list("at", 2, [text("end"), condition(body)]),
+        Trajectory::Always(body) => timed("always", &[], &[body]),
+        Trajectory::Sometime(body) => timed("sometime", &[], &[body]),
+        Trajectory::AtMostOnce(body) => timed("at-most-once", &[], &[body]),
         Trajectory::SometimeAfter(first, second) => timed("sometime-after", &[], &[first, second]),
         Trajectory::SometimeBefore(first, second) => timed("sometime-before", &[], &[first, second]),
-        Trajectory::Within(time, what) => timed("within", &[time], &[what]),
+        Trajectory::Within(time, body) => timed("within", &[time], &[body]),
         Trajectory::AlwaysWithin(time, first, second) => timed("always-within", &[time], &[first, second]),
-        Trajectory::HoldDuring(from, until, what) => timed("hold-during", &[from, until], &[what]),
-        Trajectory::HoldAfter(time, what) => timed("hold-after", &[time], &[what]),
+        Trajectory::HoldDuring(from, until, body) => timed("hold-during", &[from, until], &[body]),
+        Trajectory::HoldAfter(time, body) => timed("hold-after", &[time], &[body]),
     }
 }

@@ -1,4 +1,4 @@
-//! Conditions, effects and expressions to lists.
+//! Converts conditions, effects and expressions to lists.
 
 use num_rational::BigRational;
 
@@ -21,7 +21,7 @@ pub(super) fn atom(atom: &Atom) -> Doc {
     list(atom.predicate.name.as_str(), 1, atom.arguments.iter().map(term))
 }
 
-/// A decimal, or a quotient where there is none.
+/// Converts a number to a decimal, or to a quotient if it has no finite decimal.
 pub(super) fn number(value: &BigRational) -> Doc {
     match to_decimal(value) {
         Some(decimal) => text(decimal),
@@ -109,7 +109,7 @@ fn when(time: EffectTime) -> &'static str {
     }
 }
 
-/// `:duration`; only constraints that are evaluated at the end say so.
+/// Converts `:duration`. `at start` is the default and omitted.
 pub(super) fn duration(constraints: &[DurationConstraint]) -> Doc {
     let constraint = |constraint: &DurationConstraint| {
         let bound = [text("?duration"), expression(&constraint.expression)];
@@ -121,12 +121,13 @@ pub(super) fn duration(constraints: &[DurationConstraint]) -> Doc {
     };
     match constraints {
         [] => text("()"),
-        [one] => constraint(one),
-        several => list("and", 1, several.iter().map(constraint)),
+        [single] => constraint(single),
+        constraints => list("and", 1, constraints.iter().map(constraint)),
     }
 }
 
-/// A typed list in groups of one type, each name with `prefix`. Untyped names can stand bare only at the end.
+/// Formats a typed list in groups of equal type, each name with `prefix`. The type `object` may be omitted
+/// only at the end, because a type applies to all preceding untyped names.
 #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
 pub(super) fn typed(prefix: &str, entries: &[TypedName]) -> Vec<String> {
     let bare_from =
@@ -146,12 +147,12 @@ pub(super) fn typed(prefix: &str, entries: &[TypedName]) -> Vec<String> {
     lines
 }
 
-/// The type of a typed list, without its dash.
+/// Text of a type, without its dash.
 pub(crate) fn type_text(r#type: &TypeExpression) -> String {
     let names: Vec<_> = r#type.alternatives.iter().map(|name| name.name.as_str()).collect();
     match names.as_slice() {
         [] => "object".to_owned(),
-        [one] => (*one).to_owned(),
-        several => format!("(either {})", several.join(" ")),
+        [single] => (*single).to_owned(),
+        alternatives => format!("(either {})", alternatives.join(" ")),
     }
 }

@@ -1,6 +1,6 @@
-//! One step to the problem that is left: what executing an action changes, by the same rules as [`validate`](super::validate()).
+//! Computes the changes of a single step, by the same rules as [`validate`](super::validate()).
 //!
-//! For those who execute a plan and not only check it: the state after each action is the initial state of what remains.
+//! Used during execution: the state after each action is the initial state of the remaining problem.
 
 use num_rational::BigRational;
 use rustc_hash::FxHashMap;
@@ -21,58 +21,60 @@ use super::step;
 use super::verdict::Violation;
 use super::world::{Arguments, State, Symbol, World};
 
-/// What one step changes.
+/// Changes of one step.
 #[derive(Debug, Clone)]
 pub struct Advance {
-    /// Facts that begin to hold, sorted.
+    /// Facts that become true, sorted.
     pub added: Vec<Atom>,
-    /// Facts that cease to hold, sorted.
+    /// Facts that become false, sorted.
     pub deleted: Vec<Atom>,
-    /// The functions that it changes, sorted.
+    /// Changed functions, sorted.
     pub values: Vec<ValueChange>,
-    /// How long it takes, in the domain's time unit.
+    /// Duration, in the domain's time unit.
     pub duration: BigRational,
-    /// The value of the problem's metric if the plan ended with it; none without a metric, or where it is undefined.
+    /// Metric value if the plan ended with the step; `None` without a metric or if the value is undefined.
     pub metric: Option<BigRational>,
 }
 
-/// A function whose value a step changes.
+/// Change of a function's value.
 #[derive(Debug, Clone)]
 pub struct ValueChange {
-    /// The function with its arguments.
+    /// Function with its arguments.
     pub function: Atom,
-    /// As text: `(battery)`.
+    /// Function as text: `(battery)`.
     pub text: String,
-    /// Its value before, where it has one.
+    /// Value before the step, if defined.
     pub before: Option<BigRational>,
-    /// Its value afterwards.
+    /// Value after the step.
     pub after: BigRational,
-    /// Whether it gets a value whatever it had before, as by `assign`, and is not increased or decreased.
+    /// Whether the new value is independent of the old one, as with `assign`; `false` for increases,
+    /// decreases and scalings.
     pub assigned: bool,
 }
 
-/// Executes one step from the initial state of a problem. Timed initial literals do not take place.
+/// Executes one step in the initial state of a problem. Timed initial literals are not applied.
 ///
 /// # Errors
-/// What forbids it; with `forced`, only effects that are undefined, and actions that there are not.
+/// Returns the violation that prevents the step. With `forced`, conditions and interference are not checked;
+/// unknown actions, invalid durations, and undefined or conflicting effects remain errors.
 pub fn advance(
     domain: &Domain,
     problem: &Problem,
     step: &PlanStep,
     forced: bool,
 ) -> Result<Advance, Box<Violation>> {
-    let own = relevant(domain, problem, std::slice::from_ref(step));
-    advance_in(&World::new(domain, own.as_ref().unwrap_or(problem), &|| false), step, forced)
+    let reduced = relevant(domain, problem, std::slice::from_ref(step));
+    advance_in(&World::new(domain, reduced.as_ref().unwrap_or(problem), &|| false), step, forced)
 }
 
-/// Executes each of some steps from the initial state of a problem, as [`advance`] does for one of them that is not forced.
+/// Executes each step separately in the initial state of a problem, like [`advance`] with `forced = false`.
 pub fn advance_each(
     domain: &Domain,
     problem: &Problem,
     steps: &[PlanStep],
 ) -> Vec<Result<Advance, Box<Violation>>> {
-    let own = relevant(domain, problem, steps);
-    let world = World::new(domain, own.as_ref().unwrap_or(problem), &|| false);
+    let reduced = relevant(domain, problem, steps);
+    let world = World::new(domain, reduced.as_ref().unwrap_or(problem), &|| false);
     steps.iter().map(|step| advance_in(&world, step, false)).collect()
 }
 
@@ -85,9 +87,10 @@ fn advance_in(world: &World<'_>, step: &PlanStep, forced: bool) -> Result<Advanc
     let running =
         if forced { execution.begin_anyway(&step, &start) } else { execution.begin(&step, &start) }?;
     let mut assigned = FxHashMap::default();
-    // Nothing interferes with what has been done: an end that is enforced comes after its start, however short the action is.
-    let has_two = running.first_part() == Part::Start || (forced && is_durative(&running.instance));
-    let parts: &[Part] = if has_two { &[Part::Start, Part::End] } else { &[Part::Whole] };
+    // With `forced`, the end comes after the start even if the duration is 0: the effects at start have
+    // already happened and cannot interfere.
+    let has_two_parts = running.first_part() == Part::Start || (forced && is_durative(&running.instance));
+    let parts: &[Part] = if has_two_parts { &[Part::Start, Part::End] } else { &[Part::Whole] };
     for part in parts {
         let time = if *part == Part::End { &running.end } else { &start };
         if *part == Part::End && !forced {
@@ -110,13 +113,13 @@ fn advance_in(world: &World<'_>, step: &PlanStep, forced: bool) -> Result<Advanc
     });
     let mut values: Vec<ValueChange> = values.collect();
     values.sort_by(|left, right| left.text.cmp(&right.text));
-    let (added, deleted) = (missing(world, after, &before), missing(world, &before, after));
+    let (added, deleted) = (facts_only_in(world, after, &before), facts_only_in(world, &before, after));
     let metric = metric(world, after, &running.duration);
     Ok(Advance { added, deleted, values, duration: running.duration, metric })
 }
 
 impl Advance {
-    /// Changes the initial state of a problem, so that it is the state after the step.
+    /// Replaces the initial state of a problem by the state after the step.
     pub fn apply(&self, init: &mut Vec<InitialElement>) {
         init.retain(|element| match element {
             InitialElement::Fact(atom) => !self.deleted.iter().any(|deleted| is_same(deleted, atom)),
@@ -152,17 +155,17 @@ fn is_same(left: &Atom, right: &Atom) -> bool {
         && left.arguments.iter().zip(&right.arguments).all(|(left, right)| name(left) == name(right))
 }
 
-/// The value of the problem's metric if the plan ended in its initial state after `total_time`, in the domain's time
-/// unit; none without a metric, or where it is undefined.
+/// Metric value if the plan ended in the initial state of the problem after `total_time`, in the domain's
+/// time unit. `None` without a metric or if the value is undefined.
 pub fn metric_after(domain: &Domain, problem: &Problem, total_time: &BigRational) -> Option<BigRational> {
-    let own = relevant(domain, problem, &[]);
-    let world = World::new(domain, own.as_ref().unwrap_or(problem), &|| false);
+    let reduced = relevant(domain, problem, &[]);
+    let world = World::new(domain, reduced.as_ref().unwrap_or(problem), &|| false);
     let options = Options::default();
     let execution = Execution::new(&world, &options);
     metric(&world, &execution.state, total_time)
 }
 
-/// The value of the problem's metric if a plan ended in this state after `total_time`.
+/// Metric value if a plan ended in `state` after `total_time`.
 pub(super) fn metric(world: &World<'_>, state: &State, total_time: &BigRational) -> Option<BigRational> {
     let metric = world.problem.metric.as_ref()?;
     let evaluator = Evaluator { total_time: Some(total_time), ..Evaluator::new(world, state) };
@@ -176,13 +179,13 @@ fn note(changes: &Changes, assigned: &mut FxHashMap<Ground, bool>) {
     }
 }
 
-/// Facts that hold in one state and not in another, sorted.
-fn missing(world: &World<'_>, there: &State, here: &State) -> Vec<Atom> {
+/// Facts that hold in `state` and not in `other`, sorted.
+fn facts_only_in(world: &World<'_>, state: &State, other: &State) -> Vec<Atom> {
     let is_new = |predicate: Symbol, arguments: &Arguments| {
-        !here.facts.get(&predicate).is_some_and(|tuples| tuples.contains(arguments))
+        !other.facts.get(&predicate).is_some_and(|tuples| tuples.contains(arguments))
     };
     let mut facts: Vec<Ground> = Vec::new();
-    for (predicate, tuples) in &there.facts {
+    for (predicate, tuples) in &state.facts {
         let new = tuples.iter().filter(|arguments| is_new(*predicate, arguments));
         facts.extend(new.map(|arguments| (*predicate, arguments.clone())));
     }

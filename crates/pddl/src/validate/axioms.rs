@@ -1,42 +1,42 @@
-//! The axioms of a domain by stratum, and where new facts can be joined with their conditions.
+//! Groups the axioms of a domain by stratum and finds the atoms that new facts can be joined with.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::ast::{Atom, Condition, Derived, Domain, Name, TypedName};
 use crate::strata::Strata;
 
-/// The axioms of predicates that may depend on each other.
+/// Axioms of mutually dependent predicates.
 #[derive(Debug, Default)]
 pub(super) struct Stratum<'p> {
-    /// The predicates.
-    pub(super) own: FxHashSet<&'p Name>,
+    /// Derived predicates of the stratum.
+    pub(super) predicates: FxHashSet<&'p Name>,
     pub(super) axioms: Vec<Axiom<'p>>,
-    /// By predicate of the stratum: where the axioms mention it.
+    /// Occurrences of each predicate of the stratum in the conditions of the axioms.
     pub(super) occurrences: FxHashMap<&'p Name, Vec<Occurrence<'p>>>,
 }
 
-/// An axiom.
 #[derive(Debug)]
 pub(super) struct Axiom<'p> {
     pub(super) derived: &'p Derived,
-    /// Those parts of its condition, by address, that mention a predicate of the stratum where new facts cannot be joined.
+    /// Parts of the condition, by address, that mention a predicate of the stratum at a position where new
+    /// facts cannot be joined.
     pub(super) opaque: FxHashSet<*const Condition>,
 }
 
-/// An atom in the condition of an axiom, below conjunctions, disjunctions and existential quantifiers only.
+/// Atom in the condition of an axiom, below conjunctions, disjunctions and existential quantifiers only.
 #[derive(Debug)]
 pub(super) struct Occurrence<'p> {
-    /// The position of the axiom.
+    /// Index of the axiom.
     pub(super) axiom: usize,
     pub(super) atom: &'p Atom,
-    /// The variables of the quantifiers around the atom, outermost first.
+    /// Variables of the enclosing quantifiers, outermost first.
     pub(super) variables: Vec<&'p [TypedName]>,
-    /// The conjunctions around the atom, with the position of the conjunct that contains the atom.
+    /// Enclosing conjunctions, each with the index of the conjunct that contains the atom.
     pub(super) conjunctions: Vec<(&'p [Condition], usize)>,
 }
 
-/// The strata of a domain, lowest first. Axioms through their own negation have no strata; the checker
-/// refuses them, and here they all come into one.
+/// Returns the strata of a domain, lowest first. Axioms that depend on their own negation cannot be
+/// stratified. The checker rejects them; here they all belong to one stratum.
 #[expect(clippy::arithmetic_side_effects, reason = "levels are at most the number of predicates")]
 pub(super) fn strata(domain: &Domain) -> Vec<Stratum<'_>> {
     let levels = Strata::of(domain).ok();
@@ -47,17 +47,17 @@ pub(super) fn strata(domain: &Domain) -> Vec<Stratum<'_>> {
         if strata.len() <= level {
             strata.resize_with(level + 1, Stratum::default);
         }
-        strata[level].own.insert(name);
+        strata[level].predicates.insert(name);
         strata[level].axioms.push(Axiom { derived, opaque: FxHashSet::default() });
     }
     for stratum in &mut strata {
-        let Stratum { own, axioms, occurrences } = stratum;
+        let Stratum { predicates, axioms, occurrences } = stratum;
         for (axiom, Axiom { derived, opaque }) in axioms.iter_mut().enumerate() {
             let derived = *derived;
             let mut walk = Walk {
                 axiom,
                 derived,
-                own: &*own,
+                predicates: &*predicates,
                 variables: Vec::new(),
                 conjunctions: Vec::new(),
                 occurrences: &mut *occurrences,
@@ -69,7 +69,7 @@ pub(super) fn strata(domain: &Domain) -> Vec<Stratum<'_>> {
     strata
 }
 
-/// All predicates and functions in the conditions of axioms.
+/// Returns all predicates and functions that occur in conditions of axioms.
 pub(super) fn read_by_axioms(domain: &Domain) -> FxHashSet<&Name> {
     let mut names = FxHashSet::default();
     for axiom in &domain.derived {
@@ -80,11 +80,11 @@ pub(super) fn read_by_axioms(domain: &Domain) -> FxHashSet<&Name> {
     names
 }
 
-/// A walk through the condition of an axiom.
+/// Visitor for the condition of one axiom.
 struct Walk<'w, 'p> {
     axiom: usize,
     derived: &'p Derived,
-    own: &'w FxHashSet<&'p Name>,
+    predicates: &'w FxHashSet<&'p Name>,
     variables: Vec<&'p [TypedName]>,
     conjunctions: Vec<(&'p [Condition], usize)>,
     occurrences: &'w mut FxHashMap<&'p Name, Vec<Occurrence<'p>>>,
@@ -92,7 +92,8 @@ struct Walk<'w, 'p> {
 }
 
 impl<'p> Walk<'_, 'p> {
-    /// Notes the occurrences of predicates of the stratum. Returns `true` if there is one with which new facts cannot be joined.
+    /// Records the occurrences of predicates of the stratum. Returns `true` if the condition is opaque: new
+    /// facts cannot be joined with one of them.
     fn visit(&mut self, condition: &'p Condition) -> bool {
         let mut is_opaque = false;
         match condition {
@@ -109,7 +110,7 @@ impl<'p> Walk<'_, 'p> {
                 is_opaque = self.visit(body);
                 self.variables.pop();
             }
-            Condition::Atom(atom) if self.own.contains(&atom.predicate.name) => {
+            Condition::Atom(atom) if self.predicates.contains(&atom.predicate.name) => {
                 let occurrence = Occurrence {
                     axiom: self.axiom,
                     atom,
@@ -118,7 +119,7 @@ impl<'p> Walk<'_, 'p> {
                 };
                 self.occurrences.entry(&atom.predicate.name).or_default().push(occurrence);
             }
-            other => names_in(other, &mut |name| is_opaque |= self.own.contains(name)),
+            other => names_in(other, &mut |name| is_opaque |= self.predicates.contains(name)),
         }
         if is_opaque {
             self.opaque.insert(std::ptr::from_ref(condition));
@@ -126,19 +127,19 @@ impl<'p> Walk<'_, 'p> {
         is_opaque
     }
 
-    /// Returns `true` if one of some variables has the name of a variable around them.
+    /// Returns `true` if one of `variables` shadows an enclosing variable.
     fn hides(&self, variables: &[TypedName]) -> bool {
-        let around = self.variables.iter().copied().chain([&self.derived.head.parameters[..]]).flatten();
-        let around: FxHashSet<&Name> = around.map(|entry| &entry.identifier.name).collect();
-        variables.iter().any(|entry| around.contains(&entry.identifier.name))
+        let enclosing = self.variables.iter().copied().chain([&self.derived.head.parameters[..]]).flatten();
+        let enclosing: FxHashSet<&Name> = enclosing.map(|entry| &entry.identifier.name).collect();
+        variables.iter().any(|entry| enclosing.contains(&entry.identifier.name))
     }
 }
 
-/// Calls `found` with each predicate and each function of a condition.
-fn names_in<'p>(condition: &'p Condition, found: &mut dyn FnMut(&'p Name)) {
+/// Calls `visit` with each predicate and each function of a condition.
+fn names_in<'p>(condition: &'p Condition, visit: &mut dyn FnMut(&'p Name)) {
     condition.walk(&mut |node| {
         if let Some(atom) = node.atom().or_else(|| node.fluent()) {
-            found(&atom.predicate.name);
+            visit(&atom.predicate.name);
         }
     });
 }

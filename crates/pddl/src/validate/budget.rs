@@ -1,12 +1,12 @@
-//! When an execution has to stop before its end.
+//! Interruption of a validation by its caller.
 
 use std::cell::Cell;
 use std::fmt;
 
-/// Number of steps between two calls of the caller's function.
+/// Number of loop steps between two calls of the caller's function.
 const STRIDE: u32 = 256;
 
-/// The validation ended at a limit of its caller, without a verdict.
+/// The validation was stopped by its caller and has no verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Interrupted;
 
@@ -18,37 +18,38 @@ impl fmt::Display for Interrupted {
 
 impl std::error::Error for Interrupted {}
 
-/// The caller's limits. Once they are reached, every loop of the execution ends, and what it has found is discarded.
+/// The caller's stop condition. Once it holds, all loops end early, and their results are discarded.
 pub(super) struct Budget<'s> {
     stop: &'s dyn Fn() -> bool,
-    left: Cell<u32>,
+    /// Loop steps until the next call of `stop`.
+    steps_left: Cell<u32>,
     is_spent: Cell<bool>,
 }
 
 impl<'s> Budget<'s> {
-    /// Limits that are reached when the function returns `true`.
+    /// Budget that is exhausted when `stop` returns `true`.
     pub(super) fn new(stop: &'s dyn Fn() -> bool) -> Self {
-        Self { stop, left: Cell::new(STRIDE), is_spent: Cell::new(false) }
+        Self { stop, steps_left: Cell::new(STRIDE), is_spent: Cell::new(false) }
     }
 
-    /// Notes one step of a loop. Returns `true` if the loop has to end.
+    /// Counts one loop step. Returns `true` if the loop must end.
     pub(super) fn is_spent(&self) -> bool {
-        let left = self.left.get();
-        if left > 0 {
-            self.left.set(left.saturating_sub(1));
+        let steps_left = self.steps_left.get();
+        if steps_left > 0 {
+            self.steps_left.set(steps_left.saturating_sub(1));
             return self.is_spent.get();
         }
-        self.left.set(STRIDE);
+        self.steps_left.set(STRIDE);
         self.poll()
     }
 
-    /// Returns `true` if a loop has to end whose steps may take long.
+    /// Calls `stop` immediately, for loops with long steps. Returns `true` if the loop must end.
     pub(super) fn poll(&self) -> bool {
         self.is_spent.set(self.is_spent.get() || (self.stop)());
         self.is_spent.get()
     }
 
-    /// The result of an execution, unless a loop of it was cut short.
+    /// Returns the result of an execution unless it was interrupted.
     pub(super) fn check<T>(&self, result: T) -> Result<T, Interrupted> {
         if self.is_spent.get() { Err(Interrupted) } else { Ok(result) }
     }

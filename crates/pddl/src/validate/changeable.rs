@@ -1,10 +1,10 @@
-//! The functions and the predicates that a plan can change.
+//! Functions and predicates that a plan can change.
 
 use rustc_hash::FxHashSet;
 
 use crate::ast::{Action, ActionBody, Domain, Effect, InitialElement, Name, Problem};
 
-/// The functions that some action can change.
+/// Functions that some action can change.
 pub(super) fn changeable_functions(domain: &Domain) -> FxHashSet<&Name> {
     let mut functions = FxHashSet::default();
     for action in &domain.actions {
@@ -17,7 +17,7 @@ pub(super) fn changeable_functions(domain: &Domain) -> FxHashSet<&Name> {
     functions
 }
 
-/// The predicates whose facts actions, timed initial literals or axioms can change.
+/// Predicates that actions, timed initial literals or axioms can change.
 pub(super) fn changeable_predicates<'p>(domain: &'p Domain, problem: &'p Problem) -> FxHashSet<&'p Name> {
     let mut predicates: FxHashSet<&Name> = FxHashSet::default();
     predicates.extend(domain.derived.iter().map(|axiom| &axiom.head.identifier.name));
@@ -34,22 +34,22 @@ pub(super) fn changeable_predicates<'p>(domain: &'p Domain, problem: &'p Problem
     predicates
 }
 
-/// Calls `found` with each effect of an action that is not made of others.
-fn action_effects<'p>(action: &'p Action, found: &mut dyn FnMut(&'p Effect)) {
+/// Calls `visit` with each atomic effect of an action.
+fn action_effects<'p>(action: &'p Action, visit: &mut dyn FnMut(&'p Effect)) {
     match &action.body {
-        ActionBody::Instantaneous { effect, .. } => simple_effects(effect, found),
+        ActionBody::Instantaneous { effect, .. } => simple_effects(effect, visit),
         ActionBody::Durative { effects, .. } => {
             for (_, effect) in effects {
-                simple_effects(effect, found);
+                simple_effects(effect, visit);
             }
         }
     }
 }
 
-fn simple_effects<'p>(effect: &'p Effect, found: &mut dyn FnMut(&'p Effect)) {
+fn simple_effects<'p>(effect: &'p Effect, visit: &mut dyn FnMut(&'p Effect)) {
     match effect {
-        Effect::And(parts) => parts.iter().for_each(|part| simple_effects(part, found)),
-        Effect::ForAll(_, body) | Effect::When(_, body) => simple_effects(body, found),
-        Effect::Assign(..) | Effect::Add(_) | Effect::Delete(_) => found(effect),
+        Effect::And(parts) => parts.iter().for_each(|part| simple_effects(part, visit)),
+        Effect::ForAll(_, body) | Effect::When(_, body) => simple_effects(body, visit),
+        Effect::Assign(..) | Effect::Add(_) | Effect::Delete(_) => visit(effect),
     }
 }

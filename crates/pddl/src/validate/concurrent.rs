@@ -1,4 +1,5 @@
-//! Overlapping actions: what happens at one time reads the state before it, and happenings that interfere lie apart.
+//! Execution of overlapping actions. Simultaneous happenings read the state before them; interfering
+//! happenings must be separated.
 
 use num_rational::BigRational;
 use num_traits::Signed;
@@ -14,15 +15,16 @@ use super::step::Step;
 use super::verdict::{Violation, ViolationKind};
 use crate::number::show_number;
 
-/// A happening that lies less than the separation back.
+/// A happening less than the separation ago.
 struct Recent<'e, 'p> {
-    /// None for events.
+    /// `None` for events.
     step: Option<&'e Step<'p>>,
     time: BigRational,
     footprint: Footprint,
 }
 
-/// Executes the steps at their times; `total_time` becomes the end of the last one. In the end, all events up to it have taken place.
+/// Executes the steps at their start times. `total_time` becomes the end of the last action. Afterwards all
+/// events up to this time have been applied.
 pub(super) fn run<'e, 'p>(
     execution: &mut Execution<'e, 'p>,
     steps: &'e [Step<'p>],
@@ -45,28 +47,30 @@ pub(super) fn run<'e, 'p>(
         {
             parts.happenings.push((None, event));
         }
-        let (ending, mut going_on): (Vec<_>, Vec<_>) =
+        let (ending, mut continuing): (Vec<_>, Vec<_>) =
             running.into_iter().partition(|running| running.end == time);
         while let Some((_, step)) = starts.pop_if(|(start, _)| *start == time) {
-            let started = execution.begin(step, &time)?;
-            let part = started.first_part();
-            execution.prefer(&started, ConditionTime::AtStart, &time)?;
+            let running_action = execution.begin(step, &time)?;
+            let part = running_action.first_part();
+            execution.prefer(&running_action, ConditionTime::AtStart, &time)?;
             if part == Part::Whole {
-                execution.prefer(&started, ConditionTime::AtEnd, &time)?;
+                execution.prefer(&running_action, ConditionTime::AtEnd, &time)?;
             }
-            parts.happenings.push((Some(step), execution.happening(&started, part, &time)?));
+            parts.happenings.push((Some(step), execution.happening(&running_action, part, &time)?));
             if part == Part::Start {
-                going_on.push(started);
+                continuing.push(running_action);
             }
             *total_time = time.clone();
         }
-        for ended in &ending {
-            execution.prefer(ended, ConditionTime::AtEnd, &time)?;
-            parts.happenings.push((Some(ended.step), execution.happening(ended, Part::End, &time)?));
+        for ending_action in &ending {
+            execution.prefer(ending_action, ConditionTime::AtEnd, &time)?;
+            parts
+                .happenings
+                .push((Some(ending_action.step), execution.happening(ending_action, Part::End, &time)?));
             *total_time = time.clone();
         }
-        running = going_on;
-        parts.keep_apart(execution, &time, &mut recent)?;
+        running = continuing;
+        parts.check_separation(execution, &time, &mut recent)?;
         let is_event = parts.happenings.iter().all(|(step, _)| step.is_none());
         parts.apply(execution, &time)?;
         execution.record.note(&time, &execution.state, is_event);
@@ -75,18 +79,18 @@ pub(super) fn run<'e, 'p>(
         }
     }
     execution.pass(total_time, true);
-    // Events after the end change nothing any more, but they must not come too soon either.
+    // Later events no longer change the outcome, but they must respect the separation.
     let safe = &*total_time + &execution.options.tolerance;
     while execution.next_timed().is_some_and(|next| *next < safe)
         && let Some((time, event)) = execution.take_next_timed()
     {
         let mut parts = Simultaneous { happenings: vec![(None, event)] };
-        parts.keep_apart(execution, &time, &mut recent)?;
+        parts.check_separation(execution, &time, &mut recent)?;
     }
     Ok(())
 }
 
-/// The starts of all steps, the last one first.
+/// Start times of all steps, in descending order.
 fn starts<'e, 'p>(
     steps: &'e [Step<'p>],
     zero: &BigRational,
@@ -108,15 +112,15 @@ fn starts<'e, 'p>(
     Ok(starts)
 }
 
-/// All that happens at one time.
+/// All happenings at one time.
 #[derive(Default)]
 struct Simultaneous<'e, 'p> {
     happenings: Vec<(Option<&'e Step<'p>>, Happening)>,
 }
 
 impl<'e, 'p> Simultaneous<'e, 'p> {
-    /// Checks that nothing here interferes with each other or with what happened just before.
-    fn keep_apart(
+    /// Checks that the happenings interfere neither with each other nor with recent ones.
+    fn check_separation(
         &mut self,
         execution: &Execution<'e, 'p>,
         time: &BigRational,
@@ -125,7 +129,7 @@ impl<'e, 'p> Simultaneous<'e, 'p> {
         recent.retain(|earlier| &earlier.time + &execution.options.tolerance > *time);
         for (step, Happening { footprint, .. }) in &mut self.happenings {
             for earlier in recent.iter() {
-                apart(execution, (*step, time, footprint), earlier)?;
+                check_pair(execution, (*step, time, footprint), earlier)?;
             }
             recent.push(Recent { step: *step, time: time.clone(), footprint: std::mem::take(footprint) });
         }
@@ -133,29 +137,29 @@ impl<'e, 'p> Simultaneous<'e, 'p> {
     }
 
     fn apply(self, execution: &mut Execution<'e, 'p>, time: &BigRational) -> Result<(), Box<Violation>> {
-        let mut all = Changes::default();
+        let mut merged = Changes::default();
         let mut last = None;
         for (step, Happening { changes, .. }) in self.happenings {
             let Some(step) = step else {
-                // They come first, and do not interfere with what follows.
+                // Events come first and do not interfere with the other happenings.
                 execution.apply_events(changes);
                 continue;
             };
-            all.merge(changes).map_err(|error| execution.effect_violation(step, time, &error))?;
+            merged.merge(changes).map_err(|error| execution.effect_violation(step, time, &error))?;
             last = Some(step);
         }
-        last.map_or(Ok(()), |step| execution.apply(step, time, all))
+        last.map_or(Ok(()), |step| execution.apply(step, time, merged))
     }
 }
 
-/// Whether a happening of another action, or an event, lies far enough back not to disturb one.
-fn apart<'p>(
+/// Checks that a happening does not interfere with a recent one of another action or of an event.
+fn check_pair<'p>(
     execution: &Execution<'_, 'p>,
     (step, time, footprint): (Option<&Step<'p>>, &BigRational, &Footprint),
     earlier: &Recent<'_, 'p>,
 ) -> Result<(), Box<Violation>> {
-    let own = |other: &Step<'p>| step.is_some_and(|step| step.number == other.number);
-    if earlier.step.is_some_and(own) {
+    let is_same_step = |other: &Step<'p>| step.is_some_and(|step| step.number == other.number);
+    if earlier.step.is_some_and(is_same_step) {
         return Ok(());
     }
     let Some(touched) = footprint.interferes(&earlier.footprint) else { return Ok(()) };

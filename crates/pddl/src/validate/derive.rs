@@ -1,8 +1,10 @@
-//! Derived facts of a state: the least fixpoint of the axioms, stratum by stratum, by semi-naive evaluation \[1\].
+//! Computes the derived facts of a state: the least fixpoint of the axioms, stratum by stratum, by semi-naive
+//! evaluation \[1\].
 //!
-//! A new fact is joined with the other conditions of each axiom that mentions its predicate. That is not possible where an axiom mentions
-//! a predicate of its own stratum under a negation, an implication or a universal quantifier. The instances of such an axiom wait for
-//! the facts that were missing when they were evaluated.
+//! A new fact is joined with the remaining conditions of each axiom that mentions its predicate. This is
+//! impossible if the axiom mentions a predicate of its own stratum below a negation, an implication or a
+//! universal quantifier (an *opaque* condition). The instances of such an axiom are re-evaluated when a fact
+//! arrives that was missing in their last evaluation.
 //!
 //! \[1\] F. Bancilhon, R. Ramakrishnan: An amateur's introduction to recursive query processing strategies, SIGMOD 1986.
 
@@ -18,8 +20,7 @@ use super::evaluate::{Bindings, Evaluator};
 use super::trace::Trace;
 use super::world::{Arguments, State, Symbol, World};
 
-/// Replaces the derived facts of `state` by those that follow from its other facts. An axiom whose
-/// condition is undefined for some objects says nothing about them.
+/// Recomputes the derived facts of `state`. An axiom instance with an undefined condition derives nothing.
 pub(super) fn close(world: &World<'_>, state: &mut State) {
     state.derived.clear();
     for stratum in &world.strata {
@@ -29,29 +30,30 @@ pub(super) fn close(world: &World<'_>, state: &mut State) {
     }
 }
 
-/// An instance of an axiom with an opaque condition, which has not been found to hold.
+/// An instance of an axiom with an opaque condition that has not held so far.
 struct WaitingInstance {
     axiom: usize,
     arguments: Arguments,
-    /// The number of its evaluations. What an earlier one has waited for is of no interest.
+    /// Number of evaluations. Entries in [`Waiting`] of an earlier evaluation are obsolete.
     evaluations: u32,
 }
 
-/// The instances that wait for facts, by their numbers, each with the number of its evaluations.
+/// Instances that wait for a fact or for any fact of a predicate: instance number and evaluation number.
 #[derive(Default)]
 struct Waiting {
     facts: FxHashMap<Ground, Vec<(usize, u32)>>,
     predicates: FxHashMap<Symbol, Vec<(usize, u32)>>,
 }
 
-/// The evaluation of a stratum.
+/// State of the evaluation of one stratum.
 struct Closure<'c, 'p> {
     world: &'c World<'p>,
     stratum: &'c Stratum<'p>,
     state: &'c mut State,
-    /// New facts whose consequences have not been derived yet.
+    /// New facts whose consequences have not been derived.
     agenda: Vec<Ground>,
     instances: Vec<WaitingInstance>,
+    /// Number of each instance in `instances`, by axiom and arguments.
     numbers: FxHashMap<(usize, Arguments), usize>,
     waiting: Waiting,
 }
@@ -83,8 +85,8 @@ impl<'p> Closure<'_, 'p> {
         }
     }
 
-    /// The arguments for which the condition of an axiom holds, its opaque parts aside; with an occurrence, those for which it holds with
-    /// the given arguments of that atom.
+    /// Head arguments for which the condition of an axiom holds, ignoring its opaque parts. With a seed, only
+    /// the solutions in which the occurrence matches the given fact.
     fn heads(&self, axiom: usize, seed: Option<(&Occurrence<'p>, &Arguments)>) -> Vec<Arguments> {
         let Axiom { derived, opaque } = &self.stratum.axioms[axiom];
         let derived: &'p Derived = derived;
@@ -99,8 +101,8 @@ impl<'p> Closure<'_, 'p> {
                 return Vec::new();
             }
             for (conjuncts, position) in &occurrence.conjunctions {
-                let others = conjuncts.iter().enumerate().filter(|(other, _)| other != position);
-                parts.extend(others.map(|(_, conjunct)| conjunct));
+                let remaining = conjuncts.iter().enumerate().filter(|(index, _)| index != position);
+                parts.extend(remaining.map(|(_, conjunct)| conjunct));
             }
         } else {
             parts.push(&derived.condition);
@@ -117,7 +119,8 @@ impl<'p> Closure<'_, 'p> {
         heads
     }
 
-    /// Derives heads of an axiom, or evaluates the opaque parts of its condition first.
+    /// Derives the heads of an axiom. If the condition has opaque parts, each instance is evaluated
+    /// completely first.
     fn conclude(&mut self, axiom: usize, heads: Vec<Arguments>) {
         let is_opaque = !self.stratum.axioms[axiom].opaque.is_empty();
         for arguments in heads {
@@ -134,13 +137,14 @@ impl<'p> Closure<'_, 'p> {
         }
     }
 
-    /// Derives the head of an instance if the whole condition holds. Otherwise the instance waits.
+    /// Derives the head of an instance if its whole condition holds. Otherwise the instance waits for the
+    /// missing facts.
     fn evaluate(&mut self, number: usize) {
         let WaitingInstance { axiom, arguments, evaluations } = &mut self.instances[number];
         *evaluations = evaluations.saturating_add(1);
         let (axiom, arguments, evaluations) = (*axiom, arguments.clone(), *evaluations);
         let derived = self.stratum.axioms[axiom].derived;
-        let trace = Trace::new(&self.stratum.own);
+        let trace = Trace::new(&self.stratum.predicates);
         let evaluator = Evaluator { trace: Some(&trace), ..Evaluator::new(self.world, self.state) };
         let mut bindings = Bindings::default();
         bindings.declare(&derived.head.parameters);

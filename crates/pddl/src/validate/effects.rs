@@ -1,5 +1,5 @@
-//! Effects: all read the state before, then all change it at once; of an atom both added and deleted, the
-//! addition counts.
+//! Effects of happenings. All effects are evaluated in the state before the happening and then applied at
+//! once. If an atom is both added and deleted, it is added.
 
 use num_rational::BigRational;
 use num_traits::{One, Zero};
@@ -13,7 +13,7 @@ use super::world::{Arguments, State, Symbol, World};
 /// A fact or a function with its arguments.
 pub(super) type Ground = (Symbol, Arguments);
 
-/// What a happening changes.
+/// Changes of a happening.
 #[derive(Debug, Default)]
 pub(super) struct Changes {
     pub(super) added: FxHashSet<Ground>,
@@ -21,23 +21,23 @@ pub(super) struct Changes {
     pub(super) numeric: FxHashMap<Ground, Change>,
 }
 
-/// How one number changes.
+/// Change of one numeric function.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Change {
-    /// It gets this value.
+    /// Assigns the value.
     Assign(BigRational),
-    /// This is added.
+    /// Adds the value.
     Add(BigRational),
-    /// It is multiplied by this.
+    /// Multiplies by the value.
     Scale(BigRational),
 }
 
-/// Why effects cannot be applied.
+/// Reason why effects cannot be applied.
 #[derive(Debug)]
 pub(super) enum EffectError {
-    /// A value that they need is undefined.
+    /// A required value is undefined.
     Undefined(Undefined),
-    /// They change one number in two ways that do not commute.
+    /// One function is changed in two ways that do not commute.
     Conflict(Ground),
 }
 
@@ -48,7 +48,7 @@ impl From<Undefined> for EffectError {
 }
 
 impl<'p> Evaluator<'_, 'p> {
-    /// Collects what an effect changes.
+    /// Collects the changes of an effect in the current state.
     pub(super) fn collect(
         &self,
         effect: &'p Effect,
@@ -102,7 +102,7 @@ fn change(kind: Assignment, value: BigRational) -> Result<Change, Undefined> {
 }
 
 impl Changes {
-    /// Adds a change to those of the same number.
+    /// Combines a change with the earlier changes of the same function.
     fn record(&mut self, target: Ground, change: Change) -> Result<(), EffectError> {
         let combined = match (self.numeric.get(&target), change) {
             (None, change) => change,
@@ -121,52 +121,53 @@ impl Changes {
         Ok(())
     }
 
-    /// Takes over the changes of another action that happens at the same time.
+    /// Adds the changes of another simultaneous action.
     pub(super) fn merge(&mut self, other: Self) -> Result<(), EffectError> {
         self.added.extend(other.added);
         self.deleted.extend(other.deleted);
         other.numeric.into_iter().try_for_each(|(target, change)| self.record(target, change))
     }
 
-    /// Changes the state; on an error it stays as it is.
+    /// Applies the changes to a state. On an error the state remains unchanged.
     pub(super) fn apply(self, world: &World<'_>, state: &mut State) -> Result<(), EffectError> {
+        // Computed first, so that an error leaves the state unchanged.
         let mut values = Vec::new();
         for (target, change) in self.numeric {
-            let before = || {
+            let old_value = || {
                 let show = || Undefined::Function(world.show(target.0, &target.1));
                 state.values.get(&target).ok_or_else(show)
             };
-            let after = match &change {
+            let new_value = match &change {
                 Change::Assign(value) => value.clone(),
-                Change::Add(value) => apply(Arithmetic::Add, before()?, value)?,
-                Change::Scale(value) => apply(Arithmetic::Multiply, before()?, value)?,
+                Change::Add(value) => apply(Arithmetic::Add, old_value()?, value)?,
+                Change::Scale(value) => apply(Arithmetic::Multiply, old_value()?, value)?,
             };
-            values.push((target, after));
+            values.push((target, new_value));
         }
         state.values.extend(values);
         change_facts(self.added, self.deleted, state);
         Ok(())
     }
 
-    /// Returns `true` if a fact or a number of one of these predicates and functions is changed.
+    /// Returns `true` if a fact or a value of one of these predicates and functions changes.
     pub(super) fn concern(&self, symbols: &FxHashSet<Symbol>) -> bool {
         let facts = self.added.iter().chain(&self.deleted);
         facts.chain(self.numeric.keys()).any(|(symbol, _)| symbols.contains(symbol))
     }
 
-    /// Changes the facts of the state, and no numbers.
+    /// Applies only the changes of facts, not those of numbers.
     pub(super) fn apply_facts(self, state: &mut State) {
         change_facts(self.added, self.deleted, state);
     }
 
-    /// Whether the state stays as it is, if the changes can be applied at all.
+    /// Returns `true` if the changes, when they can be applied, leave the state as it is.
     pub(super) fn is_neutral(&self) -> bool {
         let is_zero = |change: &Change| matches!(change, Change::Add(value) if value.is_zero());
         self.added.is_empty() && self.deleted.is_empty() && self.numeric.values().all(is_zero)
     }
 }
 
-/// Deletes, then adds.
+/// Deletes facts, then adds facts, so that additions take precedence.
 fn change_facts(added: FxHashSet<Ground>, deleted: FxHashSet<Ground>, state: &mut State) {
     for (predicate, arguments) in deleted {
         if let Some(tuples) = state.facts.get_mut(&predicate) {

@@ -1,4 +1,4 @@
-//! Which parts of a condition do not hold, with their objects and values.
+//! Explains unsatisfied conditions: the conjuncts that do not hold, with their objects and values.
 
 use num_rational::BigRational;
 
@@ -9,7 +9,7 @@ use super::evaluate::{Bindings, Evaluator, Undefined};
 use super::verdict::Unmet;
 use super::world::World;
 
-/// The conjuncts of a condition that do not hold.
+/// Returns the conjuncts of a condition that do not hold.
 pub(super) fn unmet<'p>(
     evaluator: Evaluator<'_, 'p>,
     condition: &'p Condition,
@@ -27,9 +27,9 @@ pub(super) fn unmet<'p>(
     for function in functions {
         let Some(arguments) = evaluator.arguments(function, bindings) else { continue };
         let symbol = evaluator.world.symbol(&function.predicate.name);
-        let shown = evaluator.world.show(symbol, &arguments);
-        if values.iter().all(|(known, _)| *known != shown) {
-            values.push((shown, evaluator.state.values.get(&(symbol, arguments)).cloned()));
+        let text = evaluator.world.show(symbol, &arguments);
+        if values.iter().all(|(listed, _)| *listed != text) {
+            values.push((text, evaluator.state.values.get(&(symbol, arguments)).cloned()));
         }
     }
     let mut ground = condition.clone();
@@ -37,7 +37,7 @@ pub(super) fn unmet<'p>(
     vec![Unmet { condition: condition_text(&ground), values }]
 }
 
-/// Why something is undefined, for people.
+/// Describes why a value is undefined.
 pub(super) fn undefined_text(undefined: &Undefined) -> String {
     match undefined {
         Undefined::Function(function) => format!("the value of {function} is needed, but it was never set"),
@@ -47,7 +47,7 @@ pub(super) fn undefined_text(undefined: &Undefined) -> String {
     }
 }
 
-/// Puts objects for the variables that have one; `hidden` are those of quantifiers within.
+/// Substitutes objects for bound variables. `hidden` contains the variables of inner quantifiers.
 fn substitute(
     condition: &mut Condition,
     world: &World<'_>,

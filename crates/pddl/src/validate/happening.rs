@@ -1,4 +1,5 @@
-//! Happenings: the start or the end of an action, both at once, or timed initial literals; see the [definition](super).
+//! Happenings: the start or the end of an action, both at once, or timed initial literals. See the
+//! [definition](super).
 
 use num_rational::BigRational;
 use num_traits::Zero;
@@ -14,16 +15,16 @@ use super::step::Step;
 use super::verdict::{Violation, ViolationKind};
 use crate::number::show_number;
 
-/// The part of an action that happens at one time.
+/// Part of an action that is one happening.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Part {
     Start,
     End,
-    /// An instantaneous action, or one that takes no time.
+    /// An instantaneous action, or a durative action of duration 0.
     Whole,
 }
 
-/// What happens at one time: what it changes, and what it reads and writes.
+/// Changes and footprint of a happening.
 #[derive(Debug, Default)]
 pub(super) struct Happening {
     pub(super) changes: Changes,
@@ -31,14 +32,15 @@ pub(super) struct Happening {
 }
 
 impl Running<'_, '_> {
-    /// The part of this action that happens first.
+    /// First happening of the action.
     pub(super) fn first_part(&self) -> Part {
         if is_durative(&self.instance) && !self.duration.is_zero() { Part::Start } else { Part::Whole }
     }
 }
 
 impl<'e, 'p> Execution<'e, 'p> {
-    /// A part of an action in the present state. The conditions at its start have been checked.
+    /// Evaluates a part of an action in the current state and checks the conditions at end. The conditions at
+    /// start must have been checked.
     pub(super) fn happening(
         &self,
         running: &Running<'e, 'p>,
@@ -72,7 +74,7 @@ impl<'e, 'p> Execution<'e, 'p> {
         Ok(start)
     }
 
-    /// Lets all events before a time take place, or up to and including it.
+    /// Applies all events before `time`, and with `inclusive` also those at `time`.
     pub(super) fn pass(&mut self, time: &BigRational, inclusive: bool) {
         let is_due = |next: &BigRational| next < time || (inclusive && next == time);
         while self.next_timed().is_some_and(is_due) {
@@ -80,7 +82,7 @@ impl<'e, 'p> Execution<'e, 'p> {
         }
     }
 
-    /// Lets the events of the next time take place.
+    /// Applies the events of the next event time.
     pub(super) fn apply_next_timed(&mut self) {
         if let Some((time, event)) = self.take_next_timed() {
             self.apply_events(event.changes);
@@ -89,7 +91,7 @@ impl<'e, 'p> Execution<'e, 'p> {
         }
     }
 
-    /// Lets events take place.
+    /// Applies the facts of events and updates derived facts.
     pub(super) fn apply_events(&mut self, changes: Changes) {
         let concerns_axioms = changes.concern(&self.world.read_by_axioms);
         changes.apply_facts(&mut self.state);
@@ -98,25 +100,26 @@ impl<'e, 'p> Execution<'e, 'p> {
         }
     }
 
-    /// Takes the events of the next time out of those to come.
+    /// Removes the events of the next event time from the pending ones and returns them as one happening.
     pub(super) fn take_next_timed(&mut self) -> Option<(BigRational, Happening)> {
         let time = self.next_timed()?.clone();
         let mut changes = Changes::default();
         while self.next_timed() == Some(&time) {
             let (_, atom, holds) = self.pending.pop()?;
-            let (there, gone) = if holds {
+            let (target, opposite) = if holds {
                 (&mut changes.added, &mut changes.deleted)
             } else {
                 (&mut changes.deleted, &mut changes.added)
             };
-            gone.remove(&atom);
-            there.insert(atom);
+            // A later literal overrides an earlier one about the same atom and time.
+            opposite.remove(&atom);
+            target.insert(atom);
         }
         let footprint = Footprint::of_event(&changes);
         Some((time, Happening { changes, footprint }))
     }
 
-    /// Executes a part of an action in sequence, with the events of its time, which must not interfere with it.
+    /// Executes a part of an action in sequence. Events at the same time must not interfere with it.
     pub(super) fn execute(
         &mut self,
         running: &Running<'e, 'p>,
@@ -125,8 +128,8 @@ impl<'e, 'p> Execution<'e, 'p> {
     ) -> Result<(), Box<Violation>> {
         let happening = self.happening(running, part, time)?;
         self.pass(time, true);
-        let now = self.last_event.as_ref().filter(|(event, _)| event == time);
-        if let Some(touched) = now.and_then(|(_, event)| happening.footprint.interferes(event)) {
+        let simultaneous = self.last_event.as_ref().filter(|(event, _)| event == time);
+        if let Some(touched) = simultaneous.and_then(|(_, event)| happening.footprint.interferes(event)) {
             return Err(self.disturbed(running.step, time, time, &touched));
         }
         self.apply(running.step, time, happening.changes)?;
@@ -134,7 +137,7 @@ impl<'e, 'p> Execution<'e, 'p> {
         Ok(())
     }
 
-    /// An action at one time, and an event at another one, that interfere.
+    /// Violation: an action and an event interfere.
     pub(super) fn disturbed(
         &self,
         step: &Step<'p>,

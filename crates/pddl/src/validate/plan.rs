@@ -1,4 +1,4 @@
-//! The text of a plan to its steps: IPC plans, temporal plans, and what POPF prints for `PlanSys2`.
+//! Parses plans: IPC format, temporal plans, and the output of POPF for `PlanSys2`.
 
 use num_rational::BigRational;
 
@@ -7,36 +7,36 @@ use crate::diagnostic::{Errors, Sink};
 use crate::number::{Literal, literal};
 use crate::source::{Source, place};
 
-/// A plan as somebody wrote it: the steps in the order of the text.
+/// Plan as written, with its steps in the order of the text.
 #[derive(Debug, Clone, Default)]
 pub struct PlanText {
-    /// The steps.
+    /// Steps in the order of the text.
     pub steps: Vec<PlanStep>,
 }
 
 /// One action of a plan.
 #[derive(Debug, Clone)]
 pub struct PlanStep {
-    /// The name of the schema; two schemas may share it.
+    /// Name of the schema. Several schemas may share it.
     pub action: Name,
-    /// The objects for its parameters.
+    /// Objects for the parameters.
     pub arguments: Vec<Name>,
-    /// When it starts, in the domain's time unit, where the plan says so.
+    /// Start time, in the domain's time unit, if stated.
     pub start: Option<BigRational>,
-    /// How long it takes, in the domain's time unit, where the plan says so.
+    /// Duration, in the domain's time unit, if stated.
     pub duration: Option<BigRational>,
-    /// The line of the text, from 1; 0 for a step that was not read from a text.
+    /// Line of the text, from 1; 0 if the step was not read from a text.
     pub line: usize,
 }
 
 impl PlanText {
-    /// Reads `(move a b)` and `0.000: (move a b) [5.000]`, one step a line, comments from `;` on. Where a
-    /// planner announces `Solution Found`, only what follows the last announcement counts, and lines
-    /// of another form are its remarks.
+    /// Reads one step per line: `(move a b)` or `0.000: (move a b) [5.000]`. Comments begin with `;`. If the
+    /// text contains `Solution Found`, only the lines after its last occurrence are read, and lines of
+    /// another form are ignored as remarks of the planner.
     ///
     /// # Errors
     ///
-    /// Every line that is not a step.
+    /// Returns an error for each line that is not a step.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "positions in a text in memory, which are at most its length"
@@ -73,7 +73,8 @@ impl PlanText {
     }
 }
 
-/// A line up to its comment; LPG writes a semicolon inside the brackets, `[D:5.00; C:0.10]`.
+/// Removes the comment from a line. A semicolon inside brackets does not begin a comment: LPG writes
+/// `[D:5.00; C:0.10]`.
 fn without_comment(line: &str) -> &str {
     let mut in_brackets = false;
     let end = line.find(|character| {
@@ -88,8 +89,8 @@ fn looks_like_step(line: &str) -> bool {
 }
 
 fn step(line: &str) -> Result<PlanStep, String> {
-    let (before, rest) = line.split_once('(').ok_or("this is not a step of a plan")?;
-    let (inside, after) = rest.split_once(')').ok_or("the `)` of this step is missing")?;
+    let (before, remainder) = line.split_once('(').ok_or("this is not a step of a plan")?;
+    let (inside, after) = remainder.split_once(')').ok_or("the `)` of this step is missing")?;
     let start = match before.trim() {
         "" => None,
         time => Some(number(time.strip_suffix(':').ok_or("expected `:` behind the time")?.trim())?),
@@ -97,11 +98,11 @@ fn step(line: &str) -> Result<PlanStep, String> {
     let duration = match after.trim() {
         "" => None,
         bracket => {
-            // LPG closes a parenthesis that it has not opened: `[5.0000])`.
+            // LPG prints an unbalanced parenthesis: `[5.0000])`.
             let inner = bracket
                 .trim_end_matches([')', ' '])
                 .strip_prefix('[')
-                .and_then(|rest| rest.strip_suffix(']'));
+                .and_then(|remainder| remainder.strip_suffix(']'));
             let inner = inner.ok_or("expected a duration such as `[5.000]` behind the action")?;
             Some(number(inner.trim().trim_start_matches("D:").split(';').next().unwrap_or_default().trim())?)
         }

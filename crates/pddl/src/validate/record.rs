@@ -1,4 +1,4 @@
-//! What is kept of an execution, so that its trajectory and its preferences can be judged.
+//! Record of an execution, for the evaluation of trajectory constraints and preferences.
 
 use num_rational::BigRational;
 use num_traits::Zero;
@@ -7,21 +7,21 @@ use crate::ast::{Constraint, Name};
 
 use super::world::{State, World};
 
-/// A state of a trajectory.
+/// State of a trajectory.
 #[derive(Debug)]
 pub(super) struct Moment {
     pub(super) time: BigRational,
     pub(super) state: State,
-    /// Whether only timed initial literals have happened.
+    /// Whether the state results from timed initial literals only.
     is_event: bool,
 }
 
-/// What is kept of an execution where constraints or preferences ask for it.
+/// Record of an execution.
 #[derive(Debug, Default)]
 pub(super) struct Record {
-    /// The states so far; empty if no constraint asks for them.
+    /// Trajectory so far. Empty if there are no constraints.
     pub(super) moments: Vec<Moment>,
-    /// The preferences of actions that were violated, each as often as it was.
+    /// Violated preferences of actions, once per violation.
     pub(super) violated: Vec<Name>,
 }
 
@@ -34,7 +34,7 @@ impl Record {
         record
     }
 
-    /// Notes the state after something has happened; what happens at the time of an event is one happening with it.
+    /// Appends the state after a happening. Events and a happening at the same time give one state.
     pub(super) fn note(&mut self, time: &BigRational, state: &State, is_event: bool) {
         let Some(last) = self.moments.last() else { return };
         if last.is_event && last.time == *time {
@@ -44,7 +44,7 @@ impl Record {
     }
 }
 
-/// All constraints of a domain and a problem.
+/// Returns all constraints of a domain and a problem.
 pub(super) fn constraints<'p>(world: &World<'p>) -> impl Iterator<Item = &'p Constraint> + use<'p> {
     world.domain.constraints.iter().chain(&world.problem.constraints)
 }

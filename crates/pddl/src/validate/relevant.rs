@@ -1,8 +1,8 @@
-//! The part of a problem that single actions can read: facts and values of which all objects are named by the actions.
+//! Reduces a problem to the facts and values that given actions can read.
 //!
-//! Execution of one action numbers and indexes the whole initial state. Where no condition or effect runs over all objects, the
-//! action reads only what concerns its own arguments and the constants of the domain. In a map of a hundred arcs and eighteen
-//! designs that is one value in a thousand.
+//! Executing an action interns and indexes the whole initial state. If no condition or effect is quantified
+//! over objects, an action reads only atoms about its own arguments and the constants of the domain. In a map
+//! of 100 arcs and 18 designs this is one value in a thousand.
 
 use rustc_hash::FxHashSet;
 
@@ -12,8 +12,8 @@ use crate::visit::Node;
 
 use super::plan::PlanStep;
 
-/// Returns the problem without facts and values that none of the steps can read, and that its metric does not mention; none where
-/// that is not known.
+/// Returns the problem without the facts and values that neither the steps nor the metric can read. Returns
+/// `None` if these cannot be determined.
 pub(super) fn relevant(domain: &Domain, problem: &Problem, steps: &[PlanStep]) -> Option<Problem> {
     let is_plain =
         domain.derived.is_empty() && domain.constraints.is_empty() && problem.constraints.is_empty();
@@ -23,11 +23,11 @@ pub(super) fn relevant(domain: &Domain, problem: &Problem, steps: &[PlanStep]) -
         return None;
     }
     let mut metric = Vec::new();
-    if let Some(own) = &problem.metric {
-        own.expression.walk_fluents(&mut |atom| metric.push(atom));
+    if let Some(objective) = &problem.metric {
+        objective.expression.walk_fluents(&mut |atom| metric.push(atom));
     }
-    let measures: FxHashSet<&Name> = metric.iter().map(|atom| &atom.predicate.name).collect();
-    if measures.iter().any(|name| name.as_str() == "is-violated") {
+    let metric_functions: FxHashSet<&Name> = metric.iter().map(|atom| &atom.predicate.name).collect();
+    if metric_functions.iter().any(|name| name.as_str() == "is-violated") {
         return None;
     }
     let mut read = Vec::new();
@@ -40,8 +40,8 @@ pub(super) fn relevant(domain: &Domain, problem: &Problem, steps: &[PlanStep]) -
     let is_named = |atom: &Atom| atom.arguments.iter().all(|term| objects.contains(name(term)));
     let is_relevant = |element: &&InitialElement| match element {
         InitialElement::Timed(..) => true,
-        InitialElement::Value(atom, ..) => is_named(atom) || measures.contains(&atom.predicate.name),
-        // The value before is read where a function with an object as value changes.
+        InitialElement::Value(atom, ..) => is_named(atom) || metric_functions.contains(&atom.predicate.name),
+        // An assignment to an object fluent reads its previous value.
         InitialElement::Fact(atom) | InitialElement::NegatedFact(atom) => {
             is_named(atom) || domain.object_fluents.contains(&atom.predicate.name)
         }
@@ -60,11 +60,11 @@ pub(super) fn relevant(domain: &Domain, problem: &Problem, steps: &[PlanStep]) -
 
 fn name(term: &Term) -> &Name {
     match term {
-        Term::Constant(own) | Term::Variable(own) => &own.name,
+        Term::Constant(identifier) | Term::Variable(identifier) => &identifier.name,
     }
 }
 
-/// Returns `true` if a condition or an effect of the action runs over all objects, or the action has preferences.
+/// Returns `true` if the action contains a quantifier or a preference.
 fn reads_all_objects(action: &Action) -> bool {
     let mut is_quantified = false;
     action.body.walk(&mut |node| {
@@ -77,9 +77,9 @@ fn reads_all_objects(action: &Action) -> bool {
 }
 
 /// Adds the numeric functions that an action reads or changes.
-fn fluents_of<'a>(action: &'a Action, found: &mut Vec<&'a Atom>) {
+fn fluents_of<'a>(action: &'a Action, fluents: &mut Vec<&'a Atom>) {
     action.body.walk(&mut |node| match node {
-        Node::Effect(Effect::Assign(_, target, ..)) => found.push(target),
-        node => found.extend(node.fluent()),
+        Node::Effect(Effect::Assign(_, target, ..)) => fluents.push(target),
+        node => fluents.extend(node.fluent()),
     });
 }

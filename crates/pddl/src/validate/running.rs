@@ -1,4 +1,4 @@
-//! An action under way, and what its schema says of a time.
+//! Running actions, and the conditions and effects of an action at a given time.
 
 use num_rational::BigRational;
 
@@ -6,15 +6,15 @@ use crate::ast::{ActionBody, Condition, ConditionTime, Effect, EffectTime};
 
 use super::step::{Instance, Step};
 
-/// An action that has started.
+/// A started action.
 #[derive(Debug)]
 pub(super) struct Running<'e, 'p> {
     pub(super) step: &'e Step<'p>,
     pub(super) instance: Instance<'p>,
     pub(super) start: BigRational,
-    /// The exact duration, in the domain's time unit.
+    /// Exact duration, in the domain's time unit.
     pub(super) duration: BigRational,
-    /// When it ends on the plan's clock, where durations may be rounded.
+    /// End time. It may be based on a rounded duration of the plan.
     pub(super) end: BigRational,
 }
 
@@ -22,7 +22,7 @@ pub(super) fn is_durative(instance: &Instance<'_>) -> bool {
     matches!(instance.action.body, ActionBody::Durative { .. })
 }
 
-/// The conditions of an action at a time; a precondition counts as one at the start.
+/// Conditions of an action at a time. A precondition counts as a condition at start.
 pub(super) fn conditions<'p>(
     instance: &Instance<'p>,
     when: ConditionTime,
@@ -37,7 +37,7 @@ pub(super) fn conditions<'p>(
     single.into_iter().chain(several)
 }
 
-/// The effects of an action at a time; those of an instantaneous one count as effects at the start.
+/// Effects of an action at a time. Effects of an instantaneous action count as effects at start.
 pub(super) fn effects<'p>(
     instance: &Instance<'p>,
     when: EffectTime,

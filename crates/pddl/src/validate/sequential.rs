@@ -1,4 +1,4 @@
-//! One action after another, in the order of their starts.
+//! Sequential execution of actions, in the order of their start times.
 
 use num_rational::BigRational;
 use num_traits::Zero;
@@ -12,8 +12,8 @@ use super::step::Step;
 use super::verdict::{Violation, ViolationKind};
 use crate::number::show_number;
 
-/// Executes the steps; adds up their durations as long as nothing is wrong. In the end, all events up to the end of the last step
-/// have taken place.
+/// Executes the steps and sums their durations until the first violation. Afterwards all events up to the end
+/// of the last step have been applied.
 pub(super) fn run<'e, 'p>(
     execution: &mut Execution<'e, 'p>,
     steps: &'e [Step<'p>],
@@ -30,8 +30,8 @@ pub(super) fn run<'e, 'p>(
             break;
         }
         let stated = step.text.start.as_ref().filter(|_| is_timed).unwrap_or(&clock);
-        starts_late_enough(execution, step, stated, &clock)?;
-        // What the tolerance forgives is put off.
+        check_start(execution, step, stated, &clock)?;
+        // A step that starts too early within the tolerance is delayed.
         let time = stated.max(&clock).clone();
         execution.pass(&time, false);
         let running = execution.begin(step, &time)?;
@@ -51,7 +51,8 @@ pub(super) fn run<'e, 'p>(
     Ok(())
 }
 
-/// What happens between the start and the end of an action, and at its end.
+/// Applies the events between the start and the end of an action, checks the conditions over all, and
+/// executes the end.
 fn finish<'e, 'p>(
     execution: &mut Execution<'e, 'p>,
     running: &Running<'e, 'p>,
@@ -65,8 +66,8 @@ fn finish<'e, 'p>(
     execution.execute(running, Part::End, &running.end)
 }
 
-/// No step starts before the one before it has ended, up to the tolerance.
-fn starts_late_enough(
+/// Checks that a step does not start before the end of the preceding one, up to the tolerance.
+fn check_start(
     execution: &Execution<'_, '_>,
     step: &Step<'_>,
     time: &BigRational,

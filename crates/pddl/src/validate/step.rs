@@ -1,4 +1,4 @@
-//! Steps of a plan to instances of action schemas.
+//! Resolves steps of a plan to instances of action schemas.
 
 use diagnostics::nearest;
 use num_rational::BigRational;
@@ -10,17 +10,17 @@ use super::plan::PlanStep;
 use super::verdict::{Violation, ViolationKind};
 use super::world::{Symbol, World};
 
-/// A step with the schemas that it can be an instance of.
+/// Step of a plan with its possible instances.
 #[derive(Debug, Clone)]
 pub(super) struct Step<'p> {
-    /// Its place in the plan's text, from 1.
+    /// Number of the step in the plan's text, from 1.
     pub(super) number: usize,
     pub(super) text: &'p PlanStep,
-    /// More than one where schemas share a name, and its arguments fit several of them.
+    /// Several instances if schemas share a name and the arguments fit several of them.
     pub(super) instances: Vec<Instance<'p>>,
 }
 
-/// An action schema with objects for its parameters.
+/// Action schema with objects for its parameters.
 #[derive(Debug, Clone)]
 pub(super) struct Instance<'p> {
     pub(super) action: &'p Action,
@@ -28,7 +28,7 @@ pub(super) struct Instance<'p> {
 }
 
 impl Step<'_> {
-    /// The step as written, without its times.
+    /// Returns the step as written, without its times.
     pub(super) fn show(&self) -> String {
         let words: Vec<_> =
             std::iter::once(&self.text.action).chain(&self.text.arguments).map(Name::as_str).collect();
@@ -52,25 +52,27 @@ impl Step<'_> {
     }
 }
 
-/// Finds the schemas of a step; without any, `instances` is empty.
+/// Finds all schemas that a step can be an instance of. `instances` is empty if there is none.
 pub(super) fn resolve<'p>(world: &World<'p>, number: usize, text: &'p PlanStep) -> Step<'p> {
     let objects: Option<Vec<Symbol>> = text.arguments.iter().map(|name| world.object(name)).collect();
-    let named = world.domain.actions.iter().filter(|action| action.identifier.name == text.action);
-    let instances = named.filter_map(|action| instantiate(world, action, objects.as_deref()?)).collect();
+    let schemas = world.domain.actions.iter().filter(|action| action.identifier.name == text.action);
+    let instances = schemas.filter_map(|action| instantiate(world, action, objects.as_deref()?)).collect();
     Step { number, text, instances }
 }
 
-/// All ways to choose one schema for each step that fits several; none if there is one way, or if there are more than `most`.
+/// Enumerates the choices of one instance for each ambiguous step. Empty if there is only one choice or if
+/// there are more than `limit`.
 #[expect(clippy::arithmetic_side_effects, reason = "each step has a way at least")]
-pub(super) fn readings<'p>(steps: &[Step<'p>], most: usize) -> Vec<Vec<Step<'p>>> {
-    let ways = |step: &Step<'p>| step.instances.len().max(1);
-    let count = steps.iter().try_fold(1_usize, |count, step| count.checked_mul(ways(step)));
-    let Some(count) = count.filter(|count| (2..=most).contains(count)) else { return Vec::new() };
+pub(super) fn readings<'p>(steps: &[Step<'p>], limit: usize) -> Vec<Vec<Step<'p>>> {
+    let choice_count = |step: &Step<'p>| step.instances.len().max(1);
+    let count = steps.iter().try_fold(1_usize, |count, step| count.checked_mul(choice_count(step)));
+    let Some(count) = count.filter(|count| (2..=limit).contains(count)) else { return Vec::new() };
     let reading = |mut number: usize| {
         let chosen = steps.iter().map(|step| {
-            let own = number % ways(step);
-            number /= ways(step);
-            let instances = step.instances.get(own).cloned().into_iter().collect();
+            // The number of the reading is a mixed-radix number with one digit per step.
+            let choice = number % choice_count(step);
+            number /= choice_count(step);
+            let instances = step.instances.get(choice).cloned().into_iter().collect();
             Step { number: step.number, text: step.text, instances }
         });
         chosen.collect()
@@ -90,22 +92,22 @@ fn instantiate<'p>(world: &World<'p>, action: &'p Action, objects: &[Symbol]) ->
     fits.then_some(Instance { action, bindings })
 }
 
-/// Why a step is not an instance of any schema.
+/// Explains why a step is not an instance of any schema.
 pub(super) fn unresolved(world: &World<'_>, step: &Step<'_>, time: &BigRational) -> Box<Violation> {
     let name = &step.text.action;
     let mut same_name = world.domain.actions.iter().filter(|action| action.identifier.name == *name);
     let Some(action) = same_name.next() else {
-        let known = world.domain.actions.iter().map(|action| action.identifier.name.as_str());
-        let proposal = nearest(name.as_str(), known).map(|known| format!(", did you mean `{known}`?"));
+        let names = world.domain.actions.iter().map(|action| action.identifier.name.as_str());
+        let proposal = nearest(name.as_str(), names).map(|name| format!(", did you mean `{name}`?"));
         let message = format!("unknown action `{name}`{}", proposal.unwrap_or_default());
         return step.violation(time, ViolationKind::UnknownAction, message);
     };
     if let Some(unknown) = step.text.arguments.iter().find(|name| world.object(name).is_none()) {
         return step.violation(time, ViolationKind::UnknownObject, format!("unknown object `{unknown}`"));
     }
-    let (wanted, found) = (action.parameters.len(), step.text.arguments.len());
-    if same_name.next().is_none() && wanted != found {
-        let message = format!("`{name}` takes {wanted} arguments, found {found}");
+    let (expected, actual) = (action.parameters.len(), step.text.arguments.len());
+    if same_name.next().is_none() && expected != actual {
+        let message = format!("`{name}` takes {expected} arguments, found {actual}");
         return step.violation(time, ViolationKind::Arguments, message);
     }
     let message = format!("the types of these objects are not those of the parameters of `{name}`");

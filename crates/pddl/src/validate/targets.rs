@@ -1,4 +1,4 @@
-//! The numeric functions that actions change.
+//! Numeric functions that actions change, with their values.
 
 use num_rational::BigRational;
 use rustc_hash::FxHashSet;
@@ -6,12 +6,12 @@ use rustc_hash::FxHashSet;
 use super::changeable::changeable_functions;
 use super::world::{State, Symbol, World};
 
-/// The functions that some action can change.
+/// Returns the functions that some action can change.
 pub(super) fn changeable(world: &World<'_>) -> FxHashSet<Symbol> {
     changeable_functions(world.domain).into_iter().map(|name| world.symbol(name)).collect()
 }
 
-/// The values of the functions that some action can change, sorted by name.
+/// Returns the values of these functions, sorted by name.
 pub(super) fn changeable_values(world: &World<'_>, state: &State) -> Vec<(String, BigRational)> {
     let symbols = changeable(world);
     let changeable = state.values.iter().filter(|((symbol, _), _)| symbols.contains(symbol));

@@ -1,4 +1,4 @@
-//! The facts on which the result of an evaluation depends.
+//! Records the facts on which an evaluation depends.
 
 use std::cell::RefCell;
 
@@ -8,36 +8,37 @@ use crate::ast::Name;
 
 use super::world::{Arguments, Symbol};
 
-/// Facts of a stratum that were missing in an evaluation. If none of them is derived, the result stays as it is.
+/// Facts of a stratum that were missing in an evaluation, and predicates of which all facts were read. The
+/// result cannot change before such a fact is derived.
 #[derive(Debug)]
 pub(super) struct Trace<'e, 'p> {
-    own: &'e FxHashSet<&'p Name>,
+    stratum: &'e FxHashSet<&'p Name>,
     facts: RefCell<Vec<(Symbol, Arguments)>>,
-    /// Predicates all of whose facts were read.
+    /// Predicates of which all facts were read.
     predicates: RefCell<Vec<Symbol>>,
 }
 
 impl<'e, 'p> Trace<'e, 'p> {
-    /// A trace of the predicates of a stratum.
-    pub(super) fn new(own: &'e FxHashSet<&'p Name>) -> Self {
-        Self { own, facts: RefCell::default(), predicates: RefCell::default() }
+    /// Creates a trace for the predicates of a stratum.
+    pub(super) fn new(stratum: &'e FxHashSet<&'p Name>) -> Self {
+        Self { stratum, facts: RefCell::default(), predicates: RefCell::default() }
     }
 
-    /// The missing facts, and the predicates all of whose facts were read.
+    /// Returns the missing facts and the predicates of which all facts were read.
     pub(super) fn into_parts(self) -> (Vec<(Symbol, Arguments)>, Vec<Symbol>) {
         (self.facts.into_inner(), self.predicates.into_inner())
     }
 
-    /// Notes a fact that does not hold.
+    /// Records a fact that does not hold.
     pub(super) fn missed(&self, name: &Name, fact: (Symbol, Arguments)) {
-        if self.own.contains(name) {
+        if self.stratum.contains(name) {
             self.facts.borrow_mut().push(fact);
         }
     }
 
-    /// Notes that all facts of a predicate are read.
+    /// Records that all facts of a predicate are read.
     pub(super) fn read(&self, name: &Name, predicate: Symbol) {
-        if self.own.contains(name) && !self.predicates.borrow().contains(&predicate) {
+        if self.stratum.contains(name) && !self.predicates.borrow().contains(&predicate) {
             self.predicates.borrow_mut().push(predicate);
         }
     }

@@ -1,7 +1,7 @@
-//! Constraints on the states that a plan goes through, and preferences, judged by their definition \[1\].
+//! Evaluates trajectory constraints and preferences by the definition of PDDL 3 \[1\].
 //!
-//! A trajectory is a sequence of states with their times: the initial state at 0, and one state after each happening. A condition that
-//! is undefined in a state does not hold in it.
+//! A trajectory is a sequence of states with times: the initial state at 0 and the state after each
+//! happening. A condition that is undefined in a state does not hold in it.
 //!
 //! \[1\] A. Gerevini, P. Haslum, D. Long, A. Saetti, Y. Dimopoulos: Deterministic planning in the fifth international planning
 //! competition: PDDL3 and experimental evaluation of the planners, Artificial Intelligence 173, 2009, section 2.
@@ -19,7 +19,7 @@ use super::verdict::{Violation, ViolationKind};
 use super::world::World;
 
 impl<'e, 'p> Execution<'e, 'p> {
-    /// Counts the preferences of an action that do not hold when it starts or ends.
+    /// Records the preferences of an action that are violated at its start or its end.
     pub(super) fn prefer(
         &mut self,
         running: &Running<'e, 'p>,
@@ -27,7 +27,9 @@ impl<'e, 'p> Execution<'e, 'p> {
         time: &BigRational,
     ) -> Result<(), Box<Violation>> {
         let mut violated = Vec::new();
-        for preference in running.instance.action.preferences.iter().filter(|own| own.time == when) {
+        for preference in
+            running.instance.action.preferences.iter().filter(|preference| preference.time == when)
+        {
             let mut bindings = running.instance.bindings.clone();
             let evaluator = self.evaluator(Some(&running.duration));
             let count = count_violated(&evaluator, preference, &mut bindings)
@@ -38,17 +40,17 @@ impl<'e, 'p> Execution<'e, 'p> {
         Ok(())
     }
 
-    /// How often preferences are violated, each name as often as it is.
+    /// Returns the violated preferences; each name occurs once per violation.
     ///
     /// # Errors
-    /// A constraint that has to hold does not.
-    pub(super) fn judge(&self, time: &BigRational) -> Result<Vec<Name>, Box<Violation>> {
+    /// Returns a violation if a mandatory constraint does not hold.
+    pub(super) fn evaluator(&self, time: &BigRational) -> Result<Vec<Name>, Box<Violation>> {
         let mut violated = self.record.violated.clone();
-        let judge = Judge { world: self.world, moments: &self.record.moments };
+        let evaluator = TrajectoryEvaluator { world: self.world, moments: &self.record.moments };
         for constraint in constraints(self.world) {
             let mut unmet = 0_usize;
-            judge.world.each(&constraint.variables, &mut Bindings::default(), &mut |bindings| {
-                if !judge.follows(&constraint.trajectory, bindings) {
+            evaluator.world.each(&constraint.variables, &mut Bindings::default(), &mut |bindings| {
+                if !evaluator.satisfies(&constraint.trajectory, bindings) {
                     unmet = unmet.saturating_add(1);
                 }
                 true
@@ -75,7 +77,7 @@ impl<'e, 'p> Execution<'e, 'p> {
     }
 }
 
-/// How many instances of a preference do not hold.
+/// Number of violated instances of a preference.
 fn count_violated<'p>(
     evaluator: &Evaluator<'_, 'p>,
     preference: &'p Preference,
@@ -93,14 +95,14 @@ fn count_violated<'p>(
     undefined.map_or(Ok(count), Err)
 }
 
-/// A trajectory in the light of the definition.
-struct Judge<'j, 'p> {
+/// Evaluator for formulas over a trajectory.
+struct TrajectoryEvaluator<'j, 'p> {
     world: &'j World<'p>,
     moments: &'j [Moment],
 }
 
-impl<'p> Judge<'_, 'p> {
-    /// The states in which a condition holds, one flag for each.
+impl<'p> TrajectoryEvaluator<'_, 'p> {
+    /// For each state: whether a condition holds in it.
     fn holds(&self, condition: &'p Condition, bindings: &mut Bindings<'p>) -> Vec<bool> {
         let holds = |moment: &Moment| {
             Evaluator::new(self.world, &moment.state).holds(condition, bindings) == Ok(true)
@@ -108,18 +110,18 @@ impl<'p> Judge<'_, 'p> {
         self.moments.iter().map(holds).collect()
     }
 
-    fn follows(&self, trajectory: &'p Trajectory, bindings: &mut Bindings<'p>) -> bool {
+    fn satisfies(&self, trajectory: &'p Trajectory, bindings: &mut Bindings<'p>) -> bool {
         let times: Vec<&BigRational> = self.moments.iter().map(|moment| &moment.time).collect();
         match trajectory {
-            Trajectory::And(parts) => parts.iter().all(|part| self.follows(part, bindings)),
+            Trajectory::And(parts) => parts.iter().all(|part| self.satisfies(part, bindings)),
             Trajectory::ForAll(variables, body) => {
-                self.world.each(variables, bindings, &mut |bindings| self.follows(body, bindings))
+                self.world.each(variables, bindings, &mut |bindings| self.satisfies(body, bindings))
             }
-            Trajectory::AtEnd(what) => self.holds(what, bindings).last() == Some(&true),
-            Trajectory::Always(what) => self.holds(what, bindings).iter().all(|holds| *holds),
-            Trajectory::Sometime(what) => self.holds(what, bindings).contains(&true),
-            Trajectory::AtMostOnce(what) => {
-                let holds = self.holds(what, bindings);
+            Trajectory::AtEnd(body) => self.holds(body, bindings).last() == Some(&true),
+            Trajectory::Always(body) => self.holds(body, bindings).iter().all(|holds| *holds),
+            Trajectory::Sometime(body) => self.holds(body, bindings).contains(&true),
+            Trajectory::AtMostOnce(body) => {
+                let holds = self.holds(body, bindings);
                 let first = holds.iter().position(|holds| *holds).unwrap_or(holds.len());
                 !holds.iter().skip(first).skip_while(|holds| **holds).any(|holds| *holds)
             }
@@ -131,31 +133,32 @@ impl<'p> Judge<'_, 'p> {
                 let (first, second) = (self.holds(first, bindings), self.holds(second, bindings));
                 (0..first.len()).all(|i| !first[i] || second[..i].contains(&true))
             }
-            Trajectory::Within(time, what) => {
-                self.holds(what, bindings).iter().zip(times).any(|(holds, reached)| *holds && reached <= time)
+            Trajectory::Within(time, body) => {
+                self.holds(body, bindings).iter().zip(times).any(|(holds, reached)| *holds && reached <= time)
             }
             Trajectory::AlwaysWithin(time, first, second) => {
                 let (first, second) = (self.holds(first, bindings), self.holds(second, bindings));
                 let soon = |i: usize| (i..second.len()).any(|j| second[j] && times[j] - times[i] <= *time);
                 (0..first.len()).all(|i| !first[i] || soon(i))
             }
-            Trajectory::HoldDuring(from, until, what) => {
-                let holds = self.holds(what, bindings);
+            Trajectory::HoldDuring(from, until, body) => {
+                let holds = self.holds(body, bindings);
                 lasts(&holds, &times, from, |time| time < until)
             }
-            Trajectory::HoldAfter(from, what) => lasts(&self.holds(what, bindings), &times, from, |_| true),
+            Trajectory::HoldAfter(from, body) => lasts(&self.holds(body, bindings), &times, from, |_| true),
         }
     }
 }
 
-/// Whether a condition holds in the state that there is at a time, and in those that are reached from then on, as long as `is_asked`.
+/// Returns `true` if a condition holds in the state at time `from` and in all later states that `is_included`
+/// selects.
 fn lasts(
     holds: &[bool],
     times: &[&BigRational],
     from: &BigRational,
-    is_asked: impl Fn(&BigRational) -> bool,
+    is_included: impl Fn(&BigRational) -> bool,
 ) -> bool {
-    let there = times.iter().rposition(|time| *time <= from);
-    let later = || holds.iter().zip(times).filter(|(_, time)| **time >= from && is_asked(time));
-    there.is_none_or(|there| holds[there]) && later().all(|(holds, _)| *holds)
+    let current = times.iter().rposition(|time| *time <= from);
+    let later = || holds.iter().zip(times).filter(|(_, time)| **time >= from && is_included(time));
+    current.is_none_or(|current| holds[current]) && later().all(|(holds, _)| *holds)
 }

@@ -1,43 +1,42 @@
-//! What the validator says about a plan.
+//! Result of plan validation.
 
 use std::fmt;
 
 use num_rational::BigRational;
 
-/// Whether a plan is right, what it costs, and otherwise the first thing that is wrong with it.
+/// Validity and metric value of a plan, or the first violation.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Verdict {
-    /// Executable, and the goal holds in the end.
+    /// Whether the plan is executable, reaches the goal, and satisfies all mandatory constraints.
     pub valid: bool,
-    /// `total-time`, in the domain's time unit: one action after another, the sum of the durations;
-    /// concurrently, the end of the last action.
+    /// `total-time`, in the domain's time unit: the sum of the durations for sequential execution, and the
+    /// end of the last action for concurrent execution.
     pub total_time: BigRational,
-    /// The value of the metric after a valid plan, in the metric's unit; nothing without `:metric`, or
-    /// where it is undefined.
+    /// Metric value of a valid plan, in the metric's unit. `None` without `:metric` or if the value is
+    /// undefined.
     pub metric: Option<BigRational>,
-    /// The functions that actions can change, as written, with their values after the last step that was
-    /// executed; sorted.
+    /// Functions that actions can change, with their values after the last executed step; sorted.
     pub values: Vec<(String, BigRational)>,
-    /// The first thing that is wrong.
+    /// First violation, if any.
     pub violation: Option<Box<Violation>>,
 }
 
-/// A condition that does not hold, or a step that cannot be executed.
+/// An unsatisfied condition or an inexecutable step.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Violation {
-    /// The step, from 1 in the order of the plan's text; nothing for the goal.
+    /// Number of the step, from 1 in the order of the plan's text. `None` for the goal and for constraints.
     pub step: Option<usize>,
-    /// The action of the step as written.
+    /// Action of the step as written.
     pub action: Option<String>,
-    /// When, in the domain's time unit.
+    /// Time, in the domain's time unit.
     pub time: BigRational,
-    /// What kind of thing is wrong.
+    /// Kind of violation.
     pub kind: ViolationKind,
-    /// What is wrong, one sentence.
+    /// Description, one sentence.
     pub message: String,
-    /// The conditions that do not hold.
+    /// Conditions that do not hold.
     pub unmet: Vec<Unmet>,
 }
 
@@ -53,13 +52,13 @@ impl std::error::Error for Violation {}
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Unmet {
-    /// The condition with its objects.
+    /// Condition with objects for its variables.
     pub condition: String,
-    /// The functions in it, with their values.
+    /// Functions in the condition, with their values if defined.
     pub values: Vec<(String, Option<BigRational>)>,
 }
 
-/// What kind of thing is wrong with a plan.
+/// Kind of violation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum ViolationKind {
@@ -69,30 +68,30 @@ pub enum ViolationKind {
     UnknownObject,
     /// The number or the types of the arguments are wrong.
     Arguments,
-    /// The start or the duration is negative, missing, or not as the domain wants it.
+    /// The start or the duration is negative, missing, or violates the domain's constraints.
     Duration,
-    /// A precondition, or a condition at the start of an action.
+    /// A precondition or a condition at the start of an action does not hold.
     AtStart,
-    /// A condition over all of an action.
+    /// A condition over all of an action does not hold.
     OverAll,
-    /// A condition at the end of an action.
+    /// A condition at the end of an action does not hold.
     AtEnd,
-    /// A value that is needed is undefined.
+    /// A required value is undefined.
     Undefined,
-    /// Two effects at one time contradict each other.
+    /// Two simultaneous effects conflict.
     Conflict,
-    /// Two steps overlap although actions are executed one after another.
+    /// Two steps overlap in sequential execution.
     Overlap,
-    /// Two actions that interfere are less than the separation apart.
+    /// Two interfering happenings are less than the separation apart.
     Interference,
-    /// The goal.
+    /// The goal does not hold at the end.
     Goal,
-    /// A constraint on the states that the plan goes through.
+    /// A trajectory constraint does not hold.
     Constraint,
 }
 
 impl ViolationKind {
-    /// A stable word for it.
+    /// Returns a stable identifier.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::UnknownAction => "unknown_action",
