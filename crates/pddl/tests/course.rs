@@ -1,4 +1,4 @@
-//! The course of numbers through a plan: what they are after each happening, and what conditions demand of them.
+//! Tests of the numeric trace of a plan: values after each happening, and bounds in conditions.
 
 use metaplan_pddl::Source;
 use metaplan_pddl::validate::{NumberBound, PlanText, course};
@@ -17,8 +17,8 @@ const PROBLEM: &str = "(define (problem p) (:domain d) (:objects a b - robot)
     (:init (= (battery a) 50) (= (battery b) 60) (= (speed) 2) (= (reserve) 10))
     (:goal (and (there a) (>= (battery a) 20))))";
 
-/// One line for each moment: the step, the time, what is changed, and what is demanded.
-fn told(plan: &str) -> Vec<String> {
+/// Formats one line per moment: step, time, changed values, and bounds.
+fn trace(plan: &str) -> Vec<String> {
     let (domain, problem) = (Source::new("d", DOMAIN), Source::new("p", PROBLEM));
     let (domain, problem) =
         (parse_domain(&domain).0.expect("a domain"), parse_problem(&problem).0.expect("a problem"));
@@ -29,14 +29,14 @@ fn told(plan: &str) -> Vec<String> {
         values.iter().map(|(name, value)| format!(" {name}:={value}")).collect::<Vec<_>>().concat()
     };
     let mut lines = vec![format!("initial{}", values(&course.initial))];
-    lines.extend(course.moments.iter().map(|own| {
-        let bounds = own.bounds.iter().map(bound).collect::<Vec<_>>().concat();
+    lines.extend(course.moments.iter().map(|moment| {
+        let bounds = moment.bounds.iter().map(bound).collect::<Vec<_>>().concat();
         format!(
             "{} {} {}{}{bounds}",
-            own.step,
-            own.time,
-            if own.is_end { "end" } else { "start" },
-            values(&own.values)
+            moment.step,
+            moment.time,
+            if moment.is_end { "end" } else { "start" },
+            values(&moment.values)
         )
     }));
     lines.push(format!("goal{}", course.goal.iter().map(bound).collect::<Vec<_>>().concat()));
@@ -49,16 +49,16 @@ fn numbers_change_at_starts_and_ends() {
         "initial (battery a):=50 (battery b):=60",
         "0 0 start (battery a):=49 (battery a)>=14 (battery a)>1",
         "0 2 end (battery a):=43",
-        // What one of several conditions demands is demanded by none.
+        // A disjunct of a condition imposes no bound.
         "1 2 end (battery a):=90",
         "goal (battery a)>=20",
     ];
-    assert_eq!(told("0: (drive a) [2]\n2: (charge a)"), expected);
-    assert_eq!(told("(drive a)\n(charge a)"), expected, "without times one action follows the other");
+    assert_eq!(trace("0: (drive a) [2]\n2: (charge a)"), expected);
+    assert_eq!(trace("(drive a)\n(charge a)"), expected, "without times one action follows the other");
 }
 
 #[test]
-fn what_overlaps_takes_place_in_the_order_of_time() {
+fn overlapping_steps_are_traced_in_chronological_order() {
     let expected = [
         "initial (battery a):=50 (battery b):=60",
         "1 0 start (battery b):=59 (battery b)>=14 (battery b)>1",
@@ -67,5 +67,5 @@ fn what_overlaps_takes_place_in_the_order_of_time() {
         "0 3 end (battery a):=43",
         "goal (battery a)>=20",
     ];
-    assert_eq!(told("1: (drive a) [2]\n0: (drive b) [2]"), expected);
+    assert_eq!(trace("1: (drive a) [2]\n0: (drive b) [2]"), expected);
 }

@@ -1,5 +1,5 @@
-//! What a plan is, rule by rule: for each rule of the definition (the head of `validate`) plans on both sides of its border, in sequence
-//! and concurrently.
+//! Tests of the definition of a plan (`validate/definition.md`): for each rule, plans on both sides of its
+//! boundary, in sequence and concurrently.
 
 use metaplan_pddl::validate::{Options, PlanStep, PlanText, advance, validate};
 use metaplan_pddl::{Source, read};
@@ -9,14 +9,14 @@ use num_rational::BigRational;
 const IN_SEQUENCE: bool = false;
 const CONCURRENTLY: bool = true;
 
-/// A task over the atoms `p`, `q`, `r`, `g` and the numbers `x` (2), `y` (0) and `z` (undefined).
+/// Task over the atoms `p`, `q`, `r`, `g` and the numbers `x` (2), `y` (0) and `z` (undefined).
 struct Task {
     actions: String,
     init: String,
     goal: String,
 }
 
-/// A durative action.
+/// Returns a durative action in PDDL.
 fn durative(name: &str, duration: &str, condition: &str, effect: &str) -> String {
     format!(
         "(:durative-action {name} :parameters () :duration (= ?duration {duration})
@@ -41,11 +41,11 @@ impl Task {
         );
         let sources = (Source::new("domain", domain), Source::new("problem", problem));
         let read = read(&sources.0, &sources.1);
-        let (domain, problem, _) = read.unwrap_or_else(|found| panic!("{found:?}\n{}", self.actions));
+        let (domain, problem, _) = read.unwrap_or_else(|errors| panic!("{errors:?}\n{}", self.actions));
         (domain, problem)
     }
 
-    /// `valid`, or the kind of the violation. Times are exact; concurrently, the separation is 0.001.
+    /// Returns `valid` or the kind of the violation. Times are exact; concurrently, the separation is 0.001.
     fn verdict(&self, concurrent: bool, plan: &str) -> String {
         let (domain, problem) = self.parse();
         let plan = PlanText::parse(&Source::new("plan", plan)).expect("the plan can be read");
@@ -66,7 +66,7 @@ impl Task {
         }
     }
 
-    /// The same in both modes.
+    /// Checks the cases in both modes.
     fn check_both(&self, cases: &[(&str, &str)]) {
         self.check(IN_SEQUENCE, cases);
         self.check(CONCURRENTLY, cases);
@@ -74,9 +74,9 @@ impl Task {
 }
 
 #[test]
-fn over_all_is_about_the_open_interval() {
+fn a_condition_over_all_holds_in_the_open_interval() {
     let a = durative("a", "2", "(over all (p))", "(at end (g))");
-    // The event at the very end does not matter, one before does, and so does one at the start.
+    // An event exactly at the end has no effect on the condition; one before the end or at the start has.
     let ends = task(std::slice::from_ref(&a), "(p) (at 5 (not (p)))", "(g)");
     ends.check_both(&[
         ("3: (a) [2]", "valid"),
@@ -86,18 +86,19 @@ fn over_all_is_about_the_open_interval() {
     ]);
     let begins = task(&[a], "(at 5 (p))", "(g)");
     begins.check_both(&[("5: (a) [2]", "valid"), ("4.999: (a) [2]", "over_all")]);
-    // What the action itself does at its start counts, what it does at its end does not.
-    let own = durative("a", "2", "(over all (p))", "(at start (p)) (at end (not (p))) (at end (g))");
-    task(&[own], "", "(g)").check_both(&[("0: (a) [2]", "valid")]);
+    // The action's own effects at start are part of the interval, those at end are not.
+    let self_supporting =
+        durative("a", "2", "(over all (p))", "(at start (p)) (at end (not (p))) (at end (g))");
+    task(&[self_supporting], "", "(g)").check_both(&[("0: (a) [2]", "valid")]);
     let broken = durative("a", "2", "(over all (p))", "(at start (not (p))) (at end (g))");
     task(&[broken], "(p)", "(g)").check_both(&[("0: (a) [2]", "over_all")]);
-    // It comes back in the midst: that is too late.
+    // `p` becomes true again within the interval: too late.
     let gap = durative("a", "2", "(over all (p))", "(at end (g))");
     task(&[gap], "(p) (at 1 (not (p))) (at 1.5 (p))", "(g)").check_both(&[("0: (a) [2]", "over_all")]);
 }
 
 #[test]
-fn over_all_and_the_happenings_of_other_actions() {
+fn happenings_of_other_actions_can_break_a_condition_over_all() {
     let a = durative("a", "2", "(over all (p))", "(at end (g))");
     let b = durative("b", "1", "", "(at end (not (p)))");
     let breaks = task(&[a.clone(), b], "(p)", "(g)");
@@ -106,7 +107,7 @@ fn over_all_and_the_happenings_of_other_actions() {
         &[
             ("0: (a) [2]\n1: (b) [1]", "valid"),
             ("0: (a) [2]\n0.999: (b) [1]", "over_all"),
-            // At the very start it is gone when the interval begins.
+            // Deleted exactly at the start, `p` is false when the interval begins.
             ("1: (a) [2]\n0: (b) [1]", "over_all"),
         ],
     );
@@ -118,13 +119,13 @@ fn over_all_and_the_happenings_of_other_actions() {
 }
 
 #[test]
-fn an_event_that_interferes_is_at_another_time() {
+fn an_event_must_not_interfere_with_a_simultaneous_happening() {
     // An event adds what the start reads.
     let a = durative("a", "2", "(at start (p))", "(at end (g))");
     let reads = task(&[a], "(at 5 (p))", "(g)");
     reads.check(IN_SEQUENCE, &[("5: (a) [2]", "at_start"), ("5.000001: (a) [2]", "valid")]);
     reads.check(CONCURRENTLY, &[("5.0009: (a) [2]", "interference"), ("5.001: (a) [2]", "valid")]);
-    // It was there before, and is all the same moved when it is read.
+    // The event adds an atom that holds already, and still interferes with the read.
     let a = durative("a", "2", "(at start (p))", "(at end (g))");
     task(&[a], "(p) (at 5 (p))", "(g)")
         .check_both(&[("5: (a) [2]", "interference"), ("4.999: (a) [2]", "valid")]);
@@ -136,7 +137,7 @@ fn an_event_that_interferes_is_at_another_time() {
         &[("2.999999: (a) [2]", "valid"), ("3: (a) [2]", "interference"), ("3.000001: (a) [2]", "at_end")],
     );
     reads.check(CONCURRENTLY, &[("2.999: (a) [2]", "valid"), ("2.9991: (a) [2]", "interference")]);
-    // One adds what the other deletes; both add; both delete.
+    // One adds the atom that the other deletes; both add; both delete.
     for (effect, event, expected) in [
         ("(at end (p))", "(not (p))", "interference"),
         ("(at end (not (p)))", "(p)", "interference"),
@@ -147,7 +148,7 @@ fn an_event_that_interferes_is_at_another_time() {
         let a = durative("a", "2", "", &format!("{effect} (at end (g))"));
         task(&[a], &format!("(at 5 {event})"), "(g)").check_both(&[("3: (a) [2]", expected)]);
     }
-    // Instantaneous actions, which may both come at the time of an event, and the second one touches it.
+    // Two instantaneous actions at the time of an event that the second one reads.
     let actions = "(:action a :parameters () :effect (q)) (:action b :parameters () :precondition (not (p)) :effect (g))";
     let two = task(&[actions.to_owned()], "(at 5 (not (p)))", "(g)");
     two.check(IN_SEQUENCE, &[("5: (a)\n5: (b)", "interference"), ("5: (a)\n5.1: (b)", "valid")]);
@@ -155,10 +156,10 @@ fn an_event_that_interferes_is_at_another_time() {
 }
 
 #[test]
-fn what_counts_as_read() {
+fn conditions_and_effects_read_atoms_even_without_influence() {
     let event = "(at 5 (p))";
     for (effect, expected) in [
-        // Conditions of effects, active or not; right-hand sides, also of inactive effects; through derived predicates.
+        // Conditions of active and inactive effects, also through derived predicates.
         ("(at end (when (p) (r)))", "interference"),
         ("(at end (when (and (q) (p)) (r)))", "interference"),
         ("(at end (when (derived) (r)))", "interference"),
@@ -170,7 +171,7 @@ fn what_counts_as_read() {
         task(&[a], event, "(g)").check_both(&[("3: (a) [2]", expected)]);
     }
     for (condition, expected) in [
-        // It makes no difference: one part is true anyway.
+        // The event does not change the truth of the disjunction.
         ("(at end (or (p) (g)))", "interference"),
         ("(at end (or (q) (g)))", "valid"),
         ("(at end (derived))", "interference"),
@@ -182,15 +183,15 @@ fn what_counts_as_read() {
 }
 
 #[test]
-fn numbers_interfere() {
+fn changes_of_one_number_interfere_unless_they_commute() {
     let pair = |left: &str, right: &str| {
         let actions = [
             durative("a", "2", "", &format!("(at end {left})")),
             durative("b", "2", "", &format!("(at end {right})")),
         ];
         let task = task(&actions, "(q)", "");
-        let apart = task.verdict(CONCURRENTLY, "0: (a) [2]\n0.001: (b) [2]");
-        assert_eq!(apart, "valid", "{left} {right}");
+        let separated = task.verdict(CONCURRENTLY, "0: (a) [2]\n0.001: (b) [2]");
+        assert_eq!(separated, "valid", "{left} {right}");
         task.verdict(CONCURRENTLY, "0: (a) [2]\n0: (b) [2]")
     };
     for (left, right, expected) in [
@@ -212,25 +213,26 @@ fn numbers_interfere() {
 }
 
 #[test]
-fn an_action_that_takes_no_time_is_one_happening() {
+fn an_action_of_duration_zero_is_one_happening() {
     for (condition, effect, expected) in [
-        // All conditions are evaluated before, so the start does not help the end.
+        // All conditions are evaluated in the state before, so effects at start do not enable conditions at
+        // end.
         ("(at end (q))", "(at start (p)) (at end (g))", "at_end"),
         ("(at end (p))", "(at start (p)) (at end (g))", "at_end"),
         ("(at end (r))", "(at start (p)) (at end (g))", "valid"),
-        // The end reads what the start writes, although it holds before as well.
+        // The end reads an atom that the start writes, although it holds before.
         ("(at end (r))", "(at start (r)) (at end (g))", "interference"),
         ("(at start (r))", "(at end (not (r))) (at end (g))", "interference"),
-        // One adds what the other deletes; both add; both delete.
+        // One adds the atom that the other deletes; both add; both delete.
         ("", "(at start (p)) (at end (not (p))) (at end (g))", "interference"),
         ("", "(at start (not (p))) (at end (p)) (at end (g))", "interference"),
         ("", "(at start (p)) (at end (p)) (at end (g))", "valid"),
         ("", "(at start (not (r))) (at end (not (r))) (at end (g))", "valid"),
-        // Numbers.
+        // Changes of numbers.
         ("", "(at start (increase (x) 1)) (at end (increase (x) 1)) (at end (g))", "valid"),
         ("", "(at start (assign (x) 1)) (at end (assign (x) 1)) (at end (g))", "interference"),
         ("", "(at start (increase (x) 1)) (at end (increase (y) (x))) (at end (g))", "interference"),
-        // Over all says nothing.
+        // Conditions over all are not checked.
         ("(over all (p))", "(at end (g))", "valid"),
         ("(over all (p))", "(at start (p)) (at end (not (p))) (at end (g))", "interference"),
     ] {
@@ -239,13 +241,13 @@ fn an_action_that_takes_no_time_is_one_happening() {
     }
     let sums = durative("a", "0", "", "(at start (increase (x) 1)) (at end (increase (x) 3))");
     task(&[sums], "", "(= (x) 6)").check_both(&[("0: (a) [0]", "valid")]);
-    // With the least duration they are two.
+    // With a positive duration, start and end are two happenings.
     let a = durative("a", "0.001", "(at end (p))", "(at start (p)) (at end (not (p))) (at end (g))");
     task(&[a], "", "(g)").check_both(&[("0: (a) [0.001]", "valid")]);
 }
 
 #[test]
-fn effects_of_one_happening() {
+fn conflicting_effects_of_one_happening_are_reported() {
     for (effect, expected) in [
         ("(at end (not (g))) (at end (g))", "valid"),
         ("(at end (g)) (at end (assign (x) 1)) (at end (assign (x) 1))", "valid"),
@@ -253,7 +255,7 @@ fn effects_of_one_happening() {
         ("(at end (g)) (at end (assign (x) 1)) (at end (increase (x) 2))", "conflict"),
         ("(at end (g)) (at end (scale-up (x) 1)) (at end (increase (x) 2))", "conflict"),
         ("(at end (g)) (at end (increase (x) 1)) (at end (decrease (x) 1))", "valid"),
-        // An effect whose condition does not hold is none.
+        // An effect whose condition does not hold is ignored.
         ("(at end (g)) (at end (assign (x) 1)) (at end (when (p) (assign (x) 2)))", "valid"),
         ("(at end (g)) (at end (assign (x) 1)) (at end (when (not (p)) (assign (x) 2)))", "conflict"),
         ("(at end (g)) (at end (when (p) (increase (x) (z))))", "valid"),
@@ -264,7 +266,7 @@ fn effects_of_one_happening() {
     ] {
         let a = durative("a", "2", "", effect);
         task(&[a], "", "(g)").check_both(&[("0: (a) [2]", expected)]);
-        // The same at the start, where it contradicts itself as well.
+        // The same effects at the start.
         let a = durative("a", "2", "", &effect.replace("at end", "at start"));
         task(&[a], "", "(g)").check_both(&[("0: (a) [2]", expected)]);
     }
@@ -273,7 +275,7 @@ fn effects_of_one_happening() {
 #[test]
 fn the_goal_holds_when_the_last_action_ends() {
     let a = durative("a", "2", "", "(at end (g))");
-    // An event at the end counts, a later one does not, and no plan waits for one.
+    // An event at the end counts, a later one does not, and a plan cannot wait for one.
     let adds = task(std::slice::from_ref(&a), "(at 5 (p))", "(g) (p)");
     adds.check_both(&[
         ("3: (a) [2]", "valid"),
@@ -288,22 +290,22 @@ fn the_goal_holds_when_the_last_action_ends() {
     task(std::slice::from_ref(&a), "(at 0 (p))", "(p)").check_both(&[("", "valid"), ("0: (a) [2]", "valid")]);
     task(std::slice::from_ref(&a), "(p) (at 0 (not (p)))", "(p)").check_both(&[("", "goal")]);
     task(&[a], "(at 0.001 (p))", "(p)").check_both(&[("", "goal")]);
-    // An over-all condition that breaks at the end, as the goal wants.
-    let kept = durative("a", "2", "(over all (p))", "(at end (g))");
-    task(&[kept], "(p) (at 2 (not (p)))", "(g) (not (p))")
+    // A condition over all that becomes false exactly at the end, as the goal requires.
+    let guarded = durative("a", "2", "(over all (p))", "(at end (g))");
+    task(&[guarded], "(p) (at 2 (not (p)))", "(g) (not (p))")
         .check_both(&[("0: (a) [2]", "valid"), ("0.001: (a) [2]", "over_all")]);
 }
 
 #[test]
-fn in_sequence_an_end_and_a_start_may_touch() {
+fn in_sequence_an_end_and_a_start_may_coincide() {
     let a = durative("a", "2", "", "(at end (p))");
     let b = durative("b", "2", "(at start (p))", "(at start (not (p))) (at end (g))");
-    let both = task(&[a, b], "", "(g)");
-    both.check(
+    let task_of_both = task(&[a, b], "", "(g)");
+    task_of_both.check(
         IN_SEQUENCE,
         &[("0: (a) [2]\n2: (b) [2]", "valid"), ("0: (a) [2]\n1.999: (b) [2]", "overlap")],
     );
-    both.check(
+    task_of_both.check(
         CONCURRENTLY,
         &[("0: (a) [2]\n2: (b) [2]", "at_start"), ("0: (a) [2]\n2.001: (b) [2]", "valid")],
     );
@@ -318,21 +320,22 @@ fn an_instance_may_overlap_with_itself() {
         &[
             ("0: (a) [2]\n2: (a) [2]", "valid"),
             ("0: (a) [2]\n1.999: (a) [2]", "valid"),
-            // A plan may have the same action at the same time several times, and each of them counts.
+            // A plan may contain one action several times at one time, and each occurrence has its effects.
             ("0: (a) [2]\n0: (a) [2]", "valid"),
             ("0: (a) [2]", "goal"),
             ("0: (a) [2]\n0: (a) [2]\n0: (a) [2]", "goal"),
         ],
     );
     free.check(IN_SEQUENCE, &[("0: (a) [2]\n1.999: (a) [2]", "overlap")]);
-    // Each run has its own start, its own end, and what must hold between them.
+    // Each occurrence has its own start, end and conditions over all.
     let a = durative("a", "2", "(at start (p)) (over all (q))", "(at start (not (p))) (at end (g))");
     let b = durative("b", "1", "", "(at start (p)) (at end (not (q)))");
     task(&[a, b], "(p) (q)", "(g)").check(
         CONCURRENTLY,
         &[("0: (a) [2]\n0.5: (a) [2]", "at_start"), ("0: (a) [2]\n1: (b) [1]\n1.001: (a) [2]", "over_all")],
     );
-    // An end is kept apart from the end of another run like from any happening: setting a number twice is not simultaneous.
+    // The ends of two occurrences must be separated like any happenings: assigning a number twice is not
+    // simultaneous.
     for effect in ["(assign (x) 1)", "(assign (x) (+ (x) 1))"] {
         let a = durative("a", "2", "", &format!("(at end {effect})"));
         task(&[a], "", "").check(
@@ -344,7 +347,7 @@ fn an_instance_may_overlap_with_itself() {
             ],
         );
     }
-    // Adding the same, and deleting the same, is not interference; adding what the other one deletes is.
+    // Two additions or two deletions of one atom do not interfere; an addition and a deletion do.
     let a = durative("a", "2", "", "(at start (p)) (at end (not (p)))");
     task(&[a], "", "(not (p))").check(
         CONCURRENTLY,
@@ -354,7 +357,7 @@ fn an_instance_may_overlap_with_itself() {
             ("0: (a) [2]\n1.999: (a) [2]", "valid"),
         ],
     );
-    // They touch, and interfere.
+    // The occurrences follow each other directly and interfere.
     let a = durative("a", "2", "(at start (not (p)))", "(at start (p)) (at end (not (p)))");
     task(&[a], "", "").check(
         CONCURRENTLY,
@@ -367,7 +370,7 @@ fn an_instance_may_overlap_with_itself() {
 }
 
 #[test]
-fn the_tolerance_is_for_rounded_plans() {
+fn the_tolerance_delays_steps_and_limits_rounding_of_durations() {
     let a = durative("a", "5", "", "(at end (q))");
     let b = durative("b", "1", "(at start (p)) (at start (q))", "(at end (g))");
     let (domain, problem) = task(&[a, b], "(p) (at 5 (not (p)))", "(g)").parse();
@@ -375,9 +378,10 @@ fn the_tolerance_is_for_rounded_plans() {
         let plan = PlanText::parse(&Source::new("plan", text)).expect("the plan can be read");
         validate(&domain, &problem, &plan, options).violation.map(|violation| violation.kind.as_str())
     };
-    // What begins too early by a rounding begins when the step before has ended, and the event has taken place by then.
+    // A step that starts too early within the tolerance is delayed to the end of the preceding step. The
+    // event has then taken place.
     assert_eq!(verdict(&Options::default(), "0: (a) [5]\n4.9995: (b) [1]"), Some("at_start"));
-    // A separation is not a tolerance of durations.
+    // A large separation does not enlarge the tolerance of durations.
     let separation = BigRational::from_integer(BigInt::from(1));
     let wide = Options::default().with_concurrent(true).with_tolerance(separation);
     assert_eq!(verdict(&wide, "0: (a) [4.5]"), Some("duration"));
@@ -385,7 +389,7 @@ fn the_tolerance_is_for_rounded_plans() {
 }
 
 #[test]
-fn a_single_step_changes_what_it_changes_in_a_plan() {
+fn a_single_step_has_the_same_effects_as_in_a_plan() {
     let single = |duration: &str, condition: &str, effect: &str, forced: bool| {
         let (domain, problem) = task(&[durative("a", duration, condition, effect)], "(r)", "").parse();
         let plan = PlanText::parse(&Source::new("plan", "(a)")).expect("the plan can be read");
@@ -414,7 +418,7 @@ fn a_single_step_changes_what_it_changes_in_a_plan() {
 }
 
 #[test]
-fn a_step_that_fits_two_schemas_is_the_better_one() {
+fn the_best_reading_of_an_ambiguous_plan_counts() {
     let domain = "(define (domain d) (:predicates (p) (g)) (:functions (total-cost))
       (:action go :parameters () :effect (and (g) (increase (total-cost) 10)))
       (:action go :parameters () :precondition (p) :effect (and (g) (increase (total-cost) 1)))
@@ -430,7 +434,7 @@ fn a_step_that_fits_two_schemas_is_the_better_one() {
     };
     assert_eq!(metric("(p)", "(go)"), Some("1".to_owned()));
     assert_eq!(metric("", "(go)"), Some("10".to_owned()));
-    // The first of them may be the one that undoes.
+    // The first step may be an instance of the schema that deletes the goal.
     assert_eq!(metric("(p)", "(go)\n(go)"), Some("1".to_owned()));
     assert_eq!(metric("", ""), None);
 }

@@ -1,6 +1,6 @@
-//! Derived facts against their definition, the number of steps that they take, and interruptions.
+//! Tests of derived predicates: comparison with the definition, number of evaluation steps, and interruption.
 //!
-//! The oracle evaluates every ground instance of every axiom again and again, until nothing new follows.
+//! The oracle evaluates every ground instance of every axiom repeatedly until a fixpoint is reached.
 
 use std::cell::Cell;
 use std::collections::BTreeSet;
@@ -12,19 +12,18 @@ use metaplan_pddl::ast::{Domain, Problem};
 use metaplan_pddl::validate::{Interrupted, Options, PlanText, validate, validate_within};
 use metaplan_pddl::{Source, read, render};
 
-/// Some texts, one after the other.
 fn concat(texts: impl Iterator<Item = String>) -> String {
-    texts.fold(String::new(), |all, text| all + &text)
+    texts.fold(String::new(), |joined, text| joined + &text)
 }
 
 const OBJECTS: usize = 3;
-/// The variables; an inner quantifier may hide one of an outer quantifier or of the head.
+/// Variables. An inner quantifier may shadow a variable of an outer quantifier or of the head.
 const VARIABLES: [&str; 3] = ["?a", "?b", "?c"];
-/// Derived predicates with their arity. Only the last one is negated by none and may negate the others.
+/// Derived predicates with their arity. The last one is not negated by any other and may negate the others.
 const DERIVED: [(&str, usize); 4] = [("p", 1), ("q", 1), ("r", 2), ("s", 1)];
 const LAST: usize = 3;
 
-/// Which object each variable has.
+/// Object of each variable, if bound.
 type Scope = [Option<usize>; 3];
 type Fact = (usize, Vec<usize>);
 
@@ -33,7 +32,7 @@ enum Condition {
     Edge(usize, usize),
     Derived(usize, [usize; 2]),
     NotEdge(usize, usize),
-    /// The negation of a derived atom in the axiom of the last predicate, and the atom itself elsewhere.
+    /// Negated derived atom in axioms of the last predicate; the plain atom elsewhere.
     NotDerived(usize, [usize; 2]),
     NotNot(Box<Condition>),
     Equal(usize, usize),
@@ -44,7 +43,7 @@ enum Condition {
     ForAll(Vec<usize>, Box<Condition>),
 }
 
-/// An object, or one of the variables in scope.
+/// Interprets a number as a variable in scope (`Ok`) or an object (`Err`).
 fn term(number: usize, scope: &Scope) -> Result<usize, usize> {
     let visible: Vec<usize> = (0..3).filter(|variable| scope[*variable].is_some()).collect();
     if number < OBJECTS || visible.is_empty() {
@@ -62,9 +61,9 @@ fn term_text(number: usize, scope: &Scope) -> String {
     term(number, scope).map_or_else(|object| format!("o{object}"), |variable| VARIABLES[variable].to_owned())
 }
 
-/// All ways to give objects to variables.
+/// Returns all assignments of objects to variables.
 fn each(variables: &[usize], scope: &Scope) -> Vec<Scope> {
-    let mut all = vec![*scope];
+    let mut scopes = vec![*scope];
     for variable in variables {
         let with = |scope: Scope| {
             (0..OBJECTS).map(move |object| {
@@ -73,9 +72,9 @@ fn each(variables: &[usize], scope: &Scope) -> Vec<Scope> {
                 scope
             })
         };
-        all = all.into_iter().flat_map(with).collect();
+        scopes = scopes.into_iter().flat_map(with).collect();
     }
-    all
+    scopes
 }
 
 impl Condition {
@@ -89,7 +88,7 @@ impl Condition {
         let holds = |part: &Self, scope: &Scope| part.holds(edges, facts, last, scope);
         let edge = |from: usize, to: usize| edges.contains(&(object(from, scope), object(to, scope)));
         let derived = |predicate: usize, terms: &[usize; 2]| {
-            let arguments = terms[..DERIVED[predicate].1].iter().map(|own| object(*own, scope));
+            let arguments = terms[..DERIVED[predicate].1].iter().map(|term| object(*term, scope));
             facts.contains(&(predicate, arguments.collect()))
         };
         match self {
@@ -113,12 +112,12 @@ impl Condition {
             |from: usize, to: usize| format!("(edge {} {})", term_text(from, scope), term_text(to, scope));
         let derived = |predicate: usize, terms: &[usize; 2]| {
             let (name, arity) = DERIVED[predicate];
-            let terms: Vec<String> = terms[..arity].iter().map(|own| term_text(*own, scope)).collect();
+            let terms: Vec<String> = terms[..arity].iter().map(|term| term_text(*term, scope)).collect();
             format!("({name} {})", terms.join(" "))
         };
         let join = |parts: &[Self]| parts.iter().map(text).collect::<Vec<_>>().join(" ");
         let quantified = |word: &str, variables: &[usize], part: &Self| {
-            let names: Vec<&str> = variables.iter().map(|own| VARIABLES[*own]).collect();
+            let names: Vec<&str> = variables.iter().map(|variable| VARIABLES[*variable]).collect();
             let mut inner = *scope;
             for variable in variables {
                 inner[*variable] = Some(0);
@@ -154,21 +153,22 @@ fn condition() -> impl Strategy<Value = Condition> {
         1 => (0..LAST, [term(), term()]).prop_map(|(predicate, terms)| Condition::NotDerived(predicate, terms)),
         1 => (term(), term()).prop_map(|(left, right)| Condition::Equal(left, right)),
     ];
-    let variables = || prop_oneof![3 => (0..3_usize).prop_map(|one| vec![one]), 1 => Just(vec![1, 2])];
+    let variables =
+        || prop_oneof![3 => (0..3_usize).prop_map(|variable| vec![variable]), 1 => Just(vec![1, 2])];
     leaf.prop_recursive(4, 16, 3, move |inner| {
         let parts = || prop::collection::vec(inner.clone(), 1..4);
         prop_oneof![
             3 => parts().prop_map(Condition::And),
             2 => parts().prop_map(Condition::Or),
-            3 => (variables(), inner.clone()).prop_map(|(own, part)| Condition::Exists(own, part.into())),
-            1 => (variables(), inner.clone()).prop_map(|(own, part)| Condition::ForAll(own, part.into())),
+            3 => (variables(), inner.clone()).prop_map(|(bound, part)| Condition::Exists(bound, part.into())),
+            1 => (variables(), inner.clone()).prop_map(|(bound, part)| Condition::ForAll(bound, part.into())),
             1 => (term(), term(), inner.clone()).prop_map(|(from, to, part)| Condition::IfEdge(from, to, part.into())),
             1 => inner.clone().prop_map(|part| Condition::NotNot(part.into())),
         ]
     })
 }
 
-/// The parameters of a head.
+/// Parameters of the head of a predicate.
 fn head(predicate: usize) -> Vec<usize> {
     (0..DERIVED[predicate].1).collect()
 }
@@ -178,7 +178,9 @@ fn fixpoint(edges: &BTreeSet<(usize, usize)>, axioms: &[(usize, Condition)]) -> 
     for last in [false, true] {
         loop {
             let before = facts.len();
-            for (predicate, condition) in axioms.iter().filter(|(own, _)| (*own == LAST) == last) {
+            for (predicate, condition) in
+                axioms.iter().filter(|(head_predicate, _)| (*head_predicate == LAST) == last)
+            {
                 for scope in each(&head(*predicate), &[None; 3]) {
                     if condition.holds(edges, &facts, last, &scope) {
                         facts.insert((*predicate, scope.into_iter().flatten().collect()));
@@ -204,7 +206,7 @@ fn parsed(domain: &str, problem: &str) -> (Domain, Problem) {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(600))]
     #[test]
-    fn what_follows_is_the_least_fixpoint(
+    fn derived_facts_are_the_least_fixpoint(
         edges in prop::collection::btree_set((0..OBJECTS, 0..OBJECTS), 0..6),
         axioms in prop::collection::vec((0..=LAST, condition()), 1..6),
     ) {
@@ -212,7 +214,7 @@ proptest! {
         for (predicate, condition) in &axioms {
             let parameters = head(*predicate);
             let scope = each(&parameters, &[None; 3])[0];
-            let names: Vec<&str> = parameters.iter().map(|own| VARIABLES[*own]).collect();
+            let names: Vec<&str> = parameters.iter().map(|argument| VARIABLES[*argument]).collect();
             let (name, text) = (DERIVED[*predicate].0, condition.text(*predicate == LAST, &scope));
             let _ = write!(domain, "(:derived ({name} {}) {text})", names.join(" "));
         }
@@ -222,7 +224,7 @@ proptest! {
         for (predicate, (name, _)) in DERIVED.iter().enumerate() {
             for scope in each(&head(predicate), &[None; 3]) {
                 let arguments: Vec<usize> = scope.into_iter().flatten().collect();
-                let names: Vec<String> = arguments.iter().map(|own| format!("o{own}")).collect();
+                let names: Vec<String> = arguments.iter().map(|argument| format!("o{argument}")).collect();
                 let problem = format!(
                     "(define (problem p) (:domain d) (:objects o0 o1 o2) (:init {init}) (:goal ({name} {})))",
                     names.join(" ")
@@ -236,7 +238,7 @@ proptest! {
     }
 }
 
-/// A derived predicate that holds along a chain of objects.
+/// Task with a derived predicate along a chain of objects.
 fn chain(length: usize, axiom: &str) -> (Domain, Problem) {
     let domain = format!(
         "(define (domain d) (:predicates (next ?x ?y) (end ?x) (on) (p ?x)) (:derived (p ?x) {axiom})
@@ -252,7 +254,7 @@ fn chain(length: usize, axiom: &str) -> (Domain, Problem) {
 
 const JOINED: &str = "(or (and (end ?x) (on)) (exists (?y) (and (next ?x ?y) (p ?y))))";
 
-/// The number of times that a valid plan is interrupted in vain.
+/// Number of calls of `stop` during the validation of a valid plan.
 fn polls(length: usize, axiom: &str) -> u64 {
     let (domain, problem) = chain(length, axiom);
     let plan = PlanText::parse(&Source::new("plan", "(switch)")).expect("a plan");
@@ -266,15 +268,15 @@ fn polls(length: usize, axiom: &str) -> u64 {
     count.get()
 }
 
-/// Cubic evaluation would take 64 times as many steps for a chain that is four times as long.
+/// Cubic evaluation would need 64 times as many steps for a chain four times as long.
 #[test]
-fn a_chain_of_derived_facts_takes_steps_in_proportion_to_its_length() {
+fn a_chain_of_derived_facts_takes_linear_time() {
     let (short, long) = (polls(200, JOINED), polls(800, JOINED));
     assert!(long <= 5 * short, "{short} {long}");
 }
 
 #[test]
-fn a_validation_ends_when_it_is_told_to() {
+fn a_validation_ends_when_stop_returns_true() {
     let (domain, problem) = chain(2_000, JOINED);
     let plan = PlanText::parse(&Source::new("plan", "(switch)")).expect("a plan");
     for allowed in [0, 1, 2, 10] {
@@ -288,7 +290,7 @@ fn a_validation_ends_when_it_is_told_to() {
     }
 }
 
-/// Quantifiers over more variables than the call stack has frames, each with one object or with two.
+/// Quantifiers over more variables than the call stack has frames, with one object or two per variable.
 #[test]
 fn quantifiers_may_bind_many_variables() {
     let check = |count: usize, objects: &str, condition: &dyn Fn(&str) -> String| {
@@ -316,9 +318,9 @@ fn quantifiers_may_bind_many_variables() {
 const UNIVERSAL: &str =
     "(and (on) (or (end ?x) (exists (?y) (next ?x ?y))) (forall (?y) (imply (next ?x ?y) (p ?y))))";
 
-/// Each instance looks at all objects twice: when it is tried first, and when the fact that was missing is derived.
+/// Each instance visits all objects twice: at its first evaluation, and when the missing fact is derived.
 #[test]
-fn a_chain_below_a_universal_quantifier_takes_steps_in_proportion_to_its_square() {
+fn a_chain_below_a_universal_quantifier_takes_quadratic_time() {
     let (short, long) = (polls(60, UNIVERSAL), polls(240, UNIVERSAL));
     assert!(long <= 20 * short, "{short} {long}");
 }

@@ -1,6 +1,6 @@
-//! Every real PDDL file that we have: read, checked, printed and read again, with what is wrong in it.
+//! Parses, checks and prints all available real PDDL files, and parses the printed text again.
 //!
-//! Skipped where the files are absent; they are not part of the project.
+//! Skipped if the files are absent; they are not part of the project.
 
 #![expect(clippy::print_stdout, reason = "a skipped test says so")]
 
@@ -14,7 +14,7 @@ use metaplan_pddl::{
 
 const REAL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/real/pddl");
 
-/// The domains about which something is to be said: `CODE:line`, warnings with a tilde. All others are clean.
+/// Expected diagnostics of domains: `CODE:line`, with a tilde for warnings. All other domains have none.
 const DOMAINS: [(&str, &str); 16] = [
     ("navigation_planta/domain_sas.pddl", "P134:1 ~P127:59"),
     ("navigation_planta/experiment_combined_scalability/domain_sas_combined.pddl", "P134:1 ~P127:70"),
@@ -34,7 +34,7 @@ const DOMAINS: [(&str, &str); 16] = [
     ("suave_planta/suave_domain_extended.pddl", "P134:1"),
 ];
 
-/// All problems, each with its domain and with what is to be said about the problem.
+/// Problems with their domains and the expected diagnostics about the problem.
 const PROBLEMS: [(&str, &str, &str); 35] = [
     ("navigation_planta/problem", "navigation_planta/domain", ""),
     ("navigation_planta/problem_no_sas", "navigation_planta/domain_no_sas", "P100:1"),
@@ -97,12 +97,12 @@ const PROBLEMS: [(&str, &str, &str); 35] = [
     ),
     ("suave_metaplan/suave_extended_problem", "suave_metaplan/suave_extended_domain", "~P131:2"),
     ("suave_metaplan/suave_problem", "suave_metaplan/suave_domain", ""),
-    // Their domains are templates, so that nothing can be said about undeclared names.
+    // Their domains are templates, so undeclared names are not reported.
     ("suave_planta/suave_problem", "suave_planta/suave_domain", ""),
     ("suave_planta/suave_problem_extended", "suave_planta/suave_domain_extended", ""),
 ];
 
-/// The path of a file in the short form of the table of problems.
+/// Expands the short form of a path in `PROBLEMS`.
 fn path_of(short: &str) -> String {
     match short.split_once(':') {
         Some((package, file)) => {
@@ -118,9 +118,9 @@ fn source(path: &str) -> Source {
     Source::from_bytes(path, &bytes)
 }
 
-/// The paths of all files below `REAL`; none where it is absent.
+/// Returns the paths of all files below `REAL`; empty if it is absent.
 fn files() -> BTreeSet<String> {
-    let mut found = BTreeSet::new();
+    let mut paths = BTreeSet::new();
     let mut folders = vec![PathBuf::from(REAL)];
     while let Some(folder) = folders.pop() {
         let Ok(entries) = std::fs::read_dir(&folder) else { continue };
@@ -128,14 +128,14 @@ fn files() -> BTreeSet<String> {
             if path.is_dir() {
                 folders.push(path);
             } else if let Ok(relative) = path.strip_prefix(REAL) {
-                found.insert(relative.to_string_lossy().into_owned());
+                paths.insert(relative.to_string_lossy().into_owned());
             }
         }
     }
-    if found.is_empty() {
+    if paths.is_empty() {
         println!("skipped: {REAL} is absent");
     }
-    found
+    paths
 }
 
 fn summary<'d>(diagnostics: impl IntoIterator<Item = &'d Diagnostic>) -> String {
@@ -152,16 +152,17 @@ fn domains_are_read_and_their_errors_reported() {
     let files = files();
     for path in files.difference(&problems) {
         let source = source(path);
-        let (domain, mut found) = parse_domain(&source);
+        let (domain, mut diagnostics) = parse_domain(&source);
         let domain = domain.unwrap_or_else(|| panic!("{path} has a domain"));
-        if !has_errors(&found) {
-            found.extend(check_domain(&domain, &source));
+        if !has_errors(&diagnostics) {
+            diagnostics.extend(check_domain(&domain, &source));
         }
-        let expected = DOMAINS.iter().find(|(known, _)| known == path).map_or("", |(_, expected)| expected);
-        assert_eq!(summary(&found), expected, "{path}");
+        let expected =
+            DOMAINS.iter().find(|(domain_path, _)| domain_path == path).map_or("", |(_, expected)| expected);
+        assert_eq!(summary(&diagnostics), expected, "{path}");
         let printed = print_domain(&domain);
-        let (again, found) = parse_domain(&Source::new("printed", printed.clone()));
-        assert_eq!(summary(&found), "", "printed {path}");
+        let (again, diagnostics) = parse_domain(&Source::new("printed", printed.clone()));
+        assert_eq!(summary(&diagnostics), "", "printed {path}");
         assert_eq!(again.map(|domain| print_domain(&domain)), Some(printed), "{path}");
     }
 }
@@ -175,16 +176,17 @@ fn problems_are_read_and_their_errors_reported() {
             continue;
         }
         let (domain, problem) = (source(&path_of(domain)), source(&path));
-        let found = read(&domain, &problem).map_or_else(Errors::into_vec, |(_, _, found)| found);
-        let found = found.iter().filter(|diagnostic| diagnostic.file == path);
-        assert_eq!(summary(found), expected, "{path}");
-        let (Some(tree), found) = parse_problem(&problem) else { continue };
-        if has_errors(&found) {
+        let diagnostics =
+            read(&domain, &problem).map_or_else(Errors::into_vec, |(_, _, diagnostics)| diagnostics);
+        let diagnostics = diagnostics.iter().filter(|diagnostic| diagnostic.file == path);
+        assert_eq!(summary(diagnostics), expected, "{path}");
+        let (Some(tree), diagnostics) = parse_problem(&problem) else { continue };
+        if has_errors(&diagnostics) {
             continue;
         }
         let printed = print_problem(&tree);
-        let (again, found) = parse_problem(&Source::new("printed", printed.clone()));
-        assert_eq!(summary(&found), "", "printed {path}");
+        let (again, diagnostics) = parse_problem(&Source::new("printed", printed.clone()));
+        assert_eq!(summary(&diagnostics), "", "printed {path}");
         assert_eq!(again.map(|problem| print_problem(&problem)), Some(printed), "{path}");
     }
 }
@@ -192,10 +194,10 @@ fn problems_are_read_and_their_errors_reported() {
 #[test]
 fn tables_name_existing_files() {
     let files = files();
-    let named = DOMAINS.iter().map(|(domain, _)| (*domain).to_owned());
-    let named =
-        named.chain(PROBLEMS.iter().flat_map(|(problem, domain, _)| [path_of(problem), path_of(domain)]));
-    for path in named {
+    let paths = DOMAINS.iter().map(|(domain, _)| (*domain).to_owned());
+    let paths =
+        paths.chain(PROBLEMS.iter().flat_map(|(problem, domain, _)| [path_of(problem), path_of(domain)]));
+    for path in paths {
         assert!(files.is_empty() || files.contains(&path), "{path}");
     }
 }

@@ -1,4 +1,5 @@
-//! Every construct of the language, one by one: what is read, printed as written, and refused by name.
+//! Tests of every construct of the language: it is accepted and printed as written, or refused by name, or
+//! reported with a code.
 
 use metaplan_pddl::{
     Errors, Severity, Source, parse_domain, parse_problem, print_domain, print_problem, read, render,
@@ -11,7 +12,7 @@ const DOMAIN: &str = "(define (domain d) (:types place dock - place tool) (:cons
 const PROBLEM: &str = "(define (problem p) (:domain d) (:objects a b - place drill - tool)
  (:init (at a) (= (battery) 10) INIT) (:goal GOAL) METRIC)";
 
-/// The pair of texts with one thing in it; the rest is as little as possible.
+/// Domain and problem with one construct inserted at `place`, and otherwise minimal.
 fn texts(place: &str, what: &str) -> (Source, Source) {
     let (mut sections, mut init, mut goal, mut metric) = (String::new(), "", "(at b)", "");
     let truth = "(and )";
@@ -41,18 +42,23 @@ fn texts(place: &str, what: &str) -> (Source, Source) {
     (Source::new("domain", DOMAIN.replace("SECTIONS", &sections)), Source::new("problem", problem))
 }
 
-/// The codes of the errors.
+/// Returns the codes of the errors.
 fn errors(place: &str, what: &str) -> Vec<&'static str> {
     let (domain, problem) = texts(place, what);
-    let found = read(&domain, &problem).map_or_else(Errors::into_vec, |(_, _, found)| found);
-    found.iter().filter(|found| found.severity == Severity::Error).map(|found| found.code).collect()
+    let diagnostics =
+        read(&domain, &problem).map_or_else(Errors::into_vec, |(_, _, diagnostics)| diagnostics);
+    diagnostics
+        .iter()
+        .filter(|diagnostic| diagnostic.severity == Severity::Error)
+        .map(|diagnostic| diagnostic.code)
+        .collect()
 }
 
 fn without_space(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ").replace(" )", ")").replace("( ", "(")
 }
 
-/// Constructs that are read without an error, and printed as they are written here.
+/// Constructs that are accepted and printed as written here.
 const ACCEPTED: [(&str, &str); 94] = [
     ("section", "(:action a :parameters (?x - (either place tool)) :effect (and))"),
     ("section", "(:action a :parameters (?x) :effect (and))"),
@@ -183,7 +189,7 @@ fn every_construct_is_read_and_printed_as_written() {
     }
 }
 
-/// What is not supported, and the words that say so.
+/// Section, unsupported construct, and part of the message.
 const REFUSED: [(&str, &str, &str); 11] = [
     (
         "section",
@@ -207,22 +213,22 @@ const REFUSED: [(&str, &str, &str); 11] = [
 ];
 
 #[test]
-fn what_is_not_supported_is_refused_by_name() {
+fn unsupported_constructs_are_refused_by_name() {
     for (place, what, words) in REFUSED {
         let (domain, problem) = texts(place, what);
-        let found = read(&domain, &problem).map_or_else(Errors::into_vec, |(_, _, found)| found);
-        let refusal = found.iter().find(|found| found.code == "P113" && found.severity == Severity::Error);
-        let refusal = refusal.unwrap_or_else(|| panic!("{what}: {found:#?}"));
+        let diagnostics =
+            read(&domain, &problem).map_or_else(Errors::into_vec, |(_, _, diagnostics)| diagnostics);
+        let refusal = diagnostics
+            .iter()
+            .find(|diagnostic| diagnostic.code == "P113" && diagnostic.severity == Severity::Error);
+        let refusal = refusal.unwrap_or_else(|| panic!("{what}: {diagnostics:#?}"));
         assert!(refusal.message.contains(words), "{what}: {}", refusal.message);
-        let shown = render(std::slice::from_ref(refusal), &[&domain, &problem], false);
-        assert!(
-            shown.contains("= help: "),
-            "{what} is refused without a word on what would be right: {shown}"
-        );
+        let text = render(std::slice::from_ref(refusal), &[&domain, &problem], false);
+        assert!(text.contains("= help: "), "{what} is refused without a word on what would be right: {text}");
     }
 }
 
-/// What is wrong, with its code.
+/// Section, erroneous construct, and code.
 const WRONG: [(&str, &str, &str); 43] = [
     ("duration", "(= ?duration =)", "P106"),
     ("precondition", "(> (battery) -)", "P106"),
@@ -270,14 +276,14 @@ const WRONG: [(&str, &str, &str); 43] = [
 ];
 
 #[test]
-fn what_is_wrong_has_its_code() {
+fn each_error_has_its_code() {
     for (place, what, code) in WRONG {
         assert!(errors(place, what).contains(&code), "{what}: {:?}, not {code}", errors(place, what));
     }
 }
 
 #[test]
-fn untyped_names_keep_their_place_before_typed_ones() {
+fn untyped_names_before_typed_ones_survive_printing() {
     for types in ["a b - object c - d", "a b c - d e f", "a - Object b -object"] {
         let source = Source::new("domain", format!("(define (domain d) (:types {types}))"));
         let print = |source: &Source| parse_domain(source).0.map(|domain| print_domain(&domain));

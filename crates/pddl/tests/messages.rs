@@ -1,4 +1,4 @@
-//! What people read when they make the usual mistakes.
+//! Snapshots of the messages about common mistakes.
 
 use metaplan_pddl::{Errors, Source, parse_domain, read, render};
 
@@ -20,14 +20,15 @@ const PROBLEM: &str = "(define (problem p)
   (:goal (at b)))
 ";
 
-/// What is said when `wrong` stands for the first `right` in the domain or the problem.
+/// Returns the messages if `wrong` replaces the first `right` in the domain or the problem.
 fn messages(right: &str, wrong: &str) -> String {
     assert!(DOMAIN.contains(right) || PROBLEM.contains(right), "{right}");
     let domain = Source::new("domain.pddl", DOMAIN.replacen(right, wrong, 1));
     let problem = if DOMAIN.contains(right) { PROBLEM.to_owned() } else { PROBLEM.replacen(right, wrong, 1) };
     let problem = Source::new("problem.pddl", problem);
-    let found = read(&domain, &problem).map_or_else(Errors::into_vec, |(_, _, found)| found);
-    let text = render(&found, &[&domain, &problem], false);
+    let diagnostics =
+        read(&domain, &problem).map_or_else(Errors::into_vec, |(_, _, diagnostics)| diagnostics);
+    let text = render(&diagnostics, &[&domain, &problem], false);
     text.lines().map(str::trim_end).collect::<Vec<_>>().join("\n")
 }
 
@@ -335,30 +336,30 @@ fn durative_condition_without_time() {
 }
 
 #[test]
-fn a_long_line_is_cut() {
+fn a_long_line_is_truncated() {
     let text = format!(
         "(define (domain d) (:predicates (p)) {} (:actoin x){})",
         " ".repeat(5_000),
         " ".repeat(5_000)
     );
     let source = Source::new("domain.pddl", text);
-    let shown = render(&parse_domain(&source).1, &[&source], false);
-    assert!(shown.contains("domain.pddl:1:5039"), "{shown}");
-    assert!(shown.len() < 1_500, "{shown}");
+    let text_of_message = render(&parse_domain(&source).1, &[&source], false);
+    assert!(text_of_message.contains("domain.pddl:1:5039"), "{text_of_message}");
+    assert!(text_of_message.len() < 1_500, "{text_of_message}");
 }
 
 #[test]
-fn colour_is_only_escapes() {
+fn colours_are_ansi_escapes() {
     let source = Source::new("domain.pddl", "(define (domain d) (:x))");
-    let found = parse_domain(&source).1;
-    let (plain, coloured) = (render(&found, &[&source], false), render(&found, &[&source], true));
+    let diagnostics = parse_domain(&source).1;
+    let (plain, coloured) = (render(&diagnostics, &[&source], false), render(&diagnostics, &[&source], true));
     assert!(coloured.contains("\u{1b}[") && !plain.contains('\u{1b}'));
 }
 
 #[test]
-fn a_file_that_is_no_pddl_is_reported_briefly() {
+fn the_number_of_messages_about_a_file_is_limited() {
     let source = Source::new("noise", "(a) b ) ".repeat(50_000));
-    let found = parse_domain(&source).1;
-    assert_eq!(found.len(), 201);
-    assert!(found.iter().any(|diagnostic| diagnostic.code == "P119"));
+    let diagnostics = parse_domain(&source).1;
+    assert_eq!(diagnostics.len(), 201);
+    assert!(diagnostics.iter().any(|diagnostic| diagnostic.code == "P119"));
 }

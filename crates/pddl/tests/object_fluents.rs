@@ -1,4 +1,4 @@
-//! Functions with objects as values: the forms that they are compiled to, and what is said of wrong ones.
+//! Tests of object fluents: their compiled forms, and messages about errors.
 
 use metaplan_pddl::{Severity, Source, parse_problem_of, print_domain, print_problem, read};
 
@@ -13,7 +13,7 @@ const DOMAIN: &str = "(define (domain d) (:requirements :adl :object-fluents :fl
 const PROBLEM: &str = "(define (problem p) (:domain d) (:objects a b - place v w - van t - tool)
  (:init (= (fuel v) 1) INIT) (:goal GOAL) METRIC)";
 
-/// The pair of texts with one thing in it.
+/// Domain and problem with one construct inserted at `place`.
 fn texts(place: &str, what: &str) -> (Source, Source) {
     let (mut section, mut init, mut goal, mut metric) = (String::new(), "", "(and )", "");
     let parameters = "(?p ?q - place ?v ?w - van ?t - tool)";
@@ -46,7 +46,7 @@ fn without_space(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ").replace(" )", ")").replace("( ", "(")
 }
 
-/// What is written, and what is printed of it.
+/// Section, source text, and expected part of the printed text.
 const COMPILED: [(&str, &str, &str); 35] = [
     ("section", "", "(loc ?x - thing ?value1 - place)"),
     ("section", "", "(carrier ?t - tool ?value3 - van) (capital ?value4 - place))"),
@@ -128,7 +128,7 @@ const COMPILED: [(&str, &str, &str); 35] = [
         "(forall (?x - tool) (busy (carrier ?x)))",
         ":precondition (and (forall (?x - tool) (exists (?value5 - van) (carrier ?x ?value5))))",
     ),
-    // Two values for one term.
+    // Assignments that may give two values to one term.
     (
         "effect",
         "(and (assign (loc ?v) ?p) (assign (loc ?w) ?q))",
@@ -171,15 +171,15 @@ const COMPILED: [(&str, &str, &str); 35] = [
 ];
 
 #[test]
-fn each_form_is_compiled_and_can_be_read_again() {
+fn each_form_is_compiled_and_its_printed_form_can_be_parsed() {
     for (place, what, expected) in COMPILED {
         let (domain, problem) = texts(place, what);
-        let (tree, task, found) =
+        let (tree, task, warnings) =
             read(&domain, &problem).unwrap_or_else(|errors| panic!("{what}: {errors:#?}"));
-        assert!(found.is_empty(), "{what}: {found:#?}");
+        assert!(warnings.is_empty(), "{what}: {warnings:#?}");
         let printed = (print_domain(&tree), print_problem(&task));
-        let shown = without_space(&(printed.0.clone() + &printed.1));
-        assert!(shown.contains(expected), "{what}\nis\n{shown}");
+        let text = without_space(&(printed.0.clone() + &printed.1));
+        assert!(text.contains(expected), "{what}\nis\n{text}");
         let sources = (Source::new("domain", printed.0.as_str()), Source::new("problem", printed.1.as_str()));
         let (again, task, _) =
             read(&sources.0, &sources.1).unwrap_or_else(|errors| panic!("{what}: {errors:#?}"));
@@ -188,22 +188,22 @@ fn each_form_is_compiled_and_can_be_read_again() {
 }
 
 #[test]
-fn assignments_that_cannot_differ_ask_for_nothing() {
-    let alike = [
+fn assignments_that_cannot_differ_add_no_precondition() {
+    let consistent_effects = [
         "(and (assign (loc v) ?p) (assign (loc w) ?q))",
         "(and (assign (loc ?v) ?p) (assign (loc ?w) ?p))",
         "(forall (?x - van) (assign (loc ?x) home))",
         "(forall (?x - place) (assign (capital) home))",
         "(and (assign (loc ?v) ?p) (assign (base ?v) ?q))",
     ];
-    for what in alike {
+    for what in consistent_effects {
         let (domain, problem) = texts("effect", what);
         let (tree, ..) = read(&domain, &problem).unwrap_or_else(|errors| panic!("{what}: {errors:#?}"));
         assert!(!print_domain(&tree).contains(":precondition"), "{what}\n{}", print_domain(&tree));
     }
 }
 
-/// What is wrong, its code, the words that say so, and where they point.
+/// Section, erroneous text, code, part of the message, and text at the reported position.
 const WRONG: [(&str, &str, &str, &str, &str); 28] = [
     (
         "condition",
@@ -278,27 +278,28 @@ const WRONG: [(&str, &str, &str, &str, &str); 28] = [
 ];
 
 #[test]
-fn what_is_wrong_is_said_where_it_stands() {
+fn errors_have_code_message_and_position() {
     for (place, what, code, words, here) in WRONG {
         let (domain, problem) = texts(place, what);
-        let Err(found) = read(&domain, &problem) else { panic!("{what} is read") };
-        let errors: Vec<_> = found.iter().filter(|found| found.severity == Severity::Error).collect();
+        let Err(diagnostics) = read(&domain, &problem) else { panic!("{what} is read") };
+        let errors: Vec<_> =
+            diagnostics.iter().filter(|diagnostic| diagnostic.severity == Severity::Error).collect();
         let [error] = errors[..] else { panic!("{what}: {errors:#?}") };
         assert_eq!(error.code, code, "{what}: {error:#?}");
         assert!(error.message.contains(words), "{what}: {}", error.message);
         let source = if error.file == "domain" { &domain } else { &problem };
-        let rest = &source.text()[error.span.start as usize..];
+        let text_at_error = &source.text()[error.span.start as usize..];
         assert!(
-            rest.starts_with(here),
+            text_at_error.starts_with(here),
             "{what}: {} points at {}",
             error.message,
-            &rest[..20.min(rest.len())]
+            &text_at_error[..20.min(text_at_error.len())]
         );
     }
 }
 
 #[test]
-fn new_variables_are_not_those_of_the_file() {
+fn new_variables_do_not_occur_in_the_file() {
     let what = "(:action a :parameters (?value1 ?VALUE - van) :precondition (= (loc ?value1) (loc ?value)) :effect (and ))";
     let (domain, problem) = texts("section", what);
     let (tree, ..) = read(&domain, &problem).expect("it is read");
@@ -308,17 +309,17 @@ fn new_variables_are_not_those_of_the_file() {
 }
 
 #[test]
-fn a_repeated_value_is_no_error() {
+fn a_repeated_value_is_a_warning() {
     let (domain, problem) = texts("init", "(= (loc v) a) (= (loc v) a)");
-    let (_, _, found) = read(&domain, &problem).expect("it is read");
-    assert!(found.iter().all(|found| found.code == "P127"), "{found:#?}");
+    let (_, _, diagnostics) = read(&domain, &problem).expect("it is read");
+    assert!(diagnostics.iter().all(|diagnostic| diagnostic.code == "P127"), "{diagnostics:#?}");
 }
 
 #[test]
-fn a_problem_is_read_by_its_domain() {
+fn a_problem_can_be_parsed_with_the_object_fluents_of_its_domain() {
     let (domain, problem) = texts("goal", "(= (loc v) home)");
     let (tree, task, _) = read(&domain, &problem).expect("it is read");
-    let (again, found) = parse_problem_of(&tree, &problem);
-    assert!(found.is_empty());
+    let (again, diagnostics) = parse_problem_of(&tree, &problem);
+    assert!(diagnostics.is_empty());
     assert_eq!(print_problem(&again.expect("it is read")), print_problem(&task));
 }

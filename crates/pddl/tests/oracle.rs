@@ -1,5 +1,5 @@
-//! The validator against an interpreter of its own kind of task: random actions with nested quantifiers, conditional
-//! effects, a derived predicate, and a function that is undefined for one object.
+//! Compares the validator with an independent interpreter on random tasks: actions with nested quantifiers,
+//! conditional effects, a derived predicate, and a function that is undefined for one object.
 
 use proptest::prelude::*;
 
@@ -8,7 +8,7 @@ use metaplan_pddl::{Source, read, render};
 
 const OBJECTS: usize = 3;
 
-/// An object, or the variable bound by the quantifier that many levels further out.
+/// An object, or the variable of an enclosing quantifier by its distance (de Bruijn index).
 #[derive(Debug, Clone, Copy)]
 enum Term {
     Object(usize),
@@ -47,21 +47,21 @@ struct Task {
     plan: Vec<(usize, usize)>,
 }
 
-/// The facts and the values; the last object has no value.
+/// Facts and values. The last object has no value.
 #[derive(Debug, Clone, PartialEq)]
 struct State {
     facts: [[bool; OBJECTS]; 2],
     values: [i64; OBJECTS - 1],
 }
 
-/// The objects that a quantifier runs through: all, or those of the subtype.
-fn range(all: bool) -> std::ops::Range<usize> {
-    if all { 0..OBJECTS } else { 1..OBJECTS }
+/// Objects in the range of a quantifier: all, or those of the subtype.
+fn range(of_all: bool) -> std::ops::Range<usize> {
+    if of_all { 0..OBJECTS } else { 1..OBJECTS }
 }
 
 impl Term {
-    /// The object, where `scope` holds those of the variables, outermost first. Where there is no
-    /// variable, it stands for the first object.
+    /// Returns the object. `scope` contains the objects of the variables, outermost first. A variable outside
+    /// of all quantifiers denotes a fixed object.
     fn object(self, scope: &[usize]) -> usize {
         match self {
             Self::Object(object) => object,
@@ -79,7 +79,7 @@ impl Term {
     }
 }
 
-/// True, false, or undefined.
+/// True, false, or undefined (`None`).
 type Truth = Option<bool>;
 
 fn all_of(parts: impl Iterator<Item = Truth>) -> Truth {
@@ -103,7 +103,7 @@ impl Condition {
         let holds = |part: &Self| part.holds(state, derived, scope);
         match self {
             Self::Fact(predicate, term) => Some(state.facts[*predicate][term.object(scope)]),
-            // What an axiom leaves undefined does not hold.
+            // An axiom with an undefined condition derives nothing.
             Self::Derived(term) => {
                 Some(derived.holds(state, derived, &[term.object(scope)]).unwrap_or(false))
             }
@@ -123,16 +123,15 @@ impl Condition {
     }
 
     fn text(&self, depth: usize) -> String {
-        let several =
-            |parts: &[Self]| parts.iter().map(|part| part.text(depth)).collect::<Vec<_>>().join(" ");
+        let join = |parts: &[Self]| parts.iter().map(|part| part.text(depth)).collect::<Vec<_>>().join(" ");
         match self {
             Self::Fact(predicate, term) => format!("(p{predicate} {})", term.text(depth)),
             Self::Derived(term) => format!("(derived {})", term.text(depth)),
             Self::Equal(left, right) => format!("(= {} {})", left.text(depth), right.text(depth)),
             Self::AtLeast(term, least) => format!("(>= (f {}) {least})", term.text(depth)),
             Self::Not(part) => format!("(not {})", part.text(depth)),
-            Self::And(parts) => format!("(and {})", several(parts)),
-            Self::Or(parts) => format!("(or {})", several(parts)),
+            Self::And(parts) => format!("(and {})", join(parts)),
+            Self::Or(parts) => format!("(or {})", join(parts)),
             Self::Imply(left, right) => format!("(imply {} {})", left.text(depth), right.text(depth)),
             Self::Exists(of_all, part) => {
                 format!("(exists ({}) {})", variable(*of_all, depth), part.text(depth + 1))
@@ -149,7 +148,7 @@ fn variable(of_all: bool, depth: usize) -> String {
 }
 
 impl Effect {
-    /// Changes `after` as the effect wants it in `before`; nothing where that is undefined.
+    /// Applies the effect, evaluated in `before`, to `after`. Returns `None` if a value is undefined.
     fn apply(
         &self,
         before: &State,
@@ -192,7 +191,8 @@ impl Effect {
 }
 
 impl Task {
-    /// The step that cannot be executed (from 1; 0: the goal does not hold), or the final values.
+    /// Executes the plan. Returns the final values, or the number of the step that cannot be executed (from
+    /// 1; 0 for the goal).
     fn run(&self) -> Result<[i64; OBJECTS - 1], usize> {
         let mut state = State { facts: self.facts, values: [1; OBJECTS - 1] };
         for (index, (action, object)) in self.plan.iter().enumerate() {
@@ -288,7 +288,7 @@ fn effect() -> impl Strategy<Value = Effect> {
 }
 
 fn task() -> impl Strategy<Value = Task> {
-    // A disjunction with a fact that often holds lets plans get further than their first step.
+    // A disjunction with a fact that often holds: otherwise most plans would fail at their first step.
     let precondition = condition(true).prop_map(|condition| {
         Condition::Or(vec![
             condition,
@@ -312,24 +312,25 @@ fn check(task: &Task) {
     let (domain, problem) = (Source::new("domain", domain_text), Source::new("problem", problem_text));
     let (domain_tree, problem_tree) = match read(&domain, &problem) {
         Ok((domain, problem, _)) => (domain, problem),
-        Err(found) => panic!("{}", render(&found, &[&domain, &problem], false)),
+        Err(errors) => panic!("{}", render(&errors, &[&domain, &problem], false)),
     };
     let plan_tree = PlanText::parse(&Source::new("plan", plan.clone())).expect("the plan can be read");
     let verdict = validate(&domain_tree, &problem_tree, &plan_tree, &Options::default());
-    // With a time between them, the actions do the same when they may overlap.
+    // Separated in time, the actions have the same effects in concurrent execution.
     let timed: Vec<_> = plan.lines().enumerate().map(|(index, step)| format!("{index}: {step}\n")).collect();
     let timed = PlanText::parse(&Source::new("timed plan", timed.concat())).expect("the plan can be read");
     let options = Options::default().with_concurrent(true);
     let concurrent = validate(&domain_tree, &problem_tree, &timed, &options);
-    let what = |verdict: &Verdict| verdict.violation.as_ref().map(|found| (found.step, found.kind));
-    assert_eq!((what(&concurrent), &concurrent.values), (what(&verdict), &verdict.values));
-    let found = match &verdict.violation {
+    let failure =
+        |verdict: &Verdict| verdict.violation.as_ref().map(|violation| (violation.step, violation.kind));
+    assert_eq!((failure(&concurrent), &concurrent.values), (failure(&verdict), &verdict.values));
+    let outcome = match &verdict.violation {
         None => Ok(()),
         Some(violation) => Err(violation.step.unwrap_or(0)),
     };
     let expected = task.run();
     assert_eq!(
-        found,
+        outcome,
         expected.map(|_| ()),
         "{}\n{}\n{plan}{:?}",
         domain.text(),

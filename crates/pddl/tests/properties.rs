@@ -1,4 +1,4 @@
-//! Printing and parsing are inverse to each other, and no text makes the parser or the checker panic.
+//! Property tests: printing is the inverse of parsing, and no text makes the parser or the checker panic.
 
 use proptest::prelude::*;
 
@@ -6,7 +6,7 @@ use metaplan_pddl::{
     Errors, Source, has_errors, parse_domain, parse_problem, print_domain, print_problem, read, render,
 };
 
-/// A name of any of the kinds that files have.
+/// Name in one of the forms that occur in real files.
 fn name() -> impl Strategy<Value = String> {
     prop_oneof![
         "[a-z][a-z0-9_]{0,5}",
@@ -96,7 +96,7 @@ fn condition() -> impl Strategy<Value = String> {
     })
 }
 
-/// A condition with preferences, which stand below `and` and `forall` only.
+/// Condition with preferences below `and` and `forall` only.
 fn soft_condition() -> impl Strategy<Value = String> {
     let leaf = prop_oneof![
         condition(),
@@ -191,8 +191,8 @@ fn action() -> impl Strategy<Value = String> {
 
 fn domain() -> impl Strategy<Value = String> {
     let sections = (typed_list(""), typed_list(""), typed_list("?"), condition());
-    let rest = (constraints(), prop::collection::vec(action(), 0..3));
-    (sections, rest).prop_map(|((types, constants, head, body), (constraints, actions))| {
+    let body_sections = (constraints(), prop::collection::vec(action(), 0..3));
+    (sections, body_sections).prop_map(|((types, constants, head, body), (constraints, actions))| {
         format!(
             "(define (domain d) (:types {types}) (:constants {constants}) (:predicates (p {head})) (:functions (f {head})) (:derived (p {head}) {body}) (:constraints {constraints}) {})",
             actions.join("\n"),
@@ -212,7 +212,7 @@ fn problem() -> impl Strategy<Value = String> {
     ];
     let metric = prop_oneof![
         expression(),
-        (name(), expression()).prop_map(|(name, rest)| format!("(+ (is-violated {name}) {rest})")),
+        (name(), expression()).prop_map(|(name, summand)| format!("(+ (is-violated {name}) {summand})")),
     ];
     let init = prop::collection::vec(element, 0..5);
     (typed_list(""), init, soft_condition(), constraints(), metric).prop_map(
@@ -227,19 +227,19 @@ fn problem() -> impl Strategy<Value = String> {
 
 fn parse_and_print_domain(text: &str) -> String {
     let source = Source::new("domain", text);
-    let (domain, found) = parse_domain(&source);
-    assert!(!has_errors(&found), "{}", render(&found, &[&source], false));
+    let (domain, diagnostics) = parse_domain(&source);
+    assert!(!has_errors(&diagnostics), "{}", render(&diagnostics, &[&source], false));
     print_domain(&domain.expect("a domain without errors is read"))
 }
 
 fn parse_and_print_problem(text: &str) -> String {
     let source = Source::new("problem", text);
-    let (problem, found) = parse_problem(&source);
-    assert!(!has_errors(&found), "{}", render(&found, &[&source], false));
+    let (problem, diagnostics) = parse_problem(&source);
+    assert!(!has_errors(&diagnostics), "{}", render(&diagnostics, &[&source], false));
     print_problem(&problem.expect("a problem without errors is read"))
 }
 
-/// What is done to a valid text before it is read.
+/// Modification of a valid text.
 #[derive(Debug, Clone)]
 enum Mutation {
     Delete(usize, usize),
@@ -336,22 +336,23 @@ proptest! {
 }
 
 #[test]
-fn what_the_mutations_start_from_is_valid() {
+fn the_unmodified_files_have_no_errors() {
     let (domain, problem) = (Source::new("domain", DOMAIN), Source::new("problem", PROBLEM));
-    let found = read(&domain, &problem).map_or_else(Errors::into_vec, |(_, _, found)| found);
-    // The object of the problem in the domain.
-    assert_eq!(found.iter().map(|found| found.code).collect::<Vec<_>>(), ["P138"]);
+    let diagnostics =
+        read(&domain, &problem).map_or_else(Errors::into_vec, |(_, _, diagnostics)| diagnostics);
+    // The domain uses an object of the problem.
+    assert_eq!(diagnostics.iter().map(|diagnostics| diagnostics.code).collect::<Vec<_>>(), ["P138"]);
 }
 
-/// The code of the only error of a domain with this precondition.
+/// Returns the code of the only error of a domain with the given precondition.
 fn only_error(precondition: &str) -> &'static str {
     let text = format!(
         "(define (domain d) (:predicates (p)) (:action a :parameters () :precondition {precondition} :effect (p)))"
     );
     let source = Source::new("deep", text);
-    let found = parse_domain(&source).1;
-    assert_eq!(found.len(), 1, "{}", render(&found, &[&source], false));
-    found[0].code
+    let diagnostics = parse_domain(&source).1;
+    assert_eq!(diagnostics.len(), 1, "{}", render(&diagnostics, &[&source], false));
+    diagnostics[0].code
 }
 
 #[test]
@@ -372,9 +373,9 @@ fn nesting_up_to_the_limit_works() {
         let printed = parse_and_print_domain(&text);
         assert_eq!(parse_and_print_domain(&printed), printed);
         let problem = Source::new("problem", "(define (problem p) (:domain d) (:init) (:goal (p)))");
-        let found =
-            read(&Source::new("deep", text), &problem).map_or_else(Errors::into_vec, |(_, _, found)| found);
-        assert!(!found.is_empty(), "`q` is not declared");
+        let diagnostics = read(&Source::new("deep", text), &problem)
+            .map_or_else(Errors::into_vec, |(_, _, diagnostics)| diagnostics);
+        assert!(!diagnostics.is_empty(), "`q` is not declared");
     }
     let sum = format!("{}1{}", "(+ 1 ".repeat(190), ")".repeat(190));
     let text = format!(

@@ -1,8 +1,8 @@
-//! Quirks of real files: each is accepted, with a warning where the file leaves the standard; only names that are
-//! declared nowhere are errors.
+//! Quirks of real files are accepted, with a warning where a file deviates from the standard. Only undeclared
+//! names are errors.
 //!
-//! Two domains that contain the quirks, in our own words; the larger matrix of minimal pairs and the generated
-//! missions come from scripts that are not part of the project, and are skipped without them.
+//! Two domains contain the quirks. The larger matrix of minimal pairs and the generated missions are created
+//! by scripts outside of the project; without them these tests are skipped.
 
 #![expect(clippy::print_stdout, reason = "a skipped test says so")]
 
@@ -16,7 +16,7 @@ const TOOLS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/tools"
 
 const MATRIX: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/reference/pddl_quirks.md");
 
-/// Runs one of the scripts; nothing where it or Python is absent.
+/// Runs one of the scripts. Returns `None` if the script or Python is absent.
 fn script(name: &str, arguments: &[&str]) -> Option<()> {
     let path = Path::new(TOOLS).join(name);
     let output = path.exists().then(|| Command::new("python3").arg(&path).args(arguments).output());
@@ -41,16 +41,16 @@ fn file(path: &Path) -> Source {
     Source::from_bytes(path.file_name().unwrap_or_default().to_string_lossy(), &bytes)
 }
 
-/// The codes of the warnings of an accepted pair.
+/// Returns the codes of the warnings about an accepted pair.
 fn accepted(domain: &Source, problem: &Source) -> Vec<&'static str> {
     match read(domain, problem) {
         Ok((_, _, warnings)) => warnings.iter().map(|warning| warning.code).collect(),
-        Err(found) => panic!("{}", render(&found, &[domain, problem], false)),
+        Err(errors) => panic!("{}", render(&errors, &[domain, problem], false)),
     }
 }
 
 #[test]
-fn one_domain_with_all_quirks_is_accepted() {
+fn a_domain_with_all_quirks_is_accepted() {
     let domain = Source::new(
         "domain",
         "( DEFINE ( domain Q )\r\n(:requirements :Typing :typing :durative-actions)\r\n(:types room zone - place action)
@@ -71,13 +71,14 @@ fn one_domain_with_all_quirks_is_accepted() {
          (:goal (and )) (:metric minimize total-cost))",
     );
     let warnings = accepted(&domain, &problem);
-    // The glued dash, the undeclared type, the second action; the other domain, the constant, the repeated fact.
+    // In the domain: joined dash, undeclared type, second action. In the problem: other domain name, constant
+    // as object, repeated fact.
     assert_eq!(warnings, ["P107", "P136", "P127", "P131", "P127", "P127"]);
 }
 
 #[test]
 fn types_decide_which_objects_fit() {
-    // The type of an object, that of a parameter, and whether the one can stand for the other.
+    // Type of an object, type of a parameter, and whether the object fits.
     let cases = [
         ("robot", "robot", true),
         ("robot", "object", true),
@@ -91,9 +92,9 @@ fn types_decide_which_objects_fit() {
         ("both", "machine", true),
         // An object without a type is accepted with a warning.
         ("object", "place", true),
-        // A type that is declared nowhere restricts nothing.
+        // An undeclared type restricts nothing.
         ("robot", "ghost", true),
-        // A supertype need not be declared itself.
+        // A supertype need not be declared.
         ("station", "building", true),
     ];
     for (object, parameter, fits) in cases {
@@ -108,15 +109,16 @@ fn types_decide_which_objects_fit() {
             format!("(define (problem p) (:domain d) (:objects a - {object}) (:init (p a)) (:goal (p a)))");
         let errors = match read(&domain, &Source::new("problem", problem)) {
             Ok(_) => Vec::new(),
-            Err(found) => found.iter().map(|error| error.code).collect(),
+            Err(errors) => errors.iter().map(|error| error.code).collect(),
         };
         let expected: &[&str] = if fits { &[] } else { &["P126", "P126"] };
         assert_eq!(errors, expected, "{object} for {parameter}");
     }
 }
 
-/// The matrix says for each quirk which peers accept it; none of its rows goes untested.
-fn every_row_of_the_matrix_has_a_pair(index: &str) {
+/// Checks that each row of the matrix of quirks has a minimal pair. The matrix lists which other planners
+/// accept each quirk.
+fn check_matrix_rows(index: &str) {
     let Ok(text) = std::fs::read_to_string(MATRIX) else {
         println!("skipped: {MATRIX} is absent");
         return;
@@ -131,17 +133,17 @@ fn every_row_of_the_matrix_has_a_pair(index: &str) {
 }
 
 #[test]
-fn minimal_pairs_are_accepted_but_true_errors() {
+fn minimal_pairs_are_accepted_unless_a_name_is_undeclared() {
     let folder = folder("quirks");
     let Some(()) = script("pddl_quirks.py", &[&folder.to_string_lossy()]) else { return };
     let index = std::fs::read_to_string(folder.join("index.json")).expect("the script writes an index");
-    // One object a pair: {"n": 0, "name": "…", "expect": "accept"}.
+    // One JSON object per pair: {"n": 0, "name": "…", "expect": "accept"}.
     let pairs: Vec<bool> = index
         .match_indices("\"expect\": \"")
         .map(|(at, key)| index[at + key.len()..].starts_with("accept"))
         .collect();
     assert!(pairs.len() > 40, "{index}");
-    every_row_of_the_matrix_has_a_pair(&index);
+    check_matrix_rows(&index);
     for (number, is_accepted) in pairs.into_iter().enumerate() {
         let path = |kind: &str| folder.join(format!("{number:02}.{kind}.pddl"));
         let (domain, problem) = (file(&path("domain")), file(&path("problem")));
@@ -149,15 +151,16 @@ fn minimal_pairs_are_accepted_but_true_errors() {
             accepted(&domain, &problem);
             continue;
         }
-        let Err(found) = read(&domain, &problem) else { panic!("pair {number} is an error") };
-        let errors: Vec<_> = found.iter().filter(|found| found.severity == Severity::Error).collect();
+        let Err(diagnostics) = read(&domain, &problem) else { panic!("pair {number} is an error") };
+        let errors: Vec<_> =
+            diagnostics.iter().filter(|diagnostic| diagnostic.severity == Severity::Error).collect();
         assert_eq!(errors.len(), 1, "pair {number}");
         assert!(matches!(errors[0].code, "P120" | "P121"), "pair {number}: {}", errors[0].code);
     }
 }
 
 #[test]
-fn generated_missions_are_clean() {
+fn generated_missions_have_no_warnings() {
     let folder = folder("missions");
     let out = folder.to_string_lossy().into_owned();
     for (family, seed) in [("ugv", "1"), ("ugv", "2"), ("uuv", "1")] {
@@ -175,7 +178,7 @@ fn generated_missions_are_clean() {
 }
 
 #[test]
-fn what_other_planners_read_is_read_as_they_do() {
+fn lenient_syntax_is_read_as_by_other_planners() {
     let domain = Source::new(
         "domain",
         "(in-package \"PDDL\") (define (domain d) (:types oven kiln - object - board)

@@ -1,4 +1,4 @@
-//! Plans that are right, and plans that are wrong in each of the ways that there are.
+//! Tests of the validator: valid plans, and invalid plans for each kind of violation.
 
 use num_rational::BigRational;
 
@@ -9,7 +9,7 @@ fn parse(domain: &str, problem: &str) -> (ast::Domain, ast::Problem) {
     let (domain, problem) = (Source::new("domain", domain), Source::new("problem", problem));
     match read(&domain, &problem) {
         Ok((domain_tree, problem_tree, _)) => (domain_tree, problem_tree),
-        Err(found) => panic!("{}", render(&found, &[&domain, &problem], false)),
+        Err(errors) => panic!("{}", render(&errors, &[&domain, &problem], false)),
     }
 }
 
@@ -18,7 +18,7 @@ fn run((domain, problem): &(ast::Domain, ast::Problem), plan: &str, options: &Op
     validate(domain, problem, &plan, options)
 }
 
-/// A verdict on one line: `valid time=T metric=M values`, or the step, the kind and what is not met.
+/// Formats a verdict on one line: `valid time=T metric=M values`, or step, kind and unmet conditions.
 fn summary(verdict: &Verdict) -> String {
     let Some(violation) = &verdict.violation else {
         let metric = verdict.metric.as_ref().map(|metric| format!(" metric={metric}")).unwrap_or_default();
@@ -73,7 +73,7 @@ fn classical() -> (ast::Domain, ast::Problem) {
 }
 
 #[test]
-fn classical_plans() {
+fn sequential_plans_of_a_classical_task_are_judged() {
     check(
         &classical(),
         &[
@@ -103,7 +103,7 @@ fn classical_plans() {
 }
 
 #[test]
-fn numbers_do_not_grow_without_limit() {
+fn the_size_of_numbers_is_limited() {
     let plan = "(square)\n".repeat(200);
     let verdict = run(&classical(), &plan, &Options::default());
     assert!(summary(&verdict).ends_with("undefined"), "{}", summary(&verdict));
@@ -151,14 +151,14 @@ fn temporal() -> (ast::Domain, ast::Problem) {
 }
 
 #[test]
-fn temporal_plans_one_after_another() {
+fn sequential_plans_of_a_temporal_task_are_judged() {
     check(
         &temporal(),
         &[
             ("(prepare)\n(work)", "valid time=10/3 metric=50/3 (level)=20/3"),
             ("0.000: (prepare)\n0.001: (work) [3.333]", "valid time=10/3 metric=50/3 (level)=20/3"),
             ("0.0: (PREPARE) [0]\n0.001: (WORK)[3.333])", "valid time=10/3 metric=50/3 (level)=20/3"),
-            // The order is that of the times, not of the lines.
+            // Steps are ordered by time, not by line.
             ("1: (work) [3.333]\n0: (prepare) [0.001]", "valid time=10/3 metric=50/3 (level)=20/3"),
             (
                 "0.0: (PREPARE) ; [\n0.001: (WORK) [D:3.333; C:0.1]",
@@ -168,16 +168,16 @@ fn temporal_plans_one_after_another() {
             ("0: (prepare)\n0: (wait) [-1]", "2 duration"),
             ("(prepare)\n(wait)", "2 duration"),
             ("(work)", "1 over_all (warm)"),
-            // Two steps may touch, also by a rounding; they may not overlap.
+            // Two steps may be adjacent, with rounded times; they may not overlap.
             (
                 "0: (prepare)\n0: (work) [3.333]\n3.333: (light) [2]",
                 "valid time=16/3 metric=68/3 (level)=20/3",
             ),
             ("0: (prepare)\n0: (work) [3.333]\n3.3: (light) [2]", "3 overlap"),
-            // It is not day any more at the end, but it is at the start; then over all of an action.
+            // Daylight ends before the end of the action; then, before the end of a condition over all.
             ("0: (prepare)\n18: (work) [3.333]", "2 at_end (day)"),
             ("0: (prepare)\n16.666: (work) [3.333]", "valid time=10/3 metric=50/3 (level)=20/3"),
-            // It reads at its end whether it is day, so the night must not fall right then.
+            // The action reads `day` at its end, so the event must not be at the same time.
             ("0: (prepare)\n16.667: (work) [3.333]", "2 interference"),
             ("18: (heat) [3]", "1 over_all (day)"),
             (
@@ -191,15 +191,15 @@ fn temporal_plans_one_after_another() {
 }
 
 #[test]
-fn temporal_plans_with_overlap() {
+fn overlapping_plans_of_a_temporal_task_are_judged() {
     check_concurrent(
         &temporal(),
         &[
             ("0: (prepare)\n0.001: (work) [3.333]", "valid time=1667/500 metric=25003/1500 (level)=20/3"),
             ("0: (heat) [5]\n0.001: (work) [3.333]\n1: (light) [2]", "valid time=5 metric=65/3 (level)=20/3"),
-            // The heat goes off while the work is done.
+            // The heating ends during the work.
             ("0: (heat) [3]\n0.001: (work) [3.333]", "2 over_all (warm)"),
-            // Both touch `warm` at one time, and a hair apart.
+            // Both actions write `warm`, at one time and less than the separation apart.
             ("0: (prepare)\n0: (heat) [5]\n0.001: (work) [3.333]", "2 interference"),
             ("0: (prepare)\n0.0005: (heat) [5]\n0.001: (work) [3.333]", "2 interference"),
             ("0: (prepare)\n0.001: (work) [3.333]\n3.334: (work) [3.333]", "3 at_start (idle)"),
@@ -214,7 +214,7 @@ fn temporal_plans_with_overlap() {
 }
 
 #[test]
-fn derived_predicates_follow_from_each_state() {
+fn derived_predicates_are_recomputed_in_each_state() {
     let task = parse(
         "(define (domain d) (:requirements :typing) (:types node)
          (:predicates (edge ?x ?y - node) (path ?x ?y - node) (lonely ?x - node) (on ?x - node))
@@ -237,7 +237,7 @@ fn derived_predicates_follow_from_each_state() {
 }
 
 #[test]
-fn plans_in_the_form_of_popf_are_read() {
+fn the_output_of_popf_is_parsed() {
     let text = "Number of literals: 3\n(not a step)\n;;;; Solution Found\n; States: 3\n; Cost: 1.000\n0.000: (old)  [1.000]\n\
                 ;;;; Solution Found\r\n; Cost: 0.5\n0.000: (move Robot a)  [5.000]\r\n5.001: (stop)\n\n * All goal deadlines now no later than 10\n";
     let plan = PlanText::parse(&Source::new("plan", text)).expect("a plan");
@@ -254,13 +254,15 @@ fn plans_in_the_form_of_popf_are_read() {
 }
 
 #[test]
-fn lines_that_are_no_steps_are_reported() {
+fn lines_that_are_not_steps_are_reported() {
     let source =
         Source::new("plan", "go a b\n(go a\n0.5 (go a)\n1: (go a) 5\n1: (go a) [x]\n()\n(go a) ; fine\n");
-    let found = PlanText::parse(&source).expect_err("not a plan");
-    let found: Vec<_> =
-        found.iter().map(|found| format!("{}:{} {}", found.line, found.column, found.message)).collect();
-    insta::assert_snapshot!(found.join("\n"), @r"
+    let messages = PlanText::parse(&source).expect_err("not a plan");
+    let messages: Vec<_> = messages
+        .iter()
+        .map(|message| format!("{}:{} {}", message.line, message.column, message.message))
+        .collect();
+    insta::assert_snapshot!(messages.join("\n"), @r"
     1:1 this is not a step of a plan
     2:1 the `)` of this step is missing
     3:1 expected `:` behind the time
