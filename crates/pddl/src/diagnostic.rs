@@ -195,7 +195,7 @@ impl<'s> Sink<'s> {
         self.source
     }
 
-    /// Number of diagnostics so far, including those beyond the limit.
+    /// Number of reported diagnostics, including those beyond the limit.
     #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(crate) fn len(&self) -> usize {
         self.diagnostics.len() + self.beyond_limit
@@ -222,6 +222,7 @@ impl<'s> Sink<'s> {
                 format!("{} more messages about this file are not shown", self.beyond_limit + 1),
             );
         }
+        // Checks run by kind of declaration, readers work through a file by position.
         self.diagnostics.sort_by_key(|diagnostic| (diagnostic.span.start, diagnostic.code));
         // Constructs that are compiled to several forms are checked in each form.
         self.diagnostics.dedup();

@@ -40,7 +40,9 @@ impl Excerpt {
         let at = floor(place.start.min(text.len()));
         let begin = text[..at].rfind('\n').map_or(0, |at| at + 1);
         let line_end = text[at..].find('\n').map_or(text.len(), |length| at + length);
+        // The carriage return of a Windows line end does not belong to the line.
         let line_end = begin + text[begin..line_end].trim_end_matches('\r').len();
+        // All limits are rounded down to character boundaries.
         let start = floor(at.saturating_sub(CONTEXT)).max(begin);
         let mark = at.clamp(start, line_end.max(start));
         let end = floor((mark + CONTEXT).min(line_end)).max(mark);

@@ -21,6 +21,7 @@ pub fn portable(domain: &Domain, problem: &Problem) -> (Domain, Problem) {
     move_constants(&mut domain, &mut problem);
     remove_duplicates(&domain, &mut problem);
     problem.domain = domain.name.clone();
+    // The requirements of both files are collected in the domain.
     problem.requirements.clear();
     require(&mut domain, &problem);
     (domain, problem)

@@ -167,6 +167,7 @@ fn next_token(text: &str, mut at: usize) -> Option<(usize, usize)> {
     let bytes = text.as_bytes();
     loop {
         match *bytes.get(at)? {
+            // A comment extends to the end of the line.
             b';' => at += bytes[at..].iter().position(|byte| matches!(byte, b'\n' | b'\r'))?,
             b' ' | b'\t' | b'\n' | b'\r' | 0x0b | 0x0c => at += 1,
             b'(' | b')' => return Some((at, at + 1)),

@@ -66,6 +66,7 @@ impl TypeHierarchy {
     pub fn fits(&self, subtype: &TypeExpression, supertype: &TypeExpression) -> bool {
         let is_subtype =
             |lower: &Name| supertype.alternatives.iter().any(|upper| self.is_a(lower, &upper.name));
+        // An object declared with `either` counts as an object of each alternative.
         supertype.alternatives.is_empty() || subtype.alternatives.iter().any(|lower| is_subtype(&lower.name))
     }
 

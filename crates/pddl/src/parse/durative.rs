@@ -155,6 +155,7 @@ impl Parser<'_> {
         let conjunction = Condition::And(conditions.iter().map(|(_, part)| part.clone()).collect());
         self.effects_when(mark, &conjunction);
         for (time, effect) in effects {
+            // The truth of the condition would have to be remembered until the time of the effect.
             if conditions.iter().any(|(condition_time, _)| effect_time(*condition_time) != Some(time)) {
                 self.refuse(item, "conditional effects that take place at another time than their condition")
                     .help("remember the condition in an atom: `(when (at start (p)) (at start (q)))` and `(when (at end (q)) …)`");

@@ -131,6 +131,7 @@ impl Parser<'_> {
             );
             return None;
         }
+        // In these contexts there is no condition to which a quantifier could be added.
         if !self.objects.is_open {
             self.refuse(item, "object fluents in durations, metrics and within initial values").help(
                 "let a parameter of the action have the value: `(= (place-of ?x) ?p)` in its condition",
@@ -229,6 +230,7 @@ impl Parser<'_> {
         };
         let previous = self.value_variable(&function.name, target.span());
         let delete = Effect::Delete(atom(Term::Variable(previous.identifier.clone())));
+        // The new value may be among the deleted ones, because additions override deletions.
         let deletes = Effect::ForAll(vec![previous], Box::new(delete));
         let effect = match &value {
             Some(value) => Effect::And(vec![Effect::Add(atom(value.clone())), deletes]),

@@ -138,6 +138,7 @@ pub(super) fn typed(prefix: &str, entries: &[TypedName]) -> Vec<String> {
         let names: Vec<_> = group.iter().map(|entry| format!("{prefix}{}", entry.identifier.name)).collect();
         names.join(" ")
     };
+    // Grouping keeps long object lists short.
     let groups = typed.chunk_by(|left, right| group_of(left) == group_of(right));
     let mut lines: Vec<_> =
         groups.map(|group| format!("{} - {}", names(group), group_of(&group[0]))).collect();

@@ -93,6 +93,8 @@ fn advance_in(world: &World<'_>, step: &PlanStep, forced: bool) -> Result<Advanc
     let parts: &[Part] = if has_two_parts { &[Part::Start, Part::End] } else { &[Part::Whole] };
     for part in parts {
         let time = if *part == Part::End { &running.end } else { &start };
+        // No event or other action happens in between, so the state after the start is the state of the whole
+        // interval.
         if *part == Part::End && !forced {
             execution.check(&running, ConditionTime::OverAll, &start)?;
         }
@@ -121,6 +123,7 @@ fn advance_in(world: &World<'_>, step: &PlanStep, forced: bool) -> Result<Advanc
 impl Advance {
     /// Replaces the initial state of a problem by the state after the step.
     pub fn apply(&self, init: &mut Vec<InitialElement>) {
+        // Negated facts of `:init` must not contradict the added facts.
         init.retain(|element| match element {
             InitialElement::Fact(atom) => !self.deleted.iter().any(|deleted| is_same(deleted, atom)),
             InitialElement::NegatedFact(atom) => !self.added.iter().any(|added| is_same(added, atom)),

@@ -104,6 +104,7 @@ impl<'p> Walk<'_, 'p> {
                     self.conjunctions.pop();
                 }
             }
+            // A new fact satisfies one disjunct; the others need not be joined.
             Condition::Or(parts) => parts.iter().for_each(|part| is_opaque |= self.visit(part)),
             Condition::Exists(variables, body) if !self.hides(variables) => {
                 self.variables.push(variables);
@@ -119,6 +120,7 @@ impl<'p> Walk<'_, 'p> {
                 };
                 self.occurrences.entry(&atom.predicate.name).or_default().push(occurrence);
             }
+            // Below negations, implications and universal quantifiers a new fact cannot be joined.
             other => names_in(other, &mut |name| is_opaque |= self.predicates.contains(name)),
         }
         if is_opaque {

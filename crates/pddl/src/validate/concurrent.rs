@@ -40,6 +40,7 @@ pub(super) fn run<'e, 'p>(
         if execution.world.budget.poll() {
             break;
         }
+        // Events happen before or together with the next start or end.
         let time = execution.next_timed().filter(|timed| *timed <= next).unwrap_or(next).clone();
         let mut parts = Simultaneous::default();
         if execution.next_timed() == Some(&time)
@@ -72,9 +73,11 @@ pub(super) fn run<'e, 'p>(
         running = continuing;
         parts.check_separation(execution, &time, &mut recent)?;
         let is_event = parts.happenings.iter().all(|(step, _)| step.is_none());
+        // All happenings were evaluated in the state before; their changes are applied only now.
         parts.apply(execution, &time)?;
         execution.record.note(&time, &execution.state, is_event);
         for running in &running {
+            // The interval is open: an action that ends now is no longer running, one that starts now is.
             execution.check(running, ConditionTime::OverAll, &time)?;
         }
     }
@@ -126,6 +129,7 @@ impl<'e, 'p> Simultaneous<'e, 'p> {
         time: &BigRational,
         recent: &mut Vec<Recent<'e, 'p>>,
     ) -> Result<(), Box<Violation>> {
+        // Older happenings are far enough away.
         recent.retain(|earlier| &earlier.time + &execution.options.tolerance > *time);
         for (step, Happening { footprint, .. }) in &mut self.happenings {
             for earlier in recent.iter() {

@@ -54,7 +54,7 @@ pub struct CourseMoment {
 /// Bound that a condition imposes on a numeric function.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NumberBound {
-    /// The function: `(battery)`.
+    /// Function: `(battery)`.
     pub number: String,
     /// Required relation between the function and the bound.
     pub relation: Comparison,
@@ -65,7 +65,7 @@ pub struct NumberBound {
 /// Executes a plan and records the numbers. A step without a start time begins when the preceding step ends.
 ///
 /// # Errors
-/// A step is not an action of the domain, or an effect is undefined.
+/// Returns a violation if a step is not an action of the domain, or if an effect is undefined.
 pub fn course(domain: &Domain, problem: &Problem, plan: &PlanText) -> Result<Course, Box<Violation>> {
     let world = World::new(domain, problem, &|| false);
     let texts = plan.steps.iter().zip(1..);
@@ -86,6 +86,8 @@ pub fn course(domain: &Domain, problem: &Problem, plan: &PlanText) -> Result<Cou
         let next_end =
             (0..running.len()).min_by(|left, right| running[*left].1.end.cmp(&running[*right].1.end));
         let end = next_end.map(|position| &running[position].1.end);
+        // At equal times ends precede starts. A step without a start time waits for the end of a running
+        // action.
         let ends_first = match (end, starts.last().map(|next_step| &steps[*next_step].text.start)) {
             (None, None) => break,
             (None, Some(_)) => false,
@@ -116,6 +118,7 @@ impl<'e, 'p> Follower<'e, 'p> {
     fn start(&mut self, index: usize, step: &'e Step<'p>) -> Result<Option<Running<'e, 'p>>, Box<Violation>> {
         let time = step.text.start.clone().unwrap_or_else(|| self.clock.clone());
         self.execution.pass(&time, true);
+        // Prefer the schema whose conditions hold. The effects are shown even if no schema is applicable.
         let checked = self.execution.begin(step, &time);
         let running = checked.or_else(|_| self.execution.begin_anyway(step, &time))?;
         let mut bounds = self.bounds(&running, ConditionTime::AtStart);

@@ -68,6 +68,7 @@ impl<'p> Closure<'_, 'p> {
             let (predicate, arguments) = &fact;
             let name = self.world.name_of(*predicate);
             let stratum = self.stratum;
+            // Semi-naive evaluation: only solutions that use the new fact can be new.
             for occurrence in name.and_then(|name| stratum.occurrences.get(name)).into_iter().flatten() {
                 let heads = self.heads(occurrence.axiom, Some((occurrence, arguments)));
                 self.conclude(occurrence.axiom, heads);
@@ -75,6 +76,7 @@ impl<'p> Closure<'_, 'p> {
             let waiting = self.waiting.facts.remove(&fact).into_iter().flatten();
             let waiting = waiting.chain(self.waiting.predicates.remove(predicate).into_iter().flatten());
             for (number, evaluations) in waiting.collect::<Vec<_>>() {
+                // A later evaluation has replaced this entry by its own.
                 if self.instances[number].evaluations == evaluations {
                     self.evaluate(number);
                 }
@@ -111,6 +113,7 @@ impl<'p> Closure<'_, 'p> {
         evaluator.solve(parts, 0, &mut bindings, &mut |solution, undefined| {
             let objects: Option<Arguments> =
                 solution.0[..parameters].iter().map(|binding| binding.object).collect();
+            // An undefined condition derives nothing.
             if undefined.is_none() {
                 heads.extend(objects);
             }
@@ -129,6 +132,7 @@ impl<'p> Closure<'_, 'p> {
                 continue;
             }
             let number = self.instances.len();
+            // A known instance is evaluated again only when a missing fact arrives.
             if let Entry::Vacant(entry) = self.numbers.entry((axiom, arguments.clone())) {
                 entry.insert(number);
                 self.instances.push(WaitingInstance { axiom, arguments, evaluations: 0 });

@@ -94,6 +94,7 @@ impl<'e, 'p> Evaluator<'e, 'p> {
             Condition::Imply(premise, conclusion) => match self.holds(premise, bindings) {
                 Ok(false) => Ok(true),
                 Ok(true) => self.holds(conclusion, bindings),
+                // A true conclusion makes the implication true whatever the premise is.
                 Err(undefined) => match self.holds(conclusion, bindings) {
                     Ok(true) => Ok(true),
                     _ => Err(undefined),
@@ -164,6 +165,7 @@ impl<'e, 'p> Evaluator<'e, 'p> {
         self.world.each(variables, bindings, &mut |bindings| {
             match self.holds(body, bindings) {
                 Ok(false) => result = Ok(false),
+                // An undefined instance does not end the loop: a later one may be false.
                 Err(undefined) if result == Ok(true) => result = Err(undefined),
                 Ok(true) | Err(_) => {}
             }
@@ -182,6 +184,7 @@ impl<'e, 'p> Evaluator<'e, 'p> {
         self.declare(variables, bindings);
         let mut result = Ok(false);
         self.solve(vec![body], outer, bindings, &mut |_, undefined| {
+            // An undefined solution does not end the search: a later one may be true.
             result = undefined.map_or(Ok(true), |undefined| Err(undefined.clone()));
             result != Ok(true)
         });
@@ -214,6 +217,7 @@ impl<'e, 'p> Evaluator<'e, 'p> {
                 let mut operands = operands.iter().map(|operand| self.value(operand, bindings));
                 let first = operands.next().unwrap_or_else(|| Ok(BigRational::zero()))?;
                 let mut remaining = operands.peekable();
+                // `(- a)` is a negation.
                 if *operation == Arithmetic::Subtract && remaining.peek().is_none() {
                     return Ok(-first);
                 }

@@ -110,6 +110,7 @@ impl<'e, 'p> Execution<'e, 'p> {
         let rounded = step.text.duration.as_ref().filter(is_rounded).unwrap_or(&duration);
         let end = time + rounded;
         let running = Running { step, instance: instance.clone(), start: time.clone(), duration, end };
+        // The condition may depend on the exact duration, so the check follows its computation.
         self.check(&running, ConditionTime::AtStart, time)?;
         Ok(running)
     }
@@ -131,6 +132,7 @@ impl<'e, 'p> Execution<'e, 'p> {
             let bound = evaluator
                 .value(&constraint.expression, &instance.bindings)
                 .map_err(|undefined| undefined_violation(step, time, &undefined))?;
+            // An equality determines the exact duration; the stated one may be rounded.
             if constraint.operator == Comparison::Equal && exact.is_none() {
                 exact = Some(bound.clone());
             }
@@ -261,6 +263,7 @@ impl<'e, 'p> Execution<'e, 'p> {
         time: &BigRational,
         changes: Changes,
     ) -> Result<(), Box<Violation>> {
+        // The fixpoint is expensive and is computed only if its inputs change.
         let concerns_axioms = !changes.is_neutral() && changes.concern(&self.world.read_by_axioms);
         let applied = changes.apply(self.world, &mut self.state);
         applied.map_err(|error| self.effect_violation(step, time, &error))?;

@@ -28,6 +28,7 @@ pub(super) fn unmet<'p>(
         let Some(arguments) = evaluator.arguments(function, bindings) else { continue };
         let symbol = evaluator.world.symbol(&function.predicate.name);
         let text = evaluator.world.show(symbol, &arguments);
+        // A function can occur several times in a condition.
         if values.iter().all(|(listed, _)| *listed != text) {
             values.push((text, evaluator.state.values.get(&(symbol, arguments)).cloned()));
         }

@@ -14,7 +14,7 @@ use super::evaluate::Bindings;
 use super::running::{Running, conditions, effects};
 use super::world::{Symbol, World};
 
-/// Atom or numeric function in which quantified arguments are left open.
+/// Atom or numeric function whose quantified arguments match several objects.
 #[derive(Debug, Clone)]
 struct Pattern {
     symbol: Symbol,
@@ -126,10 +126,11 @@ impl Footprint {
         self.values_written.extend(other.values_written);
     }
 
-    /// Returns a fact or function that makes the order of the two happenings matter, if any.
+    /// Returns a fact or function because of which the order of the two happenings matters, if any.
     pub(super) fn interferes(&self, other: &Self) -> Option<Ground> {
         let read_or_deleted = self.disturbs(other).or_else(|| other.disturbs(self));
         read_or_deleted.or_else(|| {
+            // Assignments (0) never commute, not even assignments of equal values.
             let clash = |(target, kind): &&(Ground, u8)| {
                 other
                     .values_written

@@ -112,11 +112,12 @@ fn judge<'p>(world: &World<'p>, steps: &[Step<'p>], options: &Options) -> Verdic
         sequential::run(&mut execution, steps, &mut total_time)
     };
     let result = result.and_then(|()| goal_holds(world, &execution.state, &total_time));
-    let violations = result.and_then(|()| execution.judge(&total_time));
+    let violations = result.and_then(|()| execution.check_trajectory(&total_time));
     let metric = violations
         .as_ref()
         .ok()
         .and_then(|violated| metric_value(world, &execution.state, violated, &total_time));
+    // The final values are reported even if the plan is invalid.
     let violation = violations.err();
     let values = changeable_values(world, &execution.state);
     Verdict { valid: violation.is_none(), total_time, metric, values, violation }

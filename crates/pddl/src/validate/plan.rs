@@ -43,6 +43,7 @@ impl PlanText {
     )]
     pub fn parse(source: &Source) -> Result<Self, Errors> {
         let text = source.text();
+        // Anytime planners print improving plans; the last one is the best.
         let announced = text.rfind("Solution Found");
         let begin = announced.map_or(0, |at| text[at..].find('\n').map_or(text.len(), |end| at + end + 1));
         let mut sink = Sink::new(source);

@@ -19,7 +19,7 @@ pub(super) struct Moment {
 /// Record of an execution.
 #[derive(Debug, Default)]
 pub(super) struct Record {
-    /// Trajectory so far. Empty if there are no constraints.
+    /// States of the trajectory, in order. Empty if there are no constraints.
     pub(super) moments: Vec<Moment>,
     /// Violated preferences of actions, once per violation.
     pub(super) violated: Vec<Name>,
@@ -36,6 +36,7 @@ impl Record {
 
     /// Appends the state after a happening. Events and a happening at the same time give one state.
     pub(super) fn note(&mut self, time: &BigRational, state: &State, is_event: bool) {
+        // Without constraints nothing is recorded, to save memory.
         let Some(last) = self.moments.last() else { return };
         if last.is_event && last.time == *time {
             self.moments.pop();

@@ -15,6 +15,7 @@ use super::plan::PlanStep;
 /// Returns the problem without the facts and values that neither the steps nor the metric can read. Returns
 /// `None` if these cannot be determined.
 pub(super) fn relevant(domain: &Domain, problem: &Problem, steps: &[PlanStep]) -> Option<Problem> {
+    // Axioms and constraints can read every fact.
     let is_plain =
         domain.derived.is_empty() && domain.constraints.is_empty() && problem.constraints.is_empty();
     let names: FxHashSet<&Name> = steps.iter().map(|step| &step.action).collect();

@@ -21,6 +21,7 @@ pub(super) fn run<'e, 'p>(
 ) -> Result<(), Box<Violation>> {
     let is_timed = steps.iter().all(|step| step.text.start.is_some());
     let mut order: Vec<_> = steps.iter().collect();
+    // If a start time is missing, the order of the text counts.
     if is_timed {
         order.sort_by(|left, right| left.text.start.cmp(&right.text.start));
     }
@@ -33,6 +34,7 @@ pub(super) fn run<'e, 'p>(
         check_start(execution, step, stated, &clock)?;
         // A step that starts too early within the tolerance is delayed.
         let time = stated.max(&clock).clone();
+        // Events at this time are applied with the start, which must not interfere with them.
         execution.pass(&time, false);
         let running = execution.begin(step, &time)?;
         let part = running.first_part();

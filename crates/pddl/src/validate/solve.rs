@@ -83,6 +83,7 @@ impl<'e, 'p> Evaluator<'e, 'p> {
                 stack.pop();
             }
         };
+        // After an early end, the bindings of the open branches must be undone.
         while let Some(mut branch) = stack.pop() {
             branch.undo(bindings);
         }
@@ -140,6 +141,7 @@ impl<'e, 'p> Evaluator<'e, 'p> {
         bindings: &Bindings<'p>,
     ) -> Option<(Vec<&'p Condition>, Choices<'e, 'p>)> {
         let world = self.world;
+        // An equation with one bound side leaves a single object.
         if let Some((place, object)) = open.iter().find_map(|part| self.forced(part, bindings)) {
             let r#type = bindings.0[place].r#type;
             let object = std::iter::once(object).filter(move |object| world.is_of(*object, r#type));
@@ -149,10 +151,12 @@ impl<'e, 'p> Evaluator<'e, 'p> {
             Condition::Atom(atom) => Some((self.row_count(atom, bindings), index, atom)),
             _ => None,
         });
+        // Fewest facts first keeps the search tree small. Ties are broken by position, for determinism.
         if let Some((_, index, atom)) = atoms.min_by_key(|(count, index, _)| (*count, *index)) {
             let atom: &'p Atom = atom;
             open.swap_remove(index);
             if let Some(trace) = self.trace {
+                // A later fact of this predicate could be a further solution.
                 trace.read(&atom.predicate.name, world.symbol(&atom.predicate.name));
             }
             let rows = self.rows(atom, bindings);
@@ -163,6 +167,7 @@ impl<'e, 'p> Evaluator<'e, 'p> {
         {
             return Some((open, Choices::Alternatives(alternatives.iter())));
         }
+        // No fact restricts the remaining variables: enumerate the objects of their types.
         let place = (first..bindings.0.len()).find(|place| bindings.0[*place].object.is_none())?;
         Some((open, Choices::Objects(place, world.objects_of(bindings.0[place].r#type))))
     }

@@ -52,7 +52,7 @@ impl Step<'_> {
     }
 }
 
-/// Finds all schemas that a step can be an instance of. `instances` is empty if there is none.
+/// Finds all schemas that a step can be an instance of. Without any, `instances` is empty.
 pub(super) fn resolve<'p>(world: &World<'p>, number: usize, text: &'p PlanStep) -> Step<'p> {
     let objects: Option<Vec<Symbol>> = text.arguments.iter().map(|name| world.object(name)).collect();
     let schemas = world.domain.actions.iter().filter(|action| action.identifier.name == text.action);
@@ -89,6 +89,7 @@ fn instantiate<'p>(world: &World<'p>, action: &'p Action, objects: &[Symbol]) ->
         object: Some(*object),
     };
     let bindings = Bindings(action.parameters.iter().zip(objects).map(bind).collect());
+    // `zip` would hide a wrong number of objects, which `fits` excludes.
     fits.then_some(Instance { action, bindings })
 }
 

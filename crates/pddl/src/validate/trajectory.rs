@@ -44,7 +44,7 @@ impl<'e, 'p> Execution<'e, 'p> {
     ///
     /// # Errors
     /// Returns a violation if a mandatory constraint does not hold.
-    pub(super) fn evaluator(&self, time: &BigRational) -> Result<Vec<Name>, Box<Violation>> {
+    pub(super) fn check_trajectory(&self, time: &BigRational) -> Result<Vec<Name>, Box<Violation>> {
         let mut violated = self.record.violated.clone();
         let evaluator = TrajectoryEvaluator { world: self.world, moments: &self.record.moments };
         for constraint in constraints(self.world) {
@@ -122,6 +122,7 @@ impl<'p> TrajectoryEvaluator<'_, 'p> {
             Trajectory::Sometime(body) => self.holds(body, bindings).contains(&true),
             Trajectory::AtMostOnce(body) => {
                 let holds = self.holds(body, bindings);
+                // After the first block of states in which the condition holds, there must be no other one.
                 let first = holds.iter().position(|holds| *holds).unwrap_or(holds.len());
                 !holds.iter().skip(first).skip_while(|holds| **holds).any(|holds| *holds)
             }
@@ -131,6 +132,7 @@ impl<'p> TrajectoryEvaluator<'_, 'p> {
             }
             Trajectory::SometimeBefore(first, second) => {
                 let (first, second) = (self.holds(first, bindings), self.holds(second, bindings));
+                // Strictly before: the state itself does not count.
                 (0..first.len()).all(|i| !first[i] || second[..i].contains(&true))
             }
             Trajectory::Within(time, body) => {
@@ -158,6 +160,7 @@ fn lasts(
     from: &BigRational,
     is_included: impl Fn(&BigRational) -> bool,
 ) -> bool {
+    // Between two happenings the state of the last one persists.
     let current = times.iter().rposition(|time| *time <= from);
     let later = || holds.iter().zip(times).filter(|(_, time)| **time >= from && is_included(time));
     current.is_none_or(|current| holds[current]) && later().all(|(holds, _)| *holds)

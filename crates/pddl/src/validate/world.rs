@@ -81,6 +81,7 @@ impl<'p> World<'p> {
             changeable: FxHashSet::default(),
             fixed: FxHashMap::default(),
         };
+        // `total-cost` may be used without a declaration.
         world.intern(&Name::new("total-cost"));
         for declaration in domain.predicates.iter().chain(&domain.functions) {
             world.intern(&declaration.identifier.name);
@@ -159,7 +160,7 @@ impl<'p> World<'p> {
         }
     }
 
-    /// Names of all preferences, possibly with repetitions.
+    /// Names of all preferences. A name can occur several times.
     fn preferences(&self) -> impl Iterator<Item = &'p Name> + use<'p> {
         let constraints = self.domain.constraints.iter().chain(&self.problem.constraints);
         let constraint_names = constraints.filter_map(|constraint| constraint.preference.as_ref());
@@ -209,7 +210,7 @@ impl<'p> World<'p> {
         types.is_some_and(|types| types.iter().any(|declared| self.types.fits(declared, wanted)))
     }
 
-    /// All objects of a type.
+    /// Returns all objects of a type.
     pub(super) fn objects_of<'w>(
         &'w self,
         wanted: &'w TypeExpression,
@@ -222,7 +223,7 @@ impl<'p> World<'p> {
         Box::new(self.objects.iter().map(|(object, _)| *object).filter(|object| self.is_of(*object, wanted)))
     }
 
-    /// The only object of a type; `None` if there are none or several.
+    /// Returns the object of a type that has exactly one object, else `None`.
     pub(super) fn only_object(&self, wanted: &TypeExpression) -> Option<Symbol> {
         let mut objects = self.objects_of(wanted);
         objects.next().filter(|_| objects.next().is_none())
@@ -246,6 +247,7 @@ impl<'p> World<'p> {
     /// Initial state, without derived facts.
     pub(super) fn initial_state(&self) -> State {
         let mut state = State::default();
+        // `total-cost` starts at 0 unless `:init` sets it.
         state.values.insert((self.symbol(&Name::new("total-cost")), Arguments::new()), BigRational::zero());
         for element in &self.problem.init {
             match element {
