@@ -1,10 +1,11 @@
-//! Random tasks with conditional effects, derived predicates, quantifiers, disjunctions and a number.
+//! Generator of random tasks with conditional effects, derived predicates, quantifiers, disjunctions and a
+//! numeric function.
 
 use std::fmt::Write as _;
 
 use super::random::Random;
 
-/// Writes random domains and problems.
+/// Generator of random domains and problems in PDDL.
 pub struct Generator(pub Random);
 
 impl Generator {
@@ -12,8 +13,8 @@ impl Generator {
         self.0.below(limit).unsigned_abs()
     }
 
-    fn pick<'t>(&mut self, all: &[&'t str]) -> &'t str {
-        all[self.below(all.len() as u64) as usize]
+    fn pick<'t>(&mut self, choices: &[&'t str]) -> &'t str {
+        choices[self.below(choices.len() as u64) as usize]
     }
 
     fn term(&mut self, variables: &[&'static str]) -> &'static str {
@@ -25,10 +26,12 @@ impl Generator {
         }
     }
 
-    /// A condition over basic predicates p, q and r, derived ones up to `derived`, and the number n.
+    /// Returns a random condition over the basic predicates p, q and r, the first `derived` of the derived
+    /// predicates d1 and d2, and the number n.
     fn condition(&mut self, depth: u64, variables: &[&'static str], derived: u64) -> String {
         let connective = if depth == 0 { 0 } else { self.below(8) };
-        let more = |own: &'static str| variables.iter().copied().chain([own]).collect::<Vec<_>>();
+        let extended =
+            |variable: &'static str| variables.iter().copied().chain([variable]).collect::<Vec<_>>();
         let quantified = ["?u", "?v", "?w"][depth.min(2) as usize];
         match connective {
             4 => format!(
@@ -41,8 +44,14 @@ impl Generator {
                 self.condition(depth - 1, variables, derived),
                 self.condition(depth - 1, variables, derived)
             ),
-            6 => format!("(exists ({quantified}) {})", self.condition(depth - 1, &more(quantified), derived)),
-            7 => format!("(forall ({quantified}) {})", self.condition(depth - 1, &more(quantified), derived)),
+            6 => format!(
+                "(exists ({quantified}) {})",
+                self.condition(depth - 1, &extended(quantified), derived)
+            ),
+            7 => format!(
+                "(forall ({quantified}) {})",
+                self.condition(depth - 1, &extended(quantified), derived)
+            ),
             _ => {
                 let atom = match self.below(5 + 2 * derived) {
                     0 | 1 => format!("(p {})", self.term(variables)),
@@ -62,7 +71,7 @@ impl Generator {
             0 | 1 => format!("(p {})", self.term(variables)),
             2 => format!("(q {} {})", self.term(variables), self.term(variables)),
             3 => "(r)".into(),
-            // The number stays between 0 and 3, so that the search ends.
+            // The number stays between 0 and 3, so the state space is finite.
             _ => {
                 let change = [
                     "(when (< (n) 3) (increase (n) 1))",
@@ -76,12 +85,12 @@ impl Generator {
         if self.below(3) == 0 { format!("(not {atom})") } else { atom }
     }
 
-    /// A random domain.
+    /// Returns a random domain.
     pub fn domain(&mut self) -> String {
         let mut text = String::from(
             "(define (domain d) (:constants o1 o2) (:predicates (p ?x) (q ?x ?y) (r) (d1 ?x) (d2 ?x)) (:functions (n) (total-cost))",
         );
-        // d1 is recursive and positive, d2 may negate it.
+        // d1 is recursive and positive; d2 may negate it. The axioms are therefore stratified.
         let seed = self.condition(1, &["?x"], 0);
         let _ = write!(
             text,
@@ -109,10 +118,10 @@ impl Generator {
                         let _ = write!(text, " (when {condition} {effect})");
                     }
                     _ => {
-                        let mut more = variables.to_vec();
-                        more.push("?e");
-                        let condition = self.condition(1, &more, 2);
-                        let effect = format!("(p {})", self.term(&more));
+                        let mut extended = variables.to_vec();
+                        extended.push("?e");
+                        let condition = self.condition(1, &extended, 2);
+                        let effect = format!("(p {})", self.term(&extended));
                         let effect = if self.below(2) == 0 { format!("(not {effect})") } else { effect };
                         let _ = write!(text, " (forall (?e) (when {condition} {effect}))");
                     }
@@ -124,7 +133,7 @@ impl Generator {
         text
     }
 
-    /// A random problem of the domain.
+    /// Returns a random problem for the domain.
     pub fn problem(&mut self) -> String {
         let mut text =
             String::from("(define (problem p) (:domain d) (:objects o3) (:init (= (n) 1) (= (total-cost) 0)");

@@ -1,4 +1,4 @@
-//! Generators of small random tasks, and reference answers by exhaustive search. Only tests use this crate.
+//! Generators of small random tasks, and reference solutions by exhaustive search. Only tests use this crate.
 
 pub mod adl;
 pub mod missions;
@@ -16,7 +16,8 @@ use task::task::{State, Task};
 
 use self::random::Random;
 
-/// Robots with designs on a map with doors and lamps, some with a battery: much can happen at once, and much interferes.
+/// Returns a random task of two robots with designs on a map with doors and lamps and with limited charge.
+/// Many actions can be parallel, and many interfere.
 pub fn fleet(seed: u64) -> (String, String) {
     let mut random = Random(seed);
     let domain = "(define (domain fleet)
@@ -70,7 +71,7 @@ pub fn fleet(seed: u64) -> (String, String) {
     (domain.to_owned(), problem)
 }
 
-/// Parcels, some of them equal, and robots that carry them, with designs some of which are equal.
+/// Returns a random task of robots that carry parcels. Some parcels and some designs are interchangeable.
 pub fn depot(seed: u64) -> (String, String) {
     let mut random = Random(seed);
     let domain = "(define (domain depot)
@@ -112,38 +113,40 @@ pub fn depot(seed: u64) -> (String, String) {
     (domain.to_owned(), problem)
 }
 
-/// The ground task of a domain and a problem in PDDL.
+/// Grounds a domain and a problem in PDDL.
 ///
 /// # Panics
-/// Panics when the text is not a task.
+/// Panics if the texts are not a valid task.
 pub fn ground_text((domain, problem): (String, String)) -> Task {
     let (domain, problem, _) = read(&Source::new("d", domain), &Source::new("p", problem)).expect("PDDL");
     let config = GroundConfig { solves: vec![pddl::ast::Name::new("solves")], ..GroundConfig::default() };
     ground(&domain, &problem, &config).expect("a task")
 }
 
-/// Successors of a state, with the cost of each step.
+/// Returns the successors of a state with the cost of each step.
 ///
 /// # Panics
-/// Panics when numbers overflow.
+/// Panics on numeric overflow.
 pub fn successors(task: &Task, state: &State) -> Vec<(State, Int)> {
-    let mut all = Vec::new();
+    let mut successors = Vec::new();
     for operator in &task.operators {
         for choice in operator.admitted_combinations().filter(|choice| operator.applicable(state, choice)) {
             let next = task.successor(operator, state, &choice).expect("small numbers");
-            all.push((next, operator.cost_of(&choice)));
+            successors.push((next, operator.cost_of(&choice)));
         }
     }
-    all
+    successors
 }
 
-/// The least cost of a plan, by Dijkstra over all states that can be reached.
+/// Returns the minimum cost of a plan, by Dijkstra's algorithm over all reachable states. `None` if there is
+/// no plan.
 pub fn optimum(task: &Task) -> Option<Int> {
     let mut best = FxHashMap::from_iter([(task.initial.clone(), 0)]);
     let mut states = vec![task.initial.clone()];
     let mut open = BinaryHeap::from([Reverse((0, 0))]);
     while let Some(Reverse((cost, index))) = open.pop() {
         let state = states[index].clone();
+        // Outdated entry: the state was reached at a lower cost.
         if best[&state] < cost {
             continue;
         }
@@ -151,9 +154,9 @@ pub fn optimum(task: &Task) -> Option<Int> {
             return Some(cost);
         }
         for (next, step) in successors(task, &state) {
-            let known = best.entry(next.clone()).or_insert(Int::MAX);
-            if cost + step < *known {
-                *known = cost + step;
+            let best_cost = best.entry(next.clone()).or_insert(Int::MAX);
+            if cost + step < *best_cost {
+                *best_cost = cost + step;
                 open.push(Reverse((cost + step, states.len())));
                 states.push(next);
             }
@@ -162,20 +165,22 @@ pub fn optimum(task: &Task) -> Option<Int> {
     None
 }
 
-/// The least cost of a plan with at most so many steps, for each number from 0.
-pub fn costs_by_steps(task: &Task, most: usize) -> Vec<Option<Int>> {
+/// For each number of steps from 0 to `max_steps`, returns the minimum cost of a plan with at most that
+/// number of steps.
+pub fn costs_by_steps(task: &Task, max_steps: usize) -> Vec<Option<Int>> {
     let mut best = FxHashMap::from_iter([(task.initial.clone(), 0)]);
+    // Only states with a lower cost than before need to be expanded again.
     let mut improved = vec![(task.initial.clone(), 0)];
     let mut costs = Vec::new();
-    for _ in 0..=most {
+    for _ in 0..=max_steps {
         let goals = best.iter().filter(|(state, _)| task.is_goal(state));
         costs.push(goals.map(|(_, cost)| *cost).min());
         let mut next = Vec::new();
         for (state, cost) in improved {
             for (after, step) in successors(task, &state) {
-                let known = best.entry(after.clone()).or_insert(Int::MAX);
-                if cost + step < *known {
-                    *known = cost + step;
+                let best_cost = best.entry(after.clone()).or_insert(Int::MAX);
+                if cost + step < *best_cost {
+                    *best_cost = cost + step;
                     next.push((after, cost + step));
                 }
             }

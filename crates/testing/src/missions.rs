@@ -1,28 +1,28 @@
-//! Small missions in numbers, from which PDDL text is generated, and their cheapest plans by dynamic programming.
+//! Random small missions: PDDL text, and the cost of a cheapest plan by dynamic programming.
 
 use std::collections::{BTreeMap, BinaryHeap};
 use std::fmt::Write as _;
 
 use super::random::Random;
 
-/// A mission of a robot on a small map, in numbers.
+/// Mission of a robot on a small map.
 #[derive(Debug)]
 pub struct Mission {
     waypoints: usize,
-    /// From, to, length, least safety that a design must provide.
+    /// Start, end, length, and minimum safety of a design.
     corridors: Vec<(usize, usize, i64, i64)>,
-    /// For each function its designs: energy and time for each unit of length, safety, available.
+    /// Designs of each function: energy and time per unit of length, safety, availability.
     functions: Vec<Vec<(i64, i64, i64, bool)>>,
     battery: i64,
     charger: Option<usize>,
-    /// Cost of changing a design between moves; designs are part of the state then.
+    /// Goal waypoint.
     goal: usize,
     /// Weights of time and energy.
     pub weights: (i64, i64),
 }
 
 impl Mission {
-    /// One of many small missions.
+    /// Returns a random mission.
     pub fn random(seed: u64) -> Self {
         let mut random = Random(seed);
         let waypoints = 3 + random.below(4) as usize;
@@ -53,23 +53,23 @@ impl Mission {
     }
 
     fn combinations(&self) -> Vec<Vec<(i64, i64, i64, bool)>> {
-        let mut all = vec![Vec::new()];
+        let mut combinations = vec![Vec::new()];
         for designs in &self.functions {
-            all = all
+            combinations = combinations
                 .iter()
-                .flat_map(|known: &Vec<_>| {
+                .flat_map(|prefix: &Vec<_>| {
                     designs.iter().filter(|design| design.3).map(move |design| {
-                        let mut longer = known.clone();
+                        let mut longer = prefix.clone();
                         longer.push(*design);
                         longer
                     })
                 })
                 .collect();
         }
-        all
+        combinations
     }
 
-    /// The least cost by Dijkstra over (waypoint, battery).
+    /// Returns the minimum cost of a plan, by Dijkstra's algorithm over pairs of waypoint and battery level.
     pub fn oracle(&self) -> Option<i64> {
         let mut best = BTreeMap::from([((0_usize, self.battery), 0_i64)]);
         let mut open = BinaryHeap::from([(std::cmp::Reverse(0), 0, self.battery)]);
@@ -78,7 +78,7 @@ impl Mission {
                 return Some(cost);
             }
             for (cost, at, battery) in self.next(cost, at, battery) {
-                if best.get(&(at, battery)).is_none_or(|known| cost < *known) {
+                if best.get(&(at, battery)).is_none_or(|best_cost| cost < *best_cost) {
                     best.insert((at, battery), cost);
                     open.push((std::cmp::Reverse(cost), at, battery));
                 }
@@ -87,7 +87,7 @@ impl Mission {
         None
     }
 
-    /// Where a state leads to: cost so far, waypoint, battery.
+    /// Returns the successors of a state: cost, waypoint, battery level.
     fn next(&self, cost: i64, at: usize, battery: i64) -> Vec<(i64, usize, i64)> {
         let mut next = Vec::new();
         for (from, to, length, safety) in self.corridors.iter().filter(|corridor| corridor.0 == at) {
@@ -108,24 +108,25 @@ impl Mission {
         next
     }
 
-    /// The least cost of plans with at most so many steps, for each number from 0.
-    pub fn oracle_by_steps(&self, most: usize) -> Vec<Option<i64>> {
+    /// For each number of steps from 0 to `max_steps`, returns the minimum cost of a plan with at most that
+    /// number of steps.
+    pub fn oracle_by_steps(&self, max_steps: usize) -> Vec<Option<i64>> {
         let mut costs = Vec::new();
         let mut reached = BTreeMap::from([((0_usize, self.battery), 0_i64)]);
-        for _ in 0..=most {
+        for _ in 0..=max_steps {
             let goals = reached.iter().filter(|((at, _), _)| *at == self.goal);
             costs.push(goals.map(|(_, cost)| *cost).min());
             for ((at, battery), cost) in reached.clone() {
                 for (cost, at, battery) in self.next(cost, at, battery) {
-                    let known = reached.entry((at, battery)).or_insert(cost);
-                    *known = cost.min(*known);
+                    let best_cost = reached.entry((at, battery)).or_insert(cost);
+                    *best_cost = cost.min(*best_cost);
                 }
             }
         }
         costs
     }
 
-    /// The domain as PDDL.
+    /// Returns the domain in PDDL.
     pub fn domain(&self) -> String {
         let k = self.functions.len();
         let each = |f: &dyn Fn(usize) -> String| (0..k).map(f).collect::<Vec<_>>().join(" ");
@@ -156,7 +157,7 @@ impl Mission {
         )
     }
 
-    /// The problem as PDDL.
+    /// Returns the problem in PDDL.
     pub fn problem(&self) -> String {
         let mut objects = String::new();
         let mut init = format!(

@@ -1,10 +1,10 @@
-//! Numbers for generated test cases, the same in every run.
+//! Deterministic pseudo-random numbers for generated test cases.
 
-/// A small deterministic generator of numbers (`SplitMix64`).
+/// Deterministic pseudo-random number generator (`SplitMix64`).
 pub struct Random(pub u64);
 
 impl Random {
-    /// A number from 0 to below the limit.
+    /// Returns a number from 0 to `limit - 1`.
     pub fn below(&mut self, limit: u64) -> i64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut z = self.0;

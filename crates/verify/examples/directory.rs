@@ -23,7 +23,7 @@ fn main() -> ExitCode {
         println!("{}: claims {claim}", directory.display());
         for part in &verification.parts {
             match &part.result {
-                Ok(said) => println!("  {}: {said}", part.part),
+                Ok(summary) => println!("  {}: {summary}", part.part),
                 Err(reason) => println!("  {}: FAILS: {reason}", part.part),
             }
         }

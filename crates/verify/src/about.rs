@@ -1,51 +1,52 @@
-//! Checks that a certificate matches the present files and situation of a mission.
+//! Comparison of a certificate with the present files and situation of a mission.
 
 use mission::Mission;
 use mission::knowledge::rule_text;
 use ontology::OutputSyntax;
 use pddl::{print_domain, print_problem};
 
-use crate::knowledge::{KnowledgeFiles, ORIGIN, Origin, said_first};
+use crate::knowledge::{KnowledgeFiles, ORIGIN, Origin, first_message};
 
-/// Checks that a certificate matches the present files and situation of a mission.
+/// Checks that a certificate matches the present files and situation of a mission. Returns a
+/// confirmation, or the first difference as the error.
 pub(crate) fn about(
-    written: Option<&KnowledgeFiles<'_>>,
+    certified: Option<&KnowledgeFiles<'_>>,
     (domain, problem): (&str, &str),
     mission: &Mission,
 ) -> Result<String, String> {
     let confirmation = format!("it is about `{}` as it is now", mission.name);
-    let other = |what: &str| Err(format!("it is not about `{}` as it is now: {what}", mission.name));
-    let (written, base) = match (written, mission.knowledge()) {
-        (Some(written), Some(base)) => (written, base),
+    let mismatch = |what: &str| Err(format!("it is not about `{}` as it is now: {what}", mission.name));
+    let (certified, base) = match (certified, mission.knowledge()) {
+        (Some(certified), Some(base)) => (certified, base),
         (None, None) => {
-            let (filled, _) = mission.filled().map_err(|messages| said_first(&messages))?;
+            let (filled, _) = mission.filled().map_err(|messages| first_message(&messages))?;
             let equal = print_domain(mission.domain()) == domain && print_problem(&filled) == problem;
-            return if equal { Ok(confirmation) } else { other("domain or problem differ") };
+            return if equal { Ok(confirmation) } else { mismatch("domain or problem differ") };
         }
-        _ => return other("one has a knowledge base, and the other has none"),
+        _ => return mismatch("one has a knowledge base, and the other has none"),
     };
     let origin: Origin =
-        serde_json::from_str(written.origin).map_err(|error| format!("{ORIGIN}: {error}"))?;
+        serde_json::from_str(certified.origin).map_err(|error| format!("{ORIGIN}: {error}"))?;
     let sources = base.sources();
     let (document, _) = ontology::convert_files(&sources.documents, &sources.options, OutputSyntax::NTriples)
         .map_err(|_| "the mission's knowledge base cannot be read again".to_owned())?;
     let texts = sources.rules.iter().map(|name| rule_text(name)).collect::<Result<Vec<_>, _>>();
     let texts = texts.map_err(|message| message.message.clone())?;
     if mission.domain_source().text() != origin.domain {
-        return other("the domain differs");
+        return mismatch("the domain differs");
     }
-    if document != written.document {
-        return other("the knowledge base differs");
+    if document != certified.document {
+        return mismatch("the knowledge base differs");
     }
     if !origin.rules.iter().map(|(_, text)| text).eq(&texts) {
-        return other("the rules differ");
+        return mismatch("the rules differ");
     }
     let bindings = mission.bindings();
     if *bindings.written() != origin.bindings || bindings.names().written() != origin.names {
-        return other("the bindings differ");
+        return mismatch("the bindings differ");
     }
     if print_problem(mission.problem()) != origin.problem || base.statements() != origin.changes {
-        return other("the problem or the situation (`--scenario`, `--set`, `--fail`) differs");
+        return mismatch("the problem or the situation (`--scenario`, `--set`, `--fail`) differs");
     }
     Ok(confirmation)
 }

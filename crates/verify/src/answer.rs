@@ -39,7 +39,7 @@ struct PartAnswer<'a> {
 }
 
 impl<'a> VerificationAnswer<'a> {
-    /// What came of a verification.
+    /// Creates the answer for a verification.
     pub fn new(report: &'a Verification) -> Self {
         let part = |part: &'a VerifiedPart| PartAnswer {
             part: part.part,
@@ -56,7 +56,7 @@ impl<'a> VerificationAnswer<'a> {
     }
 }
 
-/// For people: a line for each part, and the verdict, with no character that a terminal takes for a command.
+/// Writes one line per part and the verdict. Control characters are made visible.
 impl fmt::Display for Verification {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&text(self))
@@ -67,7 +67,7 @@ fn text(report: &Verification) -> String {
     let mut text = String::new();
     for part in &report.parts {
         let _ = match &part.result {
-            Ok(said) => writeln!(text, "{:11} verified: {said}", part.part),
+            Ok(summary) => writeln!(text, "{:11} verified: {summary}", part.part),
             Err(reason) => writeln!(text, "{:11} failed: {reason}", part.part),
         };
     }
@@ -98,7 +98,7 @@ fn extent(subject: &Subject) -> String {
     if unchecked.is_empty() { checked } else { format!("{checked}; not checked: {}", unchecked.join(", ")) }
 }
 
-/// For programs: a [`VerificationAnswer`].
+/// Returns the JSON text of the [`VerificationAnswer`].
 pub fn json(report: &Verification) -> String {
     visible_json(&pretty(&VerificationAnswer::new(report))).into_owned()
 }

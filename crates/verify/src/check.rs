@@ -148,7 +148,7 @@ fn parts(
         parts.push(VerifiedPart { part: "knowledge", result: filled });
     }
     let (task_result, timed) = match same_task(&domain, &problem, (text(TASK), text(WITNESS)), stop) {
-        Ok((said, timed)) => (Ok(said), timed),
+        Ok((summary, timed)) => (Ok(summary), timed),
         // The value is not used: the part has failed.
         Err(reason) => (Err(reason), false),
     };
@@ -158,7 +158,7 @@ fn parts(
         Claim::Optimal { metric } => {
             let checked = plan(&domain, &problem, timed, text(PLAN), metric, stop);
             let (result, value) = match checked {
-                Ok((said, value)) => (Ok(said), Some(value)),
+                Ok((summary, value)) => (Ok(summary), Some(value)),
                 Err(reason) => (Err(reason), None),
             };
             parts.push(VerifiedPart { part: "plan", result });

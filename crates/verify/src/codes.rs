@@ -1,6 +1,6 @@
-//! What the codes of messages mean that this crate gives.
+//! Explanations of the message codes of this crate.
 
-/// Codes in their order, each with what it means, what causes it, and what to do.
+/// Codes in ascending order, each with its meaning, its cause and its remedy.
 pub const CODES: &[[&str; 4]] = &[[
     "M121",
     "A certificate cannot be read.",

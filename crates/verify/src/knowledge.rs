@@ -56,11 +56,11 @@ pub(crate) fn check(
     domain: &Domain,
     problem: &Problem,
 ) -> [Result<String, String>; 2] {
-    let (knowledge, said, origin) = match replayed(written) {
+    let (knowledge, summary, origin) = match replayed(written) {
         Ok(replayed) => replayed,
         Err(reason) => return [Err(reason), Err("the derivations do not say what follows".to_owned())],
     };
-    [Ok(said), filled(knowledge, &origin, domain, problem)]
+    [Ok(summary), filled(knowledge, &origin, domain, problem)]
 }
 
 /// Returns `true` if a rule file is the shipped file of that name.
@@ -96,9 +96,9 @@ fn provenance(origin: &Origin) -> Result<String, String> {
     }
 }
 
-pub(crate) fn said_first(messages: &[Message]) -> String {
+pub(crate) fn first_message(messages: &[Message]) -> String {
     let error = messages.iter().find(|message| message.is_error()).or(messages.first());
-    error.map_or_else(String::new, |found| found.message.clone())
+    error.map_or_else(String::new, |message| message.message.clone())
 }
 
 /// Reads the documents and applies the later changes.
@@ -120,7 +120,8 @@ pub fn stated(document: &str, origin: &Origin) -> Result<Stated, String> {
     // Imports would refer to documents outside of the certificate, so they are not followed.
     let options = ReadOptions { closed: true, ..ReadOptions::default() };
     let sources = Sources { documents, rules, options, ..Sources::default() };
-    let mut stated = Stated::read_for(&sources, &origin.domain).map_err(|messages| said_first(&messages))?;
+    let mut stated =
+        Stated::read_for(&sources, &origin.domain).map_err(|messages| first_message(&messages))?;
     for rule in &mut stated.program.rules {
         let file = sources.rules.iter().position(|file| **file == *rule.identity.source);
         if let Some(position) = file {
@@ -145,9 +146,9 @@ fn replayed(written: &KnowledgeFiles<'_>) -> Result<(Knowledge, String, Origin),
         stated.program.rules.len()
     );
     let facts = derivation.steps.into_iter().map(|step| step.fact).collect();
-    let Stated { symbols, program, facts: told, terms, .. } = stated;
+    let Stated { symbols, program, facts: stated_facts, terms, .. } = stated;
     let knowledge = Knowledge::closed(symbols, facts, program.equality);
-    let knowledge = knowledge.map_err(|messages| said_first(&messages))?.with_terms(terms, &told);
+    let knowledge = knowledge.map_err(|messages| first_message(&messages))?.with_terms(terms, &stated_facts);
     let summary = format!("{summary}; {}", provenance(&origin)?);
     Ok((knowledge, summary, origin))
 }
@@ -171,20 +172,20 @@ fn filled(
     let source = |name: &str, text: &str| Ok(Source::new(name, text));
     let (own_domain, own_problem) = (source("domain", &origin.domain), source("problem", &origin.problem));
     let mission = Mission::new("", Some(Ok(knowledge)), bindings, own_domain, own_problem);
-    let mission = mission.map_err(|messages| said_first(&messages))?;
-    let (mut filled, _) = mission.filled().map_err(|messages| said_first(&messages))?;
+    let mission = mission.map_err(|messages| first_message(&messages))?;
+    let (mut filled, _) = mission.filled().map_err(|messages| first_message(&messages))?;
     let unchanged_metric = print_problem(&filled);
     filled.metric.clone_from(&problem.metric);
     if print_domain(mission.domain()) != print_domain(domain) {
         return Err("the mission's domain is another one".to_owned());
     }
-    let (found, expected) = (print_problem(&filled), print_problem(problem));
-    if let Some((found, expected)) =
-        found.lines().zip(expected.lines()).find(|(found, expected)| found != expected)
+    let (actual, expected) = (print_problem(&filled), print_problem(problem));
+    if let Some((actual, expected)) =
+        actual.lines().zip(expected.lines()).find(|(actual, expected)| actual != expected)
     {
-        return Err(format!("the knowledge says `{}`, the problem `{}`", found.trim(), expected.trim()));
+        return Err(format!("the knowledge says `{}`, the problem `{}`", actual.trim(), expected.trim()));
     }
-    if found != expected {
+    if actual != expected {
         return Err("the knowledge says more or less than the problem".to_owned());
     }
     // The metric is the only part that a user chooses for each plan.

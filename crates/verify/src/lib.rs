@@ -6,16 +6,16 @@
 //! | file | holds |
 //! |---|---|
 //! | `manifest.json` | the claim, and the size and SHA-256 of every other file |
-//! | `domain.pddl`, `problem.pddl` | the files as they were planned with: availability and values filled in |
-//! | `plan.txt` | the plan; missing if there is none |
-//! | `knowledge.nt`, `origin.json` | the knowledge base, rules, bindings, and what has changed since they were read; missing if there is no knowledge base |
-//! | `derivations.json` | everything that follows from them, with the rule, its bindings and what it rests on; missing likewise |
+//! | `domain.pddl`, `problem.pddl` | the planned files, with availability and values filled in |
+//! | `plan.txt` | the plan; absent if no plan exists |
+//! | `knowledge.nt`, `origin.json` | the knowledge base, rules, bindings, and the changes since they were read; absent without a knowledge base |
+//! | `derivations.json` | all inferred facts, each with the rule, its bindings and its supports; absent without a knowledge base |
 //! | `task.json` | the ground task |
-//! | `witness.json` | the atoms that may ever hold, and the values that numbers may have: why other instances of actions need no operator |
-//! | `formula.cnf`, `legend.txt`, `proof.drat`, `hints.txt` | for small tasks: "a cheaper plan has at most so many steps" in DIMACS, what its variables mean, its refutation, what each line of that follows from |
-//! | `argument.json` | why no plan is cheaper: labels, potentials, needs (see `metaplan-certificate`) |
+//! | `witness.json` | the reachable atoms and the ranges of numbers: the reason why other instances of actions need no operator |
+//! | `formula.cnf`, `legend.txt`, `proof.drat`, `hints.txt` | for small tasks: "a cheaper plan has at most T steps" in DIMACS, the meaning of its variables, its refutation, the antecedents of each line of the refutation |
+//! | `argument.json` | the proof that no plan is cheaper: labels, potentials, needs (see `metaplan-certificate`) |
 //!
-//! What is absent: the crate links no planner code.
+//! Absent: planner code. The crate links none.
 //!
 #![doc = include_str!("../README.md")]
 

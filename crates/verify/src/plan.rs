@@ -24,7 +24,7 @@ pub fn plan(
     stop: &dyn Fn() -> bool,
 ) -> Result<(String, BigRational), String> {
     let mut plan = PlanText::parse(&Source::new(PLAN, text))
-        .map_err(|found| found.first().map_or_else(String::new, |diagnostic| diagnostic.message.clone()))?;
+        .map_err(|errors| errors.first().map_or_else(String::new, |diagnostic| diagnostic.message.clone()))?;
     if plan.steps.iter().all(|step| step.start.is_some()) {
         plan.steps.sort_by(|left, right| left.start.cmp(&right.start));
     }

@@ -9,19 +9,18 @@ use crate::manifest::{DOMAIN, PROBLEM};
 /// Parses the domain and the problem.
 ///
 /// # Errors
-/// The first error in the texts.
+/// Returns the message of the first error in the texts.
 pub fn read_pddl(domain: &str, problem: &str) -> Result<(Domain, Problem), String> {
-    let read = pddl::read(&Source::new(DOMAIN, domain), &Source::new(PROBLEM, problem));
-    let first =
-        |found: pddl::Errors| found.first().map_or_else(String::new, |diagnostic| diagnostic.message.clone());
-    read.map(|(domain, problem, _)| (domain, problem)).map_err(first)
+    let parsed = pddl::read(&Source::new(DOMAIN, domain), &Source::new(PROBLEM, problem));
+    let first = |errors: pddl::Errors| errors.first().map_or_else(String::new, |error| error.message.clone());
+    parsed.map(|(domain, problem, _)| (domain, problem)).map_err(first)
 }
 
 /// Checks that the task refines the files. Also returns `true` if plans are measured by time
 /// because there is no metric. The check ends when `stop` returns `true`.
 ///
 /// # Errors
-/// The first difference, or the reason why the check is undecided.
+/// Returns the first difference, or the reason why the check is undecided.
 pub fn same_task(
     domain: &Domain,
     problem: &Problem,

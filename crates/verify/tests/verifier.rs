@@ -1,9 +1,9 @@
-//! The program `metaplan-verify`, by itself. What it says of certificates is compared with what `metaplan verify` says of them in the
-//! tests of `metaplan`, which can make some.
+//! Tests of the program `metaplan-verify`. The tests of `metaplan`, which can create certificates, compare
+//! its output with that of `metaplan verify`.
 
 use std::process::Command;
 
-/// The status, what is written to standard output, and what to standard error.
+/// Returns the exit status, the standard output and the standard error.
 fn run(arguments: &[&str]) -> (Option<i32>, String, String) {
     let output = Command::new(env!("CARGO_BIN_EXE_metaplan-verify")).args(arguments).output();
     let output = output.expect("the program runs");
@@ -12,7 +12,7 @@ fn run(arguments: &[&str]) -> (Option<i32>, String, String) {
 }
 
 #[test]
-fn what_is_no_certificate_is_not_verified() {
+fn a_directory_without_certificate_is_not_verified() {
     let directory = tempfile::tempdir().expect("a directory");
     let path = directory.path().display().to_string();
     let (status, text, _) = run(&[&path]);
@@ -25,7 +25,7 @@ fn what_is_no_certificate_is_not_verified() {
 }
 
 #[test]
-fn conditions_of_nothing_are_bad_input() {
+fn verification_conditions_require_a_certificate() {
     let directory = tempfile::tempdir().expect("a directory");
     let path = directory.path().display().to_string();
     let file = directory.path().join("conditions.smt2");
@@ -36,7 +36,7 @@ fn conditions_of_nothing_are_bad_input() {
 }
 
 #[test]
-fn arguments_are_named_where_they_are_wrong() {
+fn wrong_arguments_are_reported() {
     for arguments in [&[][..], &["c", "--format", "turtle"], &["c", "--time-limit", "-1"]] {
         let (status, text, message) = run(arguments);
         assert_eq!((status, text.as_str()), (Some(2), ""), "{arguments:?}");

@@ -15,12 +15,12 @@ use mutate::{Draw, Files, certificates, mutate, write};
 const STACK: usize = 2 << 20;
 
 /// Upper limit on the time for one certificate on a busy machine.
-const PATIENCE: Duration = Duration::from_secs(20);
+const TIME_LIMIT: Duration = Duration::from_secs(20);
 
 fn originals() -> Vec<Files> {
-    let all = certificates(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/certificates"));
-    assert_eq!(all.len(), 4);
-    all
+    let certificates = certificates(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/certificates"));
+    assert_eq!(certificates.len(), 4);
+    certificates
 }
 
 /// Verifies a certificate in a separate thread. Returns `None` on a panic.
@@ -50,7 +50,7 @@ fn withstand(seeds: std::ops::Range<u64>) -> usize {
             let started = Instant::now();
             let outcome = verified(&changed);
             assert!(outcome.is_some(), "certificate {certificate}, seed {seed}: a panic");
-            assert!(started.elapsed() < PATIENCE, "certificate {certificate}, seed {seed}: it takes long");
+            assert!(started.elapsed() < TIME_LIMIT, "certificate {certificate}, seed {seed}: it takes long");
             accepted += usize::from(outcome == Some(true));
         }
     }

@@ -33,26 +33,26 @@ impl Draw<'_> {
             }
             Self::Bytes(bytes) => {
                 let count = if limit <= 256 { 1 } else { 3 }.min(bytes.len());
-                let (own, rest) = bytes.split_at(count);
-                *bytes = rest;
-                own.iter().fold(0, |number, byte| number << 8 | u64::from(*byte))
+                let (head, tail) = bytes.split_at(count);
+                *bytes = tail;
+                head.iter().fold(0, |number, byte| number << 8 | u64::from(*byte))
             }
         };
         usize::try_from(number % limit as u64).expect("below a usize")
     }
 
-    fn one<'a, T>(&mut self, all: &'a [T]) -> &'a T {
-        &all[self.below(all.len())]
+    fn choose<'a, T>(&mut self, choices: &'a [T]) -> &'a T {
+        &choices[self.below(choices.len())]
     }
 }
 
 /// Reads all certificates of a folder.
 pub fn certificates(folder: &Path) -> Vec<Files> {
     let entries = |path: &Path| {
-        let mut all: Vec<_> =
+        let mut paths: Vec<_> =
             std::fs::read_dir(path).expect("a folder").map(|entry| entry.expect("an entry").path()).collect();
-        all.sort();
-        all
+        paths.sort();
+        paths
     };
     let name = |path: &Path| path.file_name().expect("a name").to_string_lossy().into_owned();
     let read = |path: &std::path::PathBuf| (name(path), std::fs::read(path).expect("a file"));
@@ -66,7 +66,7 @@ pub fn mutate(files: &Files, draw: &mut Draw<'_>) -> Files {
     let mut files = files.clone();
     let names: Vec<String> = files.keys().cloned().collect();
     for _ in 0..=draw.below(3) {
-        let name = draw.one(&names);
+        let name = draw.choose(&names);
         let old = &files[name];
         let text = String::from_utf8_lossy(old);
         let new = match (draw.below(6), serde_json::from_str::<Value>(&text)) {
@@ -121,46 +121,47 @@ fn tokens(text: &str, draw: &mut Draw<'_>) -> String {
     if words.is_empty() {
         return text.to_owned();
     }
-    let (at, word) = *draw.one(&words);
+    let (at, word) = *draw.choose(&words);
     let long = "9".repeat(1 + draw.below(20_000));
     let extremes = ["0", "-1", "4294967295", "18446744073709551616", "1e400", "?x", "and", &long];
-    let other = if draw.below(2) == 0 { draw.one(&words).1 } else { *draw.one(&extremes) };
-    format!("{}{other}{}", &text[..at], &text[at + word.len()..])
+    let replacement = if draw.below(2) == 0 { draw.choose(&words).1 } else { *draw.choose(&extremes) };
+    format!("{}{replacement}{}", &text[..at], &text[at + word.len()..])
 }
 
 /// Deletes, repeats, replaces or nests a parenthesised list.
 fn lists(text: &str, draw: &mut Draw<'_>) -> String {
     let mut open = Vec::new();
-    let mut all: Vec<(usize, usize)> = Vec::new();
+    let mut spans: Vec<(usize, usize)> = Vec::new();
     for (at, byte) in text.bytes().enumerate() {
         match byte {
             b'(' => open.push(at),
-            b')' => all.extend(open.pop().map(|start| (start, at + 1))),
+            b')' => spans.extend(open.pop().map(|start| (start, at + 1))),
             _ => {}
         }
     }
-    if all.is_empty() {
+    if spans.is_empty() {
         return tokens(text, draw);
     }
-    let (start, end) = *draw.one(&all);
-    let own = &text[start..end];
-    let (other_start, other_end) = *draw.one(&all);
-    let other = &text[other_start..other_end];
-    let often = 1 + draw.below(REPETITION_LIMIT);
-    let around = *draw.one(&["(not ", "(and ", "(or (p) ", "(exists (?x) ", "(forall (?x) ", "(when (p) "]);
+    let (start, end) = *draw.choose(&spans);
+    let list = &text[start..end];
+    let (other_start, other_end) = *draw.choose(&spans);
+    let other_list = &text[other_start..other_end];
+    let count = 1 + draw.below(REPETITION_LIMIT);
+    let opening =
+        *draw.choose(&["(not ", "(and ", "(or (p) ", "(exists (?x) ", "(forall (?x) ", "(when (p) "]);
     let new = match draw.below(6) {
         0 => String::new(),
-        1 => own.repeat(often),
-        2 => other.to_owned(),
-        3 => format!("(and {own} {other})"),
+        1 => list.repeat(count),
+        2 => other_list.to_owned(),
+        3 => format!("(and {list} {other_list})"),
         4 => {
             // The validator enumerates all objects for each variable without polling a limit.
-            let often = if around.contains('?') { 1 + often % 4 } else { often };
-            format!("{}{own}{}", around.repeat(often), ")".repeat(often))
+            let count = if opening.contains('?') { 1 + count % 4 } else { count };
+            format!("{}{list}{}", opening.repeat(count), ")".repeat(count))
         }
         _ => {
-            let names = (0..=often % 4).fold(String::new(), |names, number| format!("{names} ?x{number}"));
-            format!("(exists ({names}) {own})")
+            let names = (0..=count % 4).fold(String::new(), |names, number| format!("{names} ?x{number}"));
+            format!("(exists ({names}) {list})")
         }
     };
     format!("{}{new}{}", &text[..start], &text[end..])
@@ -170,54 +171,54 @@ fn lists(text: &str, draw: &mut Draw<'_>) -> String {
 fn structure(document: &mut Value, draw: &mut Draw<'_>) {
     let mut paths = Vec::new();
     collect(document, String::new(), &mut paths);
-    let other = document.pointer(draw.one(&paths).as_str()).cloned().unwrap_or_default();
-    let path = draw.one(&paths).clone();
-    let Some(own) = document.pointer_mut(&path) else { return };
-    let often = 1 + draw.below(REPETITION_LIMIT);
+    let replacement = document.pointer(draw.choose(&paths).as_str()).cloned().unwrap_or_default();
+    let path = draw.choose(&paths).clone();
+    let Some(target) = document.pointer_mut(&path) else { return };
+    let count = 1 + draw.below(REPETITION_LIMIT);
     let number = |draw: &mut Draw<'_>| {
         let numbers =
             [json!(0), json!(-1), json!(1), json!(2), json!(u32::MAX), json!(u64::MAX), json!(1_u64 << 40)];
-        draw.one(&numbers).clone()
+        draw.choose(&numbers).clone()
     };
-    *own = match (draw.below(6), &*own) {
+    *target = match (draw.below(6), &*target) {
         (0, _) => Value::Null,
-        (1, _) => other,
-        (2, Value::Array(all)) if !all.is_empty() => {
-            let again = draw.one(all).clone();
-            all.iter().cloned().chain(std::iter::repeat_n(again, often)).collect()
+        (1, _) => replacement,
+        (2, Value::Array(items)) if !items.is_empty() => {
+            let again = draw.choose(items).clone();
+            items.iter().cloned().chain(std::iter::repeat_n(again, count)).collect()
         }
-        (3, Value::Array(all)) if !all.is_empty() => {
-            let mut all = all.clone();
-            all.remove(draw.below(all.len()));
-            all.into()
+        (3, Value::Array(items)) if !items.is_empty() => {
+            let mut items = items.clone();
+            items.remove(draw.below(items.len()));
+            items.into()
         }
-        (4, Value::Array(all)) if !all.is_empty() => {
-            let mut all = all.clone();
-            let (left, right) = (draw.below(all.len()), draw.below(all.len()));
-            all.swap(left, right);
-            all.into()
+        (4, Value::Array(items)) if !items.is_empty() => {
+            let mut items = items.clone();
+            let (left, right) = (draw.below(items.len()), draw.below(items.len()));
+            items.swap(left, right);
+            items.into()
         }
         (_, Value::Object(fields)) if !fields.is_empty() => {
             let mut fields = fields.clone();
             let names: Vec<String> = fields.keys().cloned().collect();
-            fields.remove(draw.one(&names));
+            fields.remove(draw.choose(&names));
             fields.into()
         }
-        (5, _) => (0..100).fold(other, |inner, _| json!([inner])),
+        (5, _) => (0..100).fold(replacement, |inner, _| json!([inner])),
         _ => number(draw),
     };
 }
 
 fn collect(value: &Value, path: String, paths: &mut Vec<String>) {
     match value {
-        Value::Array(all) => {
-            for (place, own) in all.iter().enumerate() {
-                collect(own, format!("{path}/{place}"), paths);
+        Value::Array(items) => {
+            for (place, child) in items.iter().enumerate() {
+                collect(child, format!("{path}/{place}"), paths);
             }
         }
         Value::Object(fields) => {
-            for (name, own) in fields {
-                collect(own, format!("{path}/{name}"), paths);
+            for (name, child) in fields {
+                collect(child, format!("{path}/{name}"), paths);
             }
         }
         _ => {}
