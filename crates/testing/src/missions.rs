@@ -116,6 +116,7 @@ impl Mission {
         for _ in 0..=max_steps {
             let goals = reached.iter().filter(|((at, _), _)| *at == self.goal);
             costs.push(goals.map(|(_, cost)| *cost).min());
+            // A copy, so that each round adds exactly one step.
             for ((at, battery), cost) in reached.clone() {
                 for (cost, at, battery) in self.next(cost, at, battery) {
                     let best_cost = reached.entry((at, battery)).or_insert(cost);

@@ -162,6 +162,7 @@ fn parts(
                 Err(reason) => (Err(reason), None),
             };
             parts.push(VerifiedPart { part: "plan", result });
+            // Without the metric value, the remaining parts have nothing to compare with.
             let Some(value) = value else { return parts };
             Some(value)
         }

@@ -96,8 +96,9 @@ fn check_streamed(directory: &Path, file: &File) -> Result<(), String> {
     Ok(())
 }
 
-/// Returns the path of a regular file of at most `most` bytes.
-fn plain_file(directory: &Path, name: &str, most: u64) -> Result<PathBuf, String> {
+/// Returns the path of a regular file of at most `limit` bytes. Symbolic links are rejected, because they
+/// could point outside of the certificate.
+fn plain_file(directory: &Path, name: &str, limit: u64) -> Result<PathBuf, String> {
     let path = directory.join(name);
     let wrong = |what: String| format!("{name}: {what}");
     let kind =
@@ -105,19 +106,20 @@ fn plain_file(directory: &Path, name: &str, most: u64) -> Result<PathBuf, String
     if !kind.is_file() {
         return Err(wrong("is not a plain file".to_owned()));
     }
-    if kind.len() > most {
-        return Err(wrong(format!("has {} bytes, more than {most}", kind.len())));
+    if kind.len() > limit {
+        return Err(wrong(format!("has {} bytes, more than {limit}", kind.len())));
     }
     Ok(path)
 }
 
-/// Reads a regular file of at most `most` bytes.
-fn read_file(directory: &Path, name: &str, most: u64) -> Result<String, String> {
-    let path = plain_file(directory, name, most)?;
+/// Reads a regular file of at most `limit` bytes.
+fn read_file(directory: &Path, name: &str, limit: u64) -> Result<String, String> {
+    let path = plain_file(directory, name, limit)?;
     let wrong = |what: String| format!("{name}: {what}");
     let mut text = String::new();
     fs::File::open(&path)
-        .and_then(|file| file.take(most).read_to_string(&mut text))
+        // The file may have grown since its size was read.
+        .and_then(|file| file.take(limit).read_to_string(&mut text))
         .map_err(|error| wrong(format!("cannot be read: {error}")))?;
     Ok(text)
 }
