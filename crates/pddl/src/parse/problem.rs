@@ -19,7 +19,7 @@ struct Once {
 }
 
 impl Parser<'_> {
-    /// `(define (problem NAME) SECTION…)`.
+    /// Parses `(define (problem NAME) SECTION…)`.
     pub(super) fn problem(&mut self, define: Item<'_>) -> Option<Problem> {
         let (name, sections) = self.header(define, "problem")?;
         let unnamed = self.identifier("unnamed", name.span);
