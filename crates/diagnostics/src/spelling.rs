@@ -44,7 +44,7 @@ mod tests {
 
     #[test]
     fn the_most_similar_name_is_suggested() {
-        let known = ["fd_available", "robot_at", "at", "fd_solves_f"];
+        let names = ["fd_available", "robot_at", "at", "fd_solves_f"];
         let cases = [
             ("fd_availabel", Some("fd_available")),
             ("available_fd", Some("fd_available")),
@@ -55,7 +55,7 @@ mod tests {
             ("battery", None),
         ];
         for (written, expected) in cases {
-            assert_eq!(nearest(written, known), expected, "{written}");
+            assert_eq!(nearest(written, names), expected, "{written}");
         }
     }
 }

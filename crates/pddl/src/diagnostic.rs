@@ -240,7 +240,7 @@ pub fn has_errors(diagnostics: &[Diagnostic]) -> bool {
 pub fn render(diagnostics: &[Diagnostic], sources: &[&Source], color: bool) -> String {
     let text = |diagnostic: &Diagnostic| {
         let place = format!("{}:{}:{}", diagnostic.file, diagnostic.line, diagnostic.column);
-        let shown = Shown {
+        let message = Shown {
             is_error: diagnostic.severity == Severity::Error,
             code: diagnostic.code,
             message: &diagnostic.message,
@@ -248,7 +248,7 @@ pub fn render(diagnostics: &[Diagnostic], sources: &[&Source], color: bool) -> S
             help: diagnostic.help.as_deref(),
             excerpts: &diagnostic.excerpts(sources),
         };
-        shown.text(color)
+        message.text(color)
     };
     diagnostics.iter().map(text).collect()
 }

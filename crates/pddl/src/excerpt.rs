@@ -183,7 +183,7 @@ mod tests {
 
     fn check(text: &str, (line, column): (usize, usize), expected: &str) {
         let excerpt = Excerpt::at("f", text, line, column);
-        let shown = Shown {
+        let message = Shown {
             is_error: true,
             code: "X100",
             message: "wrong",
@@ -191,8 +191,8 @@ mod tests {
             help: Some("right"),
             excerpts: excerpt.as_slice(),
         };
-        assert_eq!(shown.text(false), expected);
-        assert!(shown.text(true).contains("\u{1b}["));
+        assert_eq!(message.text(false), expected);
+        assert!(message.text(true).contains("\u{1b}["));
     }
 
     #[test]

@@ -154,10 +154,10 @@ const IMPLIED: [(&str, &str); 12] = [
 
 /// Adds the requirements that are used but not stated.
 fn require(domain: &mut Domain, problem: &Problem) {
-    let mut needed: FxHashSet<&'static str> = FxHashSet::default();
-    needed.insert("strips");
-    walk(domain, problem, &mut |node| needed.extend(needs(node)));
-    let mut insert = |flag, is_used: bool| is_used && needed.insert(flag);
+    let mut required: FxHashSet<&'static str> = FxHashSet::default();
+    required.insert("strips");
+    walk(domain, problem, &mut |node| required.extend(needs(node)));
+    let mut insert = |flag, is_used: bool| is_used && required.insert(flag);
     let soft = domain
         .constraints
         .iter()
@@ -171,12 +171,12 @@ fn require(domain: &mut Domain, problem: &Problem) {
     let is_durative = domain.actions.iter().any(|action| matches!(action.body, ActionBody::Durative { .. }));
     insert("durative-actions", is_durative);
     // Planners for durative actions know the older name.
-    if is_durative && needed.remove("numeric-fluents") {
-        needed.insert("fluents");
+    if is_durative && required.remove("numeric-fluents") {
+        required.insert("fluents");
     }
     // Numeric fluents include action costs.
-    if needed.contains("numeric-fluents") || needed.contains("fluents") {
-        needed.remove("action-costs");
+    if required.contains("numeric-fluents") || required.contains("fluents") {
+        required.remove("action-costs");
     }
     let mut stated = FxHashSet::default();
     domain.requirements.retain(|flag| stated.insert(flag.name.clone()));
@@ -184,7 +184,7 @@ fn require(domain: &mut Domain, problem: &Problem) {
         let implying = IMPLIED.iter().filter(|(implied, _)| implied == flag).map(|(_, implying)| *implying);
         implying.chain([*flag]).any(|flag| stated.contains(&Name::new(flag)))
     };
-    let mut missing: Vec<_> = needed.into_iter().filter(|flag| !is_stated(flag)).collect();
+    let mut missing: Vec<_> = required.into_iter().filter(|flag| !is_stated(flag)).collect();
     missing.sort_unstable();
     domain.requirements.extend(missing.into_iter().map(identifier));
 }

@@ -81,9 +81,9 @@ impl<'a> Checker<'a> {
     }
 
     /// Warns about a redundant second declaration.
-    fn repeated(&mut self, span: Span, what: &str, earlier: Span) {
+    fn repeated(&mut self, span: Span, noun: &str, earlier: Span) {
         let source = self.sink.source();
-        self.sink.warning("P127", span, format!("{what} is declared twice")).related(
+        self.sink.warning("P127", span, format!("{noun} is declared twice")).related(
             source,
             earlier,
             "the first declaration is here",
@@ -125,21 +125,21 @@ impl<'a> Checker<'a> {
     fn object(
         &mut self,
         entry: &'a TypedName,
-        what: &str,
+        noun: &str,
         declared: &mut FxHashMap<&'a Name, &'a TypedName>,
     ) {
         let Identifier { name, span } = &entry.identifier;
         self.check_type(&entry.r#type);
         let Some(earlier) = declared.insert(name, entry) else { return };
         if self.symbols.types.overlap(&earlier.r#type, &entry.r#type) {
-            self.repeated(*span, &format!("the {what} `{name}`"), earlier.identifier.span);
+            self.repeated(*span, &format!("the {noun} `{name}`"), earlier.identifier.span);
         } else {
             let source = self.sink.source();
             self.sink
                 .warning(
                     "P127",
                     *span,
-                    format!("the {what} `{name}` is declared with two types; it is of both"),
+                    format!("the {noun} `{name}` is declared with two types; it is of both"),
                 )
                 .related(source, earlier.identifier.span, "the first declaration is here");
         }
@@ -160,12 +160,12 @@ impl<'a> Checker<'a> {
         self.declarations(&domain.functions, "function");
     }
 
-    fn declarations(&mut self, declarations: &'a [Declaration], what: &str) {
+    fn declarations(&mut self, declarations: &'a [Declaration], noun: &str) {
         let mut first_declarations: FxHashMap<&Name, &Declaration> = FxHashMap::default();
         for declaration in declarations {
             let Identifier { name, span } = &declaration.identifier;
             for parameter in &declaration.parameters {
-                self.lenient_type(&parameter.r#type, what);
+                self.lenient_type(&parameter.r#type, noun);
             }
             let Some(earlier) = first_declarations.get(name) else {
                 first_declarations.insert(name, declaration);
@@ -173,14 +173,14 @@ impl<'a> Checker<'a> {
             };
             let place = earlier.identifier.span;
             if earlier.parameters.len() == declaration.parameters.len() {
-                self.repeated(*span, &format!("the {what} `{name}`"), place);
+                self.repeated(*span, &format!("the {noun} `{name}`"), place);
             } else {
                 let source = self.sink.source();
                 self.sink
                     .error(
                         "P127",
                         *span,
-                        format!("the {what} `{name}` is declared with two numbers of arguments"),
+                        format!("the {noun} `{name}` is declared with two numbers of arguments"),
                     )
                     .related(source, place, "the first declaration is here");
             }
@@ -189,7 +189,7 @@ impl<'a> Checker<'a> {
 
     /// Warns about an undeclared type in the declaration of a predicate or a function. It restricts nothing;
     /// generated files contain such types.
-    fn lenient_type(&mut self, r#type: &TypeExpression, what: &str) {
+    fn lenient_type(&mut self, r#type: &TypeExpression, noun: &str) {
         for alternative in &r#type.alternatives {
             if !self.symbols.types.contains(&alternative.name) {
                 let help = if self.sink.is_full() {
@@ -197,7 +197,7 @@ impl<'a> Checker<'a> {
                 } else {
                     super::did_you_mean(alternative.name.as_str(), self.symbols.types.names())
                 };
-                let message = format!("unknown type `{}`, this {what} takes any object", alternative.name);
+                let message = format!("unknown type `{}`, this {noun} takes any object", alternative.name);
                 self.sink.warning("P136", alternative.span, message).help = help;
             }
         }

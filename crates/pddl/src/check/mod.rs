@@ -126,12 +126,12 @@ impl<'a> Checker<'a> {
         &mut self,
         code: &'static str,
         span: Span,
-        what: &str,
+        noun: &str,
         name: &Name,
         candidates: impl IntoIterator<Item = &'n Name>,
     ) -> &mut Diagnostic {
         let help = if self.sink.is_full() { None } else { did_you_mean(name.as_str(), candidates) };
-        let diagnostic = self.sink.error(code, span, format!("unknown {what} `{name}`"));
+        let diagnostic = self.sink.error(code, span, format!("unknown {noun} `{name}`"));
         diagnostic.help = help;
         diagnostic
     }

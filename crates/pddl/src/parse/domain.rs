@@ -48,9 +48,9 @@ impl Parser<'_> {
         let mut items = define.rest();
         let Some(header) = items.next().filter(|header| header.is_headed(kind)) else {
             let place = define.rest().next().unwrap_or(define);
-            let other = if kind == "domain" { "problem" } else { "domain" };
-            let help = if place.is_headed(other) {
-                format!("this is a {other} file; were the two files exchanged?")
+            let opposite = if kind == "domain" { "problem" } else { "domain" };
+            let help = if place.is_headed(opposite) {
+                format!("this is a {opposite} file; were the two files exchanged?")
             } else {
                 format!("write `(define ({kind} name) …)`")
             };

@@ -82,16 +82,16 @@ impl Parser<'_> {
         }
     }
 
-    fn without_time(&mut self, item: Item<'_>, what: &str, forms: &str) {
+    fn without_time(&mut self, item: Item<'_>, noun: &str, forms: &str) {
         if !item.is_list() {
-            self.expected(item, &format!("a {what} with a time specifier"));
+            self.expected(item, &format!("a {noun} with a time specifier"));
             return;
         }
         self.sink
             .error(
                 "P115",
                 list_start(item),
-                format!("this {what} of a durative action has no time specifier"),
+                format!("this {noun} of a durative action has no time specifier"),
             )
             .help(format!("write {forms}"));
     }

@@ -49,12 +49,12 @@ impl Parser<'_> {
     }
 
     /// Parses `(predicate terms)`.
-    pub(super) fn atom(&mut self, item: Item<'_>, what: &str) -> Option<Atom> {
+    pub(super) fn atom(&mut self, item: Item<'_>, description: &str) -> Option<Atom> {
         let Some(first) = item.items().next() else {
-            self.expected(item, what);
+            self.expected(item, description);
             return None;
         };
-        let predicate = self.name_item(first, what)?;
+        let predicate = self.name_item(first, description)?;
         if self.objects.contains(&predicate.name) {
             return self.misplaced_object_fluent(item, &predicate.name);
         }

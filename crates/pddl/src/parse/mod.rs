@@ -160,31 +160,32 @@ impl Parser<'_> {
         Identifier { name: self.name(written), span }
     }
 
-    /// Reads a name. `what` describes the expected thing in messages.
-    fn name_item(&mut self, item: Item<'_>, what: &str) -> Option<Identifier> {
+    /// Reads a name. `description` names the expected thing in messages, with its article.
+    fn name_item(&mut self, item: Item<'_>, description: &str) -> Option<Identifier> {
         match item.symbol() {
             Some(symbol) if !symbol.starts_with(['?', ':']) => Some(self.identifier(symbol, item.span())),
             Some(symbol) => {
-                self.sink.error("P106", item.span(), format!("`{symbol}` is not {what}"));
+                self.sink.error("P106", item.span(), format!("`{symbol}` is not {description}"));
                 None
             }
             None => {
-                self.sink.error("P106", at_start(item), format!("this is a list, expected {what}"));
+                self.sink.error("P106", at_start(item), format!("this is a list, expected {description}"));
                 None
             }
         }
     }
 
-    /// Reports a syntax error at the beginning of an item: expected `what`, found the item.
-    fn expected(&mut self, item: Item<'_>, what: &str) -> &mut Diagnostic {
-        let found = match item.symbol() {
+    /// Reports a syntax error at the beginning of an item: `description` was expected, the item was found.
+    fn expected(&mut self, item: Item<'_>, description: &str) -> &mut Diagnostic {
+        let actual = match item.symbol() {
             Some(symbol) => format!("`{symbol}`"),
             None => match item.head() {
                 Some(head) => format!("`({head} …)`"),
                 None => "a list".to_owned(),
             },
         };
-        let diagnostic = self.sink.error("P106", at_start(item), format!("expected {what}, found {found}"));
+        let diagnostic =
+            self.sink.error("P106", at_start(item), format!("expected {description}, found {actual}"));
         if item.symbol().is_some_and(|symbol| symbol.starts_with("{{") || symbol.starts_with("{%")) {
             diagnostic.help("this file is a template; give the file that is made from it");
         }
@@ -192,8 +193,8 @@ impl Parser<'_> {
     }
 
     /// Reports a construct that is recognised but not supported.
-    fn refuse(&mut self, item: Item<'_>, what: &str) -> &mut Diagnostic {
-        self.sink.error("P113", at_start(item), format!("{what} are not supported"))
+    fn refuse(&mut self, item: Item<'_>, construct: &str) -> &mut Diagnostic {
+        self.sink.error("P113", at_start(item), format!("{construct} are not supported"))
     }
 
     /// Returns the `N` operands of a list. Any other number is an error that shows the correct form.

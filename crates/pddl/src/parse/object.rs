@@ -210,13 +210,13 @@ impl Parser<'_> {
 
     /// Reads `(= (place-of ?x) ?y)`, in either order. `?y` may also be a term or `undefined`.
     pub(super) fn equal_objects(&mut self, left: Item<'_>, right: Item<'_>) -> Option<Condition> {
-        let (term, other) = if self.is_object_fluent(left) { (left, right) } else { (right, left) };
-        if is_undefined(other) {
+        let (term, value) = if self.is_object_fluent(left) { (left, right) } else { (right, left) };
+        if is_undefined(value) {
             let (_, values) = self.with_terms(|parser| parser.value_of(term))?;
             return Some(Condition::Not(Box::new(has_value(values))));
         }
         let (predicate, mut arguments) = self.object_term(term)?;
-        arguments.push(self.object(other)?);
+        arguments.push(self.object(value)?);
         Some(Condition::Atom(Atom { predicate, arguments, span: term.span() }))
     }
 
@@ -318,9 +318,9 @@ impl Parser<'_> {
 
     /// Reads `(= (place-of tool) here)` in the initial state.
     pub(super) fn initial_object(&mut self, left: Item<'_>, right: Item<'_>) -> Option<InitialElement> {
-        let (term, other) = if self.is_object_fluent(left) { (left, right) } else { (right, left) };
+        let (term, value_item) = if self.is_object_fluent(left) { (left, right) } else { (right, left) };
         let (predicate, mut arguments) = self.object_term(term)?;
-        let value = if is_undefined(other) { None } else { Some(self.object(other)?) };
+        let value = if is_undefined(value_item) { None } else { Some(self.object(value_item)?) };
         let name = |term: &Term| match term {
             Term::Variable(identifier) | Term::Constant(identifier) => identifier.name.clone(),
         };
@@ -328,8 +328,8 @@ impl Parser<'_> {
         let (value_name, span) = (
             value.as_ref().map(name),
             Span {
-                start: term.span().start.min(other.span().start),
-                end: term.span().end.max(other.span().end),
+                start: term.span().start.min(value_item.span().start),
+                end: term.span().end.max(value_item.span().end),
             },
         );
         if let Some((earlier, place)) = self.objects.initial.insert(key, (value_name.clone(), span))
@@ -374,7 +374,7 @@ pub(super) fn with_needs(condition: Condition, needs: Vec<Condition>) -> Conditi
     }
     let mut parts = match condition {
         Condition::And(parts) => parts,
-        other => vec![other],
+        condition => vec![condition],
     };
     parts.extend(needs);
     Condition::And(parts)

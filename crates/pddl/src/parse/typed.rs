@@ -119,12 +119,12 @@ impl Parser<'_> {
     }
 
     /// Parses `(name ?x ?y - type)`.
-    pub(super) fn declaration(&mut self, item: Item<'_>, what: &str) -> Option<Declaration> {
+    pub(super) fn declaration(&mut self, item: Item<'_>, description: &str) -> Option<Declaration> {
         let Some(first) = item.items().next() else {
-            self.expected(item, what).help("write `(name ?x ?y - type)`");
+            self.expected(item, description).help("write `(name ?x ?y - type)`");
             return None;
         };
-        let identifier = self.name_item(first, what)?;
+        let identifier = self.name_item(first, description)?;
         let parameters = self.typed_list(item.rest(), Entries::Variables);
         Some(Declaration { identifier, parameters })
     }

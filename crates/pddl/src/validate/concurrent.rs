@@ -162,17 +162,18 @@ fn check_pair<'p>(
     (step, time, footprint): (Option<&Step<'p>>, &BigRational, &Footprint),
     earlier: &Recent<'_, 'p>,
 ) -> Result<(), Box<Violation>> {
-    let is_same_step = |other: &Step<'p>| step.is_some_and(|step| step.number == other.number);
+    let is_same_step = |earlier_step: &Step<'p>| step.is_some_and(|step| step.number == earlier_step.number);
     if earlier.step.is_some_and(is_same_step) {
         return Ok(());
     }
     let Some(touched) = footprint.interferes(&earlier.footprint) else { return Ok(()) };
     match (step, earlier.step) {
-        (Some(step), Some(other)) => {
+        (Some(step), Some(earlier_step)) => {
             let gap = show_number(&(time - &earlier.time));
-            let (number, other) = (other.number, other.show());
+            let (number, earlier_step) = (earlier_step.number, earlier_step.show());
             let touched = execution.world.show(touched.0, &touched.1);
-            let message = format!("it interferes with step {number} {other} at {touched}, {gap} apart");
+            let message =
+                format!("it interferes with step {number} {earlier_step} at {touched}, {gap} apart");
             Err(step.violation(time, ViolationKind::Interference, message))
         }
         (Some(step), None) => Err(execution.disturbed(step, time, &earlier.time, &touched)),

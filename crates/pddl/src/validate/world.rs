@@ -96,8 +96,10 @@ impl<'p> World<'p> {
         let names: Vec<Name> = world.types.names().cloned().collect();
         for name in names {
             let identifier = Identifier { name: name.clone(), span: Span::default() };
-            let wanted = TypeExpression { alternatives: vec![identifier] };
-            let fits = |types: &[&TypeExpression]| types.iter().any(|given| world.types.fits(given, &wanted));
+            let named_type = TypeExpression { alternatives: vec![identifier] };
+            let fits = |types: &[&TypeExpression]| {
+                types.iter().any(|declared| world.types.fits(declared, &named_type))
+            };
             let members = world.objects.iter().filter(|(_, types)| fits(types)).map(|(object, _)| *object);
             let members: Vec<Symbol> = members.collect();
             let set = members.iter().copied().collect();
@@ -173,7 +175,7 @@ impl<'p> World<'p> {
         let mut state = state.clone();
         let function = self.symbol(&Name::new(IS_VIOLATED));
         for name in self.preferences() {
-            let count = violated.iter().filter(|other| *other == name).count();
+            let count = violated.iter().filter(|violation| *violation == name).count();
             let arguments = Arguments::from_slice(&[self.symbol(name)]);
             state.values.insert((function, arguments), BigRational::from_integer(count.into()));
         }
@@ -200,32 +202,34 @@ impl<'p> World<'p> {
     }
 
     /// Returns `true` if an object is of a type.
-    pub(super) fn is_of(&self, object: Symbol, wanted: &TypeExpression) -> bool {
-        if let [alternative] = &wanted.alternatives[..]
+    pub(super) fn is_of(&self, object: Symbol, expected: &TypeExpression) -> bool {
+        if let [alternative] = &expected.alternatives[..]
             && let Some((_, members)) = self.members.get(&alternative.name)
         {
             return members.contains(&object);
         }
         let types = self.place.get(&object).map(|place| &self.objects[*place].1);
-        types.is_some_and(|types| types.iter().any(|declared| self.types.fits(declared, wanted)))
+        types.is_some_and(|types| types.iter().any(|declared| self.types.fits(declared, expected)))
     }
 
     /// Returns all objects of a type.
     pub(super) fn objects_of<'w>(
         &'w self,
-        wanted: &'w TypeExpression,
+        expected: &'w TypeExpression,
     ) -> Box<dyn Iterator<Item = Symbol> + 'w> {
-        if let [alternative] = &wanted.alternatives[..]
+        if let [alternative] = &expected.alternatives[..]
             && let Some((members, _)) = self.members.get(&alternative.name)
         {
             return Box::new(members.iter().copied());
         }
-        Box::new(self.objects.iter().map(|(object, _)| *object).filter(|object| self.is_of(*object, wanted)))
+        Box::new(
+            self.objects.iter().map(|(object, _)| *object).filter(|object| self.is_of(*object, expected)),
+        )
     }
 
     /// Returns the object of a type that has exactly one object, else `None`.
-    pub(super) fn only_object(&self, wanted: &TypeExpression) -> Option<Symbol> {
-        let mut objects = self.objects_of(wanted);
+    pub(super) fn only_object(&self, expected: &TypeExpression) -> Option<Symbol> {
+        let mut objects = self.objects_of(expected);
         objects.next().filter(|_| objects.next().is_none())
     }
 

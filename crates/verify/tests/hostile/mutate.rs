@@ -155,7 +155,7 @@ fn lists(text: &str, draw: &mut Draw<'_>) -> String {
         2 => other_list.to_owned(),
         3 => format!("(and {list} {other_list})"),
         4 => {
-            // The validator enumerates all objects for each variable without polling a limit.
+            // The number of assignments grows exponentially with the nesting of quantifiers.
             let count = if opening.contains('?') { 1 + count % 4 } else { count };
             format!("{}{list}{}", opening.repeat(count), ")".repeat(count))
         }
