@@ -96,10 +96,8 @@ impl<'p> World<'p> {
         let names: Vec<Name> = world.types.names().cloned().collect();
         for name in names {
             let identifier = Identifier { name: name.clone(), span: Span::default() };
-            let named_type = TypeExpression { alternatives: vec![identifier] };
-            let fits = |types: &[&TypeExpression]| {
-                types.iter().any(|declared| world.types.fits(declared, &named_type))
-            };
+            let target = TypeExpression { alternatives: vec![identifier] };
+            let fits = |types: &[&TypeExpression]| types.iter().any(|lower| world.types.fits(lower, &target));
             let members = world.objects.iter().filter(|(_, types)| fits(types)).map(|(object, _)| *object);
             let members: Vec<Symbol> = members.collect();
             let set = members.iter().copied().collect();
@@ -202,34 +200,32 @@ impl<'p> World<'p> {
     }
 
     /// Returns `true` if an object is of a type.
-    pub(super) fn is_of(&self, object: Symbol, expected: &TypeExpression) -> bool {
-        if let [alternative] = &expected.alternatives[..]
+    pub(super) fn is_of(&self, object: Symbol, target: &TypeExpression) -> bool {
+        if let [alternative] = &target.alternatives[..]
             && let Some((_, members)) = self.members.get(&alternative.name)
         {
             return members.contains(&object);
         }
         let types = self.place.get(&object).map(|place| &self.objects[*place].1);
-        types.is_some_and(|types| types.iter().any(|declared| self.types.fits(declared, expected)))
+        types.is_some_and(|types| types.iter().any(|declared| self.types.fits(declared, target)))
     }
 
     /// Returns all objects of a type.
     pub(super) fn objects_of<'w>(
         &'w self,
-        expected: &'w TypeExpression,
+        target: &'w TypeExpression,
     ) -> Box<dyn Iterator<Item = Symbol> + 'w> {
-        if let [alternative] = &expected.alternatives[..]
+        if let [alternative] = &target.alternatives[..]
             && let Some((members, _)) = self.members.get(&alternative.name)
         {
             return Box::new(members.iter().copied());
         }
-        Box::new(
-            self.objects.iter().map(|(object, _)| *object).filter(|object| self.is_of(*object, expected)),
-        )
+        Box::new(self.objects.iter().map(|(object, _)| *object).filter(|object| self.is_of(*object, target)))
     }
 
     /// Returns the object of a type that has exactly one object, else `None`.
-    pub(super) fn only_object(&self, expected: &TypeExpression) -> Option<Symbol> {
-        let mut objects = self.objects_of(expected);
+    pub(super) fn only_object(&self, target: &TypeExpression) -> Option<Symbol> {
+        let mut objects = self.objects_of(target);
         objects.next().filter(|_| objects.next().is_none())
     }
 
