@@ -1,6 +1,7 @@
 //! Diagnostics and their display: the source line, a caret, and a suggested correction.
 //!
-//! Codes are stable. P100 to P119 concern the form of a file, P120 to P149 names and types.
+//! Codes are stable. P100 to P119 concern the form of a file, P120 to P149 names and types, P150 the text of
+//! a plan.
 
 use std::error::Error;
 use std::fmt;

@@ -192,8 +192,8 @@ fn in_a_word(character: char) -> bool {
     !matches!(character, '(' | ')' | ';') && !is_space(character)
 }
 
-/// Returns `true` for all Unicode white space. Text copied from documents contains no-break spaces and byte
-/// order marks.
+/// Returns `true` for Unicode white space and byte order marks. Text copied from documents contains no-break
+/// spaces and byte order marks.
 fn is_space(character: char) -> bool {
     character.is_whitespace() || character == '\u{feff}'
 }

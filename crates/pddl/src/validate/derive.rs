@@ -30,7 +30,7 @@ pub(super) fn close(world: &World<'_>, state: &mut State) {
     }
 }
 
-/// An instance of an axiom with an opaque condition that has not held so far.
+/// An instance of an axiom with an opaque condition that has not held yet.
 struct WaitingInstance {
     axiom: usize,
     arguments: Arguments,
