@@ -12,19 +12,19 @@ type Renaming = FxHashMap<Name, Identifier>;
 
 impl Parser<'_> {
     /// Returns the conditions under which no two assignments give different values to one term.
-    pub(super) fn one_value_each(&mut self, assigned: &[Assigned]) -> Vec<(EffectTime, Condition)> {
+    pub(super) fn uniqueness_conditions(&mut self, assigned: &[Assigned]) -> Vec<(EffectTime, Condition)> {
         let mut needs = Vec::new();
         for (position, first) in assigned.iter().enumerate() {
             // Renaming apart: the variables must not capture those of the other assignment.
             let first = &if first.variables.is_empty() { first.clone() } else { self.copy(first) };
-            if !first.gives_one_value() {
+            if !first.is_functional() {
                 let second = self.copy(first);
-                needs.extend(agree(first, &second).map(|need| (first.time, need)));
+                needs.extend(consistency(first, &second).map(|need| (first.time, need)));
             }
             for second in &assigned[position..][1..] {
                 if first.time == second.time && first.function.name == second.function.name {
                     let second = self.copy(second);
-                    needs.extend(agree(first, &second).map(|need| (first.time, need)));
+                    needs.extend(consistency(first, &second).map(|need| (first.time, need)));
                 }
             }
         }
@@ -56,7 +56,7 @@ impl Parser<'_> {
 impl Assigned {
     /// Returns `true` if different instances concern different terms: each quantified variable is an
     /// argument.
-    fn gives_one_value(&self) -> bool {
+    fn is_functional(&self) -> bool {
         let is_argument = |variable: &TypedName| {
             self.arguments.iter().any(
                 |term| matches!(term, Term::Variable(identifier) if identifier.name == variable.identifier.name),
@@ -68,7 +68,7 @@ impl Assigned {
 
 /// Condition that two assignments do not take place together, concern different terms, or assign the same
 /// value. `None` if this holds trivially.
-fn agree(first: &Assigned, second: &Assigned) -> Option<Condition> {
+fn consistency(first: &Assigned, second: &Assigned) -> Option<Condition> {
     let equal =
         |left: &Term, right: &Term| Condition::Equal(left.clone(), right.clone(), first.function.span);
     let mut premises: Vec<_> = first.conditions.iter().chain(&second.conditions).cloned().collect();

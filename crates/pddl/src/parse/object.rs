@@ -308,7 +308,7 @@ impl Parser<'_> {
     pub(super) fn needs_of_effects(&mut self) -> Vec<(ConditionTime, Condition)> {
         let mut needs = std::mem::take(&mut self.objects.needs);
         let assigned = std::mem::take(&mut self.objects.assigned);
-        needs.extend(self.one_value_each(&assigned));
+        needs.extend(self.uniqueness_conditions(&assigned));
         let at = |time| match time {
             EffectTime::AtStart => ConditionTime::AtStart,
             EffectTime::AtEnd => ConditionTime::AtEnd,

@@ -9,7 +9,7 @@ use super::typed::Entries;
 
 /// Sections that a problem has at most once, as far as they were read.
 #[derive(Default)]
-struct Once {
+struct UniqueSections {
     domain: Option<Identifier>,
     domain_span: Option<Span>,
     goal: Option<Condition>,
@@ -33,22 +33,22 @@ impl Parser<'_> {
             constraints: Vec::new(),
             metric: None,
         };
-        let mut once = Once::default();
+        let mut unique = UniqueSections::default();
         for section in sections {
-            self.problem_section(section, &mut problem, &mut once);
+            self.problem_section(section, &mut problem, &mut unique);
         }
-        self.missing_sections(&problem, &once);
-        if let Some(domain) = once.domain {
+        self.missing_sections(&problem, &unique);
+        if let Some(domain) = unique.domain {
             problem.domain = domain;
         }
-        if let Some(goal) = once.goal {
+        if let Some(goal) = unique.goal {
             problem.goal = goal;
         }
-        problem.metric = once.metric;
+        problem.metric = unique.metric;
         Some(problem)
     }
 
-    fn problem_section(&mut self, section: Item<'_>, problem: &mut Problem, once: &mut Once) {
+    fn problem_section(&mut self, section: Item<'_>, problem: &mut Problem, unique: &mut UniqueSections) {
         let message_count = self.sink.len();
         let keyword = section.head().unwrap_or_default().to_ascii_lowercase();
         match keyword.as_str() {
@@ -61,19 +61,19 @@ impl Parser<'_> {
             }
             ":init" => section.rest().for_each(|item| self.initial(item, &mut problem.init)),
             ":domain" => {
-                if self.first(section, &mut once.domain_span) {
-                    once.domain = self.domain_name(section);
+                if self.first(section, &mut unique.domain_span) {
+                    unique.domain = self.domain_name(section);
                 }
             }
             ":goal" => {
-                if self.first(section, &mut once.goal_span) {
-                    once.goal = self.goal(section, &mut problem.constraints);
+                if self.first(section, &mut unique.goal_span) {
+                    unique.goal = self.goal(section, &mut problem.constraints);
                 }
             }
             ":constraints" => self.constraints(section, &mut problem.constraints),
             ":metric" => {
-                if self.first(section, &mut once.metric_span) {
-                    once.metric = self.metric(section);
+                if self.first(section, &mut unique.metric_span) {
+                    unique.metric = self.metric(section);
                 }
             }
             _ => self.other_section(section, "problem"),
@@ -121,15 +121,15 @@ impl Parser<'_> {
         }
     }
 
-    fn missing_sections(&mut self, problem: &Problem, once: &Once) {
+    fn missing_sections(&mut self, problem: &Problem, unique: &UniqueSections) {
         if self.has_unknown_section {
             return;
         }
         let place = problem.name.span;
-        if once.domain_span.is_none() {
+        if unique.domain_span.is_none() {
             self.sink.error("P110", place, "the problem has no `:domain`").help("write `(:domain name)`");
         }
-        if once.goal_span.is_none() {
+        if unique.goal_span.is_none() {
             self.sink.error("P110", place, "the problem has no `:goal`").help("write `(:goal (and …))`");
         }
     }

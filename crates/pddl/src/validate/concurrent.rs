@@ -53,9 +53,9 @@ pub(super) fn run<'e, 'p>(
         while let Some((_, step)) = starts.pop_if(|(start, _)| *start == time) {
             let running_action = execution.begin(step, &time)?;
             let part = running_action.first_part();
-            execution.prefer(&running_action, ConditionTime::AtStart, &time)?;
+            execution.record_preferences(&running_action, ConditionTime::AtStart, &time)?;
             if part == Part::Whole {
-                execution.prefer(&running_action, ConditionTime::AtEnd, &time)?;
+                execution.record_preferences(&running_action, ConditionTime::AtEnd, &time)?;
             }
             parts.happenings.push((Some(step), execution.happening(&running_action, part, &time)?));
             if part == Part::Start {
@@ -64,7 +64,7 @@ pub(super) fn run<'e, 'p>(
             *total_time = time.clone();
         }
         for ending_action in &ending {
-            execution.prefer(ending_action, ConditionTime::AtEnd, &time)?;
+            execution.record_preferences(ending_action, ConditionTime::AtEnd, &time)?;
             parts
                 .happenings
                 .push((Some(ending_action.step), execution.happening(ending_action, Part::End, &time)?));
@@ -81,7 +81,7 @@ pub(super) fn run<'e, 'p>(
             execution.check(running, ConditionTime::OverAll, &time)?;
         }
     }
-    execution.pass(total_time, true);
+    execution.apply_events_until(total_time, true);
     // Later events no longer change the outcome, but they must respect the separation.
     let safe = &*total_time + &execution.options.tolerance;
     while execution.next_timed().is_some_and(|next| *next < safe)

@@ -117,17 +117,17 @@ impl<'e, 'p> Follower<'e, 'p> {
     /// Starts a step. Returns `None` if the action has already ended because it takes no time.
     fn start(&mut self, index: usize, step: &'e Step<'p>) -> Result<Option<Running<'e, 'p>>, Box<Violation>> {
         let time = step.text.start.clone().unwrap_or_else(|| self.clock.clone());
-        self.execution.pass(&time, true);
+        self.execution.apply_events_until(&time, true);
         // Prefer the schema whose conditions hold. The effects are shown even if no schema is applicable.
         let checked = self.execution.begin(step, &time);
         let running = checked.or_else(|_| self.execution.begin_anyway(step, &time))?;
         let mut bounds = self.bounds(&running, ConditionTime::AtStart);
         bounds.extend(self.bounds(&running, ConditionTime::OverAll));
-        let mut values = self.happen(&running, EffectTime::AtStart, &time)?;
+        let mut values = self.apply_effects(&running, EffectTime::AtStart, &time)?;
         let is_whole = running.first_part() == Part::Whole;
         if is_whole && is_durative(&running.instance) {
             bounds.extend(self.bounds(&running, ConditionTime::AtEnd));
-            values.extend(self.happen(&running, EffectTime::AtEnd, &time)?);
+            values.extend(self.apply_effects(&running, EffectTime::AtEnd, &time)?);
         }
         if is_whole {
             self.clock.clone_from(&time);
@@ -138,9 +138,9 @@ impl<'e, 'p> Follower<'e, 'p> {
 
     fn end(&mut self, index: usize, running: &Running<'e, 'p>) -> Result<(), Box<Violation>> {
         let time = running.end.clone();
-        self.execution.pass(&time, true);
+        self.execution.apply_events_until(&time, true);
         let bounds = self.bounds(running, ConditionTime::AtEnd);
-        let values = self.happen(running, EffectTime::AtEnd, &time)?;
+        let values = self.apply_effects(running, EffectTime::AtEnd, &time)?;
         self.clock.clone_from(&time);
         self.note(CourseMoment { step: index, time, is_end: true, values, bounds, metric: None });
         Ok(())
@@ -153,7 +153,7 @@ impl<'e, 'p> Follower<'e, 'p> {
     }
 
     /// Applies effects. Returns the changed functions with their new values.
-    fn happen(
+    fn apply_effects(
         &mut self,
         running: &Running<'e, 'p>,
         when: EffectTime,

@@ -21,7 +21,7 @@ use super::trace::Trace;
 use super::world::{Arguments, State, Symbol, World};
 
 /// Recomputes the derived facts of `state`. An axiom instance with an undefined condition derives nothing.
-pub(super) fn close(world: &World<'_>, state: &mut State) {
+pub(super) fn derive_facts(world: &World<'_>, state: &mut State) {
     state.derived.clear();
     for stratum in &world.strata {
         let (agenda, instances) = (Vec::new(), Vec::new());

@@ -40,12 +40,12 @@ pub(super) struct Binding<'p> {
 }
 
 impl<'p> Bindings<'p> {
-    pub(super) fn place(&self, variable: &Name) -> Option<usize> {
+    pub(super) fn position(&self, variable: &Name) -> Option<usize> {
         self.0.iter().rposition(|binding| binding.variable == variable)
     }
 
     pub(super) fn get(&self, variable: &Name) -> Option<Symbol> {
-        self.place(variable).and_then(|place| self.0[place].object)
+        self.position(variable).and_then(|position| self.0[position].object)
     }
 
     pub(super) fn declare(&mut self, variables: &'p [TypedName]) {

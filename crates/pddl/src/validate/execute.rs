@@ -6,7 +6,7 @@ use num_traits::{Signed, Zero};
 use crate::ast::{ActionBody, Comparison, ConditionTime, EffectTime, InitialElement};
 use crate::number::show_number;
 
-use super::derive::close;
+use super::derive::derive_facts;
 use super::effects::{Changes, EffectError, Ground};
 use super::evaluate::{Evaluator, Undefined};
 use super::explain::{undefined_text, unmet};
@@ -34,7 +34,7 @@ pub(super) struct Execution<'e, 'p> {
 impl<'e, 'p> Execution<'e, 'p> {
     pub(super) fn new(world: &'e World<'p>, options: &'e Options) -> Self {
         let mut state = world.initial_state();
-        close(world, &mut state);
+        derive_facts(world, &mut state);
         let mut pending: Vec<_> = world
             .problem
             .init
@@ -206,7 +206,7 @@ impl<'e, 'p> Execution<'e, 'p> {
         if missing.is_empty() {
             return Ok(());
         }
-        let (kind, place) = match when {
+        let (kind, role) = match when {
             ConditionTime::AtStart if !is_durative(instance) => (ViolationKind::AtStart, "precondition"),
             ConditionTime::AtStart => (ViolationKind::AtStart, "condition at start"),
             ConditionTime::OverAll => (ViolationKind::OverAll, "condition over all"),
@@ -214,7 +214,7 @@ impl<'e, 'p> Execution<'e, 'p> {
         };
         let reason =
             undefined.as_ref().map(|reason| format!(": {}", undefined_text(reason))).unwrap_or_default();
-        let message = format!("a {place} of {} does not hold{reason}", step.show());
+        let message = format!("a {role} of {} does not hold{reason}", step.show());
         // An undefined function is the cause rather than the condition that reads it.
         let kind = if undefined.is_some() { ViolationKind::Undefined } else { kind };
         Err(Box::new(Violation { unmet: missing, ..*step.violation(time, kind, message) }))
@@ -268,7 +268,7 @@ impl<'e, 'p> Execution<'e, 'p> {
         let applied = changes.apply(self.world, &mut self.state);
         applied.map_err(|error| self.effect_violation(step, time, &error))?;
         if concerns_axioms {
-            close(self.world, &mut self.state);
+            derive_facts(self.world, &mut self.state);
         }
         Ok(())
     }

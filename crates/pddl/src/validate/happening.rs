@@ -6,7 +6,7 @@ use num_traits::Zero;
 
 use crate::ast::{ConditionTime, EffectTime};
 
-use super::derive::close;
+use super::derive::derive_facts;
 use super::effects::{Changes, Ground};
 use super::execute::Execution;
 use super::interference::Footprint;
@@ -75,7 +75,7 @@ impl<'e, 'p> Execution<'e, 'p> {
     }
 
     /// Applies all events before `time`, and with `inclusive` also those at `time`.
-    pub(super) fn pass(&mut self, time: &BigRational, inclusive: bool) {
+    pub(super) fn apply_events_until(&mut self, time: &BigRational, inclusive: bool) {
         let is_due = |next: &BigRational| next < time || (inclusive && next == time);
         while self.next_timed().is_some_and(is_due) {
             self.apply_next_timed();
@@ -96,7 +96,7 @@ impl<'e, 'p> Execution<'e, 'p> {
         let concerns_axioms = changes.concern(&self.world.read_by_axioms);
         changes.apply_facts(&mut self.state);
         if concerns_axioms {
-            close(self.world, &mut self.state);
+            derive_facts(self.world, &mut self.state);
         }
     }
 
@@ -127,7 +127,7 @@ impl<'e, 'p> Execution<'e, 'p> {
         time: &BigRational,
     ) -> Result<(), Box<Violation>> {
         let happening = self.happening(running, part, time)?;
-        self.pass(time, true);
+        self.apply_events_until(time, true);
         let simultaneous = self.last_event.as_ref().filter(|(event, _)| event == time);
         if let Some(touched) = simultaneous.and_then(|(_, event)| happening.footprint.interferes(event)) {
             return Err(self.disturbed(running.step, time, time, &touched));

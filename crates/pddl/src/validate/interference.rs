@@ -206,7 +206,7 @@ fn pattern(world: &World<'_>, bindings: &Bindings<'_>, atom: &Atom, hidden: &[&T
     let arguments = atom.arguments.iter().map(|term| match term {
         Term::Variable(identifier) => {
             match hidden.iter().rposition(|entry| entry.identifier.name == identifier.name) {
-                Some(place) => Slot::Each(place, Rc::new(world.objects_of(&hidden[place].r#type).collect())),
+                Some(index) => Slot::Each(index, Rc::new(world.objects_of(&hidden[index].r#type).collect())),
                 None => {
                     Slot::Object(bindings.get(&identifier.name).unwrap_or(world.symbol(&identifier.name)))
                 }

@@ -163,7 +163,7 @@ fn metric_value(
     total_time: &BigRational,
 ) -> Option<BigRational> {
     let metric = world.problem.metric.as_ref()?;
-    let counted = world.counted(violated, state);
-    let evaluator = Evaluator { total_time: Some(total_time), ..Evaluator::new(world, &counted) };
+    let final_state = world.with_violations(violated, state);
+    let evaluator = Evaluator { total_time: Some(total_time), ..Evaluator::new(world, &final_state) };
     evaluator.value(&metric.expression, &Bindings::default()).ok()
 }

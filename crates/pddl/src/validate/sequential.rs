@@ -35,12 +35,12 @@ pub(super) fn run<'e, 'p>(
         // A step that starts too early within the tolerance is delayed.
         let time = stated.max(&clock).clone();
         // Events at this time are applied with the start, which must not interfere with them.
-        execution.pass(&time, false);
+        execution.apply_events_until(&time, false);
         let running = execution.begin(step, &time)?;
         let part = running.first_part();
-        execution.prefer(&running, ConditionTime::AtStart, &time)?;
+        execution.record_preferences(&running, ConditionTime::AtStart, &time)?;
         if part == Part::Whole {
-            execution.prefer(&running, ConditionTime::AtEnd, &time)?;
+            execution.record_preferences(&running, ConditionTime::AtEnd, &time)?;
         }
         execution.execute(&running, part, &time)?;
         if part == Part::Start {
@@ -49,7 +49,7 @@ pub(super) fn run<'e, 'p>(
         *total_time += &running.duration;
         clock = running.end;
     }
-    execution.pass(&clock, true);
+    execution.apply_events_until(&clock, true);
     Ok(())
 }
 
@@ -64,7 +64,7 @@ fn finish<'e, 'p>(
         execution.apply_next_timed();
         execution.check(running, ConditionTime::OverAll, &next)?;
     }
-    execution.prefer(running, ConditionTime::AtEnd, &running.end)?;
+    execution.record_preferences(running, ConditionTime::AtEnd, &running.end)?;
     execution.execute(running, Part::End, &running.end)
 }
 

@@ -41,8 +41,8 @@ enum Choices<'e, 'p> {
 impl Branch<'_, '_> {
     /// Undoes the bindings of the current option.
     fn undo(&mut self, bindings: &mut Bindings<'_>) {
-        for place in self.bound.drain(..) {
-            bindings.0[place].object = None;
+        for position in self.bound.drain(..) {
+            bindings.0[position].object = None;
         }
         bindings.0.truncate(self.declared);
     }
@@ -110,7 +110,7 @@ impl<'e, 'p> Evaluator<'e, 'p> {
                 // A quantifier whose variables shadow no other ones is opened: its body joins the
                 // conjunction.
                 Condition::Exists(variables, body)
-                    if variables.iter().all(|entry| bindings.place(&entry.identifier.name).is_none()) =>
+                    if variables.iter().all(|entry| bindings.position(&entry.identifier.name).is_none()) =>
                 {
                     self.declare(variables, bindings);
                     todo.push(body);
@@ -142,10 +142,10 @@ impl<'e, 'p> Evaluator<'e, 'p> {
     ) -> Option<(Vec<&'p Condition>, Choices<'e, 'p>)> {
         let world = self.world;
         // An equation with one bound side leaves a single object.
-        if let Some((place, object)) = open.iter().find_map(|part| self.forced(part, bindings)) {
-            let r#type = bindings.0[place].r#type;
-            let object = std::iter::once(object).filter(move |object| world.is_of(*object, r#type));
-            return Some((open, Choices::Objects(place, Box::new(object))));
+        if let Some((position, object)) = open.iter().find_map(|part| self.forced(part, bindings)) {
+            let r#type = bindings.0[position].r#type;
+            let object = std::iter::once(object).filter(move |object| world.is_a(*object, r#type));
+            return Some((open, Choices::Objects(position, Box::new(object))));
         }
         let atoms = open.iter().enumerate().filter_map(|(index, part)| match part {
             Condition::Atom(atom) => Some((self.row_count(atom, bindings), index, atom)),
@@ -168,8 +168,8 @@ impl<'e, 'p> Evaluator<'e, 'p> {
             return Some((open, Choices::Alternatives(alternatives.iter())));
         }
         // No fact restricts the remaining variables: enumerate the objects of their types.
-        let place = (first..bindings.0.len()).find(|place| bindings.0[*place].object.is_none())?;
-        Some((open, Choices::Objects(place, world.objects_of(bindings.0[place].r#type))))
+        let position = (first..bindings.0.len()).find(|position| bindings.0[*position].object.is_none())?;
+        Some((open, Choices::Objects(position, world.objects_of(bindings.0[position].r#type))))
     }
 
     /// Tries the next option of a branching point. Returns the conditions to solve next, or `None` after the
@@ -178,14 +178,14 @@ impl<'e, 'p> Evaluator<'e, 'p> {
         branch.undo(bindings);
         let mut conditions = branch.open.clone();
         match &mut branch.options {
-            Choices::Objects(place, objects) => {
-                bindings.0[*place].object = Some(objects.next()?);
-                branch.bound.push(*place);
+            Choices::Objects(position, objects) => {
+                bindings.0[*position].object = Some(objects.next()?);
+                branch.bound.push(*position);
             }
             Choices::Facts(atom, facts) => {
                 while !self.unify(atom, facts.next()?, bindings, &mut branch.bound) {
-                    for place in branch.bound.drain(..) {
-                        bindings.0[place].object = None;
+                    for position in branch.bound.drain(..) {
+                        bindings.0[position].object = None;
                     }
                     if self.world.budget.is_spent() {
                         return None;
@@ -227,13 +227,13 @@ impl<'e, 'p> Evaluator<'e, 'p> {
         let Condition::Equal(left, right, _) = part else { return None };
         let unbound = |term: &Term| match term {
             Term::Variable(identifier) => {
-                bindings.place(&identifier.name).filter(|place| bindings.0[*place].object.is_none())
+                bindings.position(&identifier.name).filter(|position| bindings.0[*position].object.is_none())
             }
             Term::Constant(_) => None,
         };
         match (unbound(left), unbound(right)) {
-            (Some(place), None) => Some((place, self.term(right, bindings)?)),
-            (None, Some(place)) => Some((place, self.term(left, bindings)?)),
+            (Some(position), None) => Some((position, self.term(right, bindings)?)),
+            (None, Some(position)) => Some((position, self.term(left, bindings)?)),
             _ => None,
         }
     }
@@ -258,12 +258,12 @@ impl<'e, 'p> Evaluator<'e, 'p> {
                 continue;
             }
             let Term::Variable(identifier) = term else { return false };
-            let Some(place) = bindings.place(&identifier.name) else { return false };
-            if !self.world.is_of(*object, bindings.0[place].r#type) {
+            let Some(position) = bindings.position(&identifier.name) else { return false };
+            if !self.world.is_a(*object, bindings.0[position].r#type) {
                 return false;
             }
-            bindings.0[place].object = Some(*object);
-            bound.push(place);
+            bindings.0[position].object = Some(*object);
+            bound.push(position);
         }
         true
     }

@@ -82,7 +82,7 @@ pub(super) fn readings<'p>(steps: &[Step<'p>], limit: usize) -> Vec<Vec<Step<'p>
 
 fn instantiate<'p>(world: &World<'p>, action: &'p Action, objects: &[Symbol]) -> Option<Instance<'p>> {
     let fits = action.parameters.len() == objects.len()
-        && action.parameters.iter().zip(objects).all(|(entry, object)| world.is_of(*object, &entry.r#type));
+        && action.parameters.iter().zip(objects).all(|(entry, object)| world.is_a(*object, &entry.r#type));
     let bind = |(entry, object): (&'p crate::ast::TypedName, &Symbol)| Binding {
         variable: &entry.identifier.name,
         r#type: &entry.r#type,

@@ -20,7 +20,7 @@ use super::world::World;
 
 impl<'e, 'p> Execution<'e, 'p> {
     /// Records the preferences of an action that are violated at its start or its end.
-    pub(super) fn prefer(
+    pub(super) fn record_preferences(
         &mut self,
         running: &Running<'e, 'p>,
         when: ConditionTime,

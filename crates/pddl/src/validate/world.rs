@@ -40,7 +40,7 @@ pub(super) struct World<'p> {
     /// All objects with their declared types, constants first.
     objects: Vec<(Symbol, Vec<&'p TypeExpression>)>,
     /// Index of each object in `objects`.
-    place: FxHashMap<Symbol, usize>,
+    position: FxHashMap<Symbol, usize>,
     /// Objects of each declared type, in order and as a set.
     members: FxHashMap<Name, (Vec<Symbol>, FxHashSet<Symbol>)>,
     /// Axioms, lowest stratum first.
@@ -74,7 +74,7 @@ impl<'p> World<'p> {
             symbols: FxHashMap::default(),
             names: Vec::new(),
             objects: Vec::new(),
-            place: FxHashMap::default(),
+            position: FxHashMap::default(),
             members: FxHashMap::default(),
             strata: strata(domain),
             read_by_axioms: FxHashSet::default(),
@@ -152,10 +152,10 @@ impl<'p> World<'p> {
 
     fn insert_object(&mut self, entry: &'p TypedName) {
         let symbol = self.intern(&entry.identifier.name);
-        if let Some(place) = self.place.get(&symbol) {
-            self.objects[*place].1.push(&entry.r#type);
+        if let Some(position) = self.position.get(&symbol) {
+            self.objects[*position].1.push(&entry.r#type);
         } else {
-            self.place.insert(symbol, self.objects.len());
+            self.position.insert(symbol, self.objects.len());
             self.objects.push((symbol, vec![&entry.r#type]));
         }
     }
@@ -169,7 +169,7 @@ impl<'p> World<'p> {
     }
 
     /// Copy of a state in which `(is-violated NAME)` has its value, for the metric.
-    pub(super) fn counted(&self, violated: &[Name], state: &State) -> State {
+    pub(super) fn with_violations(&self, violated: &[Name], state: &State) -> State {
         let mut state = state.clone();
         let function = self.symbol(&Name::new(IS_VIOLATED));
         for name in self.preferences() {
@@ -196,17 +196,17 @@ impl<'p> World<'p> {
 
     /// Object with the given name.
     pub(super) fn object(&self, name: &Name) -> Option<Symbol> {
-        self.symbols.get(name).copied().filter(|symbol| self.place.contains_key(symbol))
+        self.symbols.get(name).copied().filter(|symbol| self.position.contains_key(symbol))
     }
 
     /// Returns `true` if an object is of a type.
-    pub(super) fn is_of(&self, object: Symbol, target: &TypeExpression) -> bool {
+    pub(super) fn is_a(&self, object: Symbol, target: &TypeExpression) -> bool {
         if let [alternative] = &target.alternatives[..]
             && let Some((_, members)) = self.members.get(&alternative.name)
         {
             return members.contains(&object);
         }
-        let types = self.place.get(&object).map(|place| &self.objects[*place].1);
+        let types = self.position.get(&object).map(|position| &self.objects[*position].1);
         types.is_some_and(|types| types.iter().any(|declared| self.types.fits(declared, target)))
     }
 
@@ -220,7 +220,7 @@ impl<'p> World<'p> {
         {
             return Box::new(members.iter().copied());
         }
-        Box::new(self.objects.iter().map(|(object, _)| *object).filter(|object| self.is_of(*object, target)))
+        Box::new(self.objects.iter().map(|(object, _)| *object).filter(|object| self.is_a(*object, target)))
     }
 
     /// Returns the object of a type that has exactly one object, else `None`.
