@@ -36,7 +36,7 @@ impl<'a> Checker<'a> {
             match element {
                 InitialElement::Fact(atom) | InitialElement::NegatedFact(atom) => {
                     self.atom(atom, Kind::Predicate, &scope);
-                    self.is_basic(atom);
+                    self.check_basic(atom);
                     let holds = matches!(element, InitialElement::Fact(_));
                     if let Some(earlier) = facts.insert(key(atom), (atom.span, holds)) {
                         self.repeated_fact(atom.span, holds, earlier);
@@ -50,7 +50,7 @@ impl<'a> Checker<'a> {
                 }
                 InitialElement::Timed(time, atom, _, span) => {
                     self.atom(atom, Kind::Predicate, &scope);
-                    self.is_basic(atom);
+                    self.check_basic(atom);
                     if time.is_negative() {
                         self.sink.error("P139", *span, "this time lies before the initial state");
                     }
