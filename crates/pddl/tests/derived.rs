@@ -214,7 +214,7 @@ proptest! {
         for (predicate, condition) in &axioms {
             let parameters = head(*predicate);
             let scope = each(&parameters, &[None; 3])[0];
-            let names: Vec<&str> = parameters.iter().map(|argument| VARIABLES[*argument]).collect();
+            let names: Vec<&str> = parameters.iter().map(|parameter| VARIABLES[*parameter]).collect();
             let (name, text) = (DERIVED[*predicate].0, condition.text(*predicate == LAST, &scope));
             let _ = write!(domain, "(:derived ({name} {}) {text})", names.join(" "));
         }

@@ -341,7 +341,7 @@ fn the_unmodified_files_have_no_errors() {
     let diagnostics =
         read(&domain, &problem).map_or_else(Errors::into_vec, |(_, _, diagnostics)| diagnostics);
     // The domain uses an object of the problem.
-    assert_eq!(diagnostics.iter().map(|diagnostics| diagnostics.code).collect::<Vec<_>>(), ["P138"]);
+    assert_eq!(diagnostics.iter().map(|diagnostic| diagnostic.code).collect::<Vec<_>>(), ["P138"]);
 }
 
 /// Returns the code of the only error of a domain with the given precondition.
