@@ -1,17 +1,18 @@
-//! Spelling suggestions: the declared name that is most similar to an unknown one.
+//! Spelling suggestions: the known name that is most similar to an unknown one.
 
-/// Returns the name most similar to `written`, if any is similar enough. Of equally similar names, the first
-/// is returned.
-pub(crate) fn nearest<'n>(written: &str, candidates: impl IntoIterator<Item = &'n str>) -> Option<&'n str> {
-    let written = written.to_ascii_lowercase();
-    // One edit per three characters, at most three.
+/// Returns the known name with the smallest edit distance to `written`, the first one of equally similar names.
+///
+/// Case does not matter, and the same words in another order are one edit. At most a third of the letters and at most three
+/// may differ; in a name of two letters one may. A single letter has no suggestion, because it is near every other letter.
+pub fn nearest<'n>(written: &str, known: impl IntoIterator<Item = &'n str>) -> Option<&'n str> {
+    let written = written.to_lowercase();
     let limit = match written.chars().count() {
         0 | 1 => 0,
         length => (length / 3).clamp(1, 3),
     };
     let mut best: Option<(usize, &str)> = None;
-    for name in candidates {
-        let distance = distance(&written, &name.to_ascii_lowercase());
+    for name in known {
+        let distance = distance(&written, &name.to_lowercase());
         if distance <= limit && best.is_none_or(|(least, _)| distance < least) {
             best = Some((distance, name));
         }
@@ -19,10 +20,9 @@ pub(crate) fn nearest<'n>(written: &str, candidates: impl IntoIterator<Item = &'
     best.map(|(_, name)| name)
 }
 
-/// Edit distance between two names (optimal string alignment). A permutation of the same words counts as one
-/// edit.
+/// Optimal string alignment distance, in which transposed neighbours are one edit.
 fn distance(left: &str, right: &str) -> usize {
-    // Too different for a suggestion; saves the quadratic computation.
+    // No suggestion differs in length by more than three letters of at most four bytes each.
     if left.len().abs_diff(right.len()) > 12 {
         return usize::MAX;
     }
@@ -43,8 +43,8 @@ mod tests {
     use super::nearest;
 
     #[test]
-    fn the_most_similar_name_is_suggested() {
-        let names = ["fd_available", "robot_at", "at", "fd_solves_f"];
+    fn similar_names_are_suggested() {
+        let known = ["fd_available", "robot_at", "at", "fd_solves_f"];
         let cases = [
             ("fd_availabel", Some("fd_available")),
             ("available_fd", Some("fd_available")),
@@ -55,7 +55,7 @@ mod tests {
             ("battery", None),
         ];
         for (written, expected) in cases {
-            assert_eq!(nearest(written, names), expected, "{written}");
+            assert_eq!(nearest(written, known), expected, "{written}");
         }
     }
 }
