@@ -26,28 +26,28 @@ use crate::simulate::{Experiment, Simulation};
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Sections {
-    /// The mission's name.
+    /// Name of the mission.
     name: String,
-    /// A sentence about it.
+    /// Description of the mission in one sentence.
     #[serde(default)]
     description: String,
     /// The knowledge base.
     knowledge: KnowledgeSection,
     /// The PDDL files.
     planning: PlanningSection,
-    /// PDDL symbol to query, where it is not the default; `names` has individuals.
+    /// Query of a PDDL symbol that differs from the default; the table `names` is for individuals.
     #[serde(default)]
     bindings: BindingsSection,
-    /// How eager the loop is.
+    /// Settings of the adaptation loop.
     #[serde(default)]
     adaptation: AdaptationSection,
     /// The symbols of the probabilistic process, for `compare` and for `export` to PRISM and JANI.
     #[serde(default)]
     probabilistic: Roles,
-    /// What pictures need.
+    /// Settings for pictures.
     #[serde(default)]
     report: ReportSection,
-    /// Situations by name.
+    /// Scenarios by name.
     #[serde(default)]
     scenarios: BTreeMap<String, Scenario<Simulation>>,
 }

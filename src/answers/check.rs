@@ -10,33 +10,33 @@ const CHECK: &str = "metaplan-check/1";
 
 const CHECKS: &str = "metaplan-checks/1";
 
-/// A value of a property, its policy's size, and what it took.
+/// The value of a property, the size of the model, and the running time.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct CheckAnswer<'a> {
     /// Name and version of this format.
     #[schemars(extend("const" = CHECK))]
     format: &'static str,
-    /// As it was asked.
+    /// The property, as it was given.
     property: &'a str,
-    /// Its name in a file of properties.
+    /// Name of the property in the file of properties.
     #[serde(skip_serializing_if = "Option::is_none")]
     name: Option<&'a str>,
-    /// The values of the constants that have several.
+    /// Values of the constants that are varied.
     #[serde(skip_serializing_if = "Option::is_none")]
     constants: Option<BTreeMap<&'a str, &'a str>>,
     #[serde(flatten)]
     found: Found,
-    /// The size of the model, and what it took.
+    /// Size of the model, and running time.
     statistics: SizePart,
 }
 
-/// What several properties, or several values of constants, are answered with.
+/// Answers for several properties, or for several values of constants.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ChecksAnswer<'a> {
     /// Name and version of this format.
     #[schemars(extend("const" = CHECKS))]
     format: &'static str,
-    /// An answer for each property and each value of the constants.
+    /// One answer for each property and each combination of values of the constants.
     answers: Vec<CheckAnswer<'a>>,
     /// Properties without an answer.
     refused: Vec<RefusedPart<'a>>,
@@ -45,15 +45,15 @@ pub struct ChecksAnswer<'a> {
 /// A property that has no answer.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct RefusedPart<'a> {
-    /// As it was asked.
+    /// The property, as it was given.
     property: &'a str,
-    /// Its name in the file of properties; null where it has none.
+    /// Name of the property in the file of properties; null if it has none.
     name: Option<&'a str>,
-    /// Why it has no answer.
+    /// Reasons why the property has no answer.
     messages: Vec<String>,
 }
 
-/// What stands in the middle, by the kind of property.
+/// The fields that depend on the kind of property.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 #[serde(untagged)]
 enum Found {
@@ -61,89 +61,89 @@ enum Found {
     Truth {
         #[serde(flatten)]
         value: Option<ValuePart>,
-        /// Null where it is not decided.
+        /// Whether the property holds; null if the bounds do not decide it.
         holds: Option<bool>,
     },
     Range {
-        /// The least value over the states.
+        /// Minimum over the states.
         least: ValuePart,
-        /// The greatest value over the states.
+        /// Maximum over the states.
         greatest: ValuePart,
     },
     States {
-        /// Each state of the set.
+        /// The states of the set.
         states: Vec<StatePart>,
     },
     Front {
-        /// The vertices of a Pareto front: a value for each of the two properties.
+        /// Vertices of the Pareto front, each with a value for each of the two properties.
         vertices: Vec<[ValuePart; 2]>,
     },
     Constrained {
         #[serde(flatten)]
         value: ValuePart,
-        /// The value of the best policy, which may draw lots.
+        /// Value of the best randomised policy.
         randomised: ValuePart,
-        /// The value of the best policy that does not.
+        /// Value of the best deterministic policy.
         deterministic: ProvedPart,
     },
 }
 
-/// A value: `value`, `lower` and `upper` are null where it is infinite or undefined, which `status` says; `exact` is a fraction,
-/// `inf`, or null.
+/// A value with bounds. If it is infinite or undefined, as given by `status`, `value`, `lower` and
+/// `upper` are null. `exact` is a fraction, `inf`, or null.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct ValuePart {
-    /// `finite`, `infinite`, or `undefined` (no policy keeps the bound of `multi`).
+    /// `finite`, `infinite`, or `undefined` (no policy satisfies the bound of `multi`).
     status: &'static str,
-    /// The value; null where it is infinite or undefined.
+    /// The value; null if it is infinite or undefined.
     value: Option<f64>,
-    /// It is at least this; null where it is infinite or undefined.
+    /// Lower bound on the value; null if it is infinite or undefined.
     lower: Option<f64>,
-    /// It is at most this; null where it is infinite, undefined, or not bounded.
+    /// Upper bound on the value; null if it is infinite, undefined, or not bounded.
     upper: Option<f64>,
-    /// The value as a fraction, `inf` where it is infinite, null where it was not computed exactly.
+    /// The value as a fraction; `inf` if it is infinite, null if it was not computed exactly.
     exact: Option<String>,
 }
 
-/// A state, by the values of its variables, with its value or whether the property holds in it.
+/// A state, given by the values of its variables, with its result.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct StatePart {
-    /// Variable to value.
+    /// Values of the variables.
     state: BTreeMap<String, i64>,
-    /// Whether the property holds in it.
+    /// Whether the property holds in the state; null if this is not decided.
     #[serde(skip_serializing_if = "Option::is_none")]
     holds: Option<bool>,
     #[serde(flatten)]
     value: Option<ValuePart>,
 }
 
-/// A value, and whether it is proved to be the best.
+/// A value, and whether it is proved to be optimal.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct ProvedPart {
     #[serde(flatten)]
     value: ValuePart,
-    /// Whether no policy without lots is better.
+    /// Whether it is proved that no deterministic policy is better.
     proved: bool,
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct SizePart {
-    /// Reachable states.
+    /// Number of reachable states.
     states: usize,
-    /// Choices, over all states.
+    /// Number of choices in all states.
     choices: usize,
-    /// Transitions, over all choices.
+    /// Number of transitions of all choices.
     transitions: usize,
-    /// States without a choice, which got a loop.
+    /// Number of states without a choice, to which a loop was added.
     deadlocks: usize,
-    /// What took how long.
+    /// Running times of the stages.
     milliseconds: DurationPart,
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct DurationPart {
-    /// Exploring the model.
+    /// Exploration of the model.
     build: f64,
-    /// Computing the value.
+    /// Computation of the value.
     solve: f64,
 }
 

@@ -7,7 +7,7 @@ use crate::codes::Code;
 
 const FORMAT: &str = "metaplan-code/1";
 
-/// What a code of a message means.
+/// Explanation of a message code.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct CodeAnswer {
     /// Name and version of this format.
@@ -15,11 +15,11 @@ pub struct CodeAnswer {
     format: &'static str,
     /// The code.
     code: &'static str,
-    /// What a message with this code says.
+    /// Meaning of the code.
     meaning: &'static str,
-    /// Why there is such a message.
+    /// Cause of the message.
     cause: &'static str,
-    /// What to do.
+    /// Remedy.
     remedy: &'static str,
 }
 

@@ -99,20 +99,20 @@ pub fn rows(pair: Option<&Pair>, comparison: &Comparison) -> Vec<Row> {
     rows
 }
 
-/// All comparisons, or as many as there were when time was up.
+/// All comparisons, or those that were complete at the time limit.
 #[derive(Debug, Clone, serde::Serialize, JsonSchema)]
 pub struct CompareAnswer<'a> {
     /// Name and version of this format.
     #[schemars(extend("const" = FORMAT))]
     format: &'static str,
-    /// Whether all of it was computed; false where the time limit came first.
+    /// Whether everything was computed before the time limit.
     complete: bool,
-    /// One comparison for each pair.
+    /// One comparison for each pair of start and goal.
     comparisons: Vec<ComparisonAnswer>,
-    /// Rows that `--published` adds, in the form of candidates.
+    /// Rows added by `--published`, in the form of candidates.
     #[schemars(with = "Vec<std::collections::BTreeMap<String, serde_json::Value>>")]
     published: &'a [Row],
-    /// Why it is not complete (M130).
+    /// Reason why the answer is incomplete (M130).
     messages: &'a [Message],
 }
 
@@ -127,37 +127,38 @@ impl<'a> CompareAnswer<'a> {
 /// One comparison.
 #[derive(Debug, Clone, serde::Serialize, JsonSchema)]
 pub struct ComparisonAnswer {
-    /// Where the mission starts; null for a single comparison.
+    /// Start of the mission; null for a single comparison.
     start: Option<String>,
-    /// Where it goes; null for a single comparison.
+    /// Goal of the mission; null for a single comparison.
     goal: Option<String>,
-    /// Ways to decide, each with `kind` (`a` to `f`), `name` and the measures; a measure is null where it is infinite or not defined.
+    /// The compared plans and policies, each with `kind` (`a` to `f`), `name` and the measures. A
+    /// measure is null if it is infinite or undefined.
     #[schemars(with = "Vec<std::collections::BTreeMap<String, serde_json::Value>>")]
     candidates: Vec<Row>,
     #[serde(flatten)]
     figures: Option<Figures>,
     /// Whether all candidates were computed.
     complete: bool,
-    /// What both sides took.
+    /// Size, running time and memory of both approaches.
     costs: CostsPart,
 }
 
-/// What a comparison has that is done.
+/// The fields of a complete comparison.
 #[derive(Debug, Clone, serde::Serialize, JsonSchema)]
 struct Figures {
-    /// The vertices of the front of expected time and probability of success without collision.
+    /// Vertices of the Pareto front of expected time and probability of success without collision.
     front: Vec<[f64; 2]>,
-    /// The time that a failed mission counts.
+    /// Penalty time of a failed mission.
     penalty: f64,
-    /// The penalised time that the plan with replanning takes above the best policy.
+    /// Additional penalised time of the plan with replanning over the best policy.
     price_of_determinism: Option<f64>,
-    /// Why that price is zero, where it is known without computing it; else null.
+    /// Reason why the price of determinism is zero, if this is known without computing it, else null.
     price_provably_zero: Option<&'static str>,
-    /// The penalised time that the plan without replanning takes above the best policy.
+    /// Additional penalised time of the plan without replanning over the best policy.
     price_of_open_loop: Option<f64>,
-    /// The penalised time that replanning saves.
+    /// Penalised time saved by replanning.
     value_of_replanning: Option<f64>,
-    /// What the loss of a component does; null where none may be lost.
+    /// Effect of the loss of a component; null if no component can be lost.
     loss: Option<LossPart>,
 }
 
@@ -165,65 +166,65 @@ struct Figures {
 struct LossPart {
     /// The component.
     component: String,
-    /// The probability of losing it at each move.
+    /// Probability of the loss at each move.
     rate: f64,
-    /// By the move after which it is lost.
+    /// Results for each move after which the component is lost.
     steps: Vec<LossStep>,
 }
 
 #[derive(Debug, Clone, serde::Serialize, JsonSchema)]
 struct LossStep {
-    /// Moves before the loss.
+    /// Number of moves before the loss.
     moves: usize,
-    /// The time of the plan if it can be carried on as it is; null where it cannot.
+    /// Time of the plan if it can be continued unchanged, else null.
     open_loop: Option<f64>,
-    /// The time with a new plan from there.
+    /// Time with a new plan after the loss.
     replanned: Option<f64>,
-    /// The time when the process is solved again from there.
+    /// Time with a new policy after the loss.
     solved_again: Option<f64>,
-    /// The time of the policy that reckons with the loss, which may have gone another way from the start.
+    /// Time of the policy that takes the possible loss into account and may choose another route from the start.
     anticipated: Option<f64>,
 }
 
 #[derive(Debug, Clone, serde::Serialize, JsonSchema)]
 struct CostsPart {
-    /// States of the process.
+    /// Number of states of the process.
     states: usize,
-    /// Its transitions.
+    /// Number of transitions of the process.
     transitions: usize,
-    /// Plans that were looked for.
+    /// Number of planning queries.
     plans: usize,
-    /// Variables of the largest formula.
+    /// Number of variables of the largest formula.
     variables: u64,
-    /// Clauses of the largest formula.
+    /// Number of clauses of the largest formula.
     clauses: u64,
-    /// What the policies of single objectives decide, in all states that they get to.
+    /// Number of decisions of the policies for single objectives, in all states that they reach.
     decisions: usize,
-    /// What took how long.
+    /// Running times of the stages.
     milliseconds: Milliseconds,
-    /// The greatest memory, in MB; null where the system does not tell.
+    /// Peak memory in MB; null if the system does not report it.
     peak_memory_mb: Option<u64>,
-    /// The greatest memory while the process was solved.
+    /// Peak memory until the process was solved, including memory that the planner has not released.
     process_memory_mb: Option<u64>,
-    /// The greatest memory while the first plan was made.
+    /// Peak memory of the first plan.
     first_plan_memory_mb: Option<u64>,
 }
 
 #[derive(Debug, Clone, serde::Serialize, JsonSchema)]
 struct Milliseconds {
-    /// Exploring the process.
+    /// Exploration of the process.
     build: f64,
-    /// Solving it.
+    /// Solution of the process.
     solve: f64,
-    /// Reading the policy from the solution.
+    /// Extraction of the policy from the solution.
     extract: f64,
-    /// The first plan, in all.
+    /// Total time of the first plan.
     first_plan: f64,
-    /// Grounding and encoding for it.
+    /// Grounding and encoding for the first plan.
     first_plan_build: f64,
-    /// Searching and solving for it.
+    /// Search and SAT solving for the first plan.
     first_plan_solve: f64,
-    /// Reading it from the solution.
+    /// Extraction of the first plan from the solution.
     first_plan_extract: f64,
     /// All further plans.
     more_plans: f64,

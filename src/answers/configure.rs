@@ -11,22 +11,22 @@ use crate::number::to_json;
 
 const CONFIGURE: &str = "metaplan-configure/1";
 
-/// A design for every function in need.
+/// The chosen design for each function that needs one.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ConfigureAnswer<'a> {
     /// Name and version of this format.
     #[schemars(extend("const" = CONFIGURE))]
     format: &'static str,
-    /// Whether each function in need has a design.
+    /// Whether each function that needs a design has one.
     served: bool,
     /// Whether it is proved that no choice is better.
     optimal: bool,
-    /// What the chosen designs are worth in sum.
+    /// Total utility of the chosen designs.
     #[schemars(with = "f64")]
     utility: Value,
-    /// Each objective in need, with what was chosen for it.
+    /// The objectives that need a design, with the choices for them.
     choices: Vec<ChoicePart<'a>>,
-    /// What is questionable about the files.
+    /// Warnings about the files.
     warnings: &'a [Message],
 }
 
@@ -34,13 +34,13 @@ pub struct ConfigureAnswer<'a> {
 struct ChoicePart<'a> {
     /// The objective.
     objective: &'a str,
-    /// The function that it is of; null where the knowledge base does not say.
+    /// Function of the objective; null if the knowledge base does not define it.
     function: Option<&'a str>,
-    /// Why it is in need: its statuses, `updatable`, `always improve`, or `ungrounded`.
+    /// Reasons why the objective needs a design: its statuses, `updatable`, `always improve`, or `ungrounded`.
     need: &'a [String],
-    /// The design that it had; null where there is none.
+    /// Previous design, or null.
     before: Option<&'a str>,
-    /// The design that it gets; null where there is none for it.
+    /// Chosen design; null if no design is possible.
     design: Option<&'a str>,
     /// All designs of the function, in the order of preference.
     considered: Vec<ConsideredPart<'a>>,
@@ -50,14 +50,14 @@ struct ChoicePart<'a> {
 struct ConsideredPart<'a> {
     /// The design.
     design: &'a str,
-    /// What it is worth; larger is better.
+    /// Utility of the design; larger is better.
     #[schemars(with = "f64")]
     utility: Value,
-    /// Requirements of the objective that it is estimated to miss.
+    /// Requirements of the objective that the design is estimated to violate.
     missed: &'a [String],
     /// `chosen`, `ruled out`, `less` or `not together`.
     verdict: &'static str,
-    /// Why it is ruled out, or not chosen together with the others.
+    /// Reasons why the design is ruled out, or not chosen together with the others.
     because: Vec<&'a str>,
 }
 
@@ -113,7 +113,7 @@ pub struct KeeperReadyLine {
     answer: &'static str,
     /// Name and version of this format.
     format: &'static str,
-    /// The objectives that are there.
+    /// The current objectives.
     objectives: Vec<String>,
 }
 

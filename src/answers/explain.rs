@@ -13,7 +13,7 @@ use crate::number::to_json;
 
 const FORMAT: &str = "metaplan-explain/1";
 
-/// What would change the plan.
+/// Changes that lead to another plan.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ChangesAnswer<'a> {
     /// Name and version of this format.
@@ -21,15 +21,15 @@ pub struct ChangesAnswer<'a> {
     format: &'static str,
     /// The mission's name.
     mission: &'a str,
-    /// The best plan as things are.
+    /// Best plan in the current situation.
     best: BestPart<'a>,
     /// The smallest changes that lead to another plan.
     changes: Vec<ChangePart<'a>>,
-    /// Whether these are all; if not, a limit was reached.
+    /// Whether all changes are listed; if not, a limit was reached.
     complete: bool,
 }
 
-/// All about one design.
+/// Explanation of one design.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct DesignAnswer<'a> {
     /// Name and version of this format.
@@ -37,55 +37,56 @@ pub struct DesignAnswer<'a> {
     format: &'static str,
     /// The mission's name.
     mission: &'a str,
-    /// The best plan as things are.
+    /// Best plan in the current situation.
     best: BestPart<'a>,
     /// The design.
     design: &'a str,
-    /// The functions that it solves.
+    /// Functions that the design solves.
     functions: &'a [String],
-    /// Whether it is available.
+    /// Whether the design is available.
     available: bool,
-    /// The rules and facts that rule it out.
+    /// Rules and facts that rule the design out.
     because: &'a [String],
-    /// Steps of the best plan that use it, from 1.
+    /// Steps of the best plan that use the design, from 1.
     used: &'a [usize],
-    /// The best plan in which no other design solves its functions; as if it were available if it is not.
+    /// Best plan in which only this design provides its functions, as if it were available.
     alone: BestPart<'a>,
-    /// The best plan that does not use it.
+    /// Best plan without the design.
     without: BestPart<'a>,
-    /// Single changes that have a part in whether it is available.
+    /// Single changes that contribute to the availability of the design.
     changes: Vec<ChangePart<'a>>,
-    /// Each failed component and each measurement that has a part in ruling it out.
+    /// Failed components and measurements that contribute to ruling the design out.
     causes: Vec<CausePart<'a>>,
-    /// If it is not available, the smallest sets of changes that make it available; else the changes that make it unavailable. Each suffices if all
-    /// of its changes come true together, and not without one of them.
+    /// If the design is unavailable: the smallest sets of changes that make it available. Otherwise:
+    /// the changes that make it unavailable. All changes of a set are necessary, and together they
+    /// suffice.
     repairs: Vec<RepairPart<'a>>,
-    /// Whether all plans of this answer are proved; if not, a limit was reached.
+    /// Whether all plans of this answer are proved optimal; if not, a limit was reached.
     complete: bool,
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct BestPart<'a> {
-    /// Its metric; null without a plan.
+    /// Metric of the plan; null without a plan.
     #[schemars(with = "Option<f64>")]
     cost: Option<Value>,
-    /// Whether it is proved to be the best, or that there is none.
+    /// Whether it is proved that the plan is optimal, or that no plan exists.
     proved: bool,
-    /// Its steps.
+    /// Steps of the plan.
     steps: &'a [PlannedStep],
 }
 
-/// What is otherwise than it is now.
+/// A change of the situation.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct AlterationPart<'a> {
-    /// What changes: an attribute, a function of the problem, or a component.
+    /// The changed attribute, function of the problem, or component.
     name: &'a str,
-    /// Its value now; null for components.
+    /// Current value; null for components.
     #[schemars(with = "Option<f64>")]
     from: Option<Value>,
     /// `at_least`, `at_most`, `above` or `below` the bound; `failed` or `recovered`.
     relation: &'static str,
-    /// The value from which on it has come true; null for components.
+    /// Bound that the value has to reach or cross; null for components.
     #[schemars(with = "Option<f64>")]
     bound: Option<Value>,
 }
@@ -94,30 +95,30 @@ struct AlterationPart<'a> {
 struct ChangePart<'a> {
     #[serde(flatten)]
     alteration: AlterationPart<'a>,
-    /// How far the bound may be from the exact one; null if it is exact.
+    /// Maximum error of the bound; null if it is exact.
     #[schemars(with = "Option<f64>")]
     within: Option<Value>,
-    /// Whether the design is available, or is so no more, if this change alone comes true.
+    /// Whether this change alone makes the design available, or unavailable.
     suffices: bool,
-    /// The best plan in that case.
+    /// Best plan after this change.
     then: BestPart<'a>,
 }
 
-/// Something that has a part in ruling a design out.
+/// A contribution to ruling a design out.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct CausePart<'a> {
     #[serde(flatten)]
     alteration: AlterationPart<'a>,
-    /// The rules and facts by which the design is ruled out, whatever else is repaired.
+    /// Rules and facts that rule the design out even if everything else is repaired.
     because: &'a [String],
 }
 
-/// Changes that have to come true together.
+/// Changes that are necessary together.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct RepairPart<'a> {
-    /// All of them.
+    /// The changes of the set.
     changes: Vec<AlterationPart<'a>>,
-    /// The best plan then.
+    /// Best plan after these changes.
     then: BestPart<'a>,
 }
 

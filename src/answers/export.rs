@@ -19,23 +19,23 @@ pub struct MissionExport {
     problem: String,
 }
 
-/// A mission's process as a model for model checkers.
+/// The co-adaptation process of a mission as a model for model checkers.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ModelExport {
     /// Name and version of this format.
     #[schemars(extend("const" = EXPORT))]
     format: &'static str,
-    /// The text of the model.
+    /// Text of the model.
     model: String,
 }
 
-/// Where the mission is that was made of another tool's files.
+/// The mission imported from the files of another tool.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ImportAnswer {
     /// Name and version of this format.
     #[schemars(extend("const" = IMPORT))]
     format: &'static str,
-    /// The path of the manifest that was written.
+    /// Path of the new manifest.
     mission: String,
 }
 

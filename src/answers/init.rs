@@ -5,17 +5,17 @@ use serde::Serialize;
 
 const FORMAT: &str = "metaplan-init/1";
 
-/// Where a new mission lies, and what it consists of.
+/// Directory and files of a new mission.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct InitAnswer<'a> {
     /// Name and version of this format.
     #[schemars(extend("const" = FORMAT))]
     format: &'static str,
-    /// The directory that was made.
+    /// The new directory.
     directory: &'a str,
-    /// The template that it was made from.
+    /// Template of the mission.
     template: &'static str,
-    /// What was written into it.
+    /// Files in the directory.
     files: Vec<&'static str>,
 }
 

@@ -9,38 +9,38 @@ use crate::message::Message;
 
 const FORMAT: &str = "metaplan-journal-report/1";
 
-/// What is in a journal, and what is wrong with it.
+/// Content and defects of a journal.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct JournalAnswer<'a> {
     /// Name and version of this format.
     #[schemars(extend("const" = FORMAT))]
     format: &'static str,
-    /// Whether it can be used.
+    /// Whether the journal can be used.
     sound: bool,
-    /// A sentence for each file.
+    /// One sentence per file.
     parts: &'a [String],
-    /// What is wrong with it.
+    /// Defects of the journal.
     messages: &'a [Message],
-    /// With `show`: what is in it.
+    /// With `show`: records of the journal.
     #[serde(skip_serializing_if = "Option::is_none")]
     records: Option<Vec<RecordPart<'a>>>,
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct RecordPart<'a> {
-    /// Its number, from 1.
+    /// Number of the record, from 1.
     record: u64,
-    /// The number of the file that it is in.
+    /// Number of the file with the record.
     segment: u64,
     /// `event`, `decision` or `end`.
     kind: &'a str,
-    /// Of an event: its time since the start of the mission.
+    /// For an event: time since the start of the mission.
     #[serde(skip_serializing_if = "Option::is_none")]
     microseconds: Option<u64>,
-    /// Of a decision.
+    /// For a decision: its answers.
     #[serde(skip_serializing_if = "Option::is_none")]
     answers: Option<&'a Value>,
-    /// Of an event.
+    /// For an event: its line.
     #[serde(skip_serializing_if = "Option::is_none")]
     line: Option<&'a Value>,
 }

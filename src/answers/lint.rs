@@ -7,17 +7,17 @@ use crate::message::Message;
 
 const FORMAT: &str = "metaplan-lint/1";
 
-/// All that is wrong or questionable about a mission.
+/// Errors and warnings of a mission.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct LintAnswer<'a> {
     /// Name and version of this format.
     #[schemars(extend("const" = FORMAT))]
     format: &'static str,
-    /// How many errors.
+    /// Number of errors.
     errors: usize,
-    /// How many warnings.
+    /// Number of warnings.
     warnings: usize,
-    /// All of them, in the order of the files.
+    /// Errors and warnings, in the order of the files.
     messages: &'a [Message],
 }
 

@@ -19,7 +19,7 @@ const PARETO: &str = "metaplan-pareto/1";
 
 const PLAN: &str = "metaplan-plan/1";
 
-/// A plan with its proof and its figures.
+/// A plan with its proof and statistics.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct PlanAnswer {
     /// Name and version of this format.
@@ -29,56 +29,56 @@ pub struct PlanAnswer {
     mission: String,
     /// `optimal`, `feasible`, `unsolvable`, `unsolvable_within_horizon` or `unknown`.
     status: &'static str,
-    /// The value of the metric, in its unit; null without a plan.
+    /// Metric of the plan, in its unit; null without a plan.
     #[schemars(with = "Option<f64>")]
     cost: Option<Value>,
-    /// No plan has a better metric; null where nothing is known.
+    /// Bound on the metric of every plan: no plan has a better metric; null if unknown.
     #[schemars(with = "Option<f64>")]
     lower_bound: Option<Value>,
-    /// Steps up to which all plans were considered.
+    /// Number of steps up to which all plans were considered.
     horizon: usize,
-    /// What proves the status; null where nothing does.
+    /// Proof of the status; null if it is not proved.
     proof: Option<ProofPart>,
-    /// For a metric without a best value `proved` or `suspected`; else null.
+    /// `proved` or `suspected` for a metric without a best value, else null.
     unbounded: Option<&'static str>,
-    /// The plan; empty where there is none.
+    /// The plan; empty if there is none.
     steps: Vec<StepPart>,
-    /// What was done.
+    /// Statistics of planning.
     statistics: StatisticsPart,
-    /// With `--minimize`: the values by objective.
+    /// With `--minimize`: value of each objective.
     #[serde(skip_serializing_if = "Option::is_none")]
     objectives: Option<Vec<Objective>>,
-    /// With `--alternatives`, for an optimal plan: others that are as good.
+    /// With `--alternatives`, for an optimal plan: other optimal plans.
     #[serde(skip_serializing_if = "Option::is_none")]
     alternatives: Option<AlternativesPart>,
-    /// With `--concurrent`: when the last action ends; the metric counts it, and no step's `cost` does.
+    /// With `--concurrent`: end of the last action. The metric includes it; the `cost` of a step does not.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<f64>")]
     makespan: Option<Value>,
-    /// Where no plan exists, and every design together would give one: a minimal list of designs without which there is none, whatever
-    /// others are available.
+    /// If no plan exists, but one would exist with all designs: a minimal set of unavailable designs
+    /// without which no plan exists, even if all other designs are available.
     #[serde(skip_serializing_if = "Option::is_none")]
     blocking: Option<Vec<String>>,
-    /// Where no plan exists: numeric functions that have no value, though actions need them, if there are any.
+    /// If no plan exists: numeric functions without a value that actions need, if there are any.
     #[serde(skip_serializing_if = "Option::is_none")]
     missing_values: Option<Vec<MissingValuePart>>,
 }
 
-/// A number that is missing.
+/// A missing number.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct MissingValuePart {
-    /// The numeric function with its arguments; of a design, the attribute and the design.
+    /// The numeric function with its arguments; for a design, the attribute and the design.
     function: String,
-    /// The actions that need it.
+    /// Actions that need the value.
     needed_by: Vec<String>,
-    /// The design that has no estimation, where it is that.
+    /// Design without an estimation, if this is the cause.
     #[serde(skip_serializing_if = "Option::is_none")]
     design: Option<String>,
-    /// The file that should have it.
+    /// File that should contain the value.
     file: String,
 }
 
-/// The front of several objectives.
+/// Pareto front of two objectives.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ParetoAnswer {
     /// Name and version of this format.
@@ -86,20 +86,20 @@ pub struct ParetoAnswer {
     format: &'static str,
     /// The mission's name.
     mission: String,
-    /// `optimal` where it is proved that there are no other points, `unsolvable` where there is no plan at all; else as for one plan.
+    /// `optimal` if it is proved that the front is complete, `unsolvable` if no plan exists, otherwise as for one plan.
     status: &'static str,
-    /// What is minimized, as it was asked for.
+    /// The minimised objectives, as they were given.
     objectives: Vec<String>,
-    /// The plans that none is better than in all objectives, from the best in the first objective on.
+    /// The Pareto-optimal plans, sorted from the best in the first objective.
     points: Vec<PlanAnswer>,
 }
 
-/// An objective, and the value that a plan has by it.
+/// An objective with its value for a plan.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Objective {
-    /// The objective, as it was asked for.
+    /// The objective, as it was given.
     minimize: String,
-    /// Its value for this plan.
+    /// Value of the objective for this plan.
     #[schemars(with = "f64")]
     value: Value,
 }
@@ -109,82 +109,82 @@ pub struct Objective {
 enum ProofPart {
     /// No formula up to the step bound has a better plan.
     Sat {
-        /// Steps up to which the formula was solved: no plan that is longer can be better.
+        /// Number of steps up to which the formula was solved; longer plans cannot be better.
         step_bound: usize,
-        /// The program by whose word alone the formula has no model.
+        /// External solver whose result "unsatisfiable" was not checked.
         #[serde(skip_serializing_if = "Option::is_none")]
         unchecked: Option<String>,
     },
-    /// A lower bound is reached.
+    /// The cost equals a lower bound.
     Bound,
-    /// Every state from which a better plan could go on was searched.
+    /// Search expanded every state from which a better plan could exist.
     Search,
-    /// Not even a relaxation of the task has a plan.
+    /// A relaxation of the task has no plan.
     Relaxation {
-        /// Why the relaxation has no plan.
+        /// Reason why the relaxation has no plan.
         reason: String,
     },
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct StepPart {
-    /// The name of the action.
+    /// Name of the action.
     action: String,
-    /// All its arguments, in the order of the action's parameters.
+    /// All arguments, in the order of the action's parameters.
     arguments: Vec<String>,
-    /// Function to design.
+    /// The design of each function.
     #[schemars(with = "std::collections::BTreeMap<String, String>")]
     configuration: Map<String, Value>,
-    /// When it starts, in the domain's time unit.
+    /// Start time, in the domain's time unit.
     #[schemars(with = "f64")]
     start: Value,
-    /// How long it takes; 0 for actions without duration.
+    /// Duration, in the domain's time unit; 0 for actions without duration.
     #[schemars(with = "f64")]
     duration: Value,
-    /// What it adds to the metric.
+    /// Contribution to the metric.
     #[schemars(with = "f64")]
     cost: Value,
-    /// Functions whose design differs from the one that the last step with this function used.
+    /// Functions whose design differs from that in the last step with the same function.
     reconfigured: Vec<String>,
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct StatisticsPart {
-    /// Ground operators.
+    /// Number of ground operators.
     operators: usize,
-    /// Variables of the largest formula.
+    /// Number of variables of the largest formula.
     variables: usize,
-    /// Clauses of the largest formula.
+    /// Number of clauses of the largest formula.
     clauses: usize,
-    /// Clauses by family.
+    /// Number of clauses in each family.
     #[schemars(with = "std::collections::BTreeMap<String, usize>")]
     families: Map<String, Value>,
-    /// Conflicts of the solvers, over all formulas.
+    /// Number of solver conflicts over all formulas.
     conflicts: u64,
-    /// Calls of solvers, over all formulas.
+    /// Number of solver calls over all formulas.
     solver_calls: usize,
-    /// What found the plan: `search`, `satisficing` or `sat`.
+    /// Component that found the plan: `search`, `satisficing` or `sat`.
     found_by: Option<&'static str>,
-    /// States whose successors were looked at, over all searches.
+    /// Number of expanded states over all searches.
     expanded: u64,
-    /// These successors.
+    /// Number of generated states over all searches.
     generated: u64,
-    /// Those of them that were estimated.
+    /// Number of states evaluated by a heuristic over all searches.
     evaluated: u64,
-    /// How often the search for a plan soon has begun anew, for a better one.
+    /// Number of restarts of the satisficing search for a better plan.
     restarts: usize,
-    /// Better plans, and bounds that have risen by a hundredth, in their order.
+    /// Improved plans, and lower bounds that rose by more than one percent, in order.
     history: Vec<MomentPart>,
-    /// What took how long.
+    /// Running times of the stages.
     milliseconds: MillisecondsPart,
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct MomentPart {
-    /// The metric of the best plan then; null without a plan.
+    /// Metric of the best plan at this point; null without a plan.
     #[schemars(with = "Option<f64>")]
     cost: Option<Value>,
-    /// The bound then.
+    /// Lower bound at this point.
     #[schemars(with = "f64")]
     lower_bound: Value,
 }
@@ -195,31 +195,32 @@ struct MillisecondsPart {
     read: f64,
     /// Grounding.
     ground: f64,
-    /// Bounds and searches.
+    /// Heuristics and searches.
     search: f64,
-    /// Making formulas.
+    /// Encoding of formulas.
     encode: f64,
-    /// Solving them.
+    /// SAT solving.
     solve: f64,
-    /// The times of the history.
+    /// Times of the entries of `history`.
     history: Vec<f64>,
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct AlternativesPart {
-    /// The steps of each.
+    /// Steps of each plan.
     plans: Vec<Vec<StepPart>>,
-    /// Whether it is proved that there are no others, idle actions apart: those that cost nothing and on whose effects nothing depends.
+    /// Whether it is proved that there are no other optimal plans, up to idle actions. An idle action
+    /// costs nothing, and nothing depends on its effects.
     complete: bool,
-    /// For each step, what every such plan has in common, idle actions apart; null where that is not known.
+    /// For each step, the choices that all optimal plans share, up to idle actions; null if unknown.
     forced: Option<Vec<ForcedPart>>,
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct ForcedPart {
-    /// Whether the action of the step is the same in every such plan.
+    /// Whether all optimal plans have the same action in this step.
     action: bool,
-    /// Functions whose design in this step is the same in every such plan.
+    /// Functions with the same design in this step in all optimal plans.
     functions: Vec<String>,
 }
 

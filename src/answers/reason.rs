@@ -18,59 +18,60 @@ const REASONS: &str = "metaplan-reasons/1";
 
 const SCHEMA: &str = "metaplan-schema/1";
 
-/// What follows from documents and rules.
+/// Conclusions from documents and rules.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ReasonAnswer<'a> {
     /// Name and version of this format.
     #[schemars(extend("const" = REASON))]
     format: &'static str,
-    /// Whether nothing is contradicted.
+    /// Whether the knowledge base is consistent.
     consistent: bool,
-    /// How many rules there are, of documents and rule files; axioms do not count.
+    /// Number of rules in documents and rule files, without axioms.
     rules: usize,
-    /// As N-Triples, each with its full stop.
+    /// Inferred assertions as N-Triples, each with its final dot.
     inferred: Vec<String>,
     /// The function designs.
     designs: Vec<DesignPart>,
-    /// The objectives with a status.
+    /// Objectives with a status.
     objectives: Vec<ObjectivePart>,
-    /// What is contradicted.
+    /// Contradictions.
     contradictions: &'a [Contradiction],
-    /// What is not read or not used in full, summed up in `O304`, and likely mistakes (`O4xx`).
+    /// Warnings: statements that are not or only partly used, with their summary `O304`, and probable
+    /// mistakes (`O4xx`).
     warnings: &'a [Message],
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct DesignPart {
-    /// Its local name.
+    /// Local name.
     name: String,
-    /// Its IRI.
+    /// IRI.
     iri: String,
-    /// The functions that it solves.
+    /// Functions that the design solves.
     solves: Vec<String>,
-    /// The components that it needs.
+    /// Components that the design requires.
     components: Vec<String>,
-    /// Whether it is available.
+    /// Whether the design is available.
     available: bool,
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct ObjectivePart {
-    /// Its local name.
+    /// Local name.
     objective: String,
-    /// Its status, as `o_status` has it.
+    /// Status, a value of `o_status`.
     status: String,
 }
 
-/// Whether the statements of documents follow.
+/// Entailment of the statements of documents.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct EntailmentAnswer<'a> {
     /// Name and version of this format.
     #[schemars(extend("const" = ENTAILS))]
     format: &'static str,
-    /// Whether all statements follow.
+    /// Whether all statements are entailed.
     entailed: bool,
-    /// Each statement.
+    /// The statements.
     statements: Vec<StatementPart<'a>>,
 }
 
@@ -78,34 +79,34 @@ pub struct EntailmentAnswer<'a> {
 struct StatementPart<'a> {
     /// The statement.
     statement: &'a str,
-    /// Whether it follows.
+    /// Whether the statement is entailed.
     follows: bool,
-    /// Why, or why not.
+    /// Explanation.
     reason: &'a str,
 }
 
-/// Why assertions hold, or do not.
+/// Explanations why assertions hold or do not hold.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ReasonsAnswer {
     /// Name and version of this format.
     #[schemars(extend("const" = REASONS))]
     format: &'static str,
-    /// An answer for each assertion.
+    /// One answer per assertion.
     answers: Vec<AssertionAnswer>,
 }
 
-/// Why one assertion holds, or does not.
+/// Explanation why an assertion holds or does not hold.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct AssertionAnswer {
-    /// As it was asked.
+    /// The assertion, as it was given.
     pub assertion: String,
-    /// Whether that is the answer to what was asked.
+    /// Whether the query applies: the assertion holds (`--why`) or does not hold (`--why-not`).
     pub answered: bool,
-    /// In lines.
+    /// Explanation, in several lines.
     pub reason: String,
 }
 
-/// What follows about classes and properties.
+/// Inferred hierarchies of classes and properties.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct SchemaAnswer<'a> {
     /// Name and version of this format.
@@ -121,13 +122,13 @@ pub struct SchemaAnswer<'a> {
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct EntityPart<'a> {
-    /// Its IRI.
+    /// IRI.
     iri: &'a str,
-    /// What it is directly below.
+    /// Direct superclasses or superproperties.
     direct: &'a [String],
-    /// All that it is below.
+    /// All superclasses or superproperties.
     above: &'a [String],
-    /// Why nothing can be in it; null where something can.
+    /// Reason why the class or property is empty, or null.
     empty: Option<&'a str>,
 }
 

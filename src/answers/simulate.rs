@@ -9,7 +9,7 @@ use crate::simulate::{Ending, Run, Sample, Strategy};
 
 const FORMAT: &str = "metaplan-simulate/1";
 
-/// The figures of all ways of control, and all missions.
+/// Statistics of all strategies, and all simulated runs.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct SimulateAnswer<'a> {
     /// Name and version of this format.
@@ -19,88 +19,89 @@ pub struct SimulateAnswer<'a> {
     mission: &'a str,
     /// The scenario.
     scenario: &'a str,
-    /// The unit of all times: that of the domain's times.
+    /// Unit of all times: the time unit of the domain.
     time_unit: TimeUnit,
-    /// Whether all missions that were asked for were simulated to their end.
+    /// Whether all requested runs were simulated to their end.
     complete: bool,
-    /// How many missions were asked for, over all ways of control.
+    /// Number of requested runs over all strategies.
     missions: usize,
-    /// Why it is not complete (M130).
+    /// Reason why the answer is incomplete (M130).
     messages: Vec<Message>,
-    /// The figures of each way of control, over all its missions.
+    /// Statistics of each strategy over its runs.
     strategies: Vec<StrategyPart>,
-    /// Each mission.
+    /// The simulated runs.
     runs: Vec<RunPart>,
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct StrategyPart {
-    /// The way of control.
+    /// The strategy.
     strategy: &'static str,
-    /// How many missions.
+    /// Number of runs.
     runs: usize,
-    /// How many of them reached the goal.
+    /// Number of runs that reached the goal.
     accomplished: usize,
-    /// The metric of accomplished missions; null where there is none.
+    /// Metric of accomplished runs; null if there are none.
     cost: Option<SamplePart>,
-    /// From an event that the action under way cannot go on after, to what is done about it; null without such an event.
+    /// Reaction time: from an event that prevents the current action from continuing to the reaction;
+    /// null without such an event.
     reaction: Option<SamplePart>,
-    /// How often a function got another design.
+    /// Number of changes of a function's design.
     reconfigurations: Option<SamplePart>,
-    /// How many different configurations actions were requested with.
+    /// Number of different configurations of requested actions.
     configurations: Option<SamplePart>,
-    /// Missions in which it did better than the loop; null where the loop was not run.
+    /// Number of runs in which the strategy did better than the loop; null if the loop was not simulated.
     better_than_joint: Option<usize>,
-    /// Missions in which it did worse.
+    /// Number of runs in which the strategy did worse than the loop.
     worse_than_joint: Option<usize>,
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct SamplePart {
-    /// The mean.
+    /// Mean.
     mean: f64,
-    /// The standard deviation of the sample.
+    /// Standard deviation of the sample.
     deviation: f64,
-    /// Half of the 95 % confidence interval's width, by Student's distribution.
+    /// Half-width of the 95 % confidence interval by Student's distribution.
     half_width_95: f64,
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a field of the format")]
 struct RunPart {
-    /// The way of control.
+    /// The strategy.
     strategy: &'static str,
-    /// What all that is random was drawn from.
+    /// Seed of the random numbers.
     seed: u64,
     /// Whether the goal was reached.
     accomplished: bool,
-    /// Whether the robot came to its end.
+    /// Whether the robot was lost because its `lifeline` reached 0.
     lost: bool,
-    /// Whether the time budget was used up before that.
+    /// Whether the time budget was exhausted first.
     out_of_time: bool,
-    /// Whether the way of control gave up.
+    /// Whether the strategy gave up.
     gave_up: bool,
-    /// The mission's metric at the end.
+    /// Metric at the end of the run.
     cost: f64,
-    /// How long it took.
+    /// Duration of the run.
     time: f64,
-    /// Actions that succeeded.
+    /// Number of actions that succeeded.
     actions: usize,
-    /// Actions that failed.
+    /// Number of actions that failed.
     failed: usize,
-    /// Actions that were cancelled.
+    /// Number of actions that were cancelled.
     cancelled: usize,
-    /// Plans that were looked for.
+    /// Number of planning queries.
     plans: usize,
-    /// How often a function got another design.
+    /// Number of changes of a function's design.
     reconfigurations: usize,
-    /// How many different configurations actions were requested with.
+    /// Number of different configurations of requested actions.
     configurations: usize,
-    /// The mean reaction; null without an event.
+    /// Mean reaction time; null without an event.
     reaction: Option<f64>,
-    /// When the pipeline was found; null where it was not, or the mission has none.
+    /// Time at which the pipeline was found; null if it was not found or the mission has none.
     found: Option<f64>,
-    /// How much of it was inspected; null where the mission does not inspect.
+    /// Inspected length of the pipeline; null if the mission does not inspect.
     distance: Option<f64>,
 }
 

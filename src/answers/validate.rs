@@ -10,42 +10,42 @@ use crate::number::to_json;
 
 const FORMAT: &str = "metaplan-verdict/1";
 
-/// Whether a plan is valid, and what it costs; or what is wrong with it.
+/// Validity of a plan, with its cost or its first violation.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct VerdictAnswer<'a> {
     /// Name and version of this format.
     #[schemars(extend("const" = FORMAT))]
     format: &'static str,
-    /// Whether the plan can be executed, and the goal holds in the end.
+    /// Whether the plan is executable and reaches the goal.
     valid: bool,
-    /// Its value after a valid plan; null without `:metric`, or where it is undefined.
+    /// Value of the metric after a valid plan; null without `:metric`, or if it is undefined.
     #[schemars(with = "Option<f64>")]
     metric: Option<Value>,
-    /// The sum of the durations, in the domain's time unit.
+    /// Sum of the durations, in the domain's time unit.
     #[schemars(with = "f64")]
     total_time: Value,
-    /// By function with arguments.
+    /// Final value of each numeric function with its arguments.
     #[schemars(with = "std::collections::BTreeMap<String, Option<f64>>")]
     values: Map<String, Value>,
-    /// The first thing that is wrong; null for a valid plan.
+    /// First violation; null for a valid plan.
     violation: Option<ViolationPart<'a>>,
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct ViolationPart<'a> {
-    /// The step, from 1; null for the goal.
+    /// Number of the step, from 1; null for the goal.
     step: Option<usize>,
-    /// Its action; null for the goal.
+    /// Action of the step; null for the goal.
     action: Option<&'a str>,
-    /// When, in the domain's time unit.
+    /// Time of the violation, in the domain's time unit.
     #[schemars(with = "f64")]
     time: Value,
     /// `unknown_action`, `unknown_object`, `arguments`, `duration`, `at_start`, `over_all`, `at_end`, `undefined`, `conflict`, `overlap`,
     /// `interference` or `goal`.
     kind: &'static str,
-    /// One sentence.
+    /// Message, one sentence.
     message: &'a str,
-    /// What does not hold.
+    /// Conditions that do not hold.
     unmet: Vec<UnmetPart<'a>>,
 }
 
@@ -53,7 +53,7 @@ struct ViolationPart<'a> {
 struct UnmetPart<'a> {
     /// The condition, as PDDL.
     condition: &'a str,
-    /// By function with arguments; null where it is undefined.
+    /// Value of each numeric function with its arguments; null if it is undefined.
     #[schemars(with = "std::collections::BTreeMap<String, Option<f64>>")]
     values: Map<String, Value>,
 }

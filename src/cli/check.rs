@@ -27,38 +27,38 @@ pub struct Arguments {
     /// A model in the PRISM language.
     #[arg(value_name = "MODEL")]
     model: PathBuf,
-    /// What is asked: `Pmax=? [ F "goal" ]`, `R{"time"}min=? [ F "goal" ]`, `multi(…, …)`.
+    /// A property: `Pmax=? [ F "goal" ]`, `R{"time"}min=? [ F "goal" ]`, `multi(…, …)`.
     #[arg(value_name = "PROPERTY", required_unless_present = "props", conflicts_with = "props")]
     property: Option<String>,
-    /// A file of properties, with its constants and labels; each property gets an answer.
+    /// Check all properties of a file, which may also define constants and labels.
     #[arg(long, value_name = "FILE")]
     props: Option<PathBuf>,
-    /// Only the property of this name, or with this number, from 1 (repeatable).
+    /// Check only the property with this name or number, from 1 (repeatable).
     #[arg(long, value_name = "NAME", requires = "props")]
     prop: Vec<String>,
-    /// The value of a constant (repeatable, or separated by commas); `first:last` and `first:step:last` are series, which make a
-    /// table.
+    /// Value of a constant (repeatable, or separated by commas). A series `first:last` or
+    /// `first:step:last` yields a table.
     #[arg(long = "const", value_name = "NAME=VALUE", value_delimiter = ',', value_parser = setting)]
     constants: Vec<(String, String)>,
-    /// Write the table of a series to a file, too.
+    /// Also write the table of a series to a CSV file.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-    /// Write the best policy to a file.
+    /// Write an optimal policy to a file.
     #[arg(long, value_name = "FILE", conflicts_with = "props")]
     policy: Option<PathBuf>,
-    /// Evaluate the policy of a file in place of the best one.
+    /// Evaluate the policy of a file instead of an optimal one.
     #[arg(long, value_name = "FILE", conflicts_with = "policy")]
     evaluate: Option<PathBuf>,
-    /// The reward that a policy keeps small where the property leaves a choice; the number of steps by default.
+    /// Reward that breaks ties between optimal policies; it is minimised. Default: the number of steps.
     #[arg(long, value_name = "REWARD")]
     secondary: Option<String>,
-    /// Stop beyond so many states.
+    /// Stop if there are more than this many states.
     #[arg(long, value_name = "N", default_value_t = 20_000_000)]
     state_limit: usize,
-    /// Solve in rational numbers, however long that takes.
+    /// Always solve in rational numbers, even if this is slow.
     #[arg(long, conflicts_with = "inexact")]
     exact: bool,
-    /// Solve in doubles with certified bounds, however small the model is.
+    /// Always solve in doubles with certified bounds, even if the model is small.
     #[arg(long)]
     inexact: bool,
     #[command(flatten)]
@@ -70,13 +70,13 @@ pub struct Arguments {
 /// How tight bounds have to be.
 #[derive(Debug, Args)]
 struct Tightness {
-    /// How far apart the bounds on a value may be, as a part of the value unless `--absolute` is given.
+    /// Maximum distance between the bounds on a value, relative to the value unless `--absolute` is given.
     #[arg(long, value_name = "WIDTH", value_parser = width)]
     precision: Option<f64>,
-    /// The precision is a part of the value; this is the default.
+    /// The precision is relative to the value (default).
     #[arg(long, requires = "precision", conflicts_with = "absolute")]
     relative: bool,
-    /// The precision is a difference.
+    /// The precision is an absolute difference.
     #[arg(long, requires = "precision")]
     absolute: bool,
 }

@@ -71,19 +71,19 @@ impl From<Message> for Failure {
 /// Options that all commands have.
 #[derive(Debug, Clone, Args)]
 pub(super) struct Common {
-    /// How the answer is written.
+    /// Output format of the answer.
     #[arg(long, global = true, value_enum, default_value_t = Format::Text)]
     pub(super) format: Format,
-    /// No warnings and no progress on standard error.
+    /// Suppress warnings and progress on standard error.
     #[arg(long, short, global = true)]
     pub(super) quiet: bool,
-    /// Statistics besides the answer.
+    /// Print statistics in addition to the answer.
     #[arg(long, short, global = true)]
     pub(super) verbose: bool,
-    /// Also write what the time is spent on, for `chrome://tracing` or Perfetto.
+    /// Write a trace of the running time for `chrome://tracing` or Perfetto.
     #[arg(long, global = true, value_name = "FILE")]
     pub(super) trace: Option<PathBuf>,
-    /// When messages have colours: on a terminal unless `NO_COLOR` is set, always, or never.
+    /// Use colours in messages: on a terminal unless `NO_COLOR` is set, always, or never.
     #[arg(long, global = true, value_enum, default_value_t = ColorChoice::Auto, value_name = "WHEN")]
     pub(super) color: ColorChoice,
 }
@@ -104,13 +104,13 @@ impl Common {
 /// How answers are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum Format {
-    /// For people.
+    /// Text for people.
     Text,
-    /// For programs; versioned, see the book.
+    /// JSON for programs, in versioned formats; see the book.
     Json,
-    /// `reason` only: the inferred assertions, sorted.
+    /// `reason` only: inferred assertions, sorted.
     Ntriples,
-    /// `reason` only: the inferred assertions by subject.
+    /// `reason` only: inferred assertions, grouped by subject.
     Turtle,
 }
 

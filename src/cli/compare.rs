@@ -29,39 +29,39 @@ pub struct Arguments {
     inputs: Vec<PathBuf>,
     #[command(flatten)]
     situation: Situation,
-    /// The component that may be lost on the way, and with which probability at each move.
+    /// Component that can be lost on the way, with the probability of its loss at each move.
     #[arg(long, value_name = "COMPONENT=RATE", value_parser = loss)]
     loss: Option<(String, f64)>,
-    /// The time that a mission costs which does not get to its goal; ten times our plan's by default.
+    /// Penalty time of a mission that does not reach its goal. Default: ten times the time of the plan.
     #[arg(long, value_name = "TIME", value_parser = penalty)]
     penalty: Option<f64>,
-    /// What the published procedure puts first.
+    /// First priority of the published procedure.
     #[arg(long, value_enum, default_value_t = Priority::Time)]
     priority: Priority,
-    /// How much battery one level of the process stands for; the manifest's, or 1.
+    /// Battery units per level of the process. Default: the value in the manifest, or 1.
     #[arg(long, value_name = "UNITS", value_parser = clap::value_parser!(u32).range(1..))]
     battery_unit: Option<u32>,
-    /// Leave the battery out of the process (not of our plan).
+    /// Omit the battery from the process, but not from the plan.
     #[arg(long)]
     no_battery: bool,
-    /// Stop beyond so many states.
+    /// Stop if there are more than this many states.
     #[arg(long, value_name = "N", default_value_t = 20_000_000)]
     state_limit: usize,
-    /// After this many seconds, show what has been compared and stop.
+    /// Stop after this many seconds with the comparisons so far.
     #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     time_limit: Option<Duration>,
-    /// Compare for pairs of start and goal in place of the mission's: so many, spread evenly over all pairs.
+    /// Compare for this many pairs of start and goal instead of the mission's pair, spread evenly over all pairs.
     #[arg(long, value_name = "N")]
     pairs: Option<usize>,
-    /// Compare for one pair of start and goal in place of the mission's.
+    /// Compare for another pair of start and goal than the mission's.
     #[arg(long, value_name = "START,GOAL", value_parser = pair, conflicts_with = "pairs")]
     pair: Option<Pair>,
-    /// Write the table as CSV, too.
+    /// Also write the table as CSV.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
     #[command(flatten)]
     pages: Pages,
-    /// Rows to add to the table, as JSON: a list of objects with `name` and any of the table's measures.
+    /// Add rows to the table from a JSON file: a list of objects with `name` and any measures of the table.
     #[arg(long, value_name = "FILE")]
     published: Option<PathBuf>,
 }

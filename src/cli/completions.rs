@@ -20,7 +20,7 @@ pub struct Arguments {
 /// Arguments of `man`.
 #[derive(Debug, Args)]
 pub struct ManArguments {
-    /// Where the pages are written, one for each command.
+    /// Directory for the pages.
     #[arg(long, short, value_name = "DIR")]
     output: PathBuf,
 }

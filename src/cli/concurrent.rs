@@ -8,11 +8,11 @@ use crate::cli::values::time;
 /// Whether and how actions overlap.
 #[derive(Debug, Args)]
 pub(super) struct Overlap {
-    /// Actions may overlap, by the rules of PDDL 2.1: `total-time` is the makespan, which is minimised where the problem has no
-    /// metric.
+    /// Allow actions to overlap as in PDDL 2.1. `total-time` is the makespan, which is minimised if the
+    /// problem has no metric.
     #[arg(long)]
     concurrent: bool,
-    /// With `--concurrent`: how far apart actions that interfere begin and end, in the domain's time unit.
+    /// With `--concurrent`: minimum time between interfering starts and ends of actions, in the domain's time unit.
     #[arg(long, value_name = "TIME", default_value = "0.001", value_parser = positive, requires = "concurrent")]
     epsilon: BigRational,
 }

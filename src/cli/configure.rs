@@ -23,15 +23,15 @@ pub struct Arguments {
     /// Knowledge bases (OWL in RDF/XML, Turtle, N-Triples, OWL/XML or functional syntax).
     #[arg(required = true, value_name = "KB")]
     documents: Vec<PathBuf>,
-    /// Further rules: a file, `coadaptation` or `tomasys` (repeatable).
+    /// Additional rules: a file, `coadaptation` or `tomasys` (repeatable).
     #[arg(long = "rules", value_name = "FILE")]
     rules: Vec<String>,
     #[command(flatten)]
     imports: Imports,
-    /// A measured attribute and its value (repeatable).
+    /// Set a measured attribute to a value (repeatable).
     #[arg(long = "set", value_name = "ATTRIBUTE=VALUE", value_parser = setting)]
     set: Vec<(String, String)>,
-    /// A component that has failed (repeatable).
+    /// Mark a component as failed (repeatable).
     #[arg(long, value_name = "COMPONENT")]
     fail: Vec<String>,
     #[command(flatten)]
@@ -43,22 +43,23 @@ pub struct Arguments {
 /// What is to be served, and what that is worth.
 #[derive(Debug, Clone, Default, Args)]
 pub(super) struct Wanted {
-    /// A function that is needed (repeatable; default: the objectives of the knowledge base, or else all its functions).
+    /// A required function (repeatable). Default: the objectives of the knowledge base, or all its
+    /// functions if it has none.
     #[arg(long = "objective", value_name = "FUNCTION")]
     objectives: Vec<String>,
-    /// A bound that the design for a function has to keep, as an objective's requirement (repeatable).
+    /// Bound on an attribute of the design for a function, as in a requirement of an objective (repeatable).
     #[arg(long = "require", value_name = "FUNCTION.ATTRIBUTE=BOUND", value_parser = requirement)]
     requirements: Vec<(String, String, BigRational)>,
-    /// What the estimations of all chosen designs may come to in sum (repeatable).
+    /// Upper limit on the sum of an attribute's estimations over all chosen designs (repeatable).
     #[arg(long = "budget", value_name = "ATTRIBUTE=MOST", value_parser = amount)]
     budgets: Vec<(String, BigRational)>,
-    /// A component that only one design can use at a time (repeatable).
+    /// Component that only one design can use at a time (repeatable).
     #[arg(long = "exclusive", value_name = "COMPONENT")]
     exclusive: Vec<String>,
-    /// The attribute of which designs are to have much, in place of MROS's utility.
+    /// Prefer designs with high values of this attribute, instead of MROS's utility.
     #[arg(long, value_name = "ATTRIBUTE", conflicts_with = "least")]
     most: Option<String>,
-    /// The attribute of which designs are to have little, in place of MROS's utility.
+    /// Prefer designs with low values of this attribute, instead of MROS's utility.
     #[arg(long, value_name = "ATTRIBUTE")]
     least: Option<String>,
 }

@@ -14,17 +14,17 @@ use crate::cli::situation::Imports;
 /// Arguments of `convert`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Knowledge bases in any syntax, told by their content; they are written as one, with all that they import.
+    /// Knowledge bases in any syntax, which is recognised by content. They are merged with their imports.
     #[arg(required = true, value_name = "KB")]
     documents: Vec<PathBuf>,
-    /// What to write.
+    /// Output format.
     #[arg(long = "to", value_enum, value_name = "SYNTAX")]
     syntax: Syntax,
     #[command(flatten)]
     imports: Imports,
     #[command(flatten)]
     time: TimeLimit,
-    /// The file to write; standard output by default.
+    /// Output file. Default: standard output.
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
 }
@@ -32,15 +32,15 @@ pub struct Arguments {
 /// A syntax of knowledge bases.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Syntax {
-    /// RDF/XML, every triple.
+    /// RDF/XML, with every triple.
     Rdfxml,
-    /// Turtle, every triple.
+    /// Turtle, with every triple.
     Turtle,
-    /// N-Triples, every triple, sorted.
+    /// N-Triples, with every triple, sorted.
     Ntriples,
-    /// OWL/XML, what was understood.
+    /// OWL/XML, with all axioms that were recognised.
     Owlxml,
-    /// OWL 2 functional-style syntax, what was understood.
+    /// OWL 2 functional-style syntax, with all axioms that were recognised.
     Functional,
 }
 

@@ -20,32 +20,32 @@ const COLUMNS: u16 = 100;
 /// Where a plan is drawn.
 #[derive(Debug, Args)]
 pub(super) struct Drawing {
-    /// Write the plan as a timeline into an SVG file, too; with `--pareto` the front.
+    /// Also write the plan as a timeline to an SVG file; with `--pareto`, the front.
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
-    /// Whether text shows the plan as a timeline above the table of its steps.
+    /// Show the plan as a timeline above the table of its steps.
     #[arg(long, value_enum, default_value_t)]
     picture: When,
 }
 
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
 enum When {
-    /// Where the answer goes to a terminal that is wide enough.
+    /// If the answer goes to a terminal that is wide enough.
     #[default]
     Auto,
-    /// Wherever there is room for it; in 100 columns if the answer goes to no terminal.
+    /// If there is room for it; in 100 columns if the answer does not go to a terminal.
     Always,
-    /// No.
+    /// Never.
     Never,
 }
 
 /// Where the pictures of an answer go.
 #[derive(Debug, Clone, Default, Args)]
 pub(super) struct Pages {
-    /// Write the answer as a page to look at, too.
+    /// Also write the answer as an HTML page.
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
-    /// Write each picture of that page as an SVG file into a directory, which is made if it is not there.
+    /// Write each picture of the page as an SVG file to a directory; created if it does not exist.
     #[arg(long, value_name = "DIR")]
     svg: Option<PathBuf>,
 }

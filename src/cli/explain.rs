@@ -24,10 +24,10 @@ use crate::cli::situation::Situation;
 /// Arguments of `explain`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// A mission's manifest; or the code of a message, such as M118: what it means, what causes it, what to do.
+    /// A mission's manifest, or a message code such as M118, which is explained with cause and remedy.
     #[arg(value_name = "MISSION | CODE")]
     mission: PathBuf,
-    /// A function design; without one, what would change the plan.
+    /// A function design. Without it, explain which changes lead to another plan.
     #[arg(value_name = "DESIGN")]
     query: Option<String>,
     #[command(flatten)]

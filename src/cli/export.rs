@@ -23,18 +23,18 @@ pub struct Arguments {
     /// A mission's manifest, or a PDDL domain and a PDDL problem.
     #[arg(required = true, num_args = 1..=2, value_name = "MISSION | DOMAIN PROBLEM")]
     inputs: Vec<PathBuf>,
-    /// What to write.
+    /// Output format.
     #[arg(long = "to", value_enum, value_name = "FORMAT")]
     target: Language,
-    /// Which reading of the probabilistic approach becomes a model.
+    /// Variant of the probabilistic approach to export.
     #[arg(long, value_enum, default_value_t = Setting::Corrected)]
     setting: Setting,
     #[command(flatten)]
     situation: Situation,
     #[command(flatten)]
     time: TimeLimit,
-    /// A directory for `domain.pddl` and `problem.pddl`, made if it is not there; for models, a file. Standard output by
-    /// default.
+    /// Directory for `domain.pddl` and `problem.pddl`, created if it does not exist, or output file for
+    /// a model. Default: standard output.
     #[arg(long, short, value_name = "DIR")]
     output: Option<PathBuf>,
 }
@@ -42,8 +42,7 @@ pub struct Arguments {
 /// What a mission can be written as.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Language {
-    /// The domain and the problem as they are planned, availability and values filled in, in a form that other
-    /// planners accept.
+    /// Domain and problem for other planners, with availability and values from the knowledge base.
     Pddl,
     /// The co-adaptation process in the PRISM language, for PRISM and Storm.
     Prism,
@@ -54,10 +53,10 @@ enum Language {
 /// What a model says about a mission.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Setting {
-    /// Every route, reconfiguration anywhere, collisions that are remembered, a battery that limits moves.
+    /// All routes, reconfiguration in every place, collisions are part of the state, and the battery limits moves.
     Corrected,
-    /// The five shortest routes, one reconfiguration before the first move, the last risky move decides whether it
-    /// collided, and no battery is ever empty.
+    /// The five shortest routes, one reconfiguration before the first move, collision decided by the
+    /// last risky move, and no limit by the battery.
     Published,
 }
 

@@ -20,57 +20,59 @@ pub struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Form {
-    /// The map of Cámara et al. (`map-p2cp3.json` and maps of its form, also of 2017) as a mission with probabilities.
+    /// Import a map of Cámara et al. (`map-p2cp3.json` and maps in this format, also of 2017) as a
+    /// mission with probabilities.
     CamaraMap(CamaraMap),
 }
 
 #[derive(Debug, Args)]
 struct CamaraMap {
-    /// The map.
+    /// The map file.
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// Where the mission starts, as the map names it.
+    /// Name of the initial place in the map.
     #[arg(long, default_value = "l1")]
     start: String,
-    /// Where it ends.
+    /// Name of the goal place in the map.
     #[arg(long, default_value = "l18")]
     goal: String,
-    /// The configuration at the start.
+    /// Initial configuration.
     #[arg(long, default_value = "amcl-lidar")]
     configuration: String,
-    /// Neighbouring places with no light between them, which the map does not say (repeatable, or separated by commas).
+    /// Neighbouring places with a dark way between them; the map does not contain this (repeatable, or
+    /// separated by commas).
     #[arg(long, value_name = "A-B", value_delimiter = ',', value_parser = two)]
     dark: Vec<(String, String)>,
-    /// The battery at the start, in the unit of the arcs' energy.
+    /// Initial battery, in the energy unit of the arcs.
     #[arg(long, value_name = "UNITS", default_value_t = 32_560, conflicts_with = "no_battery")]
     battery: u32,
-    /// A mission in which the battery does not matter.
+    /// Create a mission without a battery.
     #[arg(long)]
     no_battery: bool,
-    /// At which speeds each way of localisation is a configuration.
+    /// Speeds at which each localisation method is a configuration.
     #[arg(long, value_enum, default_value_t = Speeds::All)]
     speeds: Speeds,
-    /// Seconds that enabling or disabling one component takes.
+    /// Time to enable or disable one component, in seconds.
     #[arg(long, value_name = "SECONDS", default_value_t = 5)]
     switch: u32,
-    /// Which probabilities are imported.
+    /// Probabilities to import.
     #[arg(long, value_enum, default_value_t = Uncertainty::All)]
     risk: Uncertainty,
     /// The mission's name.
     #[arg(long, default_value = "camara")]
     name: String,
-    /// A directory for the mission's files, made if it is not there.
+    /// Directory for the mission's files; created if it does not exist.
     #[arg(long, short, value_name = "DIR")]
     output: PathBuf,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Uncertainty {
-    /// None of them.
+    /// No probabilities.
     None,
-    /// Those of collisions.
+    /// Probabilities of collisions.
     Collisions,
-    /// Those of collisions, and of moves that do not get to their end.
+    /// Probabilities of collisions and of incomplete moves.
     All,
 }
 
@@ -78,8 +80,8 @@ enum Uncertainty {
 enum Speeds {
     /// Full speed only, for which the map has measurements: 6 configurations.
     Full,
-    /// Full, half and safe speed, as in the original: 18 configurations. Slower ones take longer, in proportion; at safe speed
-    /// nothing is hit.
+    /// Full, half and safe speed, as in the original: 18 configurations. Times are inversely
+    /// proportional to the speed; there are no collisions at safe speed.
     All,
 }
 

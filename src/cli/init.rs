@@ -15,10 +15,10 @@ use crate::cli::output;
 /// Arguments of `init`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// The new directory; its last part is the mission's name.
+    /// The new directory. Its last component is the mission's name.
     #[arg(value_name = "NAME")]
     directory: PathBuf,
-    /// The mission to start from.
+    /// Template of the mission.
     #[arg(long, value_enum, default_value_t, value_name = "TEMPLATE")]
     from: Start,
 }

@@ -26,16 +26,16 @@ pub struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Operation {
-    /// Whether the journal can be used, and what is wrong with it.
+    /// Check whether the journal can be used, and report all defects.
     Check {
         /// The journal's directory.
         #[arg(value_name = "DIR")]
         directory: PathBuf,
-        /// The mission's manifest: the journal is resumed, without a change on disk.
+        /// The mission's manifest. The journal is resumed without changes on disk.
         #[arg(long, value_name = "MISSION")]
         mission: Option<PathBuf>,
     },
-    /// All sound records: events, and what was decided.
+    /// Show all intact records: events and decisions.
     Show {
         /// The journal's directory.
         #[arg(value_name = "DIR")]

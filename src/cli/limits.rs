@@ -32,8 +32,8 @@ const GRACE: Duration = Duration::from_millis(150);
 /// The option `--time-limit` of commands that have nothing to show before their end, and of those that show what they have.
 #[derive(Debug, Clone, Args)]
 pub(super) struct TimeLimit {
-    /// Stop after this many seconds: with what is known by then, or, if there is nothing to show before the end, without an answer
-    /// (status 12).
+    /// Stop after this many seconds with the results so far, or without an answer if there are no
+    /// partial results (status 12).
     #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     time_limit: Option<Duration>,
 }

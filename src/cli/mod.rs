@@ -73,23 +73,23 @@ enum Subcommands {
     /// Check a mission for errors and warnings without planning: knowledge base, rules, PDDL and manifest.
     #[command(after_long_help = examples::LINT)]
     Lint(lint::Arguments),
-    /// Query what follows from knowledge bases and rules: assertions, availability, objectives in error.
+    /// Query the conclusions of knowledge bases and rules: assertions, availability, objectives in error.
     #[command(after_long_help = examples::REASON)]
     Reason(reason::Arguments),
     /// Convert a knowledge base with its imports to one document in another syntax.
     #[command(after_long_help = examples::CONVERT)]
     Convert(convert::Arguments),
-    /// Model-check a PRISM-language model: a value with bounds, and its policy.
+    /// Check a property of a PRISM model: its value with bounds, and an optimal policy.
     Check(check::Arguments),
     /// Compare Metaplan with probabilistic model checking on a co-adaptation mission.
     #[command(after_long_help = examples::COMPARE)]
     Compare(compare::Arguments),
-    /// Choose a design for each function in need as MROS does, without a task plan.
+    /// Choose a design for each function that needs one, without a task plan, as MROS does.
     #[command(after_long_help = examples::CONFIGURE)]
     Configure(configure::Arguments),
     /// Import a mission from the files of another tool.
     Import(import::Arguments),
-    /// Explain why a design is available or chosen, what would change the answer, or what a code means.
+    /// Explain why a design is available or chosen, which changes lead to another plan, or a message code.
     #[command(after_long_help = examples::EXPLAIN)]
     Explain(explain::Arguments),
     /// Export a mission for other planners, with the facts from the knowledge base.
@@ -107,7 +107,7 @@ enum Subcommands {
     /// Simulate a robot under the loop and under other controllers.
     #[command(after_long_help = examples::SIMULATE)]
     Simulate(simulate::Arguments),
-    /// Run one command with each combination of parameters, in shards, and write a table of the results.
+    /// Run a command with each combination of parameters, in shards, and write a table of the results.
     #[command(after_long_help = examples::SWEEP)]
     Sweep(sweep::Arguments),
     /// Validate a plan independently of the planner: executable, reaches the goal, cost.

@@ -34,91 +34,91 @@ pub struct Arguments {
     inputs: Vec<PathBuf>,
     #[command(flatten)]
     situation: Situation,
-    /// Only plans with at most this many steps.
+    /// Consider only plans with at most this many steps.
     #[arg(long, value_name = "N", allow_negative_numbers = true, conflicts_with = "concurrent")]
     horizon: Option<usize>,
     /// Stop after this many seconds with the best plan so far.
     #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     time_limit: Option<Duration>,
-    /// Stop when the program takes more than this much memory, in megabytes, with the best plan so far.
+    /// Stop with the best plan so far if the program uses more than this many megabytes of memory.
     #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u64).range(1..), allow_negative_numbers = true)]
     memory_limit: Option<u64>,
-    /// What finds plans, and proves that there is none better: search and then the SAT solver, or one of them alone.
+    /// Method to find plans and prove optimality: search followed by the SAT solver, or one of them alone.
     #[arg(long, value_enum, default_value_t, conflicts_with = "concurrent")]
     engine: EngineName,
-    /// Have the SAT solver confirm what is proved without it, however long that takes.
+    /// Confirm results of search with the SAT solver, even if this is slow.
     #[arg(long, conflicts_with = "concurrent")]
     confirm: bool,
-    /// The SAT solver: `varisat`, `batsat`, or a program with its arguments that reads DIMACS on its standard input.
+    /// SAT solver: `varisat`, `batsat`, or a program with arguments that reads DIMACS from standard input.
     #[arg(long, value_name = "NAME", default_value = Backend::BUILT_IN[0], conflicts_with = "concurrent")]
     solver: Backend,
-    /// How the SAT solver finds a cheapest plan: cheaper and cheaper plans until there is none, or a lower bound that rises until a
-    /// plan costs as much. The cost of the answer is the same.
+    /// Method to find an optimal plan with the SAT solver: search for cheaper plans until none exists,
+    /// or raise the lower bound until a plan has this cost. It does not change the cost of the answer.
     #[arg(long, value_enum, default_value_t, conflicts_with = "concurrent")]
     strategy: StrategyName,
-    /// How many actions stand at one step of the SAT solver's formulas; if not given, several while a first plan is looked
-    /// for, and one from then on. The answer is the same.
+    /// Number of actions per step of the SAT formulas. Default: several until there is a first plan,
+    /// then one. It does not change the cost of the answer.
     #[arg(long, value_enum, conflicts_with = "concurrent")]
     encoding: Option<Encoding>,
-    /// What to minimize in place of the problem's metric: an expression as in a metric, or a function's name. Repeated,
-    /// earlier objectives come first, and later ones decide among plans that are equal by them.
+    /// Minimise an expression or a function instead of the problem's metric. If the option is repeated,
+    /// later objectives break ties of earlier ones.
     #[arg(long, value_name = "EXPRESSION", allow_hyphen_values = true)]
     minimize: Vec<String>,
-    /// All plans that are best by one of two objectives without being worse by the other.
+    /// Return the Pareto front of two objectives.
     #[arg(long, value_name = "EXPRESSION,EXPRESSION", conflicts_with_all = ["minimize", "plan_format", "concurrent"])]
     pareto: Option<String>,
-    /// Write all that is needed to check that the answer is optimal, or that there is no plan, into a new directory;
-    /// `metaplan verify` checks it.
+    /// Write a certificate of optimality, or of the absence of plans, to a new directory. `metaplan verify` checks it.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["pareto", "concurrent"])]
     certificate: Option<PathBuf>,
-    /// Up to so many further plans that are as good as the best one, and which choices all such plans share.
+    /// Return up to this many additional optimal plans, and the choices that all optimal plans share.
     #[arg(long, value_name = "N", conflicts_with_all = ["minimize", "pareto", "plan_format", "concurrent"])]
     alternatives: Option<usize>,
     #[command(flatten)]
     overlap: Overlap,
-    /// How the plan is written: by default `table` on standard output, and `ipc` in a file.
+    /// Format of the plan. Default: `table` on standard output, `ipc` in a file.
     #[arg(long, value_enum)]
     plan_format: Option<PlanFormat>,
     #[command(flatten)]
     drawing: Drawing,
-    /// Write the front as a page to look at, too, whose points unfold to plans.
+    /// Also write the front as an HTML page. Its points can be expanded to plans.
     #[arg(long, value_name = "FILE", requires = "pareto")]
     report: Option<PathBuf>,
-    /// Write the plan to a file: steps that `metaplan validate` and other tools read. With `--format json`, `--pareto` or
-    /// `--alternatives` the file has the whole answer. `-` is standard output.
+    /// Write the plan to a file that `metaplan validate` and other tools can read. With `--format
+    /// json`, `--pareto` or `--alternatives` the file contains the whole answer. `-` is standard
+    /// output.
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Encoding {
-    /// One.
+    /// One action.
     Sequential,
-    /// Several that can be executed in any order.
+    /// Several actions that can be executed in any order.
     ForAllStep,
-    /// Several that can be executed in at least one order.
+    /// Several actions that can be executed in at least one order.
     ExistsStep,
 }
 
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
 enum StrategyName {
-    /// The one that is faster in general.
+    /// The strategy that is faster in general.
     #[default]
     Auto,
-    /// Cheaper and cheaper plans.
+    /// Search for cheaper plans.
     Tighten,
-    /// A rising lower bound.
+    /// Raise the lower bound.
     Cores,
 }
 
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
 enum EngineName {
-    /// Search, then the SAT solver.
+    /// Search, followed by the SAT solver.
     #[default]
     Auto,
-    /// The SAT solver.
+    /// SAT solver only.
     Sat,
-    /// Search.
+    /// Search only.
     Search,
 }
 

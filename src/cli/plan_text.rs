@@ -8,15 +8,15 @@ use crate::cli::output;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum PlanFormat {
-    /// Lines `(action arguments)`, or `start: (action arguments) [duration]`.
+    /// Lines `(action arguments)` or `start: (action arguments) [duration]`.
     Ipc,
-    /// What the POPF plugin of `PlanSys2` parses.
+    /// Format that the POPF plugin of `PlanSys2` parses.
     Plansys2,
-    /// XML of BehaviorTree.CPP 4: a sequence of actions, with changes of modes between them.
+    /// XML of BehaviorTree.CPP 4: a sequence of actions with mode changes between them.
     Btcpp,
-    /// As `--format json`.
+    /// JSON, as with `--format json`.
     Json,
-    /// A table for people, with the cost and what is proved; `validate` does not read it.
+    /// A table for people, with cost and proof; `validate` cannot read it.
     Table,
 }
 

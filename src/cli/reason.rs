@@ -24,27 +24,27 @@ pub struct Arguments {
     /// Knowledge bases (OWL in RDF/XML, Turtle, N-Triples, OWL/XML or functional syntax); `-` is standard input.
     #[arg(required = true, value_name = "KB")]
     documents: Vec<PathBuf>,
-    /// Further rules: a file, `coadaptation` or `tomasys` (repeatable).
+    /// Additional rules: a file, `coadaptation` or `tomasys` (repeatable).
     #[arg(long = "rules", value_name = "FILE")]
     rules: Vec<String>,
     #[command(flatten)]
     imports: Imports,
-    /// Statements to add: assertions, axioms and rules (a document; repeatable).
+    /// Add the statements of a document: assertions, axioms and rules (repeatable).
     #[arg(long, value_name = "FILE")]
     assert: Vec<PathBuf>,
-    /// Statements to take away: assertions, axioms and rules (a document; repeatable).
+    /// Remove the statements of a document: assertions, axioms and rules (repeatable).
     #[arg(long, value_name = "FILE")]
     retract: Vec<PathBuf>,
-    /// A measured attribute and its value (repeatable).
+    /// Set a measured attribute to a value (repeatable).
     #[arg(long = "set", value_name = "ATTRIBUTE=VALUE", value_parser = setting)]
     set: Vec<(String, String)>,
-    /// A component that has failed (repeatable).
+    /// Mark a component as failed (repeatable).
     #[arg(long, value_name = "COMPONENT")]
     fail: Vec<String>,
-    /// Two names never stand for one individual, as in databases and in PDDL; in OWL they may.
+    /// Assume that different names denote different individuals, as in PDDL but not in OWL.
     #[arg(long)]
     unique_names: bool,
-    /// How many steps conclusions may take; a rule that never ends is named when they are used up.
+    /// Maximum number of inference steps. If it is exceeded, the error names a rule that does not terminate.
     #[arg(long, value_name = "N", default_value_t = DEFAULT_STEP_BUDGET)]
     step_limit: u64,
     #[command(flatten)]

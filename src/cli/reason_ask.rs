@@ -21,16 +21,17 @@ use crate::cli::situation::Imports;
 /// Questions; at most one kind at a time.
 #[derive(Debug, Args)]
 pub struct Questions {
-    /// Whether what a document states follows, and from what (repeatable).
+    /// Check whether the statements of a document are entailed, and explain why (repeatable).
     #[arg(long, value_name = "FILE", group = "question")]
     entails: Vec<PathBuf>,
-    /// What follows about classes and properties: which are below which, which are empty.
+    /// Show the inferred hierarchies of classes and properties, and empty classes and properties.
     #[arg(long, group = "question")]
     schema: bool,
-    /// Why an assertion holds: `SUBJECT PROPERTY VALUE`, or `SUBJECT a CLASS`; names may be local (repeatable).
+    /// Explain why an assertion holds: `SUBJECT PROPERTY VALUE` or `SUBJECT a CLASS`. Local names are
+    /// allowed (repeatable).
     #[arg(long, value_name = "ASSERTION", group = "question")]
     why: Vec<String>,
-    /// Why an assertion does not hold: how near each rule comes to concluding it (repeatable).
+    /// Explain why an assertion does not hold: the unsatisfied part of each rule that could infer it (repeatable).
     #[arg(long, value_name = "ASSERTION", group = "question")]
     why_not: Vec<String>,
 }

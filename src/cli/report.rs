@@ -37,18 +37,18 @@ pub struct Arguments {
     /// Stop after this many seconds with the best plan so far.
     #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     time_limit: Option<Duration>,
-    /// Stop when the program takes more than this much memory, in megabytes, with the best plan so far.
+    /// Stop with the best plan so far if the program uses more than this many megabytes of memory.
     #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u64).range(1..), allow_negative_numbers = true)]
     memory_limit: Option<u64>,
-    /// Also what was verified of the certificate in a directory, which `metaplan plan --certificate` has written.
+    /// Include the verification of a certificate that `metaplan plan --certificate` has written.
     #[arg(long, value_name = "DIR", conflicts_with = "concurrent")]
     certificate: Option<PathBuf>,
     #[command(flatten)]
     overlap: Overlap,
-    /// In place of a plan, what the loop did whose journal is in a directory: events, inferences, plans and effects.
+    /// Report a run of the loop from its journal instead of a plan: events, inferences, plans and effects.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["inputs", "certificate", "scenario", "set", "fail", "concurrent"])]
     journal: Option<PathBuf>,
-    /// Also each picture as an SVG file in a directory, which is made if it is not there.
+    /// Also write each picture as an SVG file to a directory; created if it does not exist.
     #[arg(long, value_name = "DIR")]
     svg: Option<PathBuf>,
     /// Write the page to a file.

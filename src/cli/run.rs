@@ -30,24 +30,24 @@ pub struct Arguments {
     inputs: Vec<PathBuf>,
     #[command(flatten)]
     situation: Situation,
-    /// Without a task plan: a design for every function in need, as `metaplan configure` chooses it.
+    /// Run without a task plan: choose a design for every function that needs one, as `metaplan configure` does.
     #[arg(long, conflicts_with = "journal")]
     configure: bool,
     #[command(flatten)]
     wanted: Wanted,
-    /// With `--configure`: a TOML file with the section `[adaptation]` of a manifest, whose filters count.
+    /// With `--configure`: a TOML file with the section `[adaptation]` of a manifest; only its filters are used.
     #[arg(long, value_name = "FILE", requires = "configure")]
     adaptation: Option<PathBuf>,
-    /// Where events come from, one JSON object a line, or an MCAP file; `-` is standard input.
+    /// Source of events: one JSON object per line, or an MCAP file; `-` is standard input.
     #[arg(long, value_name = "FILE", default_value = "-")]
     events: PathBuf,
-    /// Write events and decisions there first, and go on from there after a crash.
+    /// Write events and decisions to a journal before they take effect, and resume from it after a crash.
     #[arg(long, value_name = "DIR")]
     journal: Option<PathBuf>,
-    /// When the journal is forced to the disk.
+    /// Time at which the journal is forced to disk.
     #[arg(long, value_enum, default_value_t = Fsync::Effects, requires = "journal")]
     fsync: Fsync,
-    /// After so many events the journal gets a snapshot.
+    /// Write a snapshot to the journal after this many events.
     #[arg(long, value_name = "N", default_value_t = 1000, requires = "journal",
           value_parser = clap::value_parser!(u64).range(1..))]
     snapshot_every: u64,
@@ -61,7 +61,7 @@ enum Fsync {
     Always,
     /// Before effects.
     Effects,
-    /// When the operating system sees fit.
+    /// When the operating system decides.
     Never,
 }
 

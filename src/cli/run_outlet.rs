@@ -23,25 +23,25 @@ use crate::cli::output;
 /// Where the run goes besides standard output.
 #[derive(Debug, Args)]
 pub(super) struct Outlets {
-    /// Record what is heard and answered as an MCAP file, which must not be there yet.
+    /// Record events and answers to a new MCAP file.
     #[arg(long, value_name = "FILE")]
     mcap: Option<PathBuf>,
-    /// How events and answers are recorded; diagnostics are always messages of ROS 2.
+    /// Encoding of recorded events and answers. Diagnostics are always ROS 2 messages.
     #[arg(long, value_name = "FORM", value_enum, default_value_t = Recorded::Json, requires = "mcap")]
     mcap_events: Recorded,
-    /// Show the run as a page of the Web: PORT, HOST or HOST:PORT; without one only this machine can look at it.
+    /// Serve a web page of the run at PORT, HOST or HOST:PORT. By default only this machine can access it.
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = "")]
     serve: Option<String>,
-    /// The file with the token that the page asks for; needed where other machines can reach it.
+    /// File with the access token of the page. Required if other machines can reach it.
     #[arg(long, value_name = "FILE", requires = "serve")]
     serve_token: Option<PathBuf>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Recorded {
-    /// As JSON with schemas, for viewers.
+    /// JSON with schemas, for viewers.
     Json,
-    /// As `std_msgs/msg/String`, for `ros2 bag play`.
+    /// `std_msgs/msg/String`, for `ros2 bag play`.
     String,
 }
 

@@ -29,25 +29,25 @@ pub struct Arguments {
     /// A mission's manifest.
     #[arg(value_name = "MISSION")]
     mission: PathBuf,
-    /// A scenario of the manifest that says what a simulated robot meets.
+    /// A scenario of the manifest with a section `simulation`.
     #[arg(long, value_name = "NAME")]
     scenario: String,
-    /// Who decides (repeatable; all without it).
+    /// Strategy to simulate (repeatable). Default: all.
     #[arg(long, value_enum)]
     strategy: Vec<Who>,
-    /// So many missions for each strategy, with seeds that count up.
+    /// Number of missions per strategy, with consecutive seeds.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     runs: u32,
     /// The first seed.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Stop after this many seconds with the missions that are simulated by then.
+    /// Stop after this many seconds with the missions simulated so far.
     #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     time_limit: Option<Duration>,
-    /// Write what was observed and answered in the first mission of each strategy, one JSON object a line.
+    /// Write the observations and answers of the first mission of each strategy, one JSON object per line.
     #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
-    /// Write one line for each mission, with the columns of SUAVE among others.
+    /// Write one line per mission, including the columns of SUAVE.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
     #[command(flatten)]
@@ -58,13 +58,13 @@ pub struct Arguments {
 enum Who {
     /// The adaptation loop.
     Joint,
-    /// A new joint plan when an action has failed.
+    /// A new joint plan after an action has failed.
     Failure,
-    /// For each function by itself the cheapest design with which the action can be done.
+    /// For each function separately, the cheapest design with which the action is executable.
     Greedy,
-    /// For each function any design with which the action can be done.
+    /// For each function, a random design with which the action is executable.
     Random,
-    /// The first plan to its end.
+    /// The first plan, without adaptation.
     None,
 }
 

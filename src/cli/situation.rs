@@ -21,22 +21,23 @@ pub(super) struct Situation {
     /// A knowledge base for DOMAIN and PROBLEM (OWL; repeatable).
     #[arg(long = "kb", value_name = "FILE")]
     knowledge: Vec<PathBuf>,
-    /// Rules for that knowledge base: a file, `coadaptation` or `tomasys` (repeatable; default `coadaptation`).
+    /// Rules for the knowledge base: a file, `coadaptation` or `tomasys` (repeatable; default `coadaptation`).
     #[arg(long = "rules", value_name = "FILE")]
     rules: Vec<String>,
     #[command(flatten)]
     imports: Imports,
-    /// What an individual of that knowledge base is called in PROBLEM: `fd_spiral_low=fd_search_low`; a star on both sides
-    /// stands for the same characters, `fd_spiral_*=fd_search_*` (repeatable).
+    /// Name of an individual of the knowledge base in PROBLEM: `fd_spiral_low=fd_search_low`. A `*` on
+    /// both sides matches the same characters: `fd_spiral_*=fd_search_*` (repeatable).
     #[arg(long = "name", value_name = "INDIVIDUAL=OBJECT", value_parser = setting)]
     names: Vec<(String, String)>,
-    /// A scenario of the mission's manifest.
+    /// Apply a scenario of the mission's manifest.
     #[arg(long, value_name = "NAME")]
     scenario: Option<String>,
-    /// A measured attribute, a numeric fluent or a fact: `ambient_light=0.9`, `battery=30`, `robot_at=wp2` (repeatable).
+    /// Set a measured attribute, a numeric fluent or a fact: `ambient_light=0.9`, `battery=30`,
+    /// `robot_at=wp2` (repeatable).
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     set: Vec<(String, String)>,
-    /// A component that has failed (repeatable).
+    /// Mark a component as failed (repeatable).
     #[arg(long, value_name = "COMPONENT")]
     fail: Vec<String>,
 }
@@ -44,13 +45,13 @@ pub(super) struct Situation {
 /// Where imports are looked for; never the network.
 #[derive(Debug, Clone, Args)]
 pub(super) struct Imports {
-    /// An OASIS XML catalog that says where imports lie (repeatable).
+    /// An OASIS XML catalog with the locations of imports (repeatable).
     #[arg(long, value_name = "FILE")]
     catalog: Vec<PathBuf>,
-    /// A directory to look for imports in, with those below it (repeatable).
+    /// Search a directory and its subdirectories for imports (repeatable).
     #[arg(long, value_name = "DIR", value_parser = existing_directory)]
     directory: Vec<PathBuf>,
-    /// Goes on with a warning where an import is found nowhere.
+    /// Continue with a warning if an import is not found.
     #[arg(long)]
     #[allow(clippy::struct_field_names)]
     ignore_missing_imports: bool,

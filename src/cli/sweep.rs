@@ -19,28 +19,28 @@ use crate::cli::values::seconds;
 /// Arguments of `sweep`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// The study: what is run, and what is varied (TOML).
+    /// The study: a TOML file with the command and the varied parameters.
     #[arg(value_name = "STUDY")]
     study: PathBuf,
-    /// The directory of the lines that runs leave.
+    /// Directory for the results of the runs.
     #[arg(long, short, value_name = "DIR")]
     output: PathBuf,
-    /// Only every N-th run, from the I-th on: for N processes, on any number of machines.
+    /// Execute only every N-th run, starting with the I-th, to distribute a study over N processes or machines.
     #[arg(long, value_name = "I/N", default_value_t)]
     shard: Shard,
-    /// Stop after this many seconds with the runs that are done by then; `--resume` goes on.
+    /// Stop after this many seconds with the runs so far. `--resume` continues.
     #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     time_limit: Option<Duration>,
-    /// Go on where the shard was when it ended.
+    /// Continue an interrupted shard.
     #[arg(long)]
     resume: bool,
-    /// Run nothing: put the lines of all shards together.
+    /// Merge the results of all shards without running anything.
     #[arg(long, conflicts_with_all = ["shard", "resume", "time_limit"])]
     merge: bool,
     /// With `--merge`: write all rows as CSV.
     #[arg(long, value_name = "FILE", requires = "merge")]
     csv: Option<PathBuf>,
-    /// With `--merge`: with times and other figures that differ from run to run.
+    /// With `--merge`: include times and other figures that vary between runs.
     #[arg(long, requires = "merge")]
     measured: bool,
 }

@@ -21,16 +21,17 @@ use crate::cli::values::time;
 /// Arguments of `validate`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// A mission's manifest, or a PDDL domain and a PDDL problem, and then the plan: lines `(action arguments)` or
-    /// `start: (action arguments) [duration]`, or the JSON of `metaplan plan`; `-` is standard input.
+    /// A mission's manifest, or a PDDL domain and a PDDL problem, followed by the plan: lines `(action
+    /// arguments)` or `start: (action arguments) [duration]`, or the JSON of `metaplan plan`; `-` is
+    /// standard input.
     #[arg(required = true, num_args = 1..=3, value_name = "MISSION PLAN | DOMAIN PROBLEM PLAN")]
     inputs: Vec<PathBuf>,
     #[command(flatten)]
     situation: Situation,
-    /// Actions may overlap, by the rules of PDDL 2.1; without it they are executed one after another.
+    /// Allow actions to overlap as in PDDL 2.1. By default they are executed one after another.
     #[arg(long)]
     concurrent: bool,
-    /// How far times may lie from the exact ones, and how far apart actions that interfere must begin and end.
+    /// Tolerance of times, and minimum time between interfering starts and ends of actions.
     #[arg(long, value_name = "TIME", default_value = "0.001", value_parser = time)]
     tolerance: BigRational,
     #[command(flatten)]

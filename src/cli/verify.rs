@@ -17,24 +17,24 @@ use crate::cli::values::{seconds, setting};
 /// Arguments of `verify`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// What `metaplan plan --certificate` has written.
+    /// The directory written by `metaplan plan --certificate`.
     directory: PathBuf,
-    /// Write the argument as verification conditions in SMT-LIB 2, too: an SMT solver has to answer `unsat` to each.
+    /// Also write the argument as verification conditions in SMT-LIB 2. An SMT solver has to answer `unsat` to each.
     #[arg(long, value_name = "FILE")]
     smt: Option<PathBuf>,
-    /// The verification fails if it takes more seconds.
+    /// Fail if the verification takes more than this many seconds.
     #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true, default_value = "600")]
     time_limit: Duration,
-    /// Whether the certificate is about this mission, too: its manifest.
+    /// Also check that the certificate is about the mission with this manifest.
     #[arg(long, value_name = "MISSION")]
     mission: Option<PathBuf>,
-    /// The mission in this situation: a scenario of its manifest.
+    /// Apply a scenario of the mission's manifest.
     #[arg(long, value_name = "NAME", requires = "mission")]
     scenario: Option<String>,
-    /// As with `plan` (repeatable).
+    /// Set a value, as with `plan --set` (repeatable).
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting, requires = "mission")]
     set: Vec<(String, String)>,
-    /// As with `plan` (repeatable).
+    /// Mark a component as failed (repeatable).
     #[arg(long, value_name = "COMPONENT", requires = "mission")]
     fail: Vec<String>,
 }

@@ -15,7 +15,7 @@ use serde::Deserialize;
 use crate::message::{Errors, Message};
 use crate::mission::Mission;
 
-/// Which PDDL symbols stand for what; the section `[probabilistic]` of a manifest.
+/// The PDDL symbols of the co-adaptation process; the section `[probabilistic]` of a manifest.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[allow(missing_docs, reason = "the names are those of the roles")]
@@ -46,11 +46,11 @@ pub struct Roles {
     pub battery: String,
     /// The function `(reserve)`.
     pub reserve: String,
-    /// How much battery one level of the process stands for, in the unit of the problem.
+    /// Battery units per level of the process, in the unit of the problem.
     pub battery_unit: u32,
-    /// The component that may be lost on the way, if there is one.
+    /// Component that can be lost on the way, if any.
     pub loss_component: Option<String>,
-    /// The probability of losing it, for each move.
+    /// Probability of losing the component, for each move.
     pub loss_rate: f64,
 }
 

@@ -24,7 +24,7 @@ pub const FORMAT: &str = "metaplan-events/1";
 /// Maximum length of a line in bytes. Longer lines are refused.
 pub const LONGEST_LINE: usize = 1 << 20;
 
-/// Something that has happened.
+/// A report of the managed system.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[serde(tag = "event")]
 #[schemars(deny_unknown_fields)]
@@ -35,131 +35,131 @@ pub enum Event {
     Measured {
         /// Local name or IRI.
         attribute: String,
-        /// In the attribute's unit.
+        /// Value, in the attribute's unit.
         #[serde(serialize_with = "as_number")]
         #[schemars(with = "f64")]
         value: BigRational,
     },
-    /// A component reports how it is.
+    /// A component reports its status.
     #[serde(rename = "component_status")]
     Component {
         /// Local name or IRI.
         component: String,
-        /// How it is.
+        /// Status of the component.
         #[serde(serialize_with = "as_word")]
         #[schemars(schema_with = "status_schema")]
         status: Status,
     },
-    /// A requested action has begun.
+    /// A requested action has started.
     #[serde(rename = "action_started")]
     Started {
-        /// The number of the request.
+        /// Number of the action.
         action: u64,
     },
-    /// A requested action has done all that it should.
+    /// A requested action has succeeded.
     #[serde(rename = "action_succeeded")]
     Succeeded {
-        /// The number of the request.
+        /// Number of the action.
         action: u64,
     },
     /// A requested action has ended without success.
     #[serde(rename = "action_failed")]
     Failed {
-        /// The number of the request.
+        /// Number of the action.
         action: u64,
-        /// Why, in words.
+        /// Reason of the failure.
         #[serde(skip_serializing_if = "String::is_empty")]
         #[schemars(default)]
         reason: String,
     },
-    /// An action has been brought to a safe end, as asked for.
+    /// An action has been ended safely, as requested.
     #[serde(rename = "action_cancelled")]
     Cancelled {
-        /// The number of the request.
+        /// Number of the action.
         action: u64,
     },
-    /// How much of an action is done.
+    /// Progress of an action.
     #[serde(rename = "action_progress")]
     Progress {
-        /// The number of the request.
+        /// Number of the action.
         action: u64,
-        /// From 0 to 1, in hundredths.
+        /// Completed part, from 0 to 1, in hundredths.
         #[serde(serialize_with = "as_number")]
         #[schemars(with = "f64")]
         fraction: BigRational,
     },
-    /// Another goal from now on, as a PDDL condition.
+    /// The goal has changed.
     #[serde(rename = "goal_changed")]
     Goal {
-        /// The condition.
+        /// The new goal, a PDDL condition.
         goal: String,
     },
     /// A fact or a value of the problem, as for `--set`.
     #[serde(rename = "fact_changed")]
     Fact {
-        /// `battery`, `robot_at`, `pipeline_found pl1`.
+        /// Name, as in `battery`, `robot_at`, `pipeline_found pl1`.
         name: String,
-        /// The value, the last argument, or a truth value.
+        /// A number, the last argument, or a truth value.
         #[schemars(schema_with = "word_schema")]
         value: String,
     },
-    /// An effect has reached the managed system.
+    /// An effect has arrived at the managed system.
     #[serde(rename = "acknowledged")]
     Acknowledged {
-        /// The number of the effect.
+        /// Number of the effect.
         effect: u64,
     },
-    /// A change of designs could not be carried out: the design counts as not realisable until [`Event::Design`] says otherwise.
+    /// A reconfiguration has failed. The design counts as not realisable until [`Event::Design`] reports that it is.
     #[serde(rename = "reconfiguration_failed")]
     ReconfigurationFailed {
-        /// The number of the effect.
+        /// Number of the effect.
         effect: u64,
     },
-    /// A function says whether it can take a design, whatever follows from components and measurements.
+    /// A function reports whether it can use a design, independently of components and measurements.
     #[serde(rename = "design_status")]
     Design {
         /// Local name or IRI.
         design: String,
-        /// Whether it can.
+        /// Whether the function can use the design.
         realisable: bool,
     },
-    /// A function was seen to have a design that nobody here has asked for.
+    /// A function has a design that the loop did not request.
     #[serde(rename = "configuration_observed")]
     Observed {
         /// Local name.
         function: String,
-        /// Local name; none where the function has no design.
+        /// Local name; null if the function has no design.
         #[schemars(schema_with = "name_or_null_schema")]
         design: Option<String>,
     },
-    /// A function is needed from now on.
+    /// A function is required from now on.
     #[serde(rename = "objective_added")]
     ObjectiveAdded {
-        /// The objective's name.
+        /// Name of the objective.
         objective: String,
-        /// The function, by local name or IRI.
+        /// Local name or IRI of the function.
         function: String,
-        /// Attribute types, by local name or IRI, and bounds in their units.
+        /// Bounds by local name or IRI of the attribute type, in the attribute's unit.
         #[serde(serialize_with = "as_numbers", skip_serializing_if = "Vec::is_empty")]
         #[schemars(with = "BTreeMap<String, f64>", default)]
         requirements: Vec<(String, BigRational)>,
-        /// Whether to look for a better design also while all is well.
+        /// Whether to choose a better design also if the objective is not in error.
         #[schemars(default)]
         always_improve: bool,
     },
-    /// An objective is given up.
+    /// An objective has ended.
     #[serde(rename = "objective_removed")]
     ObjectiveRemoved {
-        /// Its name.
+        /// Name of the objective.
         objective: String,
     },
-    /// Time passes.
+    /// Time has passed.
     #[serde(rename = "tick")]
     Tick,
-    /// A remark for who reads the journal. It changes nothing.
+    /// A remark for readers of the journal. It changes nothing.
     #[serde(rename = "note")]
     Note {
-        /// What is to be remembered.
+        /// Text of the remark.
         text: String,
     },
 }

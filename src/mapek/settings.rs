@@ -19,52 +19,54 @@ use crate::number;
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AdaptationSection {
-    /// A plan that could be kept is replaced only by one whose metric is better by this much; 0 is any benefit.
+    /// Minimum improvement of the metric for which a valid plan is replaced; 0 means any improvement.
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     minimum_benefit: Option<Spanned<toml::Value>>,
-    /// For so many seconds must a design be back before a better plan is looked for (5 if nothing is said); of the clock, whatever the unit of the domain's times.
+    /// Seconds for which a design must be available again before the loop searches for a better plan
+    /// (default 5). Always in seconds, independent of the domain's time unit.
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     settle: Option<Spanned<toml::Value>>,
-    /// So many seconds may one plan take (10 if nothing is said); then the best so far is used if there is one. It is looked for again when
-    /// something changes, and with twice the time after twice that pause, and so on.
+    /// Time limit for a plan in seconds (default 10). Then the best plan so far is used, if there is
+    /// one. Planning is repeated after a change, and also after a pause that doubles each time together
+    /// with the limit.
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     time_limit: Option<Spanned<toml::Value>>,
-    /// Of plans that are as good and as long, one is chosen that has most steps of the plan at hand; otherwise the choice depends on the
-    /// situation alone.
+    /// Choose, among equally good plans of equal length, one that keeps most steps of the current plan.
+    /// Otherwise the choice depends only on the situation.
     #[serde(default)]
     stay_close: bool,
-    /// For so many seconds must a component report a failure before it is believed (0 if nothing is said: a failure counts at once).
+    /// Seconds for which a component must report a failure before it takes effect (default 0: at once).
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     confirm_time: Option<Spanned<toml::Value>>,
-    /// For so many seconds must a component that has failed be in order again before that is believed (2 if nothing is said).
+    /// Seconds for which a failed component must report that it works before it counts as recovered (default 2).
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     heal_time: Option<Spanned<toml::Value>>,
-    /// Share of a bound by which it must be kept again after it was missed (0.02 if nothing is said; 0 for none), unless the attribute has
-    /// its own `hysteresis`.
+    /// Hysteresis of attributes without their own `hysteresis`, as a share of the bound (default 0.02; 0 for none).
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     band: Option<Spanned<toml::Value>>,
-    /// Times of single components, by local name.
+    /// Settings of single components, by local name.
     #[serde(default)]
     components: ComponentsSection,
     /// Filters of measured attributes, by local name.
     #[serde(default)]
     measured: MeasuredsSection,
-    /// What is done at once, before any planning, where the action under way loses a design or cannot go on: `reconfigure` gives it other
-    /// available designs if what is left of it can be done with them, and suspends it otherwise; `suspend` always suspends it.
+    /// Immediate reaction, before planning, if the current action loses a design or cannot continue.
+    /// `reconfigure` selects other available designs if the action can be completed with them, and
+    /// suspends it otherwise. `suspend` always suspends it.
     #[serde(default)]
     safe_reaction: SafeReaction,
-    /// So many seconds may an effect remain without acknowledgement, and an action without a report, at least, before it is overdue
-    /// (10 if nothing is said; 0 for ever).
+    /// Seconds without acknowledgement after which an effect is overdue, and minimum time without a
+    /// report after which an action is overdue (default 10; 0 for no deadline).
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     deadline: Option<Spanned<toml::Value>>,
-    /// An action is overdue when nothing was heard of it for its expected duration times this (3 if nothing is said).
+    /// An action is overdue after this multiple of its expected duration without a report (default 3).
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     deadline_factor: Option<Spanned<toml::Value>>,

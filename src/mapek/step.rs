@@ -48,19 +48,19 @@ impl JsonSchema for PlannedStep {
         json_schema!({
             "type": "object",
             "properties": {
-                "action": { "type": "string", "description": "The name of the action." },
+                "action": { "type": "string", "description": "Name of the action." },
                 "arguments": {
                     "type": "array",
                     "items": { "type": "string" },
-                    "description": "All its arguments in the order of the parameters, designs among them."
+                    "description": "All arguments, including designs, in the order of the parameters."
                 },
                 "configuration": {
                     "type": "object",
                     "additionalProperties": { "type": "string" },
-                    "description": "Function to design."
+                    "description": "The design of each function."
                 },
-                "duration": { "type": "number", "description": "How long it takes, in the domain's time unit." },
-                "cost": { "type": "number", "description": "What it adds to the metric." }
+                "duration": { "type": "number", "description": "Duration, in the domain's time unit." },
+                "cost": { "type": "number", "description": "Contribution to the metric." }
             },
             "required": ["action", "arguments", "configuration", "duration", "cost"]
         })

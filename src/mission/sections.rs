@@ -26,10 +26,10 @@ pub struct KnowledgeSection {
     /// Rule files, or `coadaptation`, `tomasys`.
     #[serde(default = "shipped_rules")]
     rules: Vec<String>,
-    /// Catalogs of IRIs, where imports are looked for first.
+    /// Catalogs of IRIs, which are searched first for imports.
     #[serde(default)]
     catalogs: Vec<PathBuf>,
-    /// Directories in which imports are looked for.
+    /// Directories to search for imports.
     #[serde(default)]
     directories: Vec<PathBuf>,
 }
@@ -67,7 +67,8 @@ pub struct PlanningSection {
     pub domain: PathBuf,
     /// The problem file.
     pub problem: PathBuf,
-    /// The unit of the domain's times: `seconds`, `minutes` or `hours`. Simulations need it: the clock of the loop goes in seconds.
+    /// Time unit of the domain: `seconds`, `minutes` or `hours`. It converts the times of simulations
+    /// to the loop's clock in seconds.
     #[serde(default)]
     pub time_unit: TimeUnit,
 }
@@ -76,7 +77,7 @@ pub struct PlanningSection {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum TimeUnit {
-    /// As robots have it, and most domains.
+    /// Seconds, as in robots and most domains.
     #[default]
     Seconds,
     /// 60 seconds.
@@ -147,7 +148,7 @@ impl JsonSchema for BindingsSection {
     fn json_schema(_: &mut SchemaGenerator) -> Schema {
         json_schema!({
             "type": "object",
-            "description": "PDDL symbols with queries, and the table `names`: what individuals are called in the problem.",
+            "description": "Queries of PDDL symbols, and the table `names` with the names of individuals in the problem.",
             "properties": { "names": { "type": "object", "additionalProperties": { "type": "string" } } },
             "additionalProperties": { "type": "string" }
         })
@@ -225,21 +226,21 @@ impl<'de> Visitor<'de> for QueryOrNames {
     }
 }
 
-/// A situation: what has failed, and what has changed; and what a simulated robot meets, of which a mission knows nothing.
+/// A situation: failed components, changed values, and the simulated environment, which is not part of the mission.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scenario<S> {
-    /// What happens, in a sentence.
+    /// Description of the scenario in one sentence.
     #[serde(default)]
     pub description: String,
     /// Components that have failed.
     #[serde(default)]
     pub fail: Vec<String>,
-    /// Measured attributes, fluents and facts by name, as for `--set`; strings, numbers or truth values.
+    /// Measured attributes, fluents and facts by name, as for `--set`; values are strings, numbers or truth values.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, serde_json::Value>")]
     pub set: BTreeMap<String, toml::Value>,
-    /// What a simulated robot meets.
+    /// Simulated environment of the robot.
     pub simulation: Option<S>,
 }
 

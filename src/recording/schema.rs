@@ -43,21 +43,21 @@ pub(super) fn event() -> Value {
     json!({
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": EVENT,
-        "description": "A line that the loop has heard",
+        "description": "A line of input of the loop",
         "type": "object",
         "properties": {
             "line": {"type": "integer", "description": "number of the line, from 1"},
-            "nanoseconds": {"type": "integer", "description": "time since the start of the mission, as the loop counts"},
+            "nanoseconds": {"type": "integer", "description": "time since the start of the mission, measured by the loop"},
             "event": {
                 "type": "object",
-                "description": "the line as it was, in the format metaplan-events/1",
+                "description": "the unchanged line, in the format metaplan-events/1",
                 "properties": {
                     "event": {"type": "string"},
                     "seq": {"type": "integer"},
-                    "time": {"type": "number", "description": "seconds since the start of the mission, as the sender counts"}
+                    "time": {"type": "number", "description": "seconds since the start of the mission, given by the sender"}
                 }
             },
-            "text": {"type": "string", "description": "the line as it was, where it is not a JSON object"}
+            "text": {"type": "string", "description": "the unchanged line, if it is not a JSON object"}
         },
         "required": ["line", "nanoseconds"]
     })
@@ -87,7 +87,7 @@ pub(super) fn answer() -> Value {
         "description": "An answer of the loop, in the format metaplan-events/1",
         "type": "object",
         "properties": {
-            "answer": {"type": "string", "description": "its kind"},
+            "answer": {"type": "string", "description": "kind of the answer"},
             "line": {"type": "integer", "description": "number of the line that it answers; 0 before the first"},
             "designs": {"type": "array", "items": {"type": "object", "properties": {
                 "design": {"type": "string"}, "available": {"type": "boolean"}, "because": texts
@@ -95,13 +95,13 @@ pub(super) fn answer() -> Value {
             "objectives": {"type": "array", "items": {"type": "object", "properties": {
                 "objective": {"type": "string"}, "statuses": texts, "because": texts
             }}},
-            "cost": {"type": ["number", "null"], "description": "what the steps of a plan, or a step, add to the metric"},
-            "lower_bound": {"type": ["number", "null"], "description": "no plan adds less"},
+            "cost": {"type": ["number", "null"], "description": "contribution of a plan or a step to the metric"},
+            "lower_bound": {"type": ["number", "null"], "description": "lower bound on the contribution of every plan"},
             "optimal": {"type": "boolean"},
             "steps": {"type": "array", "items": step},
             "status": {"type": "string"},
             "effect": {"type": "integer", "description": "number of an effect"},
-            "action": {"type": "integer", "description": "number of the action that an effect is about"},
+            "action": {"type": "integer", "description": "number of the action to which an effect belongs"},
             "name": {"type": "string", "description": "name of a requested action"},
             "arguments": texts,
             "configuration": {"type": "object", "additionalProperties": {"type": "string"}},

@@ -16,11 +16,12 @@ use crate::message::{Errors, Message};
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ReportSection {
-    /// Where places lie: a CSV file of lines `place,x,y`, or two functions of places, `["x", "y"]`; y is upwards.
+    /// Positions of places: a CSV file with lines `place,x,y`, or two functions of places, `["x",
+    /// "y"]`; y points upwards.
     positions: Option<Written>,
 }
 
-/// How a manifest says where places lie.
+/// Source of the positions of places.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(
     untagged,

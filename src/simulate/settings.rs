@@ -5,48 +5,49 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// How a scenario is simulated. Times are in the domain's time unit (`planning.time_unit`).
+/// Settings of a simulation. Times are in the domain's time unit (`planning.time_unit`).
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Simulation {
-    /// The time from one report to the next, in the domain's time unit, as all times of the section.
+    /// Time between two reports. All times of the section are in the domain's time unit.
     pub step: f64,
-    /// The mission is given up after this time.
+    /// Time after which the mission is aborted.
     pub time_budget: f64,
-    /// How long an action that cannot go on waits before it fails.
+    /// Time that an action waits before it fails, if it cannot continue.
     pub patience: f64,
-    /// Actions take up to this share longer or shorter than expected.
+    /// Maximum relative deviation of action durations.
     #[serde(default)]
     pub noise: f64,
-    /// The numeric function that ends the mission when it comes to 0, such as `battery`.
+    /// Numeric function, such as `battery`, that ends the mission when it reaches 0.
     #[serde(default)]
     pub lifeline: Option<String>,
-    /// What happens once.
+    /// Events that occur once.
     #[serde(default)]
     pub events: Vec<Disturbance>,
-    /// Attributes that swing.
+    /// Attributes that oscillate.
     #[serde(default)]
     pub signals: Vec<Signal>,
     /// Components that fail at random.
     #[serde(default)]
     pub failures: Vec<RandomFailure>,
-    /// How the figures of SUAVE are found.
+    /// Symbols for the figures of SUAVE.
     #[serde(default)]
     pub suave: Option<Suave>,
 }
 
-/// Something that happens once: at a time, or when a condition holds for the first time.
+/// An event that occurs once: at a time, or when a condition first holds.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Disturbance {
-    /// When; an event has either this or `when`.
+    /// Time of the event; an event has either `at` or `when`.
     #[serde(default)]
     pub at: Option<f64>,
-    /// The condition: a fact as `predicate arguments` or `(predicate arguments)`, or any condition of PDDL, such as `(< (battery) 20)`.
+    /// Condition of the event: a fact as `predicate arguments` or `(predicate arguments)`, or any PDDL
+    /// condition, such as `(< (battery) 20)`.
     #[serde(default)]
     pub when: Option<String>,
-    /// So much later than that at most, by a random part of it.
+    /// Maximum random delay after the time or condition.
     #[serde(default)]
     pub within: f64,
     /// Components that fail.
@@ -55,24 +56,24 @@ pub struct Disturbance {
     /// Components that recover.
     #[serde(default)]
     pub recover: Vec<String>,
-    /// Names to values, as for `--set`.
+    /// Values by name, as for `--set`.
     #[serde(default)]
     pub set: BTreeMap<String, String>,
 }
 
-/// An attribute that swings: `mean + amplitude * sin(2 * pi * (time / period + phase))`.
+/// An attribute that oscillates: `mean + amplitude * sin(2 * pi * (time / period + phase))`.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Signal {
     /// The attribute.
     pub attribute: String,
-    /// In the attribute's unit.
+    /// Mean value, in the attribute's unit.
     pub mean: f64,
-    /// In the attribute's unit.
+    /// Amplitude, in the attribute's unit.
     pub amplitude: f64,
-    /// In the domain's time unit.
+    /// Period, in the domain's time unit.
     pub period: f64,
-    /// From 0 to 1; random without it.
+    /// Phase, from 0 to 1; random by default.
     #[serde(default)]
     pub phase: Option<f64>,
 }
@@ -83,22 +84,22 @@ pub struct Signal {
 pub struct RandomFailure {
     /// The component.
     pub component: String,
-    /// The mean time to a failure.
+    /// Mean time to a failure.
     pub mean_time: f64,
-    /// The time from a failure to the recovery; never without it.
+    /// Time from a failure to the recovery; by default the component does not recover.
     #[serde(default)]
     pub recovery: Option<f64>,
 }
 
-/// How the figures that SUAVE reports are found in this mission.
+/// Symbols of the mission from which the figures of SUAVE are computed.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Suave {
-    /// The fact that the pipeline is found, as `when` of an event.
+    /// Fact that holds once the pipeline is found, in the form of `when` of an event.
     pub found: String,
-    /// The action that inspects it.
+    /// Action that inspects the pipeline.
     pub inspect: String,
-    /// The numeric function that says how long it is.
+    /// Numeric function with the length of the pipeline.
     pub length: String,
 }
 

@@ -10,35 +10,35 @@ use super::table::Group;
 use crate::message::Message;
 use crate::simulate::Sample;
 
-/// How far a shard, or a study, has come; and means over repetitions where shards were merged.
+/// Progress of a shard or study; after merging, also means over repetitions.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct SweepAnswer {
     /// Name and version of this format.
     #[schemars(extend("const" = FORMAT))]
     format: &'static str,
-    /// How many runs there are: of the shard, or of the study.
+    /// Number of runs of the shard or study.
     runs: usize,
-    /// How many of them are done.
+    /// Number of completed runs.
     done: usize,
-    /// How many of these have no answer.
+    /// Number of completed runs without an answer.
     failed: usize,
-    /// How many of these were ended by the time limit.
+    /// Number of completed runs that reached the time limit.
     timed_out: usize,
-    /// Runs that are not done, the first hundred of them.
+    /// Runs that are not complete; at most the first hundred.
     missing: Vec<usize>,
-    /// Why it was ended before all runs were done, if a limit did that (M130).
+    /// Reason why a limit ended the command before all runs were complete (M130).
     messages: Vec<Message>,
-    /// With `--merge`: rows that differ in numbers and seeds only.
+    /// With `--merge`: groups of rows that differ only in numbers and seeds.
     groups: Vec<GroupPart>,
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct GroupPart {
-    /// Keys and words that its rows have in common.
+    /// Keys and text values that are common to the rows of the group.
     common: Map<String, Value>,
-    /// How many rows.
+    /// Number of rows.
     rows: usize,
-    /// By column.
+    /// Mean of each column.
     means: Map<String, Value>,
 }
 

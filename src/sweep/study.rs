@@ -18,25 +18,26 @@ use crate::setup::Setup;
 /// Maximum number of runs; more are considered a mistake.
 const MAX_RUNS: usize = 10_000_000;
 
-/// What is run, and what is varied.
+/// The command of a study, and its varied parameters.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Sections {
-    /// What the study is about.
+    /// Description of the study.
     #[serde(default)]
     description: String,
-    /// A command of `metaplan` with what is the same in all runs. `{KEY}` stands for a varied value, `{dir}` for a directory of the run's own.
+    /// Command of `metaplan` with the arguments that are common to all runs. `{KEY}` is replaced by a
+    /// varied value, `{dir}` by a separate directory for each run.
     command: Vec<String>,
-    /// Ends a run after so many seconds.
+    /// Time limit of a run in seconds.
     #[serde(default)]
     time_limit: Option<f64>,
-    /// Where the rows of the table stand in an answer, as a JSON pointer to an object or to a list of objects.
+    /// JSON pointer to the rows of the table in an answer: to an object or to a list of objects.
     #[serde(default)]
     rows: String,
-    /// Keys whose values are repetitions: tables have means over them.
+    /// Keys whose values are repetitions. Tables contain means over them.
     #[serde(default = "seeds")]
     repetitions: Vec<String>,
-    /// Values by key. A key that `{KEY}` does not name is an option of the command.
+    /// Values of each key. A key that does not occur as `{KEY}` is an option of the command.
     #[serde(default)]
     vary: BTreeMap<String, Variation>,
     /// Pairs of places of a mission, as values of the key `pair`.
@@ -55,7 +56,7 @@ fn seeds() -> Vec<String> {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(untagged)]
 enum Variation {
-    /// One after the other. A list is an option that is given several times, a truth value one that is there or not.
+    /// A list of values. A value that is a list repeats the option; a truth value includes or omits the option.
     List(Vec<Scalars>),
     /// Whole numbers.
     Range(Range),
@@ -67,9 +68,9 @@ enum Variation {
 struct Range {
     /// The first value.
     from: i64,
-    /// No value is beyond this one.
+    /// Limit of the values, included.
     to: i64,
-    /// From each value to the next.
+    /// Difference between consecutive values.
     #[serde(default = "one")]
     step: i64,
 }
@@ -98,9 +99,9 @@ enum Scalar {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Pairs {
-    /// The manifest of a mission whose problem spells out places.
+    /// Manifest of a mission whose problem defines places.
     mission: PathBuf,
-    /// So many, spread evenly over all of them.
+    /// Maximum number of pairs, spread evenly over all pairs. Default: all.
     #[serde(default)]
     most: Option<usize>,
 }

@@ -22,13 +22,16 @@ pub fn answers() -> String {
         let mut previous_format = String::new();
         for alternative in alternatives {
             let format = alternative["properties"]["format"]["const"].as_str().expect("a format").to_owned();
+            // Without an empty line, Markdown would continue the table of the previous alternative.
+            text.push_str(if text.is_empty() { "" } else { "\n" });
             if format != previous_format {
-                let _ = writeln!(text, "{}## {format}\n", if text.is_empty() { "" } else { "\n" });
+                let _ = writeln!(text, "## {format}\n");
             }
             let source =
                 about.strip_prefix("metaplan ").map_or(about.to_owned(), |command| format!("`{command}`"));
             let description = alternative["description"].as_str().expect("a description");
-            let _ = writeln!(text, "From {source}. {description}\n\n| field | type | means |\n|---|---|---|");
+            let _ =
+                writeln!(text, "From {source}. {description}\n\n| field | type | meaning |\n|---|---|---|");
             for row in Table::of(&schema_of_format, &alternative, &format, "") {
                 let _ = writeln!(text, "| `{}` | {} | {} |", row.path, row.kind, row.means);
             }
@@ -50,7 +53,7 @@ pub fn study() -> String {
 
 fn keys(format: &str) -> String {
     let root_schema = schema(format).expect("a schema");
-    let mut text = "| key | type | means | unless said otherwise |\n|---|---|---|---|\n".to_owned();
+    let mut text = "| key | type | meaning | default |\n|---|---|---|---|\n".to_owned();
     for row in Table::of(&root_schema, &root_schema, format, "NAME") {
         let _ = writeln!(text, "| `{}` | {} | {} | {} |", row.path, row.kind, row.means, row.default);
     }

@@ -86,7 +86,7 @@ fn codes() -> String {
             letter = &code.code[..1];
             let _ = write!(
                 text,
-                "{}### {letter}\n\n| code | says | because | so |\n|---|---|---|---|\n",
+                "{}### {letter}\n\n| code | meaning | cause | remedy |\n|---|---|---|---|\n",
                 if text.is_empty() { "" } else { "\n" }
             );
         }
@@ -101,9 +101,9 @@ fn terms(kind: &str) -> String {
     let metamodel = std::fs::read_to_string(root().join("ontology/kb/tomasys.ttl")).expect("the metamodel");
     let is_property = kind != "owl:Class";
     let mut table = if is_property {
-        "| term | of | is | means |\n|---|---|---|---|\n".to_owned()
+        "| term | domain | range | meaning |\n|---|---|---|---|\n".to_owned()
     } else {
-        "| term | means |\n|---|---|\n".to_owned()
+        "| term | meaning |\n|---|---|\n".to_owned()
     };
     let mut count = 0;
     for statement in metamodel.split("\n\n").filter(|statement| statement.starts_with(':')) {

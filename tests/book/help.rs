@@ -54,7 +54,7 @@ fn describe(command: &[&str], help: &str, text: &mut String) {
         write!(text, "{separator}### metaplan {}\n\n{about}.\n\n```text\n{usage}\n```\n", command.join(" "));
     let entries: Vec<Entry> = entries(help).into_iter().filter(|entry| !is_common(&entry.head)).collect();
     if !entries.is_empty() {
-        text.push_str("\n| argument or option | means |\n|---|---|\n");
+        text.push_str("\n| argument or option | meaning |\n|---|---|\n");
     }
     for entry in entries {
         let _ = writeln!(text, "| `{}` | {} |", entry.head, entry.text);

@@ -31,11 +31,11 @@ impl std::ops::Deref for Message {
 pub struct Details {
     /// `error` or `warning`.
     pub severity: &'static str,
-    /// The stable code of the cause.
+    /// Stable code of the cause.
     pub code: String,
-    /// One sentence.
+    /// Message, one sentence.
     pub message: String,
-    /// The file, where it is about one.
+    /// File, if the message is about one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<String>,
     /// Line, from 1.
@@ -44,7 +44,7 @@ pub struct Details {
     /// Column, from 1, in characters.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub column: Option<usize>,
-    /// What would be right.
+    /// Help: a possible correction.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub help: Option<String>,
     /// The source line, where there is one, and that of another place that matters.
@@ -239,14 +239,14 @@ impl std::error::Error for Message {}
 
 const ERROR_FORMAT: &str = "metaplan-error/1";
 
-/// What every command answers that has failed.
+/// Answer of a failed command.
 #[derive(Debug, Clone, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ErrorAnswer<'a> {
     /// Name and version of this format.
     #[cfg_attr(feature = "schema", schemars(extend("const" = ERROR_FORMAT)))]
     format: &'static str,
-    /// All that is wrong.
+    /// All errors and warnings.
     messages: &'a [Message],
 }
 

@@ -9,7 +9,7 @@ use crate::manifest::{Claim, Subject, SubjectKind, Unchecked, Verification, Veri
 
 const FORMAT: &str = "metaplan-verification/1";
 
-/// What a certificate claims, and whether each part of it holds.
+/// The claim of a certificate, and the results of checking its parts.
 #[derive(Debug, Clone, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct VerificationAnswer<'a> {
@@ -18,23 +18,23 @@ pub struct VerificationAnswer<'a> {
     format: &'static str,
     /// Whether every part is verified.
     verified: bool,
-    /// What the certificate claims: `{"optimal": {"metric": "408"}}`, `"unsolvable"`, or null.
+    /// Claim of the certificate: `{"optimal": {"metric": "408"}}`, `"unsolvable"`, or null.
     claim: Option<&'a Claim>,
-    /// The files or the mission that the claim was checked for, or null if the files cannot be read.
+    /// Files or mission for which the claim was checked; null if the files cannot be read.
     subject: Option<&'a Subject>,
-    /// What was checked, up to the first part that failed.
+    /// Results of the checked parts, up to the first failure.
     parts: Vec<PartAnswer<'a>>,
 }
 
 #[derive(Debug, Clone, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 struct PartAnswer<'a> {
-    /// `files`, `derivations`, `knowledge`, `task`, `plan`, `argument`, `formula`, `proof`, `steps`, `mission`; or `limits`, where time or
-    /// memory was up.
+    /// `files`, `derivations`, `knowledge`, `task`, `plan`, `argument`, `formula`, `proof`, `steps`,
+    /// `mission`; or `limits` if a time or memory limit was reached.
     part: &'static str,
-    /// Whether it holds.
+    /// Whether the part is verified.
     verified: bool,
-    /// What was found, or why it does not hold.
+    /// Result of the check, or the reason for its failure.
     message: &'a str,
 }
 

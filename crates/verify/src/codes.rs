@@ -4,6 +4,6 @@
 pub const CODES: &[[&str; 4]] = &[[
     "M121",
     "A certificate cannot be read.",
-    "Its directory has not the files that its manifest lists, or they are changed.",
-    "Write it again with `plan --certificate DIR`.",
+    "Its directory lacks files of its manifest, or has changed files.",
+    "Create it again with `plan --certificate DIR`.",
 ]];

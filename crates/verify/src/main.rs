@@ -17,28 +17,28 @@ const BAD_INPUT: u8 = 3;
 const INVALID: u8 = 30;
 const FAULT: u8 = 70;
 
-/// Checks a certificate of an optimal plan, or that there is no plan, without trusting the planner.
+/// Verify a certificate of optimality, or of the absence of plans, without trusting the planner.
 #[derive(Debug, Clone, Parser)]
 #[command(name = "metaplan-verify", version, about, max_term_width = 100)]
 struct Arguments {
-    /// What `metaplan plan --certificate` has written.
+    /// The directory written by `metaplan plan --certificate`.
     directory: PathBuf,
-    /// How the answer is written.
+    /// Output format of the answer.
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
-    /// Write the argument as verification conditions in SMT-LIB 2, too: an SMT solver has to answer `unsat` to each.
+    /// Also write the argument as verification conditions in SMT-LIB 2. An SMT solver has to answer `unsat` to each.
     #[arg(long, value_name = "FILE")]
     smt: Option<PathBuf>,
-    /// The verification fails if it takes more seconds.
+    /// Fail if the verification takes more than this many seconds.
     #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true, default_value = "600")]
     time_limit: Duration,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Format {
-    /// For people.
+    /// Text for people.
     Text,
-    /// For programs.
+    /// JSON for programs.
     Json,
 }
 

@@ -41,42 +41,45 @@ pub struct ComponentSection {
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MeasuredSection {
-    /// A bound that was missed is kept again by this much, in the attribute's unit (2 % of the bound if nothing is said; 0 for none).
+    /// Hysteresis: distance from a violated bound at which it counts as satisfied again, in the
+    /// attribute's unit (default 2 % of the bound; 0 for none).
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     hysteresis: Number,
-    /// Values at which designs change, besides the bounds that the designs of the knowledge base state: those in rules.
+    /// Additional bounds at which designs change, such as those in rules. The bounds of designs in the
+    /// knowledge base are included automatically.
     #[serde(default)]
     #[schemars(with = "Vec<f64>")]
     bounds: Vec<Spanned<toml::Value>>,
-    /// Of the last `of` samples so many must have crossed a bound before that counts.
+    /// Number of the last `of` samples that must have crossed a bound before the crossing takes effect.
     #[serde(default)]
     agree: usize,
-    /// Number of samples for `agree`.
+    /// Number of samples considered by `agree`.
     #[serde(default)]
     of: usize,
-    /// For so many seconds must all samples have crossed a bound before that counts.
+    /// Seconds for which all samples must have crossed a bound before the crossing takes effect.
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     debounce: Number,
-    /// The least plausible value; samples below are ignored.
+    /// Minimum plausible value; lower samples are ignored.
     #[serde(default)]
     #[schemars(with = "Option<f64>")]
     minimum: Number,
-    /// The greatest plausible value; samples above are ignored.
+    /// Maximum plausible value; higher samples are ignored.
     #[serde(default)]
     #[schemars(with = "Option<f64>")]
     maximum: Number,
-    /// The greatest plausible difference from one sample to the next; a farther one counts if the next one confirms it.
+    /// Maximum plausible difference between consecutive samples. A sample with a larger difference
+    /// takes effect if the next sample confirms it.
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     jump: Number,
-    /// For longer than so many seconds without a plausible sample, and the sensor is silent (never if nothing is said).
+    /// Seconds without a plausible sample after which the sensor is silent (default: never).
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     period: Number,
-    /// What counts for a silent sensor: `worst` (the value with which the fewest designs can be used), `keep` (the last value), `unknown`
-    /// (no value, which violates no requirement).
+    /// Value of a silent sensor: `worst` (the value with which the fewest designs can be used), `keep`
+    /// (the last value), `unknown` (no value, which violates no requirement).
     #[serde(default)]
     stale: Stale,
 }

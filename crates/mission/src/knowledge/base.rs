@@ -56,9 +56,9 @@ pub struct Knowledge {
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Contradiction {
-    /// The axiom or rule that is violated.
+    /// Violated axiom or rule.
     pub violated: String,
-    /// The facts that violate it together.
+    /// Facts that together violate the axiom or rule.
     pub facts: Vec<String>,
 }
 
