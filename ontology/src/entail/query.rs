@@ -124,8 +124,13 @@ impl Prover {
                 explain(&copy, &goal)
             }
             Axiom::SameIndividual(individuals) => {
-                let goal = same(&mut copy, &name(&individuals[0]), &name(&individuals[1]));
-                explain(&copy, &goal)
+                // Every neighbouring pair must be proved.
+                let mut explanations = Vec::new();
+                for pair in individuals.windows(2) {
+                    let goal = same(&mut copy, &name(&pair[0]), &name(&pair[1]));
+                    explanations.push(explain(&copy, &goal));
+                }
+                explanations.into_iter().collect::<Option<Vec<_>>>().map(|all| all.join("\n"))
             }
             Axiom::DifferentIndividuals(individuals) => {
                 let individuals: Vec<Iri> = individuals.iter().map(name).collect();

@@ -305,9 +305,10 @@ impl Search<'_> {
         let running = tick.running.iter().map(|(instance, remaining)| (*instance, remaining - 1)).collect();
         let number = self.nodes[from].2 + 1;
         let target = self.node((after, running, number));
-        // After all events, a tick that changes nothing leads back to its node. This edge is omitted.
-        if target != from {
-            let cost = fit(cost + self.reduction.time * self.unit)?;
+        let cost = fit(cost + self.reduction.time * self.unit)?;
+        // After all events, a tick that changes nothing leads back to its node. Such an edge matters only if it gains something each
+        // time.
+        if target != from || cost < 0 {
             self.graph.edges.push((from, target, cost));
             self.starts.push(tick.starts.clone());
         }

@@ -154,9 +154,9 @@ impl Planner {
             self.busy.fetch_sub(1, Ordering::Relaxed);
             return Err(NoPlan::None(format!("{MAX_REQUESTS} other plans are being looked for")));
         }
-        let planned = self.plan_now(domain, problem, alternatives);
-        self.busy.fetch_sub(1, Ordering::Relaxed);
-        planned
+        // The request is counted until it ends, also if planning panics.
+        let _request = CountedRequest(&self.busy);
+        self.plan_now(domain, problem, alternatives)
     }
 
     fn plan_now(&self, domain: String, problem: String, alternatives: usize) -> Result<Found, NoPlan> {
@@ -229,5 +229,14 @@ fn validate_domain_response(is_ready: bool, domain: &str) -> ValidateDomainRespo
         Err(messages) => {
             ValidateDomainResponse { success: false, error_info: NoPlan::Input(messages).text() }
         }
+    }
+}
+
+/// A request in the number of current requests.
+struct CountedRequest<'a>(&'a AtomicUsize);
+
+impl Drop for CountedRequest<'_> {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::Relaxed);
     }
 }
