@@ -4,7 +4,9 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::configure::{Choice, Configuration, Considered, Verdict};
+use crate::answers::run::RecoveryPart;
+use crate::configure::{Choice, Configuration, Considered, Keeper, Verdict};
+use crate::journal::Recovery;
 use crate::mapek::FORMAT;
 use crate::message::Message;
 use crate::number::to_json;
@@ -115,11 +117,21 @@ pub struct KeeperReadyLine {
     format: &'static str,
     /// The current objectives.
     objectives: Vec<String>,
+    #[serde(flatten)]
+    recovered: Option<RecoveryPart>,
 }
 
 impl KeeperReadyLine {
-    /// First line of a loop with these objectives.
-    pub fn new(objectives: Vec<String>) -> Self {
-        Self { answer: "ready", format: FORMAT, objectives }
+    /// First line of a loop, with the state of its journal if there is one.
+    pub fn new(keeper: &Keeper, recovery: Option<&Recovery>) -> Self {
+        let objectives = keeper.configurator().objectives().into_iter();
+        let recovered = recovery
+            .map(|recovery| RecoveryPart::new(keeper.lines(), keeper.sequence(), keeper.missing(), recovery));
+        Self {
+            answer: "ready",
+            format: FORMAT,
+            objectives: objectives.map(|objective| objective.individual.name).collect(),
+            recovered,
+        }
     }
 }

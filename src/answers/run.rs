@@ -1,6 +1,7 @@
 //! JSON lines of `metaplan run` in addition to the answers of the loop, and the log of `metaplan
 //! simulate`.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
 
@@ -20,15 +21,35 @@ pub struct ReadyLine {
 }
 
 /// State of the journal of a loop.
-#[derive(Debug, Clone, Serialize)]
-struct RecoveryPart {
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub(super) struct RecoveryPart {
+    /// Whether the loop was restored from the journal.
     resumed: bool,
+    /// Number of handled lines.
     lines: u64,
+    /// Greatest sequence number of a line, or null if no line had a number.
     seq: Option<u64>,
     /// Ranges of skipped numbers below `seq`, with both ends.
     missing: Vec<[u64; 2]>,
+    /// Number of bytes of an incomplete record that were cut off.
     cut_bytes: u64,
+    /// Faults of the journal that did not affect the recovery.
     warnings: Vec<String>,
+}
+
+impl RecoveryPart {
+    /// State after a recovery: the number of handled lines, their greatest sequence number, and the
+    /// skipped ones.
+    pub(super) fn new(lines: u64, seq: Option<u64>, missing: Vec<[u64; 2]>, recovery: &Recovery) -> Self {
+        Self {
+            resumed: recovery.replayed.is_some(),
+            lines,
+            seq,
+            missing,
+            cut_bytes: recovery.cut,
+            warnings: recovery.warnings.iter().map(|warning| warning.message.clone()).collect(),
+        }
+    }
 }
 
 impl ReadyLine {
@@ -39,14 +60,8 @@ impl ReadyLine {
 
     /// Adds the state of an opened journal.
     pub fn resume(&mut self, beliefs: &Beliefs, recovery: &Recovery) {
-        self.recovered = Some(RecoveryPart {
-            resumed: recovery.replayed.is_some(),
-            lines: beliefs.lines(),
-            seq: beliefs.sequence(),
-            missing: beliefs.missing(),
-            cut_bytes: recovery.cut,
-            warnings: recovery.warnings.iter().map(|warning| warning.message.clone()).collect(),
-        });
+        let (lines, seq, missing) = (beliefs.lines(), beliefs.sequence(), beliefs.missing());
+        self.recovered = Some(RecoveryPart::new(lines, seq, missing, recovery));
     }
 }
 

@@ -32,6 +32,7 @@ mod reason;
 mod reason_ask;
 mod report;
 mod run;
+mod run_keeper;
 mod run_lines;
 mod run_outlet;
 mod run_session;

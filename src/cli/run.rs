@@ -8,15 +8,16 @@ use std::time::{Duration, Instant};
 use clap::{Args, ValueEnum};
 use metaplan::answers::{KeeperReadyLine, PlanningLine, ReadyLine};
 use metaplan::configure::Keeper;
-use metaplan::journal::{Journal, Policy, Sync};
+use metaplan::journal::{Journal, Policy, Recovery, Sync};
 use metaplan::knowledge::Knowledge;
-use metaplan::mapek::{Clock as _, FilterSettings, Loop, Observation, Settings, SystemClock, Watch};
+use metaplan::mapek::{Loop, Recoverable, Settings, Watch};
 use metaplan::message::Message;
 use metaplan::setup::Setup;
 
 use crate::cli::common::{Common, Exit, Failure};
 use crate::cli::configure::Wanted;
 use crate::cli::output;
+use crate::cli::run_keeper::KeeperSession;
 use crate::cli::run_lines::Lines;
 use crate::cli::run_outlet::{Outlet, Outlets, is_over};
 use crate::cli::run_session::Session;
@@ -31,11 +32,11 @@ pub struct Arguments {
     #[command(flatten)]
     situation: Situation,
     /// Run without a task plan: choose a design for every function that needs one, as `metaplan configure` does.
-    #[arg(long, conflicts_with = "journal")]
+    #[arg(long)]
     configure: bool,
     #[command(flatten)]
     wanted: Wanted,
-    /// With `--configure`: a TOML file with the section `[adaptation]` of a manifest; only its filters are used.
+    /// With `--configure`: a TOML file with the section `[adaptation]` of a manifest; only its filters and `unrecorded` are used.
     #[arg(long, value_name = "FILE", requires = "configure")]
     adaptation: Option<PathBuf>,
     /// Source of events: one JSON object per line, or an MCAP file; `-` is standard input.
@@ -82,18 +83,23 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let mut control = Loop::new(mission, settings)?;
     let events = Lines::open(&arguments.events)?;
     let mut ready = ReadyLine::new(name.clone());
-    let journal = journal(arguments, common, &mut control, &mut ready)?;
+    let journal = match journal(arguments, common, &mut control)? {
+        None => None,
+        Some((journal, recovery)) => {
+            ready.resume(control.beliefs(), &recovery);
+            Some(journal)
+        }
+    };
     let outlet = Outlet::open(&arguments.outlets, &name, painter)?;
     ended(drive(common, control, journal, &ready, events, &outlet), &outlet)
 }
 
-/// Opens the journal, if requested, and reports its state in the first line.
+/// Opens the journal, if requested, and restores the loop from it.
 fn journal(
     arguments: &Arguments,
     common: &Common,
-    control: &mut Loop,
-    ready: &mut ReadyLine,
-) -> Result<Option<Journal>, Message> {
+    control: &mut impl Recoverable,
+) -> Result<Option<(Journal, Recovery)>, Message> {
     let Some(directory) = &arguments.journal else { return Ok(None) };
     let sync = match arguments.fsync {
         Fsync::Always => Sync::Always,
@@ -102,9 +108,8 @@ fn journal(
     };
     let policy = Policy { sync, snapshot_every: arguments.snapshot_every };
     let (journal, recovery) = Journal::open(directory, policy, control)?;
-    ready.resume(control.beliefs(), &recovery);
     output::warnings(common, &recovery.warnings);
-    Ok(Some(journal))
+    Ok(Some((journal, recovery)))
 }
 
 /// Closes the outputs after the loop, also after a failure.
@@ -140,46 +145,36 @@ fn keep(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     output::warnings(common, knowledge.warnings());
     let configurator = arguments.wanted.configurator(knowledge)?;
     consistent(Some(configurator.knowledge()))?;
-    let objectives =
-        configurator.objectives().into_iter().map(|objective| objective.individual.name).collect();
-    let filters = filters(arguments.adaptation.as_deref(), configurator.knowledge())?;
-    let keeper = Keeper::new(configurator, None).with_filters(&filters);
+    let settings = adaptation(arguments.adaptation.as_deref(), configurator.knowledge())?;
+    let keeper = Keeper::new(configurator, None).with_filters(&settings.filters);
+    let mut keeper = keeper.with_unrecorded(settings.unrecorded);
     let events = Lines::open(&arguments.events)?;
+    let (journal, recovery) = journal(arguments, common, &mut keeper)?.unzip();
     let outlet = Outlet::open(&arguments.outlets, "", None)?;
-    let ready = output::line(&KeeperReadyLine::new(objectives));
-    ended(keep_going(common, keeper, &ready, events, &outlet), &outlet)
+    let ready = KeeperReadyLine::new(&keeper, recovery.as_ref());
+    ended(keep_going(common, keeper, journal, &ready, events, &outlet), &outlet)
 }
 
-/// Reads the filters of a file, or returns the default filters.
-fn filters(file: Option<&Path>, knowledge: &Knowledge) -> Result<FilterSettings, Failure> {
-    let Some(file) = file else { return Ok(FilterSettings::default()) };
-    Ok(Settings::read(file, Some(knowledge))?.filters)
+/// Reads the section `[adaptation]` of a file, or returns the default settings.
+fn adaptation(file: Option<&Path>, knowledge: &Knowledge) -> Result<Settings, Failure> {
+    let Some(file) = file else { return Ok(Settings::default()) };
+    Ok(Settings::read(file, Some(knowledge))?)
 }
 
 /// Runs the configuration loop as [`drive`] runs the planning loop.
 fn keep_going(
     common: &Common,
-    mut keeper: Keeper,
-    ready: &str,
-    mut events: Lines,
+    keeper: Keeper,
+    journal: Option<Journal>,
+    ready: &KeeperReadyLine,
+    events: Lines,
     outlet: &Outlet,
 ) -> Result<(), Failure> {
-    let mut written = outlet.say(ready);
-    let mut clock = SystemClock::default();
-    let (mut line, mut read) = (0, Instant::now());
-    let mut answers = keeper.start();
-    loop {
-        if is_over(written.and_then(|()| outlet.answer(line, &answers, read)))? {
-            return Ok(());
-        }
-        let Some(next) = events.next(common)? else { return Ok(()) };
-        read = Instant::now();
-        line += 1;
-        let now = next.now.unwrap_or_else(|| clock.now());
-        outlet.heard(line, now, &next.text);
-        answers = keeper.handle_at(&Observation::parse(&next.text), now);
-        written = Ok(());
+    if is_over(outlet.say(&output::line(ready)))? {
+        return Ok(());
     }
+    let session = KeeperSession::new(common, keeper, journal, outlet);
+    if events.is_file() { session.replay(events) } else { session.live(events) }
 }
 
 /// Time of planning before the first heartbeat, and between two heartbeats.

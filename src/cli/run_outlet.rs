@@ -18,6 +18,7 @@ use metaplan::setup::Setup;
 use metaplan::visible::visible_json;
 use serde::Serialize;
 
+use crate::cli::common::Common;
 use crate::cli::output;
 
 /// Where the run goes besides standard output.
@@ -175,6 +176,15 @@ pub(super) fn is_over(written: io::Result<()>) -> Result<bool, Message> {
 
 pub(super) fn unwritten(error: &io::Error) -> Message {
     Message::error("M321", format!("the journal cannot be written: {error}"))
+}
+
+/// Prints a warning if an answer says that the loop continues without its journal.
+pub(super) fn warn_if_unrecorded<'a>(common: &Common, answers: impl IntoIterator<Item = &'a Answer>) {
+    for answer in answers {
+        if let Answer::Unrecorded { message } = answer {
+            output::warnings(common, [&Message::warning("M324", message.clone())]);
+        }
+    }
 }
 
 /// Starts a recording, which is completed also when a signal ends the program.

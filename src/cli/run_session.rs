@@ -18,20 +18,20 @@ use metaplan::message::Message;
 
 use crate::cli::common::{Common, Failure};
 use crate::cli::run_lines::{Line, Lines};
-use crate::cli::run_outlet::{Outlet, is_over, unwritten};
+use crate::cli::run_outlet::{Outlet, is_over, unwritten, warn_if_unrecorded};
 
 /// Maximum number of lines that are read in advance.
-const MAX_WAITING: usize = 1024;
+pub(super) const MAX_WAITING: usize = 1024;
 
 /// Maximum number of consecutive cancelled searches. The next search runs to its end; otherwise
 /// input that changes all the time would prevent every plan.
 const MAX_STOPPED: u32 = 3;
 
 /// Minimum time between two timers.
-const MIN_PAUSE: Duration = Duration::from_millis(1);
+pub(super) const MIN_PAUSE: Duration = Duration::from_millis(1);
 
 /// Inputs of the loop.
-enum Input {
+pub(super) enum Input {
     Line(Line, Instant),
     Thoughts(Thoughts),
     End,
@@ -47,7 +47,7 @@ struct PlanSearch {
 
 /// Control flow after an input.
 #[derive(PartialEq, Eq)]
-enum Flow {
+pub(super) enum Flow {
     GoesOn,
     /// The reader of the answers has closed the pipe, which is not an error.
     Over,
@@ -222,9 +222,9 @@ impl<'a> Session<'a> {
             && let Some(more) = self.control.deliberate_at_once()
         {
             answers.extend(more);
-            self.decided(&answers)?;
+            self.decided(&mut answers)?;
         } else if let Some(journal) = &mut self.journal {
-            journal.reacted(&mut self.control, &answers).map_err(|error| unwritten(&error))?;
+            journal.reacted(&mut self.control, &mut answers).map_err(|error| unwritten(&error))?;
         }
         self.say(&answers)
     }
@@ -242,7 +242,7 @@ impl<'a> Session<'a> {
         if self.control.due().is_none_or(|due| due > now) {
             return Ok(Flow::GoesOn);
         }
-        let answers = match &mut self.journal {
+        let mut answers = match &mut self.journal {
             None => self.control.react(&Observation::timer(), now),
             Some(journal) => journal
                 .observe(&mut self.control, Observation::TIMER, now)
@@ -250,7 +250,7 @@ impl<'a> Session<'a> {
         };
         self.stop_thinking();
         if let Some(journal) = &mut self.journal {
-            journal.reacted(&mut self.control, &answers).map_err(|error| unwritten(&error))?;
+            journal.reacted(&mut self.control, &mut answers).map_err(|error| unwritten(&error))?;
         }
         self.say(&answers)
     }
@@ -299,8 +299,8 @@ impl<'a> Session<'a> {
     /// Deliberates at once if no search is necessary, and otherwise starts a search on another
     /// thread.
     fn deliberate(&mut self, sender: &SyncSender<Input>) -> Result<Flow, Failure> {
-        if let Some(answers) = self.control.deliberate_at_once() {
-            self.decided(&answers)?;
+        if let Some(mut answers) = self.control.deliberate_at_once() {
+            self.decided(&mut answers)?;
             return self.say(&answers);
         }
         let thinker = self.control.thinker();
@@ -319,9 +319,9 @@ impl<'a> Session<'a> {
     fn conclude(&mut self, thoughts: Thoughts) -> Result<Flow, Failure> {
         let was_stopped = self.thinking.take().is_some_and(|search| search.is_stopped);
         let is_late = self.stopped >= MAX_STOPPED;
-        if let Some(answers) = self.control.deliberate_with(thoughts, is_late) {
+        if let Some(mut answers) = self.control.deliberate_with(thoughts, is_late) {
             self.stopped = 0;
-            self.decided(&answers)?;
+            self.decided(&mut answers)?;
             self.say(&answers)
         } else {
             self.stopped = if was_stopped { self.stopped + 1 } else { 0 };
@@ -334,8 +334,8 @@ impl<'a> Session<'a> {
             thinking.stop.store(true, Ordering::Relaxed);
         }
         if self.control.has_agenda() {
-            let answers = self.control.deliberate();
-            self.decided(&answers)?;
+            let mut answers = self.control.deliberate();
+            self.decided(&mut answers)?;
             if self.say(&answers)? == Flow::Over {
                 return Ok(Flow::Over);
             }
@@ -343,7 +343,7 @@ impl<'a> Session<'a> {
         self.answer_line(line, read)
     }
 
-    fn decided(&mut self, answers: &[Answer]) -> Result<(), Failure> {
+    fn decided(&mut self, answers: &mut Vec<Answer>) -> Result<(), Failure> {
         if let Some(journal) = &mut self.journal {
             journal.decided(&mut self.control, answers).map_err(|error| unwritten(&error))?;
         }
@@ -352,6 +352,7 @@ impl<'a> Session<'a> {
 
     /// Writes answers to the last line; more may follow.
     fn say(&self, answers: &[Answer]) -> Result<Flow, Failure> {
+        warn_if_unrecorded(self.common, answers);
         let number = self.control.beliefs().lines();
         let flow = flow(self.outlet.answer_so_far(number, answers))?;
         self.outlet.plan(self.control.beliefs(), answers);
@@ -360,6 +361,7 @@ impl<'a> Session<'a> {
 
     /// Writes the last answers to a line, and its acknowledgement.
     fn answer(&self, number: u64, answers: &[Answer], read: Instant) -> Result<Flow, Failure> {
+        warn_if_unrecorded(self.common, answers);
         let flow = flow(self.outlet.answer(number, answers, read))?;
         self.outlet.plan(self.control.beliefs(), answers);
         Ok(flow)
@@ -375,7 +377,7 @@ impl<'a> Session<'a> {
 }
 
 /// Ends the run if the reader of the answers has closed the pipe.
-fn flow(written: std::io::Result<()>) -> Result<Flow, Failure> {
+pub(super) fn flow(written: std::io::Result<()>) -> Result<Flow, Failure> {
     Ok(if is_over(written)? { Flow::Over } else { Flow::GoesOn })
 }
 
@@ -390,7 +392,7 @@ fn gather(inputs: &Receiver<Input>, waiting: &mut VecDeque<Input>) {
 }
 
 /// Reads lines on a separate thread.
-fn read(mut events: Lines, common: Common, sender: SyncSender<Input>) {
+pub(super) fn read(mut events: Lines, common: Common, sender: SyncSender<Input>) {
     std::thread::spawn(move || {
         loop {
             let input = match events.next(&common) {

@@ -309,6 +309,12 @@ pub const CODES: &[[&str; 4]] = &[
         "Send the events after the number in the message again.",
     ],
     [
+        "M324",
+        "A journal is incomplete.",
+        "It could not be written, as on a full disk, and `unrecorded = \"continue\"` lets the loop continue without it.",
+        "Free disk space, and start a journal in another directory. The incomplete journal cannot be resumed.",
+    ],
+    [
         "M330",
         "A recording is truncated.",
         "Recording was interrupted. All complete messages were read.",

@@ -44,7 +44,7 @@ pub struct Configurator {
     wishes: Wishes,
     /// Objectives in need that no design could serve, or for which the robot could not change
     /// designs; they stay in need.
-    pending: BTreeSet<String>,
+    pub(super) pending: BTreeSet<String>,
 }
 
 impl Configurator {

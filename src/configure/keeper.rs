@@ -12,8 +12,8 @@ use crate::configure::choice::{Choice, Verdict, current};
 use crate::configure::configurator::{Configurator, Goal};
 use crate::knowledge::{Fault, RobotReport};
 use crate::mapek::{
-    Accepted, Answer, Event, FilterSettings, FilterStates, Filters, Numbers, Observation, Refusal, available,
-    changes, doubts, inferred,
+    Accepted, Answer, Event, FilterSettings, FilterStates, Filters, Numbers, Observation, Refusal,
+    Unrecorded, available, changes, doubts, inferred,
 };
 use crate::message::Message;
 
@@ -51,6 +51,9 @@ pub enum Service {
         optimal: bool,
         /// Number of the effect, from 1.
         effect: u64,
+        /// `true` if the change may have been requested before the program was restarted.
+        #[serde(skip_serializing_if = "std::ops::Not::not")]
+        repeated: bool,
     },
     /// No design can serve the objective now. The objective keeps its design, if any.
     #[serde(rename = "unserved")]
@@ -64,36 +67,60 @@ pub enum Service {
     },
 }
 
+impl From<Answer> for KeeperAnswer {
+    fn from(answer: Answer) -> Self {
+        Self::Loop(answer)
+    }
+}
+
+impl Service {
+    /// Marks a request as repeated.
+    #[must_use]
+    pub(super) fn repeated(mut self) -> Self {
+        if let Self::Reconfigure { repeated, .. } = &mut self {
+            *repeated = true;
+        }
+        self
+    }
+}
+
 /// Maximum number of changes of design that can be undone.
 const MAX_CHANGES: usize = 256;
 
 /// A requested change of design. It is undone if it fails, even after its acknowledgement.
 #[derive(Debug, Clone)]
-struct PendingChange {
-    objective: String,
-    from: Option<String>,
-    to: String,
+pub(super) struct PendingChange {
+    pub(super) objective: String,
+    pub(super) from: Option<String>,
+    pub(super) to: String,
 }
 
 /// Adaptation loop for the functions of a robot, without a task plan.
 #[derive(Debug, Clone)]
 pub struct Keeper {
-    configurator: Configurator,
-    limit: Option<Duration>,
+    pub(super) configurator: Configurator,
+    pub(super) limit: Option<Duration>,
     /// Sequence numbers of the received lines.
-    numbers: Numbers,
-    effects: u64,
-    pending_changes: BTreeMap<u64, PendingChange>,
-    available: BTreeSet<String>,
-    statuses: BTreeMap<String, Vec<String>>,
-    violated: BTreeSet<String>,
-    fault: Option<Fault>,
+    pub(super) numbers: Numbers,
+    pub(super) effects: u64,
+    pub(super) pending_changes: BTreeMap<u64, PendingChange>,
+    /// Latest requested change of each objective, unless it was acknowledged or has failed.
+    pub(super) outstanding: BTreeMap<u64, Service>,
+    pub(super) available: BTreeSet<String>,
+    pub(super) statuses: BTreeMap<String, Vec<String>>,
+    pub(super) violated: BTreeSet<String>,
+    pub(super) fault: Option<Fault>,
     /// Last reported reasons for each objective that no design can serve.
-    unserved: BTreeMap<String, Vec<String>>,
-    filters: Filters,
-    states: FilterStates,
+    pub(super) unserved: BTreeMap<String, Vec<String>>,
+    pub(super) filters: Filters,
+    pub(super) unrecorded: Unrecorded,
+    pub(super) states: FilterStates,
+    /// `true` once the first choice was made.
+    pub(super) has_begun: bool,
+    /// Number of received lines.
+    pub(super) lines: u64,
     /// Time of the last line, since the start.
-    now: Duration,
+    pub(super) now: Duration,
 }
 
 impl Keeper {
@@ -107,6 +134,7 @@ impl Keeper {
             numbers: Numbers::default(),
             effects: 0,
             pending_changes: BTreeMap::new(),
+            outstanding: BTreeMap::new(),
             available,
             statuses: BTreeMap::new(),
             violated: BTreeSet::new(),
@@ -114,7 +142,10 @@ impl Keeper {
             unserved: BTreeMap::new(),
             states: filters.states(Some(configurator.knowledge())),
             filters,
+            unrecorded: Unrecorded::default(),
             configurator,
+            has_begun: false,
+            lines: 0,
             now: Duration::ZERO,
         }
     }
@@ -127,10 +158,37 @@ impl Keeper {
         Self { filters, states, ..self }
     }
 
+    /// Sets the reaction to a journal that cannot be written.
+    #[must_use]
+    pub fn with_unrecorded(self, unrecorded: Unrecorded) -> Self {
+        Self { unrecorded, ..self }
+    }
+
     /// Returns the time since the start at which a filter needs a tick, if nothing else is
     /// reported.
     pub fn due(&self) -> Option<Duration> {
         self.filters.due(&self.states)
+    }
+
+    /// Returns the time of the last line, since the start.
+    pub fn now(&self) -> Duration {
+        self.now
+    }
+
+    /// Returns the number of received lines.
+    pub fn lines(&self) -> u64 {
+        self.lines
+    }
+
+    /// Returns the greatest sequence number of a line.
+    pub fn sequence(&self) -> Option<u64> {
+        self.numbers.greatest()
+    }
+
+    /// Returns the ranges of sequence numbers below the greatest one that were never received, with
+    /// both ends.
+    pub fn missing(&self) -> Vec<[u64; 2]> {
+        self.numbers.missing()
     }
 
     /// Returns the configurator, with the knowledge and the served objectives.
@@ -141,6 +199,7 @@ impl Keeper {
     /// Makes the first choice.
     pub fn start(&mut self) -> Vec<KeeperAnswer> {
         let mut answers = Vec::new();
+        self.has_begun = true;
         self.adapt(&mut answers);
         answers
     }
@@ -155,6 +214,7 @@ impl Keeper {
     /// decrease.
     pub fn handle_at(&mut self, observation: &Observation, now: Duration) -> Vec<KeeperAnswer> {
         let mut answers = Vec::new();
+        self.lines += u64::from(!observation.is_timer);
         self.now = self.now.max(observation.time.unwrap_or(now));
         // A line that was received before must not have an effect again.
         if let Some(refusal) = observation.sequence.and_then(|seq| self.numbers.refused(seq)) {
@@ -199,9 +259,13 @@ impl Keeper {
                 self.configurator.pursue(&goal).map_err(refused)?;
             }
             Event::ObjectiveRemoved { objective } => self.give_up(objective, answers)?,
-            Event::Acknowledged { effect } => self.check_effect(*effect)?,
+            Event::Acknowledged { effect } => {
+                self.check_effect(*effect)?;
+                self.outstanding.remove(effect);
+            }
             Event::ReconfigurationFailed { effect } => {
                 self.check_effect(*effect)?;
+                self.outstanding.remove(effect);
                 self.undo(*effect).map_err(refused)?;
             }
             Event::Design { design, realisable } => {
@@ -280,7 +344,7 @@ impl Keeper {
             && let Some(design) = current(objective)
         {
             self.effects += 1;
-            answers.push(KeeperAnswer::Service(Service::Reconfigure {
+            let reconfigure = Service::Reconfigure {
                 objective: objective.individual.name.clone(),
                 function: objective.function.as_ref().map(|function| function.name.clone()),
                 from: Some(design.to_owned()),
@@ -288,7 +352,9 @@ impl Keeper {
                 because: vec!["the objective was given up".to_owned()],
                 optimal: true,
                 effect: self.effects,
-            }));
+                repeated: false,
+            };
+            answers.push(self.request(&objective.individual.name, reconfigure));
         }
         // A failed change of a removed objective needs no undo.
         self.pending_changes.retain(|_, pending_changes| pending_changes.objective != name);
@@ -350,7 +416,8 @@ impl Keeper {
             }
             let (from, to) = (choice.before.clone(), choice.design.clone());
             let (because, effect) = (reasons_of(choice), self.effects);
-            answers.push(KeeperAnswer::Service(Service::Reconfigure {
+            let name = objective.clone();
+            let reconfigure = Service::Reconfigure {
                 objective,
                 function,
                 from,
@@ -358,8 +425,19 @@ impl Keeper {
                 because,
                 optimal,
                 effect,
-            }));
+                repeated: false,
+            };
+            answers.push(self.request(&name, reconfigure));
         }
+    }
+
+    /// Stores a change as the outstanding change of its objective, in place of earlier changes.
+    fn request(&mut self, name: &str, reconfigure: Service) -> KeeperAnswer {
+        self.outstanding.retain(
+            |_, earlier| !matches!(earlier, Service::Reconfigure { objective, .. } if objective == name),
+        );
+        self.outstanding.insert(self.effects, reconfigure.clone());
+        KeeperAnswer::Service(reconfigure)
     }
 
     /// Reports the designs and objectives whose conclusions have changed.

@@ -13,6 +13,7 @@
 mod choice;
 mod configurator;
 mod keeper;
+mod record;
 
 pub use choice::{Choice, Configuration, Considered, Verdict, Wishes, Worth};
 pub use configurator::{Configurator, Goal};

@@ -10,6 +10,10 @@ use serde_json::Value;
 use super::record::{FORMAT, Link, Record, opening};
 use crate::message::Message;
 
+/// Kind of a segment's file in place of `journal` if a write to the segment has failed and the loop
+/// continues. Both words have the same length, so that renaming needs no disk space.
+pub(super) const INCOMPLETE: &str = "partial";
+
 /// A segment, up to its first fault.
 #[derive(Debug)]
 pub(super) struct Segment {
@@ -60,6 +64,8 @@ pub(super) struct JournalFiles {
     /// Segments by number, or the fault that makes a segment unreadable.
     pub(super) segments: BTreeMap<u64, Result<Segment, String>>,
     pub(super) snapshots: BTreeMap<u64, Result<SnapshotFile, String>>,
+    /// Number of the segment at whose end a write has failed, if the loop continued.
+    pub(super) incomplete: Option<u64>,
 }
 
 impl JournalFiles {
@@ -75,7 +81,8 @@ impl JournalFiles {
             let Ok(number) = number.parse::<u64>() else { continue };
             let bytes = || read_private(&directory.join(&name)).map_err(|error| error.to_string());
             match kind {
-                "journal" => {
+                "journal" | INCOMPLETE => {
+                    contents.incomplete = Some(number).filter(|_| kind == INCOMPLETE).or(contents.incomplete);
                     contents.segments.insert(number, bytes().and_then(|bytes| segment(&bytes, number)));
                 }
                 "snapshot" => {
@@ -85,6 +92,27 @@ impl JournalFiles {
             }
         }
         Ok(contents)
+    }
+
+    /// Returns the name of a segment's file.
+    pub(super) fn name(&self, number: u64) -> String {
+        name(if self.incomplete == Some(number) { INCOMPLETE } else { "journal" }, number)
+    }
+
+    /// Checks that no write has failed.
+    ///
+    /// # Errors
+    /// M324 if the loop continued after a failed write.
+    pub(super) fn require_complete(&self, directory: &Path) -> Result<(), Message> {
+        let Some(number) = self.incomplete else { return Ok(()) };
+        let text = format!(
+            "the journal cannot be resumed: it could not be written after {}, and the loop continued without it, so that the \
+             numbers of later effects would be used twice",
+            self.name(number)
+        );
+        let help = "free disk space, and start a journal in another directory; `metaplan journal show` lists the \
+                    records";
+        Err(Message::at("M324", &directory.display().to_string(), None, text).with_help(help))
     }
 
     /// Returns the sound snapshot with which the segment of this number begins.

@@ -20,6 +20,9 @@
 //! system releases when the process ends. The file also stores the number of records, so that
 //! missing records are detected.
 //!
+//! If a write fails, no answer leaves the program. With [`Unrecorded::Continue`], the segment is then
+//! renamed, so that the journal cannot be resumed, and the loop continues without it.
+//!
 //! - \[1\] C. Mohan et al.: ARIES, a transaction recovery method, ACM TODS 17, 1992.
 
 mod directory;
@@ -36,11 +39,11 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 
-use crate::mapek::{Answer, Decision, Loop, Observation, Snapshot};
+use crate::mapek::{Answer, Decision, Observation, Recoverable, Snapshot, Unrecorded};
 use crate::message::Message;
 pub use recovery::Recovery;
 
-use directory::{JournalFiles, Segment, broken, closing, name, path};
+use directory::{INCOMPLETE, JournalFiles, Segment, broken, closing, name, path};
 use lock::Lock;
 use record::{Link, header};
 use recover::{Replay, Unfinished, settle, usable};
@@ -90,6 +93,12 @@ pub struct Journal {
     /// Work that was begun and not decided when the program ended.
     unfinished: Option<Unfinished>,
     digest: String,
+    /// Reaction to a failed write.
+    unrecorded: Unrecorded,
+    /// `true` after a failed write if the loop continues.
+    is_incomplete: bool,
+    /// Message about the failed write, until it is answered.
+    notice: Option<String>,
 }
 
 impl Journal {
@@ -99,13 +108,17 @@ impl Journal {
     ///
     /// # Errors
     /// The directory cannot be used, or another process uses it; or the journal is damaged or
-    /// belongs to another mission. The journal is unchanged in these cases.
-    pub fn open(directory: &Path, policy: Policy, control: &mut Loop) -> Result<(Self, Recovery), Message> {
+    /// incomplete, or belongs to another mission. The journal is unchanged in these cases.
+    pub fn open<C: Recoverable>(
+        directory: &Path,
+        policy: Policy,
+        control: &mut C,
+    ) -> Result<(Self, Recovery), Message> {
         let failed = |error: io::Error| broken(directory, &error.to_string());
         directory::make_directory(directory).map_err(failed)?;
         let lock = Lock::take(directory)?;
         let contents = JournalFiles::read(directory).map_err(failed)?;
-        let digest = control.digest();
+        let (digest, unrecorded) = (control.digest(), control.unrecorded());
         let mut recovery = Recovery::default();
         let directory = directory.to_owned();
         if contents.segments.is_empty() && contents.snapshots.is_empty() {
@@ -117,8 +130,20 @@ impl Journal {
                 .map_err(|error| broken(&directory, &error.to_string()))?;
             let unfinished = Some(Unfinished::Agenda);
             let (segment, observations) = (0, 0);
-            let journal =
-                Self { directory, policy, segment, file, link, lock, observations, unfinished, digest };
+            let journal = Self {
+                directory,
+                policy,
+                segment,
+                file,
+                link,
+                lock,
+                observations,
+                unfinished,
+                digest,
+                unrecorded,
+                is_incomplete: false,
+                notice: None,
+            };
             return Ok((journal, recovery));
         }
         let failed = |error: io::Error| broken(&directory, &error.to_string());
@@ -137,7 +162,20 @@ impl Journal {
             recovery.warnings.push(Message::warning("M323", text));
         }
         let segment = segments.last().map_or(from, |last| last.number);
-        let journal = Self { directory, policy, segment, file, link, lock, observations, unfinished, digest };
+        let journal = Self {
+            directory,
+            policy,
+            segment,
+            file,
+            link,
+            lock,
+            observations,
+            unfinished,
+            digest,
+            unrecorded,
+            is_incomplete: false,
+            notice: None,
+        };
         Ok((journal, recovery))
     }
 
@@ -146,7 +184,7 @@ impl Journal {
     /// # Errors
     /// The journal cannot be resumed: it is damaged, or belongs to another mission, or the mission
     /// leads to other decisions.
-    pub fn rehearse(directory: &Path, control: &mut Loop) -> Result<Recovery, Message> {
+    pub fn rehearse<C: Recoverable>(directory: &Path, control: &mut C) -> Result<Recovery, Message> {
         let contents =
             JournalFiles::read(directory).map_err(|error| broken(directory, &error.to_string()))?;
         let mut recovery = Recovery::default();
@@ -160,18 +198,21 @@ impl Journal {
     ///
     /// # Errors
     /// The journal cannot be written; the answers must not leave the program.
-    pub fn begin(&mut self, control: &mut Loop) -> io::Result<Vec<Answer>> {
+    pub fn begin<C: Recoverable>(&mut self, control: &mut C) -> io::Result<Vec<C::Answer>> {
         let mut answers = Vec::new();
         if let Some(unfinished) = self.unfinished.take() {
             answers = match unfinished {
                 Unfinished::Agenda => control.deliberate(),
                 Unfinished::Observation(line, now) => {
                     self.observations += 1;
-                    control.handle(&Observation::recorded(&line), Duration::from_micros(now))
+                    let observation = Observation::recorded(&line);
+                    let mut answers = control.react(&observation, Duration::from_micros(now));
+                    answers.extend(control.deliberate());
+                    answers
                 }
             };
             let decision = control.decision(&answers);
-            self.decide(&decision)?;
+            self.write(|journal| journal.decide(&decision))?;
         }
         self.again(control, answers)
     }
@@ -181,25 +222,32 @@ impl Journal {
     ///
     /// # Errors
     /// The journal cannot be written; the answers must not leave the program.
-    pub fn begin_reacting(&mut self, control: &mut Loop) -> io::Result<Vec<Answer>> {
+    pub fn begin_reacting<C: Recoverable>(&mut self, control: &mut C) -> io::Result<Vec<C::Answer>> {
         let mut answers = Vec::new();
         if let Some(Unfinished::Observation(line, now)) = self.unfinished.take() {
             self.observations += 1;
             answers = control.react(&Observation::recorded(&line), Duration::from_micros(now));
-            self.reacted(control, &answers)?;
+            self.reacted(control, &mut answers)?;
         }
         self.again(control, answers)
     }
 
     /// Returns answers and effects that were not acknowledged, for repeated output.
-    fn again(&mut self, control: &Loop, mut answers: Vec<Answer>) -> io::Result<Vec<Answer>> {
-        self.file.sync_data()?;
-        self.lock.store_count(self.link.next)?;
+    fn again<C: Recoverable>(
+        &mut self,
+        control: &C,
+        mut answers: Vec<C::Answer>,
+    ) -> io::Result<Vec<C::Answer>> {
+        self.write(|journal| {
+            journal.file.sync_data()?;
+            journal.lock.store_count(journal.link.next)
+        })?;
         // Effects of the new answers must not be repeated.
-        let fresh: Vec<u64> = answers.iter().filter_map(Answer::effect).map(|effect| effect.number).collect();
+        let fresh: Vec<u64> = answers.iter().filter_map(C::effect).collect();
         let again = control.repeat().into_iter();
-        let is_fresh = |answer: &Answer| answer.effect().is_some_and(|effect| fresh.contains(&effect.number));
+        let is_fresh = |answer: &C::Answer| C::effect(answer).is_some_and(|effect| fresh.contains(&effect));
         answers.extend(again.filter(|answer| !is_fresh(answer)));
+        self.give_notice::<C>(&mut answers);
         Ok(answers)
     }
 
@@ -208,10 +256,15 @@ impl Journal {
     ///
     /// # Errors
     /// The journal cannot be written; the answers must not leave the program.
-    pub fn handle(&mut self, control: &mut Loop, line: &str, now: Duration) -> io::Result<Vec<Answer>> {
+    pub fn handle<C: Recoverable>(
+        &mut self,
+        control: &mut C,
+        line: &str,
+        now: Duration,
+    ) -> io::Result<Vec<C::Answer>> {
         let mut answers = self.observe(control, line, now)?;
         answers.extend(control.deliberate());
-        self.decided(control, &answers)?;
+        self.decided(control, &mut answers)?;
         Ok(answers)
     }
 
@@ -220,45 +273,104 @@ impl Journal {
     ///
     /// # Errors
     /// The journal cannot be written; the answers must not leave the program.
-    pub fn observe(&mut self, control: &mut Loop, line: &str, now: Duration) -> io::Result<Vec<Answer>> {
+    pub fn observe<C: Recoverable>(
+        &mut self,
+        control: &mut C,
+        line: &str,
+        now: Duration,
+    ) -> io::Result<Vec<C::Answer>> {
         let micros = u64::try_from(now.as_micros()).unwrap_or(u64::MAX);
-        self.append("event", &[json!(micros), json!(line)])?;
+        self.write(|journal| journal.append("event", &[json!(micros), json!(line)]))?;
         self.observations += 1;
-        Ok(control.react(&Observation::recorded(line), Duration::from_micros(micros)))
+        let mut answers = control.react(&Observation::recorded(line), Duration::from_micros(micros));
+        self.give_notice::<C>(&mut answers);
+        Ok(answers)
     }
 
-    /// Writes the answers of [`Journal::observe`].
+    /// Writes the answers of [`Journal::observe`]. Adds an answer if the loop continues without the journal.
     ///
     /// # Errors
     /// The journal cannot be written; the answers must not leave the program.
-    pub fn reacted(&mut self, control: &mut Loop, answers: &[Answer]) -> io::Result<()> {
+    pub fn reacted<C: Recoverable>(
+        &mut self,
+        control: &mut C,
+        answers: &mut Vec<C::Answer>,
+    ) -> io::Result<()> {
         let decision = control.decision(answers);
-        self.append("reaction", &[json!(decision.answers)])?;
-        self.keep(answers)
-    }
-
-    /// Writes the answers of a deliberation, after the answers to the previous observation if these
-    /// were not written.
-    ///
-    /// # Errors
-    /// The journal cannot be written; the answers must not leave the program.
-    pub fn decided(&mut self, control: &mut Loop, answers: &[Answer]) -> io::Result<()> {
-        let decision = control.decision(answers);
-        self.decide(&decision)?;
-        self.keep(answers)?;
-        // A snapshot cannot store a pending deliberation.
-        if self.observations >= self.policy.snapshot_every && !control.has_agenda() {
-            self.checkpoint(control)?;
-        }
+        self.write(|journal| {
+            journal.append("reaction", &[json!(decision.answers)])?;
+            journal.keep::<C>(answers)
+        })?;
+        self.give_notice::<C>(answers);
         Ok(())
     }
 
+    /// Writes the answers of a deliberation, after the answers to the previous observation if these
+    /// were not written. Adds an answer if the loop continues without the journal.
+    ///
+    /// # Errors
+    /// The journal cannot be written; the answers must not leave the program.
+    pub fn decided<C: Recoverable>(
+        &mut self,
+        control: &mut C,
+        answers: &mut Vec<C::Answer>,
+    ) -> io::Result<()> {
+        let decision = control.decision(answers);
+        self.write(|journal| {
+            journal.decide(&decision)?;
+            journal.keep::<C>(answers)?;
+            // A snapshot cannot store a pending deliberation.
+            if journal.observations >= journal.policy.snapshot_every && !control.has_agenda() {
+                journal.checkpoint(control)?;
+            }
+            Ok(())
+        })?;
+        self.give_notice::<C>(answers);
+        Ok(())
+    }
+
+    /// Performs a write, unless the loop continues without the journal. If the write fails and the loop
+    /// may continue, the journal is marked as incomplete.
+    fn write(&mut self, write: impl FnOnce(&mut Self) -> io::Result<()>) -> io::Result<()> {
+        if self.is_incomplete {
+            return Ok(());
+        }
+        let Err(error) = write(self) else { return Ok(()) };
+        if self.unrecorded == Unrecorded::Stop {
+            return Err(error);
+        }
+        // Without the mark, a resumed loop would use the numbers of effects twice.
+        self.mark_incomplete().map_err(|fault| {
+            let text = format!("{error}; and it cannot be marked as incomplete: {fault}");
+            io::Error::new(error.kind(), text)
+        })?;
+        self.is_incomplete = true;
+        self.notice = Some(format!(
+            "the journal cannot be written: {error}; the run continues without it, and the journal cannot be resumed"
+        ));
+        Ok(())
+    }
+
+    /// Renames the last segment, which needs no disk space.
+    fn mark_incomplete(&self) -> io::Result<()> {
+        let from = path(&self.directory, "journal", self.segment);
+        std::fs::rename(from, path(&self.directory, INCOMPLETE, self.segment))?;
+        sync_directory(&self.directory)
+    }
+
+    /// Adds the answer about a failed write, once.
+    fn give_notice<C: Recoverable>(&mut self, answers: &mut Vec<C::Answer>) {
+        if let Some(message) = self.notice.take() {
+            answers.insert(0, Answer::Unrecorded { message }.into());
+        }
+    }
+
     /// Flushes answers to the disk according to the policy.
-    fn keep(&mut self, answers: &[Answer]) -> io::Result<()> {
+    fn keep<C: Recoverable>(&mut self, answers: &[C::Answer]) -> io::Result<()> {
         // `Effects` is sufficient, because only effects change the world.
         let must = match self.policy.sync {
             Sync::Always => true,
-            Sync::Effects => answers.iter().any(|answer| answer.effect().is_some()),
+            Sync::Effects => answers.iter().any(|answer| C::effect(answer).is_some()),
             Sync::Never => false,
         };
         if must {
@@ -280,7 +392,7 @@ impl Journal {
 
     /// Begins a new segment, ends the current one and writes a snapshot, in this order. Older
     /// generations are removed.
-    fn checkpoint(&mut self, control: &Loop) -> io::Result<()> {
+    fn checkpoint<C: Recoverable>(&mut self, control: &mut C) -> io::Result<()> {
         let next = self.segment + 1;
         let (end, at) = closing(&self.link, self.segment);
         let (file, link) = create_segment(&self.directory, &at, &self.digest, next)?;
@@ -288,7 +400,7 @@ impl Journal {
         self.file.sync_data()?;
         (self.file, self.link, self.segment, self.observations) = (file, link, next, 0);
         self.lock.store_count(self.link.next)?;
-        let line = snapshot_line(&at, &self.digest, next, control);
+        let line = record::snapshot(&at, &self.digest, next, &control.checkpoint().0);
         write_snapshot(&self.directory, next, &line)?;
         for entry in std::fs::read_dir(&self.directory)? {
             let name = entry?.file_name();
@@ -317,12 +429,13 @@ struct Resumed<'c> {
 }
 
 /// Restores a loop from the newest sound snapshot and the later observations.
-fn resume<'c>(
+fn resume<'c, C: Recoverable>(
     directory: &Path,
     contents: &'c JournalFiles,
-    control: &mut Loop,
+    control: &mut C,
     recovery: &mut Recovery,
 ) -> Result<Resumed<'c>, Message> {
+    contents.require_complete(directory)?;
     let digest = control.digest();
     let (from, segments) =
         usable(contents, &mut recovery.warnings).map_err(|text| broken(directory, &text))?;
@@ -339,10 +452,13 @@ fn resume<'c>(
     let mut replay = Replay { directory, control, recovery, observations: 0, unfinished: None };
     let mut missing_snapshots = Vec::new();
     for segment in &segments {
-        // A crash between the creation of a segment and its snapshot leaves the snapshot missing.
-        if segment.number > from && contents.start(segment.number).is_err() {
-            let line = snapshot_line(&segment.before, &digest, segment.number, replay.control);
-            missing_snapshots.push((segment.number, line));
+        if segment.number > from {
+            let snapshot = replay.control.checkpoint();
+            // A crash between the creation of a segment and its snapshot leaves the snapshot missing.
+            if contents.start(segment.number).is_err() {
+                let line = record::snapshot(&segment.before, &digest, segment.number, &snapshot.0);
+                missing_snapshots.push((segment.number, line));
+            }
         }
         replay.segment(segment)?;
     }
@@ -359,10 +475,6 @@ fn create_segment(directory: &Path, after: &Link, digest: &str, number: u64) -> 
     let file = file.persist(path(directory, "journal", number)).map_err(|error| error.error)?;
     sync_directory(directory)?;
     Ok((file, link))
-}
-
-fn snapshot_line(at: &Link, digest: &str, number: u64, control: &Loop) -> String {
-    record::snapshot(at, digest, number, &control.snapshot().0)
 }
 
 /// Writes a snapshot. An existing snapshot that was not usable is kept under another name.

@@ -9,7 +9,7 @@ use std::time::Duration;
 use super::directory::{End, JournalFiles, OLD_FORMAT, Segment, broken, closing, open_private, path};
 use super::record::{Link, Record};
 use super::recovery::Recovery;
-use crate::mapek::{Answer, Loop, Observation};
+use crate::mapek::{Observation, Recoverable};
 use crate::message::Message;
 
 /// Unfinished work that is decided first.
@@ -63,16 +63,16 @@ pub(super) fn usable<'a>(
 }
 
 /// Replays records on a loop.
-pub(super) struct Replay<'a> {
+pub(super) struct Replay<'a, C> {
     pub(super) directory: &'a Path,
-    pub(super) control: &'a mut Loop,
+    pub(super) control: &'a mut C,
     pub(super) recovery: &'a mut Recovery,
     /// Number of observations in the last segment.
     pub(super) observations: u64,
     pub(super) unfinished: Option<Unfinished>,
 }
 
-impl Replay<'_> {
+impl<C: Recoverable> Replay<'_, C> {
     /// Replays a segment.
     pub(super) fn segment(&mut self, segment: &Segment) -> Result<(), Message> {
         self.observations = 0;
@@ -132,7 +132,7 @@ impl Replay<'_> {
     }
 
     /// Compares answers with the recorded ones.
-    fn compare(&mut self, written: &Record, answers: &[Answer]) -> Result<(), Message> {
+    fn compare(&mut self, written: &Record, answers: &[C::Answer]) -> Result<(), Message> {
         if self.control.decision(answers).agrees(&written.list(0)) {
             return Ok(());
         }

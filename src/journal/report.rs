@@ -48,13 +48,15 @@ impl JournalReport {
             return Err(broken(directory, "there is none"));
         }
         let (mut parts, mut messages, mut entries) = (Vec::new(), Vec::new(), Vec::new());
-        if let Err(text) = usable(&contents, &mut messages) {
+        if let Err(message) = contents.require_complete(directory) {
+            messages.push(message);
+        } else if let Err(text) = usable(&contents, &mut messages) {
             messages.push(broken(directory, &text));
         }
         for (number, segment) in &contents.segments {
             match segment {
                 Ok(segment) => {
-                    parts.push(format!("{}: {}", name("journal", *number), describe(segment)));
+                    parts.push(format!("{}: {}", contents.name(*number), describe(segment)));
                     entries.extend(segment.records.iter().map(|record| Entry {
                         record: record.number,
                         segment: *number,
@@ -67,7 +69,7 @@ impl JournalReport {
                         },
                     }));
                 }
-                Err(text) => parts.push(format!("{}: {text}", name("journal", *number))),
+                Err(text) => parts.push(format!("{}: {text}", contents.name(*number))),
             }
         }
         for (number, snapshot) in &contents.snapshots {

@@ -40,7 +40,8 @@ pub(super) fn keys(answer: &str) -> Vec<String> {
         "suspend_action" | "resume_action" | "cancel_action" => vec!["suspension".to_owned()],
         // A plan that is found, lost or kept: lines of all three kinds are repeated in their order,
         // since the cost of a kept plan is in the first.
-        kind @ ("plan_found" | "plan_none" | "plan_kept" | "ready" | "contradicted" | "unconcluded") => {
+        kind @ ("plan_found" | "plan_none" | "plan_kept" | "ready" | "contradicted" | "unconcluded"
+        | "unrecorded") => {
             vec![kind.to_owned()]
         }
         "reconfigure" => about.function.map(|function| format!("function {function}")).into_iter().collect(),
@@ -62,6 +63,7 @@ mod tests {
     fn answers_have_state_keys() {
         let check = |answer: &str, expected: &[&str]| assert_eq!(keys(answer), expected, "{answer}");
         check(r#"{"answer":"ready"}"#, &["ready"]);
+        check(r#"{"answer":"unrecorded","message":"x"}"#, &["unrecorded"]);
         check(r#"{"answer":"plan_found","cost":1,"steps":[]}"#, &["plan_found"]);
         check(r#"{"answer":"plan_none","status":"unsolvable"}"#, &["plan_none"]);
         check(r#"{"answer":"plan_kept","because":"x"}"#, &["plan_kept"]);

@@ -112,6 +112,11 @@ pub enum Answer {
         /// Greatest number that is too old.
         mark: u64,
     },
+    /// The journal cannot be written and is now incomplete. The loop continues without it.
+    Unrecorded {
+        /// Description of the fault and its consequences.
+        message: String,
+    },
     /// The line, or a part of it, was refused and has changed nothing.
     Error {
         /// A stable code.
@@ -277,6 +282,7 @@ impl Answer {
             Self::Silent { .. } => "silent",
             Self::Duplicate { .. } => "duplicate",
             Self::Stale { .. } => "stale",
+            Self::Unrecorded { .. } => "unrecorded",
             Self::Error { .. } => "error",
         }
     }
@@ -334,6 +340,7 @@ impl Answer {
                 object.serialize_entry("seq", sequence)?;
                 object.serialize_entry("because", &because)
             }
+            Self::Unrecorded { message } => object.serialize_entry("message", message),
             Self::Error { code, message } => {
                 object.serialize_entry("code", code)?;
                 object.serialize_entry("message", message)

@@ -101,6 +101,11 @@ impl Loop {
         Ok(Self { settings, beliefs, monitor, planner, agenda, question: 0, digest })
     }
 
+    /// Returns the settings of the loop.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
     /// State of the loop.
     pub fn beliefs(&self) -> &Beliefs {
         &self.beliefs

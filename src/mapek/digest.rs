@@ -2,13 +2,16 @@
 
 use sha2::{Digest as _, Sha256};
 
+use crate::knowledge::Knowledge;
 use crate::mapek::event::FORMAT;
-use crate::mapek::settings::Settings;
+use crate::mapek::settings::{Settings, Unrecorded};
 use crate::mission::Mission;
 
 /// Hashes everything that initial decisions depend on: facts, rules, domain, filled problem, bindings, settings, and
 /// the versions of program and format.
 pub(super) fn digest(mission: &Mission, settings: &Settings) -> String {
+    // A journal that can be resumed is complete, so the reaction to a failed write does not matter.
+    let settings = settings.clone().with_unrecorded(Unrecorded::default());
     let mut problem = mission.problem().clone();
     mission.fill(&mut problem);
     let mut parts = vec![
@@ -21,11 +24,23 @@ pub(super) fn digest(mission: &Mission, settings: &Settings) -> String {
         pddl::print_problem(&problem),
     ];
     if let Some(knowledge) = mission.knowledge() {
-        let engine = knowledge.engine();
-        let facts: Vec<rules::Fact> = engine.facts().collect();
-        parts.push(ontology::ntriples(engine.symbols(), &facts));
-        parts.push(rules::print_rules(engine.program(), engine.symbols(), &rules::Prefixes::default()));
+        parts.extend(knowledge_parts(knowledge));
     }
+    checksum(&parts)
+}
+
+/// The facts and the rules of a knowledge base as text.
+pub(crate) fn knowledge_parts(knowledge: &Knowledge) -> [String; 2] {
+    let engine = knowledge.engine();
+    let facts: Vec<rules::Fact> = engine.facts().collect();
+    [
+        ontology::ntriples(engine.symbols(), &facts),
+        rules::print_rules(engine.program(), engine.symbols(), &rules::Prefixes::default()),
+    ]
+}
+
+/// Returns the first half of the SHA-256 of texts with their lengths, in hexadecimal digits.
+pub(crate) fn checksum(parts: &[String]) -> String {
     let mut hash = Sha256::new();
     for part in parts {
         hash.update((part.len() as u64).to_le_bytes());

@@ -49,6 +49,12 @@ fn essence(mut answer: Value) -> Value {
             strip("objectives", "because");
         }
         "contradicted" => strip("contradictions", "facts"),
+        // Without a task plan, the reasons for a design are explanations, too.
+        "reconfigure" | "unserved" => {
+            if let Some(object) = answer.as_object_mut() {
+                object.remove("because");
+            }
+        }
         _ => {}
     }
     answer
@@ -260,7 +266,7 @@ fn effect_from_record(record: &Value) -> Option<Effect> {
     Some(Effect { number, action, command, repeated: false, supersedes })
 }
 
-fn statement_to_record(statement: &Statement) -> Value {
+pub(crate) fn statement_to_record(statement: &Statement) -> Value {
     let part = |part: &Part| match part {
         Part::Name(name) => json!(name),
         Part::Literal(lexical, datatype) => json!([lexical, datatype]),
@@ -268,7 +274,7 @@ fn statement_to_record(statement: &Statement) -> Value {
     json!([statement.predicate, statement.arguments.iter().map(part).collect::<Vec<_>>()])
 }
 
-fn statement_from_record(record: &Value) -> Option<Statement> {
+pub(crate) fn statement_from_record(record: &Value) -> Option<Statement> {
     let text = |value: &Value| value.as_str().map(ToOwned::to_owned);
     let part = |part: &Value| match part {
         Value::Array(pair) => Some(Part::Literal(text(pair.first()?)?, text(pair.get(1)?)?)),

@@ -70,6 +70,11 @@ pub struct AdaptationSection {
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     deadline_factor: Option<Spanned<toml::Value>>,
+    /// Reaction if the journal cannot be written, as on a full disk: `stop` ends the program; `continue`
+    /// marks the journal as incomplete, so that it cannot be resumed, answers `unrecorded`, and continues
+    /// without it.
+    #[serde(default)]
+    unrecorded: Unrecorded,
 }
 
 /// A file that contains only the section `adaptation`.
@@ -92,6 +97,17 @@ pub enum SafeReaction {
     Suspend,
 }
 
+/// Reaction to a journal that cannot be written.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Unrecorded {
+    /// The loop stops before the answers that are not recorded leave the program.
+    #[default]
+    Stop,
+    /// The journal is marked as incomplete, and the loop continues without it.
+    Continue,
+}
+
 impl AdaptationSection {
     /// Returns the settings, with defaults for missing keys.
     ///
@@ -99,8 +115,8 @@ impl AdaptationSection {
     /// A value is not a number, or negative.
     pub fn settings(&self, origin: &ManifestPath) -> Result<Settings, Message> {
         let filters = filters(&self.confirm_time, &self.heal_time, &self.components, &self.measured, origin)?;
-        let (stay_close, safe_reaction) = (self.stay_close, self.safe_reaction);
-        let mut settings = Settings { stay_close, filters, safe_reaction, ..Settings::default() };
+        let (stay_close, safe_reaction, unrecorded) = (self.stay_close, self.safe_reaction, self.unrecorded);
+        let mut settings = Settings { stay_close, filters, safe_reaction, unrecorded, ..Settings::default() };
         if let Some(value) = &self.band {
             settings.filters.band = origin.number("band", value)?;
         }
@@ -160,6 +176,8 @@ pub struct Settings {
     pub deadline_factor: f64,
     /// Unit of the domain's times.
     pub time_unit: TimeUnit,
+    /// Reaction to a journal that cannot be written.
+    pub unrecorded: Unrecorded,
 }
 
 impl Settings {
@@ -222,6 +240,12 @@ impl Settings {
         Self { deadline, ..self }
     }
 
+    /// Sets the reaction to a journal that cannot be written.
+    #[must_use]
+    pub fn with_unrecorded(self, unrecorded: Unrecorded) -> Self {
+        Self { unrecorded, ..self }
+    }
+
     /// Sets [`Settings::time_unit`].
     #[must_use]
     pub fn with_time_unit(self, time_unit: TimeUnit) -> Self {
@@ -265,6 +289,7 @@ impl Default for Settings {
             deadline: DEADLINE,
             deadline_factor: 3.0,
             time_unit: TimeUnit::default(),
+            unrecorded: Unrecorded::default(),
         }
     }
 }

@@ -65,7 +65,11 @@ fn happening(answer: &Value) -> (Kind, String, Vec<Reason>) {
         "request_action" => (Kind::Effect, format!("begin {}", action(answer, "name")), Vec::new()),
         "reconfigure" => {
             let from = answer["from"].as_str().map(|from| format!(" in place of {from}")).unwrap_or_default();
-            (Kind::Effect, format!("{} gets {}{from}", word("function"), word("to")), Vec::new())
+            let to = answer["to"].as_str().unwrap_or("no design");
+            (Kind::Effect, format!("{} gets {to}{from}", word("function")), lines(&answer["because"]))
+        }
+        "unserved" => {
+            (Kind::Effect, format!("no design can serve {}", word("objective")), lines(&answer["because"]))
         }
         "cancel_action" => (Kind::Effect, format!("cancel: {}", word("because")), Vec::new()),
         "suspend_action" => (Kind::Effect, format!("suspend: {}", word("because")), Vec::new()),

@@ -153,7 +153,7 @@ fn choices_equal_those_of_mros_except_for_listed_differences() {
 }
 
 /// Two functions. Their best designs both use the arm, and together exceed the energy budget.
-const ROBOT: &str = r"
+pub const ROBOT: &str = r"
 @prefix t: <http://metacontrol.org/tomasys#> .
 @prefix owl: <http://www.w3.org/2002/07/owl#> .
 @prefix : <http://example.org/robot#> .
@@ -171,12 +171,12 @@ const ROBOT: &str = r"
 :e4 a t:QAvalue ; t:isQAtype :energy ; t:hasValue 4 .
 ";
 
-fn robot() -> Knowledge {
+pub fn robot() -> Knowledge {
     robot_with("")
 }
 
 /// The robot with additional statements.
-fn robot_with(statements: &str) -> Knowledge {
+pub fn robot_with(statements: &str) -> Knowledge {
     let directory = tempfile::tempdir().expect("a directory");
     let file = directory.path().join("robot.ttl");
     std::fs::write(&file, format!("{ROBOT}{statements}")).expect("written");

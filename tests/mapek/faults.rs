@@ -50,7 +50,7 @@ enum Outcome {
 
 /// Creates a temporary directory, in memory if possible: hundreds of thousands of journals are opened, and each is
 /// flushed to disk.
-fn temporary_directory() -> tempfile::TempDir {
+pub fn temporary_directory() -> tempfile::TempDir {
     let memory = Path::new("/dev/shm");
     let in_memory = memory.is_dir().then(|| tempfile::tempdir_in(memory).ok()).flatten();
     in_memory.unwrap_or_else(|| tempfile::tempdir().expect("a directory"))

@@ -10,6 +10,7 @@ mod faults;
 mod fleet;
 mod fuzz;
 mod journal;
+mod keeper;
 mod kill;
 mod noise;
 mod numbers;

@@ -99,7 +99,8 @@ pub fn verifier() -> &'static Path {
     })
 }
 
-fn outcome(program: &Path, directory: &Path, arguments: &[&str], input: &str) -> Outcome {
+/// Runs a program in a directory with a text as standard input.
+pub fn outcome(program: &Path, directory: &Path, arguments: &[&str], input: &str) -> Outcome {
     use std::io::{Seek as _, Write as _};
     // A file instead of a pipe: `run` then answers each line before it reads the next one.
     let mut stdin = tempfile::tempfile().expect("a file");

@@ -68,7 +68,7 @@ fn all_unknown_names_are_reported() {
         &["run", "missions/ugv.toml", "--budget", "safety=1"][..],
         &["run", "--configure", "ontology/kb/ugv.ttl", "--scenario", "x"],
         &["run", "--configure", "ontology/kb/ugv.ttl", "--name", "a=b"],
-        &["run", "--configure", "ontology/kb/ugv.ttl", "--journal", "x"],
+        &["run", "--configure", "ontology/kb/ugv.ttl", "--snapshot-every", "9"],
     ] {
         assert_eq!(metaplan(arguments).status, 2, "{arguments:?}");
     }

@@ -15,6 +15,8 @@ mod examples;
 mod explain;
 mod explain_causes;
 mod export;
+#[cfg(unix)]
+mod full_disk;
 mod help;
 mod init;
 mod interrupted;

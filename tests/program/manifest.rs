@@ -39,7 +39,7 @@ fn invalid_sections_are_refused_by_all_commands() {
         "[adaptation]\nsetle = 1",
         "10:1: error[M104]: unknown field `setle`, expected one of `minimum_benefit`, `settle`, `time_limit`, \
          `stay_close`, `confirm_time`, `heal_time`, `band`, `components`, `measured`, `safe_reaction`, \
-         `deadline`, `deadline_factor`; did you mean `settle`?",
+         `deadline`, `deadline_factor`, `unrecorded`; did you mean `settle`?",
     );
     check(
         "[adaptation.measured.ambient_ligth]\nhysteresis = 0.1",
@@ -77,9 +77,9 @@ fn all_errors_of_a_manifest_are_reported() {
          `bindings`, `adaptation`, `probabilistic`, `report`, `scenarios`; did you mean `scenarios`?\n\
          m.toml:14:1: error[M104]: unknown field `setle`, expected one of `minimum_benefit`, `settle`, `time_limit`, \
          `stay_close`, `confirm_time`, `heal_time`, `band`, `components`, `measured`, `safe_reaction`, \
-         `deadline`, `deadline_factor`; did you mean `settle`?\n\
+         `deadline`, `deadline_factor`, `unrecorded`; did you mean `settle`?\n\
          m.toml:16:1: error[M104]: unknown field `min`, expected one of `minimum_benefit`, `settle`, `time_limit`, \
          `stay_close`, `confirm_time`, `heal_time`, `band`, `components`, `measured`, `safe_reaction`, \
-         `deadline`, `deadline_factor`",
+         `deadline`, `deadline_factor`, `unrecorded`",
     );
 }

@@ -4,7 +4,7 @@
 
 const SHOWN = 500; // lines of what happens
 const QUIET = new Set(["handled", "ready", "planning", "plan_kept"]);
-const BAD = new Set(["error", "plan_none", "contradicted", "unconcluded", "suspend_action", "cancel_action"]);
+const BAD = new Set(["error", "plan_none", "contradicted", "unconcluded", "unrecorded", "suspend_action", "cancel_action"]);
 const $ = (id) => document.getElementById(id);
 let state;
 let drawing = false, again = false;
@@ -128,13 +128,15 @@ const WORDS = {
   plan_kept: (it) => it.because,
   plan_none: (it) => `${it.status}: ${it.because}`,
   planning: (it) => `for ${it.seconds} s; cost ${it.cost ?? "not known"}, at least ${it.lower_bound ?? "not known"}`,
-  reconfigure: (it) => `${it.function}: ${it.from ?? "nothing"} → ${it.to}`,
+  reconfigure: (it) => `${it.function}: ${it.from ?? "nothing"} → ${it.to ?? "nothing"}`,
+  unserved: (it) => `${it.objective}: ${reasons(it.because)}`,
   request_action: (it) => `${it.action}: ${it.name} ${context(it)} (${pairs(it.configuration)})`,
   cancel_action: (it) => `${it.action}: ${it.because}`,
   suspend_action: (it) => `${it.action}: ${it.because}`,
   resume_action: (it) => `${it.action}`,
   error: (it) => `${it.code}: ${it.message}`,
   unconcluded: (it) => it.message ?? "it is known again what follows",
+  unrecorded: (it) => it.message,
   contradicted: (it) => it.contradictions.map((own) => own.violated).join("; ") || "consistent again",
 };
 
@@ -161,7 +163,7 @@ const CHANGES = {
     markSteps();
   },
   reconfigure(it) {
-    state.configuration.set(it.function, it.to);
+    state.configuration.set(it.function, it.to ?? "nothing");
     showConfiguration();
   },
   inferred(it) {

@@ -284,6 +284,7 @@ impl Machine {
                 Answer::Error { code, message } => {
                     self.outputs.push(Output::Warn(format!("{code}: {message}")));
                 }
+                Answer::Unrecorded { message } => self.outputs.push(Output::Warn(message)),
                 Answer::Effect(effect) => self.effect(effect),
                 _ => {}
             }

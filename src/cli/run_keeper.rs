@@ -1,0 +1,131 @@
+//! Session of the configuration loop between input and output, in the two modes of `run_session`.
+//! A choice needs no search, so each line is answered completely in both modes.
+
+use std::sync::mpsc::{RecvTimeoutError, sync_channel};
+use std::time::{Duration, Instant};
+
+use metaplan::configure::{Keeper, KeeperAnswer};
+use metaplan::journal::Journal;
+use metaplan::mapek::{Clock as _, Observation, SystemClock};
+
+use crate::cli::common::{Common, Failure};
+use crate::cli::run_lines::{Line, Lines};
+use crate::cli::run_outlet::{Outlet, unwritten, warn_if_unrecorded};
+use crate::cli::run_session::{Flow, Input, MAX_WAITING, MIN_PAUSE, flow, read};
+
+/// A configuration loop with its inputs and outputs.
+pub(super) struct KeeperSession<'a> {
+    common: &'a Common,
+    keeper: Keeper,
+    journal: Option<Journal>,
+    outlet: &'a Outlet,
+    clock: SystemClock,
+    /// Time of the last line of the journal, before this program started.
+    begun: Duration,
+    /// `true` if a line had a time. Time then advances with lines only.
+    has_times: bool,
+}
+
+impl<'a> KeeperSession<'a> {
+    pub(super) fn new(
+        common: &'a Common,
+        keeper: Keeper,
+        journal: Option<Journal>,
+        outlet: &'a Outlet,
+    ) -> Self {
+        let (begun, clock) = (keeper.now(), SystemClock::default());
+        Self { common, keeper, journal, outlet, clock, begun, has_times: false }
+    }
+
+    /// Answers lines without reacting to the passing of time in between.
+    pub(super) fn replay(mut self, mut events: Lines) -> Result<(), Failure> {
+        let mut flow = self.begin()?;
+        while flow == Flow::GoesOn {
+            let Some(line) = events.next(self.common)? else { break };
+            flow = self.answer_line(&line, Instant::now())?;
+        }
+        Ok(())
+    }
+
+    /// Answers lines as they come, and reacts when something becomes due.
+    pub(super) fn live(mut self, events: Lines) -> Result<(), Failure> {
+        let (sender, inputs) = sync_channel(MAX_WAITING);
+        read(events, self.common.clone(), sender);
+        let mut flow = self.begin()?;
+        while flow == Flow::GoesOn {
+            let input = match self.pause() {
+                Some(pause) => inputs.recv_timeout(pause),
+                None => inputs.recv().map_err(|_| RecvTimeoutError::Disconnected),
+            };
+            flow = match input {
+                Ok(Input::Line(line, read)) => self.answer_line(&line, read)?,
+                Ok(Input::Failed(message)) => return Err(message.into()),
+                Err(RecvTimeoutError::Timeout) => self.elapse()?,
+                Ok(Input::End | Input::Thoughts(_)) | Err(RecvTimeoutError::Disconnected) => break,
+            };
+        }
+        Ok(())
+    }
+
+    /// Makes the first choice, or repeats the answers that may not have left the program.
+    fn begin(&mut self) -> Result<Flow, Failure> {
+        let read = Instant::now();
+        let answers = match &mut self.journal {
+            None => self.keeper.start(),
+            Some(journal) => journal.begin(&mut self.keeper).map_err(|error| unwritten(&error))?,
+        };
+        self.warn(&answers);
+        flow(self.outlet.answer(self.keeper.lines(), &answers, read))
+    }
+
+    fn answer_line(&mut self, line: &Line, read: Instant) -> Result<Flow, Failure> {
+        let observation = Observation::parse(&line.text);
+        self.has_times = self.has_times || line.now.is_some() || observation.time.is_some();
+        let now = self.begun + line.now.unwrap_or_else(|| self.clock.now());
+        self.outlet.heard(self.keeper.lines() + 1, now, &line.text);
+        let answers = self.handle(&line.text, &observation, now)?;
+        self.warn(&answers);
+        flow(self.outlet.answer(self.keeper.lines(), &answers, read))
+    }
+
+    /// Returns the time until a report that a filter holds back becomes due. `None` without such a
+    /// report, or if lines have times.
+    fn pause(&mut self) -> Option<Duration> {
+        let due = self.keeper.due().filter(|_| !self.has_times)?;
+        Some(due.saturating_sub(self.begun + self.clock.now()).max(MIN_PAUSE))
+    }
+
+    /// Reacts to the passing of time. The answers have the number of the last line.
+    fn elapse(&mut self) -> Result<Flow, Failure> {
+        let now = self.begun + self.clock.now();
+        if self.keeper.due().is_none_or(|due| due > now) {
+            return Ok(Flow::GoesOn);
+        }
+        let answers = self.handle(Observation::TIMER, &Observation::timer(), now)?;
+        self.warn(&answers);
+        flow(self.outlet.answer_so_far(self.keeper.lines(), &answers))
+    }
+
+    fn warn(&self, answers: &[KeeperAnswer]) {
+        let of_loop = answers.iter().filter_map(|answer| match answer {
+            KeeperAnswer::Loop(answer) => Some(answer),
+            _ => None,
+        });
+        warn_if_unrecorded(self.common, of_loop);
+    }
+
+    /// Handles a line or a timer, and writes it to the journal first if there is one.
+    fn handle(
+        &mut self,
+        text: &str,
+        observation: &Observation,
+        now: Duration,
+    ) -> Result<Vec<KeeperAnswer>, Failure> {
+        match &mut self.journal {
+            None => Ok(self.keeper.handle_at(observation, now)),
+            Some(journal) => {
+                Ok(journal.handle(&mut self.keeper, text, now).map_err(|error| unwritten(&error))?)
+            }
+        }
+    }
+}

@@ -1,0 +1,116 @@
+//! Interface between a loop and its journal: the recorded data, and the restoration from them.
+
+use std::time::Duration;
+
+use serde_json::Value;
+
+use crate::mapek::answer::Answer;
+use crate::mapek::control::Loop;
+use crate::mapek::event::Observation;
+use crate::mapek::record::{Decision, Snapshot};
+use crate::mapek::settings::Unrecorded;
+use crate::message::Message;
+
+/// A loop whose state can be restored from a journal. Equal observations at equal times, with the recorded plans, must give equal
+/// decisions.
+pub trait Recoverable {
+    /// An answer of the loop.
+    type Answer: From<Answer>;
+
+    /// Returns a checksum of all inputs of decisions, before the loop begins.
+    fn digest(&self) -> String;
+
+    /// Returns the reaction to a journal that cannot be written.
+    fn unrecorded(&self) -> Unrecorded;
+
+    /// Returns `true` if the loop has not begun, or has reacted to an observation and has not deliberated.
+    fn has_agenda(&self) -> bool;
+
+    /// Reacts to an observation; `now` is the time since the start.
+    fn react(&mut self, observation: &Observation, now: Duration) -> Vec<Self::Answer>;
+
+    /// Decides the pending questions of the reactions. Makes the first decision if the loop has not begun.
+    fn deliberate(&mut self) -> Vec<Self::Answer>;
+
+    /// Reacts and deliberates with recorded plans.
+    fn handle_again(
+        &mut self,
+        observation: &Observation,
+        now: Duration,
+        plans: &[Value],
+    ) -> Vec<Self::Answer>;
+
+    /// Deliberates with recorded plans.
+    fn deliberate_again(&mut self, plans: &[Value]) -> Vec<Self::Answer>;
+
+    /// Returns the decision with these answers. The journal calls this once after each step.
+    fn decision(&mut self, answers: &[Self::Answer]) -> Decision;
+
+    /// Returns the effects that were not acknowledged, for repetition after a restart.
+    fn repeat(&self) -> Vec<Self::Answer>;
+
+    /// Returns the number of the effect that an answer requests.
+    fn effect(answer: &Self::Answer) -> Option<u64>;
+
+    /// Returns the state as data. Afterwards the loop makes the same decisions as a loop that is restored
+    /// from the data.
+    fn checkpoint(&mut self) -> Snapshot;
+
+    /// Restores the state of a loop with the same checksum.
+    ///
+    /// # Errors
+    /// The snapshot is damaged, or belongs to another loop.
+    fn restore(&mut self, snapshot: &Snapshot) -> Result<(), Message>;
+}
+
+impl Recoverable for Loop {
+    type Answer = Answer;
+
+    fn digest(&self) -> String {
+        self.digest()
+    }
+
+    fn unrecorded(&self) -> Unrecorded {
+        self.settings().unrecorded
+    }
+
+    fn has_agenda(&self) -> bool {
+        self.has_agenda()
+    }
+
+    fn react(&mut self, observation: &Observation, now: Duration) -> Vec<Answer> {
+        self.react(observation, now)
+    }
+
+    fn deliberate(&mut self) -> Vec<Answer> {
+        self.deliberate()
+    }
+
+    fn handle_again(&mut self, observation: &Observation, now: Duration, plans: &[Value]) -> Vec<Answer> {
+        self.handle_again(observation, now, plans)
+    }
+
+    fn deliberate_again(&mut self, plans: &[Value]) -> Vec<Answer> {
+        self.deliberate_again(plans)
+    }
+
+    fn decision(&mut self, answers: &[Answer]) -> Decision {
+        self.decision(answers)
+    }
+
+    fn repeat(&self) -> Vec<Answer> {
+        self.repeat()
+    }
+
+    fn effect(answer: &Answer) -> Option<u64> {
+        answer.effect().map(|effect| effect.number)
+    }
+
+    fn checkpoint(&mut self) -> Snapshot {
+        self.snapshot()
+    }
+
+    fn restore(&mut self, snapshot: &Snapshot) -> Result<(), Message> {
+        self.restore(snapshot)
+    }
+}
