@@ -38,7 +38,7 @@ pub(super) fn react(
         running.step = step;
         reconfigure(beliefs, &mut running, answers);
     } else {
-        let because = format!("{reason}; it stands still until it is decided what becomes of it");
+        let because = format!("{reason}; the action is suspended until a new decision");
         effect(beliefs, running.action, Command::Suspend { because }, answers);
         (running.suspended, running.provisional) = (true, true);
     }

@@ -87,10 +87,12 @@ fn shorten_effect(
 ) {
     match effect {
         Effect::And(parts) => {
-            parts.iter_mut().for_each(|part| shorten_effect(part, remaining_share, whole, changes))
+            for part in parts {
+                shorten_effect(part, remaining_share, whole, changes);
+            }
         }
         Effect::ForAll(_, body) | Effect::When(_, body) => {
-            shorten_effect(body, remaining_share, whole, changes)
+            shorten_effect(body, remaining_share, whole, changes);
         }
         Effect::Assign(kind @ (Assignment::Increase | Assignment::Decrease), target, value, _) => {
             if let Some(whole) = whole {

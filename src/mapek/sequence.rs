@@ -137,7 +137,7 @@ mod tests {
                     }
                     Classification::Seen => assert!(seen.contains(&number), "{number}"),
                     Classification::Stale(mark) => {
-                        assert!(number <= mark && seen.len() > MAX_RANGES, "{number}")
+                        assert!(number <= mark && seen.len() > MAX_RANGES, "{number}");
                     }
                     Classification::Ahead(limit) => assert!(number > limit, "{number}"),
                 }

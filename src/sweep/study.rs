@@ -245,7 +245,8 @@ impl Study {
         for (index, name) in sections.repetitions.iter().enumerate() {
             if sections.repetitions != seeds() && !names.contains(name.as_str()) {
                 let suggestion = did_you_mean(name, names.iter().copied());
-                let text = format!("`{name}` is not a key that is varied, so nothing repeats it{suggestion}");
+                let text =
+                    format!("`repetitions` names `{name}`, but the study does not vary this key{suggestion}");
                 mistakes.push(wrong(&["repetitions".into(), index.into()], text));
             }
         }

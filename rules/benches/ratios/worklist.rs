@@ -87,7 +87,7 @@ impl Index {
 /// A binary relation, with indexes on the columns that rules look up.
 #[derive(Default)]
 struct Pairs {
-    pairs: FxHashSet<(Symbol, Symbol)>,
+    members: FxHashSet<(Symbol, Symbol)>,
     rows: Vec<(Symbol, Symbol)>,
     by_first: Option<Index>,
     by_second: Option<Index>,
@@ -95,7 +95,7 @@ struct Pairs {
 
 impl Pairs {
     fn insert(&mut self, first: Symbol, second: Symbol) -> bool {
-        let is_new = self.pairs.insert((first, second));
+        let is_new = self.members.insert((first, second));
         if is_new {
             self.rows.push((first, second));
             if let Some(index) = &mut self.by_first {

@@ -100,10 +100,9 @@ fn inexact(built_in: BuiltIn, values: &[f64]) -> Option<f64> {
         (BuiltIn::UnaryMinus, [a]) => -a,
         (BuiltIn::Abs, [a]) => a.abs(),
         (BuiltIn::Ceiling, [a]) => a.ceil(),
-        (BuiltIn::Floor, [a]) => a.floor(),
         // Adding 0.5 first would round 0.49999999999999994 and odd integers above 2^52 up.
         (BuiltIn::Round, [a]) if a - a.floor() >= 0.5 => a.floor() + 1.0,
-        (BuiltIn::Round, [a]) => a.floor(),
+        (BuiltIn::Floor | BuiltIn::Round, [a]) => a.floor(),
         (BuiltIn::RoundHalfToEven, [a]) => a.round_ties_even(),
         (BuiltIn::RoundHalfToEven, [a, digits]) => {
             let unit = 10_f64.powi(digits.clamp(-300.0, 300.0) as i32);

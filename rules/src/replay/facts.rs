@@ -10,7 +10,7 @@ type Relation = (Symbol, usize);
 
 /// An immutable, indexed set of facts.
 pub(super) struct Facts {
-    facts: FxHashSet<Fact>,
+    members: FxHashSet<Fact>,
     by_relation: FxHashMap<Relation, Vec<Fact>>,
     /// Positions in `by_relation`, by argument position and symbol.
     by_place: FxHashMap<(Relation, usize, Symbol), Vec<usize>>,
@@ -19,12 +19,12 @@ pub(super) struct Facts {
 impl Facts {
     pub fn new(facts: impl Iterator<Item = Fact>) -> Self {
         let mut index = Self {
-            facts: FxHashSet::default(),
+            members: FxHashSet::default(),
             by_relation: FxHashMap::default(),
             by_place: FxHashMap::default(),
         };
         for fact in facts {
-            if !index.facts.insert(fact.clone()) {
+            if !index.members.insert(fact.clone()) {
                 continue;
             }
             let relation = (fact.predicate, fact.arguments.len());
@@ -38,7 +38,7 @@ impl Facts {
     }
 
     pub fn contains(&self, fact: &Fact) -> bool {
-        self.facts.contains(fact)
+        self.members.contains(fact)
     }
 
     /// Facts of a relation with a symbol at an argument position, or all facts of the relation.
