@@ -114,8 +114,8 @@ fn our_metamodel_says_all_that_the_real_one_says() {
         ontology.axioms.iter().map(|annotated| annotated.axiom.clone()).collect()
     };
     let missing: Vec<String> = axioms(&real).difference(&axioms(&ours)).map(ToString::to_string).collect();
-    // Conclusions may have several values in the embedded metamodel: a second reason must not be a
-    // contradiction.
+    // In the embedded metamodel, the properties that rules conclude are not functional, so that a
+    // second conclusion is not a contradiction.
     let concluded =
         ["b_status", "cc_availability", "fd_realisability", "fg_status", "o_status", "o_updatable"];
     let functional = |name| format!("FunctionalDataProperty(<http://metacontrol.org/tomasys#{name}>)");

@@ -1,4 +1,4 @@
-//! JSON answer of `metaplan configure`, and the first line of its loop.
+//! JSON answer of `metaplan configure`, and the first output line of `metaplan run --configure`.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -122,7 +122,7 @@ pub struct KeeperReadyLine {
 }
 
 impl KeeperReadyLine {
-    /// First line of a loop, with the state of its journal if there is one.
+    /// The first output line of a loop, with the state of its journal if there is one.
     pub fn new(keeper: &Keeper, recovery: Option<&Recovery>) -> Self {
         let objectives = keeper.configurator().objectives().into_iter();
         let recovered = recovery

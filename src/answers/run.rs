@@ -10,7 +10,7 @@ use crate::mapek::{Beliefs, FORMAT, Planning};
 use crate::number::to_json;
 use crate::simulate::Strategy;
 
-/// First line of a loop: its mission, and its position in the journal.
+/// The first output line of a loop: its mission, and its position in the journal.
 #[derive(Debug, Clone, Serialize)]
 pub struct ReadyLine {
     answer: &'static str,
@@ -53,7 +53,7 @@ impl RecoveryPart {
 }
 
 impl ReadyLine {
-    /// First line of a loop without a journal.
+    /// The first output line of a loop without a journal.
     pub fn new(mission: String) -> Self {
         Self { answer: "ready", format: FORMAT, mission, recovered: None }
     }

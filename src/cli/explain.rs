@@ -172,7 +172,7 @@ fn alteration_text(alteration: &Alteration, about: bool) -> String {
     }
 }
 
-/// Text of an explanation by reasoning alone.
+/// Text of the reasons for a design's availability. They need no planning.
 fn why_text(why: &Availability) -> String {
     let functions = why.functions.join(", ");
     let state = if why.available { "is available" } else { "is not available" };
@@ -190,7 +190,8 @@ fn why_text(why: &Availability) -> String {
     text
 }
 
-/// Text of an explanation by planning.
+/// Text of the plans about a design: the best plan, the best plan with this design as the only one
+/// of its functions, and the best plan without the design. Repairs follow.
 fn design_text(found: &DesignExplanation) -> String {
     let DesignExplanation { availability, best, .. } = found;
     let mut text = String::new();

@@ -151,7 +151,9 @@ fn processor_time() -> Option<Duration> {
     Some(Duration::from_millis(user.saturating_add(system).saturating_mul(10)))
 }
 
-/// Ends the program late. Reading does not poll the limits; all later stages do, except for faults.
+/// Starts a thread that ends the program if the limits do not end it. Reading does not poll the
+/// limits: the thread ends the program when a limit is reached. All later stages should poll the
+/// limits. In case a loop does not (a bug), the thread ends the program a tenth of the limit later.
 fn give_up_late(limits: Limits, has_read: Arc<AtomicBool>, late: Deadline, common: Common) {
     std::thread::spawn(move || {
         while !has_read.load(Ordering::Relaxed) && !limits.reached() {

@@ -41,7 +41,7 @@ pub struct Wishes {
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Configuration {
-    /// The choice for each objective in need, sorted by name.
+    /// The choice for each objective that needs a design, sorted by name.
     pub choices: Vec<Choice>,
     /// Sum of the utilities of the chosen designs.
     pub utility: BigRational,
@@ -58,7 +58,7 @@ pub struct Choice {
     pub objective: String,
     /// Function of the objective, by local name, if it has one.
     pub function: Option<String>,
-    /// Reasons for the need: statuses of the objective, `updatable`, `always improve`, or
+    /// Reasons why the objective needs a design: its statuses, `updatable`, `always improve`, or
     /// `ungrounded`.
     pub need: Vec<String>,
     /// The design before the choice, by local name.
@@ -353,7 +353,7 @@ fn requirement_text(missed: &Missed) -> String {
     format!("{attribute}: estimated {}, required {}: {status}", decimal(estimation), decimal(bound))
 }
 
-/// Returns the reasons for an objective's need.
+/// Returns the reasons why an objective needs a design; see [`Choice::need`].
 fn need(objective: &Objective) -> Vec<String> {
     let mut need = objective.statuses.clone();
     if objective.updatable {

@@ -24,7 +24,7 @@ pub struct Alteration {
     pub name: String,
     /// The current value. `None` for a component.
     pub from: Option<BigRational>,
-    /// The value or the state after the alteration.
+    /// The bound for the new value, or the new state.
     pub to: Target,
 }
 
@@ -51,7 +51,7 @@ pub struct Change {
     pub then: BestPlan,
 }
 
-/// Value or state after an alteration.
+/// Target of an alteration: a bound for the new value of a number, or the new state of a component.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Target {
     /// A value of at least this bound.

@@ -27,7 +27,8 @@ impl Findings {
         self.lost.is_empty() && self.gained.is_empty() && self.errors.is_empty()
     }
 
-    /// Adds later findings. A design that was lost and is available again is in neither set.
+    /// Adds later findings. A design that is lost and then gained, or gained and then lost, is removed from both `lost`
+    /// and `gained`.
     pub(super) fn extend(&mut self, later: Self) {
         for design in later.lost {
             if !self.gained.remove(&design) {

@@ -48,7 +48,7 @@ struct Agenda {
     is_start: bool,
 }
 
-/// State that deliberation changes before it plans.
+/// State that deliberation can change before its first search.
 #[derive(Debug)]
 pub(super) struct Checkpoint {
     agenda: Option<Agenda>,
@@ -265,7 +265,7 @@ impl Loop {
         self.beliefs.receipts.supersede(effect, function, to);
     }
 
-    /// Copies the state that deliberation changes before it plans.
+    /// Copies the state that deliberation can change before its first search, for [`Loop::roll_back`].
     pub(super) fn checkpoint(&self) -> Checkpoint {
         let beliefs = &self.beliefs;
         Checkpoint {
@@ -278,7 +278,7 @@ impl Loop {
         }
     }
 
-    /// Restores the state before deliberation.
+    /// Restores the state before deliberation. Deliberation must not have searched since the checkpoint.
     pub(super) fn roll_back(&mut self, to: Checkpoint) {
         let beliefs = &mut self.beliefs;
         self.agenda = to.agenda;

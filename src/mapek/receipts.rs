@@ -53,8 +53,8 @@ impl Receipts {
         self.by_number
     }
 
-    /// Returns `true` if a reconfiguration of the function was superseded without an answer. It may still arrive, even if
-    /// the function was observed since.
+    /// Returns `true` if a reconfiguration of the function was superseded before it was answered. The robot may still
+    /// carry out such a reconfiguration, even after an observation of the function.
     pub(super) fn has_superseded(&self, function: &str) -> bool {
         self.functions.get(function).is_some_and(|history| !history.superseded.is_empty())
     }

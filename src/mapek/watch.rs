@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use num_rational::BigRational;
 
-/// Shared handle to the state of a loop's planner. Clones share it.
+/// Shared handle to the progress of a loop's planner. Clones share the progress.
 #[derive(Debug, Clone, Default)]
 pub struct Watch(Arc<Mutex<WatchState>>);
 
@@ -14,10 +14,10 @@ struct WatchState {
     planning: Option<Planning>,
 }
 
-/// State of a search.
+/// Progress of a planning run.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Planning {
-    /// Number of the search, from 1.
+    /// Number of the planning run, from 1.
     pub number: u64,
     /// Cost of the incumbent, if reported.
     pub cost: Option<BigRational>,
@@ -26,7 +26,7 @@ pub struct Planning {
 }
 
 impl Watch {
-    /// Returns the state of the current search, if any.
+    /// Returns the progress of the current planning run, if any.
     pub fn look(&self) -> Option<Planning> {
         self.state(|state| state.planning.clone())
     }

@@ -90,7 +90,8 @@ impl Planned<'_> {
         matches!(self.task, Ground::Concurrent)
     }
 
-    /// Returns the plan with the arguments of the domain's file.
+    /// Returns the plan, with the arguments of each step as in the domain's file: without the designs
+    /// that the knowledge base has added as arguments.
     pub fn written(&self) -> Option<Plan> {
         self.solution.plan.clone().map(|plan| self.mission.written(plan))
     }
@@ -151,7 +152,8 @@ impl PlannedFront<'_> {
         &self.objectives
     }
 
-    /// Returns the plans with the arguments of the domain's file.
+    /// Returns the front, with the arguments of each step as in the domain's file: without the designs
+    /// that the knowledge base has added as arguments.
     pub fn written(&self) -> Front {
         let mut front = self.front.clone();
         for point in &mut front.points {

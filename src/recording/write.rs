@@ -121,7 +121,7 @@ impl<W: Write + Seek> Recording<W> {
     /// attributes and components as diagnostics.
     ///
     /// # Errors
-    /// The file cannot be written, now or since an error before.
+    /// The file cannot be written, or an earlier write has failed.
     pub fn event(&mut self, time: u64, line: u64, now: Duration, text: &str) -> io::Result<()> {
         let event = text.starts_with('{').then(|| serde_json::from_str::<&RawValue>(text).ok()).flatten();
         let nanoseconds = u64::try_from(now.as_nanos()).unwrap_or(u64::MAX);
@@ -139,7 +139,7 @@ impl<W: Write + Seek> Recording<W> {
     /// Writes an answer, a JSON object of the format.
     ///
     /// # Errors
-    /// The file cannot be written, now or since an error before.
+    /// The file cannot be written, or an earlier write has failed.
     pub fn answer(&mut self, time: u64, answer: &str) -> io::Result<()> {
         let kind = serde_json::from_str::<Kind>(answer).map(|kind| schema::topic(&kind.answer));
         // The last topic takes the kinds that no other topic lists.
@@ -151,7 +151,7 @@ impl<W: Write + Seek> Recording<W> {
     /// Flushes all messages to the sink, so that the file is readable up to this point.
     ///
     /// # Errors
-    /// The file cannot be written, now or since an error before.
+    /// The file cannot be written, or an earlier write has failed.
     pub fn flush(&mut self) -> io::Result<()> {
         self.writer.0.flush().map_err(failed)
     }
@@ -159,7 +159,7 @@ impl<W: Write + Seek> Recording<W> {
     /// Completes the file with its index.
     ///
     /// # Errors
-    /// The file cannot be written, now or since an error before.
+    /// The file cannot be written, or an earlier write has failed.
     pub fn finish(mut self) -> io::Result<()> {
         self.writer.0.finish().map_err(failed)?;
         self.writer.0.into_inner().flush()

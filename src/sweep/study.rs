@@ -265,7 +265,8 @@ impl Study {
         Ok(Self { sections, directory, digest, keys, origin: place })
     }
 
-    /// Message about a mistake in the study's file, at the end of a path.
+    /// Message about a mistake in the study's file. `path` contains the keys that lead to the mistaken
+    /// value.
     pub fn mistake(&self, path: &[Key], text: &str) -> Message {
         let place = self.origin.place_of(path, Part::Value);
         self.origin.quote([Message::at("M150", self.origin.file(), place, text)]).swap_remove(0)

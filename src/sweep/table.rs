@@ -13,7 +13,7 @@ const STATUS: &str = "status";
 /// Contents of a cell. `None` if the row has no such value.
 pub type Cell = Option<Value>;
 
-/// A row: an object in the answer of a run.
+/// A row of the table: the varied keys of a run, its status, and one JSON value of its answer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
     /// Number of the run.

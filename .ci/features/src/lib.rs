@@ -1,1 +1,1 @@
-//! Nothing: see the manifest.
+//! Empty crate that selects features of shared dependencies; see its `Cargo.toml`.

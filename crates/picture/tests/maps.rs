@@ -1,4 +1,5 @@
-//! Maps: each number is at the arrow of its own direction, for all ways of a plan.
+//! Maps: each step number is nearer to the arrow of its own move than to any other arrow, for all
+//! connections between places that a plan uses.
 
 use metaplan_picture::{Map, Place, Plan, Report, Step};
 use roxmltree::{Document, Node};

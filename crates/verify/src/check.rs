@@ -149,7 +149,8 @@ fn parts(
     }
     let (task_result, timed) = match same_task(&domain, &problem, (text(TASK), text(WITNESS)), stop) {
         Ok((summary, timed)) => (Ok(summary), timed),
-        // The value is not used: the part has failed.
+        // Without a task, it is unknown whether the plan is timed. The certificate is rejected in
+        // any case; the plan is still checked, as an untimed one.
         Err(reason) => (Err(reason), false),
     };
     parts.push(VerifiedPart { part: "task", result: task_result });

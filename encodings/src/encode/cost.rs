@@ -23,7 +23,8 @@ use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::encode::interference::Interference;
 use crate::sat::Lit;
 
-/// Maximum number of amounts at a step in the order encoding; beyond it the sum is binary.
+/// Maximum number of distinct accumulated amounts in the order encoding. Beyond it, the sum is
+/// encoded with binary addition.
 const AMOUNT_LIMIT: usize = 1_000;
 
 /// Cost limit of an encoding: only plans with cost at most `limit` are admitted; `bounds` provides

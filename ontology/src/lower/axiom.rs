@@ -233,7 +233,8 @@ impl AxiomLowering<'_, '_> {
         }
     }
 
-    /// Lowers a cycle of subclass axioms. Directions without a rule form are gaps.
+    /// Lowers an equivalence as a cycle of subclass axioms. A subclass axiom that no rule can express is
+    /// recorded as unsupported.
     fn equivalent_classes(&mut self, classes: &[ClassExpression]) {
         for (sub, sup) in classes.iter().zip(classes.iter().cycle().skip(1)) {
             self.sub_class(sub, sup);

@@ -274,7 +274,7 @@ impl Run {
                 for value in self.pairs("hasValue").after(measurement) {
                     for design in self.pairs("typeFD").after(grounding) {
                         for estimation in self.pairs("hasQAestimation").after(design) {
-                            let fits = self.pairs("isQAtype").pairs.contains(&(estimation, kind));
+                            let fits = self.pairs("isQAtype").members.contains(&(estimation, kind));
                             let literal = |symbol| symbols.value(symbol).as_literal();
                             let is_less = |estimated: Symbol| {
                                 let order =

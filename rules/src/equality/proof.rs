@@ -84,7 +84,8 @@ impl Equality {
         Derivation { steps }
     }
 
-    /// Pairs of all edges, each after the pairs on which it depends.
+    /// All recorded equalities as `same_as` facts. Each equality follows the equalities that its
+    /// derivation uses.
     pub fn pairs_in_order(&self) -> Vec<Fact> {
         let edges: BTreeMap<EdgeId, &Edge> =
             self.classes.edges.iter().map(|(id, edge)| (*id, edge)).collect();
@@ -115,7 +116,8 @@ impl Equality {
         used_edges
     }
 
-    /// A stated fact that a row represents; `None` if the row is not stated.
+    /// Stated fact that equals `row` after its names are replaced by their representatives; `None` if
+    /// there is no such fact.
     pub fn witness(&self, engine: &Engine, row: &Fact) -> Option<Fact> {
         match self.originals.get(row) {
             Some(facts) => facts.first().cloned(),
@@ -123,8 +125,8 @@ impl Equality {
         }
     }
 
-    /// Facts about names for the rows of a violation, preferably stated facts, together with the equalities
-    /// between different names of one individual.
+    /// Facts about names for the rows (facts about representatives) of a violation, preferably stated
+    /// facts, together with the equalities between different names of one individual.
     pub fn witnesses(&self, engine: &Engine, rows: Vec<Fact>) -> Vec<Fact> {
         let mut facts = Vec::new();
         for row in rows {

@@ -143,7 +143,7 @@ pub(crate) enum Verdict {
     Held(Hold),
 }
 
-/// Something that becomes due without a sample.
+/// Change of a filter's state by the passage of time, without a sample.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Elapsed {
     /// A crossing has lasted for the debounce time. Newly believed value.

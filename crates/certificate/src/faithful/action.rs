@@ -51,8 +51,8 @@ pub(super) fn waits(timeline: &Timeline, structure: &Structure) -> Result<Vec<Ca
 /// New values of fluents.
 type Changes = BTreeMap<Key, Linear>;
 
-/// Returns the cases in which an instance can be executed. The reader has the binding of its
-/// parameters.
+/// Returns the cases in which an instance may be executable in a state that satisfies the reader's
+/// invariant. The reader has the binding of its parameters.
 pub(super) fn cases<'r>(
     mut reader: Reader<'r>,
     structure: &Structure,

@@ -171,7 +171,8 @@ impl<'f> Files<'f> {
         if (self.stop)() { Err(Cause::Stopped) } else { Ok(()) }
     }
 
-    /// The cases in which an instance can be executed in states of the witness.
+    /// Cases in which an instance may be executable in a state that satisfies the invariant. An empty
+    /// result proves that it is executable in no such state.
     fn cases(&self, instance: &Instance, invariant: &Invariant, axioms: &Axioms) -> Result<Vec<Case>> {
         self.stopped()?;
         if instance.requires.iter().any(|key| !invariant.may_hold(key)) {

@@ -25,8 +25,9 @@ const SIZE_LIMIT: usize = 200_000;
 const WORK_LIMIT: usize = 16 * SIZE_LIMIT;
 /// Upper limit on the variables of one quantifier or of the head of a rule.
 const VARIABLE_LIMIT: usize = 10_000;
-/// Upper limit on the nesting of conditions while derived atoms are replaced by their rules. It
-/// bounds the stack; atoms below are replaced one by one.
+/// Upper limit on the nesting of conditions while derived atoms are recursively replaced by their
+/// rules. It bounds the call stack. Atoms at a deeper nesting are evaluated one at a time, with an
+/// explicit stack (see [`Reader::unfold`]).
 const UNFOLDING_LIMIT: usize = 100;
 
 /// The key of `total-time` in metrics.
@@ -70,10 +71,10 @@ struct Unfolding {
     path: Vec<Key>,
     /// The nesting at which the outermost derived atom is evaluated.
     base: usize,
-    /// An atom below [`UNFOLDING_LIMIT`], to be evaluated on its own before the evaluation is
-    /// repeated.
+    /// An atom nested deeper than [`UNFOLDING_LIMIT`]. It is evaluated on its own before the
+    /// evaluation is repeated.
     pending: Option<Key>,
-    /// The conditions of pending atoms that are finished.
+    /// Conditions of former pending atoms, whose evaluation is complete.
     known: FxHashMap<Key, Formula>,
 }
 

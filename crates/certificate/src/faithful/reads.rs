@@ -21,7 +21,7 @@ pub(super) struct Reads<'r> {
     pub(super) durations: Vec<&'r Expression>,
 }
 
-/// The atom or fluent of a query.
+/// The ground atom or numeric fluent for which [`Reads`] decides whether the happening reads it.
 #[derive(Clone, Copy)]
 enum ReadQuery<'w> {
     Atom(&'w Key),

@@ -59,10 +59,12 @@ fn interpret(task: &Task, plan: &[Step]) -> Result<State, usize> {
     if state.is_goal(task) { Ok(state) } else { Err(0) }
 }
 
-/// Beyond this, products might not fit the numbers of the interpreter.
+/// Upper limit on numerators and denominators. Products of larger numbers might overflow in the
+/// interpreter.
 const LARGE: i128 = 200;
 
-/// The plan up to before the step that makes a number large, so that the goal is not evaluated with it.
+/// Prefix of the plan before the first step that makes a number larger than [`LARGE`]. The goal is
+/// therefore never evaluated with a larger number.
 fn with_small_numbers<'s>(task: &Task, plan: &'s [Step]) -> &'s [Step] {
     let mut state = State::initial(task);
     for (number, step) in plan.iter().enumerate() {
@@ -80,7 +82,8 @@ fn with_small_numbers<'s>(task: &Task, plan: &'s [Step]) -> &'s [Step] {
     plan
 }
 
-/// Executes a plan with both; returns whether it is valid.
+/// Executes a plan with the validator and with the interpreter, and compares the results. Returns
+/// `true` if the plan is valid.
 pub fn check_plan(task: &Task, (domain, problem): &(Domain, Problem), plan: &[Step]) -> bool {
     let plan = with_small_numbers(task, plan);
     let text: String = plan.iter().map(step_text).collect();

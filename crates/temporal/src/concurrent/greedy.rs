@@ -45,7 +45,8 @@ pub(super) enum Mode {
     Sequential,
     /// Starts and ends are separate successors.
     Overlapping,
-    /// Like `Overlapping`, and a state that is reached again earlier is expanded again.
+    /// Like `Overlapping`, with two additions. A state that is reached again with a smaller bound
+    /// on the makespan is expanded again. Successors with unsettled clocks are kept.
     Sooner,
 }
 

@@ -28,18 +28,18 @@ const PAGE: usize = 512;
 /// Cache size of the database in bytes.
 const CACHE: usize = 64 << 20;
 
-/// Value type of messages: (subject, id, time, payload); the key is (stream, sequence).
+/// Value type of messages: (subject, id, time, payload); the key is (stream, sequence number).
 type Parts = (&'static str, &'static str, u64, &'static [u8]);
 const MESSAGES: TableDefinition<'static, (u8, u64), Parts> = TableDefinition::new("messages");
-/// Index of the messages of a partition: (stream, partition, sequence).
+/// Index of the messages of a partition: (stream, partition, sequence number).
 const OF_PARTITION: TableDefinition<'static, (u8, u32, u64), ()> = TableDefinition::new("of_partition");
-/// Sequence of the last message by (stream, subject).
+/// Sequence number of the last message by (stream, subject).
 const LAST: TableDefinition<'static, (u8, &str), u64> = TableDefinition::new("last");
-/// Sequence of messages by (stream, message id).
+/// Sequence number of a message by (stream, message id).
 const IDS: TableDefinition<'static, (u8, &str), u64> = TableDefinition::new("ids");
 /// Revisions and values by (bucket, key).
 const VALUES: TableDefinition<'static, (u8, &str), (u64, &[u8])> = TableDefinition::new("values");
-/// Counters by name: the number of partitions and the last sequence.
+/// Counters by name: the number of partitions and the last sequence number.
 const NUMBERS: TableDefinition<'static, &str, u64> = TableDefinition::new("numbers");
 
 /// A log in a local directory.
@@ -63,7 +63,7 @@ struct Request {
     done: oneshot::Sender<Answer>,
 }
 
-/// Sequence or revision of a write.
+/// Sequence number or revision of a write.
 type Answer = Result<Receipt, Fault>;
 
 enum Write {
@@ -118,7 +118,7 @@ impl Local {
         answer.await.map_err(failed)?
     }
 
-    /// Reads up to `most` messages of a partition after a sequence.
+    /// Reads up to `most` messages of a partition after a sequence number.
     fn page(&self, stream: Stream, partition: u32, after: u64, most: usize) -> Result<Vec<Stored>, Fault> {
         let (number, transaction) = (stream as u8, self.0.database.begin_read().map_err(failed)?);
         let of_partition = transaction.open_table(OF_PARTITION).map_err(failed)?;

@@ -71,7 +71,7 @@ impl Bucket {
 /// A message of a stream.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Stored {
-    /// Sequence from 1, over all subjects of the stream.
+    /// Sequence number from 1, over all subjects of the stream.
     pub sequence: u64,
     /// Subject without the prefix of the stream.
     pub subject: String,
@@ -90,8 +90,8 @@ pub struct Message<'a> {
     pub subject: &'a str,
     /// Message id. A second message with the same id is not stored.
     pub id: &'a str,
-    /// Required sequence of the last message of the subject, if the append is conditional; 0
-    /// requires that there is none.
+    /// Required sequence number of the last message of the subject, if the append is conditional; 0
+    /// requires that the subject has no message.
     pub after: Option<u64>,
     /// Contents of the message.
     pub payload: &'a [u8],
@@ -100,7 +100,7 @@ pub struct Message<'a> {
 /// Acknowledgement of an append.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Receipt {
-    /// Sequence of the message.
+    /// Sequence number of the message.
     pub sequence: u64,
     /// `true` if an earlier message with the same id was found instead.
     pub is_known: bool,
@@ -140,8 +140,8 @@ pub trait Store: Clone + Send + Sync + 'static {
     /// Time after which leases and presences expire unless they are renewed. It never changes.
     fn lease(&self) -> Duration;
 
-    /// Returns the messages of a partition after a sequence as an endless stream, in ascending
-    /// order.
+    /// Returns the messages of a partition after a sequence number as an endless stream, in
+    /// ascending order.
     fn follow(
         &self,
         stream: Stream,
@@ -149,7 +149,8 @@ pub trait Store: Clone + Send + Sync + 'static {
         after: u64,
     ) -> impl Future<Output = Result<BoxStream<'static, Result<Stored, Fault>>, Fault>> + Send;
 
-    /// Returns all messages of a partition after a sequence that exist at the time of the call.
+    /// Returns all messages of a partition after a sequence number that exist at the time of the
+    /// call.
     fn history(
         &self,
         stream: Stream,
@@ -157,7 +158,7 @@ pub trait Store: Clone + Send + Sync + 'static {
         after: u64,
     ) -> impl Future<Output = Result<Vec<Stored>, Fault>> + Send;
 
-    /// Returns the sequence of the last message of a partition; 0 for an empty partition.
+    /// Returns the sequence number of the last message of a partition; 0 for an empty partition.
     fn end(&self, stream: Stream, partition: u32) -> impl Future<Output = Result<u64, Fault>> + Send;
 
     /// Appends a message durably.
@@ -174,7 +175,7 @@ pub trait Store: Clone + Send + Sync + 'static {
         subject: &str,
     ) -> impl Future<Output = Result<Option<Stored>, Fault>> + Send;
 
-    /// Returns the message with a sequence, of any subject.
+    /// Returns the message with a sequence number, of any subject.
     fn at(&self, stream: Stream, sequence: u64)
     -> impl Future<Output = Result<Option<Stored>, Fault>> + Send;
 

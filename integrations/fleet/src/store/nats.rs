@@ -2,7 +2,8 @@
 //!
 //! Streams `FLEET-events` and `FLEET-decisions`, and a bucket for each [`Bucket`], all with the
 //! replicas that they were created with. Consistent reads are answered by the stream leader.
-//! Consumers may lag behind, so readers are given the sequence up to which they have to read.
+//! Consumers may lag behind, so readers are given the sequence number up to which they have to
+//! read.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -185,8 +186,8 @@ impl Nats {
         &self.buckets[bucket as usize]
     }
 
-    /// Reads all messages of a filter after a sequence, up to the end and at least to the required
-    /// sequence.
+    /// Reads all messages of a filter after a sequence number, up to the end and at least to the
+    /// required sequence number.
     async fn read(
         &self,
         name: &str,

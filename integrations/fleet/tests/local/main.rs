@@ -35,7 +35,7 @@ fn shared<S: Store>(store: S, name: &str, settings: Settings) -> Arc<Shared<S>> 
     Arc::new(Shared::new(store, missions(), name.to_owned(), settings))
 }
 
-/// Appends events of a robot and returns their sequences.
+/// Appends events of a robot and returns their sequence numbers.
 async fn tell<S: Store>(store: &S, robot: &str, events: &[String]) -> Vec<u64> {
     let subject = Address::of(robot, store.partitions()).to_string();
     let mut sequences = Vec::new();

@@ -10,7 +10,8 @@ use crate::perform::{Call, End, Perform, Running};
 use crate::performer::action::SERVER_TIMEOUT;
 use crate::performer::settings::argument;
 
-/// Positions of the function and the design among the arguments.
+/// Performer that executes an action by a call of `change_mode`. The fields `function` and `design`
+/// are the positions of these values among the arguments of the action, if the settings state them.
 #[derive(Debug)]
 pub(super) struct ChangeMode {
     node: Arc<Node>,

@@ -41,7 +41,7 @@ impl Joint {
         available.map(|design| design.individual.name.to_lowercase()).collect()
     }
 
-    /// Locks the mission after applying the pending diagnostics.
+    /// Locks the mission and applies the pending diagnostics to it.
     fn lock(&self) -> MutexGuard<'_, Mission> {
         let mut mission = self.mission.lock().unwrap_or_else(PoisonError::into_inner);
         // Invalid or unknown diagnostics concern other devices.

@@ -40,7 +40,7 @@ pub(super) enum Output {
 pub(super) struct Wanted {
     pub(super) function: String,
     pub(super) mode: String,
-    /// Effect of the keeper that requires the mode. `None` if the function is released.
+    /// Effect of the keeper that requires the mode. `None` if the cancellation of a goal requires it.
     effect: Option<u64>,
 }
 
@@ -199,7 +199,8 @@ impl Keeping {
         self.publish_status(goal);
     }
 
-    /// Cancels a goal. Its function is released first.
+    /// Cancels a goal: requests the unground mode of its function, and ends the goal when the mode is
+    /// set. The cancellation of an unknown goal is rejected.
     pub(super) fn cancel(&mut self, goal: GoalId) {
         let Some(pursued) = self.goals.get_mut(&goal) else {
             self.outputs.push(Output::Cancelled(goal, false));
