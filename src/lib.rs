@@ -3,8 +3,10 @@
 //! This facade joins the libraries: [`ontology`] (OWL model of the robot), [`rules`] (inference),
 //! `metaplan-planner` (planning) and `metaplan-probabilistic` (model checking of decision
 //! processes, applied to missions by [`comparison`]). `metaplan-mission` joins OWL and PDDL,
-//! [`mission`] plans with both, and `metaplan-verify` checks the certificates of plans. The facade
-//! contains the sequence of the stages, not their algorithms.
+//! [`mission`] plans with both, and `metaplan-verify` checks the certificates of plans.
+//!
+//! The facade also contains the adaptation loop ([`mapek`]), the choice of designs without a plan
+//! ([`configure`]), explanations of plans ([`explain`]) and simulation ([`simulate`]).
 
 pub use ::{probabilistic, verify};
 pub use ::mission::{Errors, Message, file, knowledge, message, visible};

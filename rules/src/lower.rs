@@ -13,7 +13,7 @@ use crate::store::{RelationId, Store};
 use crate::symbol::{Symbol, Symbols};
 use crate::vocabulary::{DIFFERENT_FROM, SAME_AS};
 
-/// Lowers rules without errors of [`crate::safety::check`].
+/// Lowers rules in which [`crate::safety::check`] finds no error.
 pub(crate) struct Lowering<'a> {
     symbols: &'a mut Symbols,
     store: &'a mut Store,

@@ -32,7 +32,7 @@ pub(super) fn front_text(name: &str, objectives: &[String], front: &Front, colum
         }
         (Status::Feasible, _) => {
             let proved = solved.iter().filter(|point| point.solution.status == Status::Optimal).count();
-            // A point with a better first objective may exist beyond the last one.
+            // The last point may be unproved: a plan that dominates it may exist.
             let open = if proved < solved.len() { ", and one more that is not proved to be" } else { "" };
             let _ = writeln!(
                 text,

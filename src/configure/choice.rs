@@ -69,7 +69,7 @@ pub struct Choice {
     pub considered: Vec<Considered>,
 }
 
-/// A design of an objective's function.
+/// A design that was considered for an objective, with its utility and the decision on it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Considered {

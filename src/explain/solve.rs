@@ -1,4 +1,4 @@
-//! Computes the best plan for a mission, optionally with other designs.
+//! Computes the best plan for a mission, optionally with a changed set of available designs.
 
 use planner::{Config, Limits, Status, optimize};
 
@@ -16,8 +16,8 @@ pub fn best(mission: &Mission, limits: &Limits) -> Result<BestPlan, Errors> {
     solve(mission, limits, &|_, available| available)
 }
 
-/// Computes the best plan with the designs for which `allowed` returns `true`, given the name and
-/// whether it is available.
+/// Computes the best plan with the designs for which `allowed` returns `true`. The arguments of
+/// `allowed` are the name of a design, and `true` if the design is available.
 pub(super) fn solve(
     mission: &Mission,
     limits: &Limits,

@@ -164,8 +164,9 @@ impl VariedMission<'_> {
         self.simplest(function, from, (same, value), then)
     }
 
-    /// Returns the bound between a value with the same plan and one with another: the number with
-    /// the fewest digits if the plan changes there.
+    /// Returns the bound at which the plan changes, between `same`, a value with the same plan, and
+    /// `other`, a value with the plan `then`. The bound is the number with the fewest decimals in
+    /// this interval if the plan changes at this number or just beyond it. Otherwise it is `other`.
     fn simplest(
         &self,
         function: &str,

@@ -168,7 +168,8 @@ pub(super) fn follows(before: &Segment, after: &Segment) -> bool {
     after.records.is_empty() && closing(&before.after, before.number).1 == after.before
 }
 
-/// Returns the last line of a segment that has a successor, and the link after it.
+/// Creates the line that closes a segment and names its successor. Also returns the link after this
+/// line.
 pub(super) fn closing(at: &Link, segment: u64) -> (String, Link) {
     at.line("end", &[Value::from(segment + 1)])
 }

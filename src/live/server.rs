@@ -94,7 +94,7 @@ impl Live {
         self.sender.send_event(number, text);
     }
 
-    /// Publishes an answer, a JSON object of the format. Never blocks.
+    /// Publishes an answer of the loop, as the text of its JSON object. Never blocks.
     pub fn said(&self, answer: &str) {
         self.sender.send_answer(answer);
     }

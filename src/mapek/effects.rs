@@ -71,8 +71,8 @@ pub(super) fn effect(beliefs: &mut Beliefs, action: u64, command: Command, answe
     let is_replaced = |old: &Effect| command.replaces(&old.command, old.action == action);
     let replaced: Vec<u64> =
         outstanding.values().filter(|old| is_replaced(old)).map(|old| old.number).collect();
-    // The new effect may arrive before the effects that the replaced ones have superseded. Therefore, all of them are
-    // listed.
+    // The list contains the replaced effects and the effects that these have superseded, because the new effect may
+    // arrive before any of them.
     let mut supersedes: BTreeSet<u64> = replaced.iter().copied().collect();
     supersedes
         .extend(replaced.iter().filter_map(|number| outstanding.get(number)).flat_map(|old| &old.supersedes));

@@ -1,4 +1,4 @@
-//! Context of a plan's picture: the task of the plan, and the coordinates.
+//! Context of a plan's picture: domain, problem, coordinates of places, and designs.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use pddl::ast::{Domain, Problem};
 use crate::mission::Mission;
 use crate::report::positions::Positions;
 
-/// Context of a plan's picture.
+/// Context of a plan's picture, as the caller supplies it.
 #[derive(Debug, Clone, Copy)]
 pub struct Seen<'a> {
     /// The mission.
@@ -21,7 +21,8 @@ pub struct Seen<'a> {
 /// Designs of a knowledge base, with the first function that each of them solves.
 pub(super) type Designs = BTreeMap<String, String>;
 
-/// The task of a plan, with further context.
+/// Context of a plan's picture, as the drawing functions need it: the domain and the problem, the
+/// coordinates of places, and the designs.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Scene<'a> {
     pub(super) domain: &'a Domain,

@@ -206,8 +206,8 @@ fn components(knowledge: &Knowledge) -> Vec<Message> {
     doubts
 }
 
-/// Returns `true` for a class membership or a component status, which give a component no effect on
-/// designs.
+/// Returns `true` if the fact is a class membership or a component status. Such a fact does not link
+/// the component to a design.
 fn is_plain(engine: &Engine, fact: &Fact) -> bool {
     let name = engine.symbols().value(fact.predicate).as_name().unwrap_or_default();
     fact.arguments.len() == 1 || local_name(name) == "c_status"

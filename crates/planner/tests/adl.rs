@@ -1,6 +1,6 @@
 //! Plans with conditional effects, derived predicates, quantifiers and disjunctions: known optima,
-//! and random tasks on which the quick search and the SAT solver alone must agree. (That ground
-//! tasks mean what the files mean is checked elsewhere, against an interpreter of the files.)
+//! and random tasks on which the quick search and the SAT solver alone must agree. (The semantics of
+//! ground tasks is checked elsewhere, against an interpreter of the files.)
 
 use metaplan_planner::{Config, Engine, GroundConfig, Solution, Status, ground, optimize};
 use testing::adl::Generator;
@@ -9,11 +9,11 @@ use testing::random::Random;
 use crate::tally::limits;
 use pddl::{Source, read};
 
-/// Engines, each with the states that the exact search stores before others have their turn.
+/// Engines, each with the number of states that A\* stores before the other parts of the planner start.
 const WAYS: [(Engine, usize); 5] =
     [(Engine::Auto, 20_000), (Engine::Auto, 30), (Engine::Auto, 1), (Engine::Search, 1), (Engine::Sat, 0)];
 
-/// Solves a task in one of the ways.
+/// Solves a task with an engine and a head start, see [`WAYS`].
 fn solve(domain: &str, problem: &str, engine: Engine, head_start: usize) -> Solution {
     let (domain, problem, _) = read(&Source::new("domain", domain), &Source::new("problem", problem))
         .unwrap_or_else(|errors| panic!("{errors:?}\n{domain}\n{problem}"));

@@ -1,5 +1,5 @@
-//! The planner for actions that overlap at the borders of the definition (the head of `validate`):
-//! what it claims to be the least makespan, or out of reach, and the validator with it.
+//! Limit cases of the definition of overlapping actions (in the head of `validate`): the makespans
+//! and the unsolvability that the planner proves. The validator checks each plan.
 
 use std::fs::read_to_string;
 use std::path::Path;
@@ -66,9 +66,10 @@ fn over_all_is_about_the_open_interval() {
     check(&[a()], "(p) (at 1.999 (not (p)))", "(g)", NONE);
     check(&[a()], "(at 3 (p))", "(g)", "5");
     check(&[a()], "(p) (at 0 (not (p)))", "(g)", NONE);
-    // What the goal wants happens at the end, where it breaks what held until then.
+    // The event achieves the goal `(not (p))` at the end of the action, where the condition over all
+    // no longer applies.
     check(&[a()], "(p) (at 2 (not (p)))", "(g) (not (p))", "2");
-    // The event and the start of another action, each of which alone would break it.
+    // The event and the start of `b` preserve the condition over all only if they happen together.
     let both = durative("a", "4", "(over all (or (and (p) (q)) (and (not (p)) (not (q)))))", "(at end (g))");
     let helps = || durative("b", "1", "", "(at start (not (q)))");
     check(&[both.clone(), helps()], "(p) (q) (at 2 (not (p)))", "(g)", "4");
@@ -77,20 +78,21 @@ fn over_all_is_about_the_open_interval() {
 
 #[test]
 fn events_that_interfere_lie_apart() {
-    // After the event, which adds the fact that the start reads; strictly after it, because the
-    // start deletes that fact.
+    // The start reads the fact that the event adds, so it happens strictly after the event.
     check(&[durative("a", "2", "(at start (p))", "(at end (g))")], "(at 5 (p))", "(g)", "7.001");
+    // The end deletes the fact that the event adds, so the separation must lie between them.
     let deletes = || durative("a", "2", "", "(at end (g)) (at end (not (p)))");
     check(&[deletes()], "(at 2 (p))", "(g)", "2.001");
     check(&[deletes()], "(at 2.001 (p))", "(g)", "2");
     check(&[deletes()], "(at 2.0009 (p))", "(g)", "2.0019");
     check(&[deletes()], "(at 1.9995 (p))", "(g)", "2.0005");
     check(&[deletes()], "(at 1.999 (p))", "(g)", "2");
-    // Before it: the end reads what the event deletes, and the start has to wait for another one.
+    // The end reads the fact that the second event deletes, so it happens before that event. The start
+    // happens after the first event.
     let reads = || durative("a", "2", "(at start (q)) (at end (p))", "(at end (g))");
     check(&[reads()], "(p) (at 1 (q)) (at 3.002 (not (p)))", "(g)", "3.001");
     check(&[reads()], "(p) (at 1 (q)) (at 3.0019 (not (p)))", "(g)", NONE);
-    // What does not interfere does not wait.
+    // Happenings that do not interfere need no separation.
     check(&[durative("a", "2", "", "(at end (g)) (at end (p))")], "(at 2 (p))", "(g)", "2");
     check(&[durative("a", "2", "", "(at end (g)) (at end (not (p)))")], "(at 2 (not (p)))", "(g)", "2");
     check(&[durative("a", "2", "", "(at end (g))")], "(at 2 (p))", "(g) (p)", "2");

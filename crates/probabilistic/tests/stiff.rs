@@ -1,4 +1,5 @@
-//! Chains with a tiny probability of leaving, for which no certificate in doubles exists. Elimination has a small relative error.
+//! Stiff processes, in which a set of states is left with a tiny probability. The inductive certificate does not
+//! exist in doubles for them, but state elimination has a small relative error.
 
 #![allow(clippy::print_stdout)]
 

@@ -1,8 +1,9 @@
-//! Limits of a computation: a deadline, memory, and a flag that Ctrl-C sets.
+//! Limits of a computation: a deadline, an interrupt flag, and the memory of a search.
 //!
-//! Long loops iterate through [`Limits::watch`] or call [`LimitPoll::beat`]. Both return [`Interrupted`] at a
-//! limit, which callers propagate with `?`: an interrupted function has no result that could be mistaken for an
-//! answer. So the compiler checks that every caller stops.
+//! Ctrl-C sets the flag, and so does the memory limit of the process. Long loops iterate through [`Limits::watch`]
+//! or call [`LimitPoll::beat`]. Both check the deadline and the flag and return [`Interrupted`] at a limit, which
+//! callers propagate with `?`: an interrupted function has no result that could be mistaken for an answer. So the
+//! compiler checks that every caller stops. Searches compare their own memory with [`Limits::room`].
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -31,7 +32,7 @@ const GRACE: Duration = Duration::from_millis(120);
 const DEFAULT_MEMORY: usize = 1 << 31;
 
 impl Limits {
-    /// Returns limits without deadline; only the interrupt flag applies.
+    /// Returns limits without a deadline, with a new interrupt flag and the default memory limit.
     pub fn none() -> Self {
         Self::default()
     }
@@ -66,7 +67,7 @@ impl Limits {
     }
 
     /// Returns limits for the completion of an answer. The deadline is later by a tenth of the time
-    /// limit and a constant grace period; flag and memory limit do not apply.
+    /// limit and a constant grace period. The flag is new, and the memory limit is the default.
     #[must_use]
     pub fn extended(&self) -> Self {
         let grace = self.time.mul_f64(0.1).saturating_add(GRACE);
@@ -104,10 +105,10 @@ impl Limits {
         Arc::clone(&self.interrupt)
     }
 
-    /// Checks the limits.
+    /// Checks the deadline and the interrupt flag.
     ///
     /// # Errors
-    /// [`Interrupted`] if a limit is reached.
+    /// [`Interrupted`] if the deadline has passed or the flag is set.
     pub fn check(&self) -> Result<(), Interrupted> {
         if self.reached() { Err(Interrupted) } else { Ok(()) }
     }
@@ -122,7 +123,7 @@ impl Limits {
         LimitPoll { limits: self, left: 0, stride: 1, last: None }
     }
 
-    /// Returns `true` if a limit is reached.
+    /// Returns `true` if the deadline has passed or the interrupt flag is set.
     pub fn reached(&self) -> bool {
         self.interrupt.load(Ordering::Relaxed)
             || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)

@@ -190,8 +190,9 @@ impl Sum<'_, '_> {
         increments_by_source
     }
 
-    /// Reduced cost of an operator with its cheapest designs, by abstract state if it depends on
-    /// it.
+    /// Adds the reduced cost of an operator with its cheapest designs to `out`: a single amount, or
+    /// an amount for each abstract transition if the amounts differ. Also forbids the operator in
+    /// transitions from or to a dead end of the abstraction.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "costs to go and the cost of an operator are at most GROWTH_LIMIT; steps are in memory"

@@ -32,7 +32,7 @@ pub(crate) fn lower(rules: &[Rule], context: &mut Context) -> usize {
             continue;
         }
         let content: Vec<_> = context.rules[position..].iter().map(canonical).collect();
-        // A rule can be lowered to several rules of the engine; all of them are removed.
+        // A duplicate may have been lowered to several rules of the engine; all of them are removed.
         if !contents.insert(content) {
             context.rules.truncate(position);
             duplicates += 1;

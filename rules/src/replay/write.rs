@@ -7,7 +7,8 @@ use crate::engine::Engine;
 use crate::fact::Fact;
 
 impl Engine {
-    /// Returns a step for every fact that holds, after its supports, as input of [`crate::replay`].
+    /// Returns one derivation of all facts that hold, as input of [`crate::replay`]. It has a step for
+    /// each fact, and the supports of a fact come before it.
     pub fn everything(&self) -> Derivation {
         let mut positions: FxHashMap<Fact, usize> = FxHashMap::default();
         let mut steps = Vec::new();

@@ -10,7 +10,7 @@ use super::model::{Action, Atom, Body, Effect, Expression, Fluent, Operation, Pa
 /// Reason why an action cannot be executed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Obstacle {
-    /// The definition forbids it.
+    /// The semantics forbids the action, for the given reason.
     Blocked(&'static str),
     /// A number exceeds the range of the oracle, so the result is unknown.
     TooLarge,

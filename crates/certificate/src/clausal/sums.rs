@@ -1,9 +1,9 @@
 //! Encodes the accumulated cost and the numeric variables after each step, in binary.
 //!
-//! An operator adds a constant and entries of tables over its slots, all in two's complement. The
-//! operator and the designs of the step determine the bits of each summand. No sum overflows: the
-//! accumulated cost is limited after each step, and numbers are as wide as their range after T
-//! steps requires.
+//! All numbers are in two's complement. An operator adds a constant and one entry from each of its
+//! tables, which the designs of the step select. An assignment adds these summands to 0 instead of
+//! the previous value. No sum overflows: the accumulated cost is limited after each step, and each
+//! variable is wide enough for its range after all steps of the formula.
 
 use std::collections::BTreeMap;
 

@@ -12,8 +12,8 @@ use pddl::ast::{Atom, Condition, Name, Term, TypedName};
 const WORTHWHILE: usize = 16;
 
 impl Reader<'_> {
-    /// Returns the candidates of the first variable in `bound` under the condition `within`, or
-    /// all objects of its type without a condition.
+    /// Returns the candidates of the first variable in `bound` under the condition `within`. Returns
+    /// all objects of its type if there is no condition, or if it does not restrict the variable.
     pub(super) fn candidates(&self, bound: &[TypedName], within: Option<&Condition>) -> Vec<u32> {
         let Some(first) = bound.first() else { return Vec::new() };
         let hidden: Vec<&Name> = bound.iter().map(|variable| &variable.identifier.name).collect();
@@ -25,7 +25,8 @@ impl Reader<'_> {
         }
     }
 
-    /// Returns the candidates of a variable in a conjunction.
+    /// Returns the candidates of a variable in a conjunction. Returns all objects of its type if no
+    /// conjunct restricts the variable.
     pub(super) fn candidates_where(&self, variable: &TypedName, conditions: &[&Condition]) -> Vec<u32> {
         match self.restricted_by_all(&variable.identifier.name, conditions.iter().copied(), &[]) {
             Some(objects) => {
@@ -35,7 +36,8 @@ impl Reader<'_> {
         }
     }
 
-    /// Returns the smallest candidate set that a conjunct gives, see [`Reader::restricted`].
+    /// Returns the smallest candidate set among those of the visited conjuncts, or `None` if no
+    /// conjunct restricts the variable; see [`Reader::restricted`].
     fn restricted_by_all<'c>(
         &self,
         name: &Name,

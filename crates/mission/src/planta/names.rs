@@ -16,7 +16,7 @@ pub(super) const LESS: &str = "lessThan";
 pub(super) const EQUAL: &str = "equalTo";
 /// Derived predicate: an axiom is violated.
 pub(super) const INCONSISTENT: &str = "inferred-Inconsistent";
-/// Predicate: the realisability of a design is the boolean in its second argument.
+/// Predicate of a design and a boolean: with `false`, the design is not realisable.
 pub(super) const UNREALISABLE: &str = "inferred-Fd_realisability";
 /// Pseudo-design in PLANTA's domains of a function that is not in use.
 pub(super) const UNGROUND: &str = "fd_unground";

@@ -14,7 +14,7 @@ const MAX_WORK: usize = 2_000_000;
 pub(super) enum End {
     /// There are no further paths.
     Exhausted,
-    /// There may be more.
+    /// The enumeration stopped early, so there may be further paths.
     Stopped,
 }
 
@@ -53,7 +53,8 @@ impl<'g> Paths<'g> {
         self.graph.edges[from..to].iter().filter(|edge| self.graph.alive[edge.to as usize])
     }
 
-    /// Visits paths until `visit` returns `false`.
+    /// Visits the paths. Stops early if `visit` returns `false`, or if [`MAX_WORK`] edges were
+    /// followed.
     pub(super) fn each(&mut self, visit: &mut dyn FnMut(Vec<GroundStep>) -> bool) -> End {
         if !self.graph.alive.first().is_some_and(|is_alive| *is_alive) {
             return End::Exhausted;
@@ -70,7 +71,7 @@ impl<'g> Paths<'g> {
         End::Stopped
     }
 
-    /// Visits the paths with `length` steps.
+    /// Visits the paths with `length` steps. Stops early like [`Paths::each`].
     fn each_of(&mut self, length: usize, visit: &mut dyn FnMut(Vec<GroundStep>) -> bool) -> End {
         let mut path: Vec<u32> = Vec::new();
         let mut branches = vec![Branch { label: ROOT, next: self.first[ROOT as usize] }];

@@ -13,10 +13,10 @@ use crate::solve::problem::Direction;
 use crate::solve::quotient::Quotient;
 use crate::solve::work::Work;
 
-/// Upper limit on the rounds of policy iteration for the greatest number of steps.
+/// Upper limit on the rounds of policy iteration that compute the greatest expected number of steps.
 const MAX_ROUNDS: usize = 200;
 
-/// Sweeps between two solutions of a chain.
+/// Upper limit on the sweeps that improve the policy in one round.
 const SWEEPS: usize = 10;
 
 /// Relative error of evaluating a row that was built from at most `widest` transitions.

@@ -1,11 +1,13 @@
-//! Compiles preferences to hidden actions after the plan: each instance is satisfied, or violated
-//! at a cost.
+//! Compiles preferences to hidden actions that evaluate the preferences after the plan.
 //!
-//! The actions have a fixed order, exactly one of both is applicable for each instance, and they
-//! change nothing else. Every plan thus has exactly one evaluation. With overlapping actions, the
-//! hidden actions would extend the makespan. There is then an action per instance with its
-//! violation as the precondition, which is never executed: its condition is evaluated in the last
-//! state.
+//! Each instance gets two hidden actions: one for its satisfaction, and one for its violation, which
+//! has a cost. Exactly one of the two is applicable. The instances have a fixed order, and the hidden
+//! actions change only their own atoms and the counts of violations. Every plan thus has exactly one
+//! evaluation.
+//!
+//! If actions can overlap, hidden actions would extend the makespan. Each instance then gets one
+//! action that is never executed. Its precondition is the violation of the instance, and is
+//! evaluated in the last state.
 
 use num_rational::BigRational;
 use num_traits::{One, Zero};

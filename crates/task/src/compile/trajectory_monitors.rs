@@ -234,7 +234,7 @@ impl<'t> Monitors<'t> {
         Ok(())
     }
 
-    /// Returns `true` if the additions neither separate happenings nor exclude any.
+    /// Returns `true` if the monitors neither forbid a happening nor make two happenings interfere.
     pub(super) fn keeps_apart_nothing(&self) -> bool {
         let is_plain = |addition: &Addition| {
             addition.conditions.is_empty()

@@ -1,12 +1,12 @@
-//! Sequential plans, moved to the earliest times: the first plan of a task that does not require
-//! overlap, and an upper bound on the cost of a best plan for all other tasks.
+//! Sequential plans, moved to the earliest times. If a task does not require overlap, they give a
+//! first plan, whose cost is an upper bound on the cost of a best plan.
 //!
-//! These plans solve the task in which actions do not overlap. Searches for that task are better
-//! informed: it has fewer variables with more values, landmarks, mutexes and interchangeable
-//! objects. Each resulting sequence is executed like any other sequence, so that its actions
-//! overlap where they can. So every plan that is returned is one of the overlapping task. A
-//! sequence that is not, for example because a timed initial literal would interrupt an action, is
-//! dropped.
+//! These plans solve the sequential task, in which actions do not overlap. Searches for the
+//! sequential task are better informed: it has fewer variables, with more values, and also
+//! landmarks, mutexes and interchangeable objects. Each resulting sequence is executed in the
+//! overlapping task at the earliest times, so that its actions overlap where they can. Every
+//! returned plan is therefore a plan of the overlapping task. A sequence that cannot be executed is
+//! dropped, for example if a timed initial literal would interrupt an action.
 
 use std::cell::OnceCell;
 

@@ -77,8 +77,9 @@ pub(super) fn split(mut lifted: Lifted, solves: &[Name], mentions: &dyn Fn(u32) 
     let (mut origins, mut designs) = (Vec::new(), Vec::new());
     let waited = lifted.time.waited;
     if !events.is_empty() {
-        // A plan ends with its last action, not with timed initial literals. An action without
-        // effects may therefore be useful to delay the end.
+        // A plan must end with the end of an action, not with a timed initial literal: literals
+        // after time 0 add `waited`, and ends delete it. An action without effects may therefore be
+        // useful, because it extends the plan beyond a literal.
         let done = Formula::Literal { positive: false, predicate: waited, terms: Vec::new() };
         let goal = std::mem::replace(&mut lifted.goal, Formula::truth());
         lifted.goal = Formula::And(vec![goal, done]);

@@ -16,7 +16,8 @@ pub(super) const LIMIT: Int = 1 << 90;
 /// Divisors of the numbers that hold durations, by start operator.
 pub(super) type Divisors = FxHashMap<OperatorId, Rational>;
 
-/// The unit of all times: number of units per time unit of the files.
+/// Internal unit of time, in which all times are integers: the number of internal units per time unit
+/// of the PDDL files.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Unit(pub(super) Int);
 

@@ -58,7 +58,7 @@ struct Design {
     change: i64,
     /// Required component.
     component: Option<usize>,
-    /// Required least visibility.
+    /// Lower limit on the visibility with which the design can be used.
     visibility: Option<i64>,
 }
 
@@ -68,11 +68,11 @@ pub struct Robot {
     form: Form,
     functions: usize,
     designs: Vec<Design>,
-    /// Least safety for narrow ways.
+    /// Lower limit on the safety of a design on narrow ways.
     safety: i64,
-    /// Greatest energy of each design at quiet places.
+    /// Upper limit on the energy of each design at quiet places.
     quiet: Option<i64>,
-    /// Greatest slowness of each design at all places.
+    /// Upper limit on the slowness of each design at all places.
     quick: Option<i64>,
     /// `true` if a change of design has a price.
     reconfiguration: bool,

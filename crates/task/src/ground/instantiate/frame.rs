@@ -1,8 +1,9 @@
-//! Cache of instance data that depends only on the designs of the slots.
+//! Data about the designs of the slots, shared by several instances of an action schema.
 //!
-//! Suitable designs, forbidden combinations, costs and consumption depend on few parameters: the
-//! battery use of a route depends on the route, but not on the battery level. They are computed
-//! once for each combination of these parameters and shared by the instances.
+//! Suitable designs, forbidden combinations, costs and consumption depend on only a few parameters
+//! of the schema, the key parameters. For example, the battery use of a route depends on the route,
+//! but not on the battery level. The data are computed once for each combination of the key
+//! parameters.
 
 use std::sync::Arc;
 

@@ -46,7 +46,7 @@ impl Machine {
         let mode = self.settings.functions.unground(function).to_owned();
         let requested = self.pending.get(function).map(|change| &change.mode);
         let has = requested.or_else(|| self.modes.get(function));
-        // The mode of an unknown function cannot be withdrawn.
+        // Nothing is requested while the mode of the function is unknown.
         if has.is_some_and(|has| *has != mode) {
             self.change(Change { function: function.to_owned(), mode, effect: None, attempt: 1 });
         }
