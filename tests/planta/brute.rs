@@ -481,7 +481,7 @@ fn collect_predicates(condition: &Condition, negated: bool, predicates: &mut Vec
         }
         Condition::Not(inner) => collect_predicates(inner, !negated, predicates),
         Condition::Exists(_, inner) | Condition::ForAll(_, inner) => {
-            collect_predicates(inner, negated, predicates)
+            collect_predicates(inner, negated, predicates);
         }
         Condition::Imply(left, right) => {
             collect_predicates(left, !negated, predicates);

@@ -131,7 +131,9 @@ fn change_number(document: &mut Value, key: &str, random: &mut Random) {
     fn numbers<'v>(value: &'v mut Value, key: &str, inside: bool, values: &mut Vec<&'v mut Value>) {
         match value {
             Value::Array(elements) => {
-                elements.iter_mut().for_each(|element| numbers(element, key, inside, values))
+                for element in elements {
+                    numbers(element, key, inside, values);
+                }
             }
             Value::Object(fields) => {
                 fields

@@ -129,7 +129,7 @@ impl Happening {
             match (self.changes.iter_mut().find(|(value, _)| *value == at), change) {
                 (Some((_, Change::Add(sum))), Change::Add(amount)) => *sum = fit(*sum + amount)?,
                 (Some((_, Change::Scale(product))), Change::Scale(amount)) => {
-                    *product = fit(*product * amount)?
+                    *product = fit(*product * amount)?;
                 }
                 _ => self.changes.push((at, change)),
             }

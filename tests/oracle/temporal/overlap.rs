@@ -308,7 +308,7 @@ impl Search<'_> {
         let cost = fit(cost + self.reduction.time * self.unit)?;
         // After all events, a tick that changes nothing leads back to its node. Such an edge matters only if it gains something each
         // time.
-        if target != from || cost < 0 {
+        if target != from || cost < Q::from_integer(0) {
             self.graph.edges.push((from, target, cost));
             self.starts.push(tick.starts.clone());
         }

@@ -210,7 +210,7 @@ impl<'w> Search<'w> {
                     .and_then(|end| if end.interferes(event) { Err(INTERFERES) } else { end.apply(&state) })
                 {
                     Ok(end) => {
-                        self.reach((from, instance, duration), ((start, false), None), end, event_count + 1)
+                        self.reach((from, instance, duration), ((start, false), None), end, event_count + 1);
                     }
                     Err(Obstacle::TooLarge) => self.open = true,
                     Err(Obstacle::Blocked(_)) => {}

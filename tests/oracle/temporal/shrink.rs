@@ -26,7 +26,7 @@ pub fn smaller(task: &Task) -> Vec<Task> {
             Body::Instantaneous(part) => {
                 for part in parts(part) {
                     add_changed(&|smaller_task| {
-                        smaller_task.actions[at].body = Body::Instantaneous(part.clone())
+                        smaller_task.actions[at].body = Body::Instantaneous(part.clone());
                     });
                 }
             }
@@ -47,7 +47,7 @@ pub fn smaller(task: &Task) -> Vec<Task> {
                     }
                 }
                 bodies.into_iter().for_each(|body| {
-                    add_changed(&|smaller_task| smaller_task.actions[at].body = body.clone())
+                    add_changed(&|smaller_task| smaller_task.actions[at].body = body.clone());
                 });
             }
         }
