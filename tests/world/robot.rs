@@ -117,6 +117,10 @@ impl Robot {
     pub fn fail_late(&mut self) -> Option<Value> {
         let (effect, design) = self.before.take()?;
         self.design = Some(design);
+        // An action may have waited for the design before.
+        if let Some(action) = &mut self.action {
+            action.awaited_design.take_if(|awaited| self.design.as_ref() == Some(awaited));
+        }
         self.refused.append(&mut self.refused_before);
         self.refused.insert(effect);
         let report = json!({ "event": "reconfiguration_failed", "effect": effect });
