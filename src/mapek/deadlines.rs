@@ -117,11 +117,8 @@ fn check_action(beliefs: &mut Beliefs, settings: &Settings, answers: &mut Vec<An
     if let Some(cancel) = open_cancel(beliefs).cloned()
         && let Some(running) = &mut beliefs.running
     {
-        let time_since_report = beliefs.now.saturating_sub(running.last_report);
-        if time_since_report >= next_deadline_after(running, settings) {
-            running.overdue = running.overdue.saturating_mul(2).max(1);
-            let (effect, action, seconds) =
-                (Some(cancel.number), running.action, time_since_report.as_secs());
+        if let Some(seconds) = passed_deadline(running, beliefs.now, settings) {
+            let (effect, action) = (Some(cancel.number), running.action);
             answers.push(Answer::Overdue { effect, action, seconds, outcome: OverdueOutcome::Repeated });
             answers.push(Answer::Effect(Effect { repeated: true, ..cancel }));
         }
@@ -131,12 +128,7 @@ fn check_action(beliefs: &mut Beliefs, settings: &Settings, answers: &mut Vec<An
     else {
         return;
     };
-    let time_since_report = beliefs.now.saturating_sub(running.last_report);
-    if time_since_report < next_deadline_after(running, settings) {
-        return;
-    }
-    // Deadlines double, so that a robot that never reports causes few messages.
-    running.overdue = running.overdue.saturating_mul(2).max(1);
+    let Some(seconds) = passed_deadline(running, beliefs.now, settings) else { return };
     let (action, request) = (running.action, running.request);
     let is_unacknowledged = beliefs.outstanding.contains_key(&request);
     let is_first = running.overdue == 1;
@@ -151,7 +143,6 @@ fn check_action(beliefs: &mut Beliefs, settings: &Settings, answers: &mut Vec<An
         (false, _, true) => OverdueOutcome::Cancelled,
         _ => OverdueOutcome::Waiting,
     };
-    let seconds = time_since_report.as_secs();
     answers.push(Answer::Overdue { effect: is_unacknowledged.then_some(request), action, seconds, outcome });
     match outcome {
         OverdueOutcome::Repeated => {
@@ -175,6 +166,17 @@ fn check_action(beliefs: &mut Beliefs, settings: &Settings, answers: &mut Vec<An
         }
         OverdueOutcome::Failed | OverdueOutcome::Waiting => {}
     }
+}
+
+/// Returns the seconds since the last report of an action if its deadline has passed, and sets the next deadline. Deadlines double, so
+/// that a robot that never reports causes few messages.
+fn passed_deadline(running: &mut Running, now: Duration, settings: &Settings) -> Option<u64> {
+    let time_since_report = now.saturating_sub(running.last_report);
+    if time_since_report < next_deadline_after(running, settings) {
+        return None;
+    }
+    running.overdue = running.overdue.saturating_mul(2).max(1);
+    Some(time_since_report.as_secs())
 }
 
 /// Time after the last report at which the next deadline of an action passes.
