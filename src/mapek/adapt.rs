@@ -15,7 +15,7 @@ use crate::mapek::analyze::{Findings, missing_conclusions};
 use crate::mapek::answer::Answer;
 use crate::mapek::ask::{Outcome, Question};
 use crate::mapek::beliefs::{Beliefs, Retry, Running};
-use crate::mapek::effects::{cancel, reconfigure, resume_suspended, suspend};
+use crate::mapek::effects::{cancel, must_be_sent, reconfigure, resume_suspended, suspend};
 use crate::mapek::interrupt::{Interruption, weigh};
 use crate::mapek::monitor::Changes;
 use crate::mapek::plan::Planner;
@@ -241,7 +241,11 @@ impl Adaptation<'_> {
     /// Requests the designs of the action under way again for functions that have lost them.
     fn configure_again(&mut self, answers: &mut Vec<Answer>) {
         let Some(mut running) = self.beliefs.running.take() else { return };
-        if !running.suspended && !running.cancelling {
+        let is_active = !running.suspended && !running.cancelling;
+        // Without a design to be sent the objectives are up to date.
+        if is_active
+            && running.step.configuration.iter().any(|pair| must_be_sent(self.beliefs, &running, pair))
+        {
             reconfigure(self.beliefs, &mut running, answers);
         }
         self.beliefs.running = Some(running);

@@ -48,12 +48,9 @@ pub(super) fn request(beliefs: &mut Beliefs, step: PlannedStep, answers: &mut Ve
 /// A requested action can still be waiting for designs that were sent before. Therefore, changed designs of the action
 /// are sent even if the functions already have them.
 pub(super) fn reconfigure(beliefs: &mut Beliefs, running: &mut Running, answers: &mut Vec<Answer>) {
-    let may_wait = !running.suspended && (!running.started || running.resumed);
     for pair in &running.step.configuration {
-        let (function, design) = pair;
-        if beliefs.expected(function) != Some(design)
-            || may_wait && !running.sent_configuration.contains(pair)
-        {
+        if must_be_sent(beliefs, running, pair) {
+            let (function, design) = pair;
             let from = beliefs.configuration.get(function).cloned();
             let command = Command::Reconfigure { function: function.clone(), from, to: design.clone() };
             effect(beliefs, running.action, command, answers);
@@ -61,6 +58,14 @@ pub(super) fn reconfigure(beliefs: &mut Beliefs, running: &mut Running, answers:
     }
     running.sent_configuration.clone_from(&running.step.configuration);
     objectives(beliefs, Some(&running.step), answers);
+}
+
+/// Returns `true` if a function has to be asked for a design of an action: it has another one, or the action may be waiting for the one
+/// that was sent before.
+pub(super) fn must_be_sent(beliefs: &Beliefs, running: &Running, pair: &(String, String)) -> bool {
+    let may_wait = !running.suspended && (!running.started || running.resumed);
+    let (function, design) = pair;
+    beliefs.expected(function) != Some(design) || may_wait && !running.sent_configuration.contains(pair)
 }
 
 /// Creates an effect, and removes the effects that it supersedes.
