@@ -121,47 +121,33 @@ impl Journal {
         let (digest, unrecorded) = (control.digest(), control.unrecorded());
         let mut recovery = Recovery::default();
         let directory = directory.to_owned();
-        if contents.segments.is_empty() && contents.snapshots.is_empty() {
-            // The lock file proves that the journal had records before.
-            if lock.records > 0 {
-                return Err(broken(&directory, &format!("{} is missing", name("journal", 0))));
-            }
-            let (file, link) = create_segment(&directory, &Link::first(), &digest, 0)
-                .map_err(|error| broken(&directory, &error.to_string()))?;
-            let unfinished = Some(Unfinished::Agenda);
-            let (segment, observations) = (0, 0);
-            let journal = Self {
-                directory,
-                policy,
-                segment,
-                file,
-                link,
-                lock,
-                observations,
-                unfinished,
-                digest,
-                unrecorded,
-                is_incomplete: false,
-                notice: None,
-            };
-            return Ok((journal, recovery));
-        }
         let failed = |error: io::Error| broken(&directory, &error.to_string());
-        let Resumed { from, segments, observations, unfinished, missing_snapshots } =
-            resume(&directory, &contents, control, &mut recovery)?;
-        let (file, link) = settle(&directory, &segments, &mut recovery).map_err(failed)?;
-        for (number, line) in missing_snapshots {
-            write_snapshot(&directory, number, &line).map_err(failed)?;
-        }
-        // A machine that lost power may have lost records that were not flushed.
-        if lock.records > link.next {
-            let text = format!(
-                "the last {} records of the journal are missing; send again what follows `seq`",
-                lock.records - link.next
-            );
-            recovery.warnings.push(Message::warning("M323", text));
-        }
-        let segment = segments.last().map_or(from, |last| last.number);
+        let (segment, (file, link), observations, unfinished) =
+            if contents.segments.is_empty() && contents.snapshots.is_empty() {
+                // The lock file proves that the journal had records before.
+                if lock.records > 0 {
+                    return Err(broken(&directory, &format!("{} is missing", name("journal", 0))));
+                }
+                let created = create_segment(&directory, &Link::first(), &digest, 0).map_err(failed)?;
+                (0, created, 0, Some(Unfinished::Agenda))
+            } else {
+                let Resumed { from, segments, observations, unfinished, missing_snapshots } =
+                    resume(&directory, &contents, control, &mut recovery)?;
+                let (file, link) = settle(&directory, &segments, &mut recovery).map_err(failed)?;
+                for (number, line) in missing_snapshots {
+                    write_snapshot(&directory, number, &line).map_err(failed)?;
+                }
+                // A machine that lost power may have lost records that were not flushed.
+                if lock.records > link.next {
+                    let text = format!(
+                        "the last {} records of the journal are missing; send again what follows `seq`",
+                        lock.records - link.next
+                    );
+                    recovery.warnings.push(Message::warning("M323", text));
+                }
+                let segment = segments.last().map_or(from, |last| last.number);
+                (segment, (file, link), observations, unfinished)
+            };
         let journal = Self {
             directory,
             policy,
