@@ -74,7 +74,8 @@ impl Beliefs {
         for (number, function, design) in implied {
             self.outstanding.remove(&number);
             self.waits.remove(&number);
-            self.configured(number, function, design);
+            self.configured(number, function.clone(), design);
+            self.receipts.functions.entry(function).or_default().implied = Some(number);
         }
     }
 
@@ -142,6 +143,7 @@ impl Beliefs {
         // A superseded reconfiguration without an answer may have been carried out in between.
         let is_before_known = history.superseded.range(..effect).next().is_none();
         history.superseded.retain(|number, _| *number > effect);
+        history.implied = history.implied.filter(|implied| *implied > effect);
         if history.last.as_ref().is_some_and(|last| last.effect >= effect) {
             return Receipt::Recorded;
         }

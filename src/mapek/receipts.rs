@@ -26,6 +26,9 @@ pub(super) struct Received {
     /// nor pending; 0 if it never was. It is unknown whether reconfigurations up to this number were carried out before
     /// or after the observation.
     pub(super) doubted: u64,
+    /// Last reconfiguration whose arrival was implied by a report of an action, unless a later one was acknowledged.
+    /// Copies of it may still arrive.
+    pub(super) implied: Option<u64>,
 }
 
 /// The acknowledged reconfiguration with the greatest number.
@@ -80,9 +83,10 @@ impl Receipts {
         }
     }
 
-    /// Numbers of superseded reconfigurations of a function without an answer.
+    /// Numbers of earlier reconfigurations of a function that were not acknowledged by their number.
     pub(super) fn unanswered(&self, function: &str) -> impl Iterator<Item = &u64> {
-        self.functions.get(function).into_iter().flat_map(|history| history.superseded.keys())
+        let history = self.functions.get(function).into_iter();
+        history.flat_map(|history| history.superseded.keys().chain(&history.implied))
     }
 
     /// Returns function and design of a superseded reconfiguration.
@@ -98,7 +102,8 @@ impl Receipts {
                 let before = last.before.as_ref().map(|before| json!([before.design, before.effect]));
                 json!([last.effect, last.design, before, last.failed])
             });
-            json!([name, last, history.superseded.iter().collect::<Vec<_>>(), history.doubted])
+            let superseded = history.superseded.iter().collect::<Vec<_>>();
+            json!([name, last, superseded, history.doubted, history.implied])
         };
         json!([self.by_number, self.functions.iter().map(function).collect::<Vec<_>>()])
     }
@@ -121,7 +126,8 @@ impl Receipts {
             };
             let superseded = record.get(2)?.as_array()?.iter().map(superseded).collect::<Option<_>>()?;
             let doubted = record.get(3)?.as_u64()?;
-            Some((text(record.get(0)?)?, Received { last, superseded, doubted }))
+            let implied = record.get(4)?.as_u64();
+            Some((text(record.get(0)?)?, Received { last, superseded, doubted, implied }))
         };
         let functions = record.get(1)?.as_array()?.iter().map(function).collect::<Option<_>>()?;
         Some(Self { by_number: record.get(0)?.as_bool()?, functions })
