@@ -81,9 +81,16 @@ pub(super) fn effect(beliefs: &mut Beliefs, action: u64, command: Command, answe
     let mut supersedes: BTreeSet<u64> = replaced.iter().copied().collect();
     supersedes
         .extend(replaced.iter().filter_map(|number| outstanding.get(number)).flat_map(|old| &old.supersedes));
-    // Superseded reconfigurations without an answer may still arrive, too.
-    if let Command::Reconfigure { function, .. } = &command {
-        supersedes.extend(beliefs.receipts.unanswered(function));
+    // Superseded reconfigurations without an answer may still arrive, too. A request or resumption may arrive without the
+    // last reconfiguration, which supersedes them.
+    match &command {
+        Command::Reconfigure { function, .. } => supersedes.extend(beliefs.receipts.unanswered(function)),
+        Command::Request { step: PlannedStep { configuration, .. } } | Command::Resume { configuration } => {
+            let functions = configuration.iter().map(|(function, _)| function);
+            supersedes
+                .extend(functions.flat_map(|function| beliefs.receipts.unanswered_superseded(function)));
+        }
+        Command::Suspend { .. } | Command::Cancel { .. } => {}
     }
     // The list is bounded. The oldest effects have most likely arrived or been lost.
     while supersedes.len() > MAX_SUPERSEDED {

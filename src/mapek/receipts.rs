@@ -83,10 +83,15 @@ impl Receipts {
         }
     }
 
-    /// Numbers of earlier reconfigurations of a function that were not acknowledged by their number.
+    /// Numbers of superseded reconfigurations of a function without an answer.
+    pub(super) fn unanswered_superseded(&self, function: &str) -> impl Iterator<Item = &u64> {
+        self.functions.get(function).into_iter().flat_map(|history| history.superseded.keys())
+    }
+
+    /// Numbers of earlier reconfigurations of a function of which a copy may still be on its way.
     pub(super) fn unanswered(&self, function: &str) -> impl Iterator<Item = &u64> {
-        let history = self.functions.get(function).into_iter();
-        history.flat_map(|history| history.superseded.keys().chain(&history.implied))
+        let implied = self.functions.get(function).and_then(|history| history.implied.as_ref());
+        self.unanswered_superseded(function).chain(implied)
     }
 
     /// Returns function and design of a superseded reconfiguration.

@@ -312,8 +312,11 @@ impl Judge {
                 is_about_designs.iter().any(|kind| event["event"] == *kind)
             }
         });
+        // An abandoned reconfiguration can be carried out after an observation, and its acknowledgement can be lost.
+        let is_late = self.given_up.contains(&robot.configured.1)
+            && self.belief.superseded.contains_key(&robot.configured.1);
         // If the report of a restart is lost, the loop cannot know that the function has no design.
-        let is_unknowable = self.is_misled || robot.has_lost_design;
+        let is_unknowable = self.is_misled || robot.has_lost_design || is_late;
         let is_certain = self.belief.is_settled() && !is_on_its_way && !is_unknowable;
         match believed {
             // By the table, an uncertain design is not believed.

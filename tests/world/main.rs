@@ -163,6 +163,8 @@ const REPAIRED_SEEDS: [u64; 18] =
 ///
 /// - A superseded or abandoned reconfiguration arrived after an observation of the function: 37078, 66068, 69890,
 ///   104954, 130019, 170712.
+/// - The arrival of a reconfiguration was implied by a report, but a copy of it or an earlier one was still on its way:
+///   1553946, 4514333.
 /// - The design before a failed reconfiguration had failed, too, or was unknown: 2027, 2048, 3125, 3920, 39845, 54391,
 ///   78452.
 /// - An action waited for a design that its function would never get: 39, 201, 4693, 33347, 36095, 36977, 57984.
@@ -172,11 +174,11 @@ const REPAIRED_SEEDS: [u64; 18] =
 /// - A refused line came at the time of another search: 540936.
 /// - Two reconfigurations were refused at the same time: 14748.
 /// - The judge was wrong about late failures, forgotten actions and robots without acknowledgements: 20, 529, 2245,
-///   15852, 23994, 37483, 116491.
-const REPAIRED_SEEDS_OF_ALL_KINDS: [u64; 36] = [
-    540_936, 20, 39, 201, 529, 2027, 2048, 2245, 3125, 3920, 4693, 15852, 23994, 33347, 36095, 36977, 37078,
-    37483, 39845, 43186, 46304, 54391, 57984, 63592, 65974, 66068, 67888, 69890, 78452, 104_954, 116_491,
-    123_382, 130_019, 165_595, 170_712, 14748,
+///   15852, 23994, 37483, 116491, 4501127.
+const REPAIRED_SEEDS_OF_ALL_KINDS: [u64; 39] = [
+    1_553_946, 4_514_333, 4_501_127, 540_936, 20, 39, 201, 529, 2027, 2048, 2245, 3125, 3920, 4693, 15852,
+    23994, 33347, 36095, 36977, 37078, 37483, 39845, 43186, 46304, 54391, 57984, 63592, 65974, 66068, 67888,
+    69890, 78452, 104_954, 116_491, 123_382, 130_019, 165_595, 170_712, 14748,
 ];
 
 #[test]

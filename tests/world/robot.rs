@@ -55,7 +55,7 @@ pub struct Robot {
     /// The last reconfiguration that was carried out, with the previous design, if it can still fail.
     before: Option<(u64, String)>,
     /// Action and number of the last reconfiguration that was carried out.
-    configured: (u64, u64),
+    pub configured: (u64, u64),
     /// Future actions that were suspended before their request arrived.
     suspended_early: BTreeSet<u64>,
     /// Future actions that were suspended and resumed before their request arrived, with number and design of the
