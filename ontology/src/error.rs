@@ -205,8 +205,8 @@ impl Error {
     }
 }
 
-/// A statement that was not read, or was read in another way than it is written. The rest of the knowledge base
-/// is used.
+/// A problem that does not prevent the use of a knowledge base: a statement that was not read or was
+/// read in another way than it is written, or a questionable part of the model.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
 #[non_exhaustive]
 pub enum Warning {
@@ -403,12 +403,12 @@ pub enum Warning {
     },
 }
 
-/// Formats a position as a prefix of a message.
+/// Formats a position as a prefix of a message; empty without a position.
 fn before(position: Option<&Position>) -> String {
     position.map_or_else(String::new, |position| format!("{position}: "))
 }
 
-/// Returns the position, or the file if the position is unknown.
+/// Returns the position as text, or the file if the position is unknown.
 fn place(file: &str, position: Option<&Position>) -> String {
     position.map_or_else(|| file.to_owned(), ToString::to_string)
 }
@@ -447,8 +447,8 @@ fn label_suffix(label: Option<&str>) -> String {
     label.map_or_else(String::new, |label| format!(" ({label})"))
 }
 
-/// Joins the values; beyond `MAX_LISTED_VALUES` + 1 of them, only the first `MAX_LISTED_VALUES` and the number
-/// of the others.
+/// Joins the values with commas. If there are more than `MAX_LISTED_VALUES` + 1 values, lists only the
+/// first `MAX_LISTED_VALUES` and the number of the others.
 fn abbreviated(values: &[String]) -> String {
     match values.get(..MAX_LISTED_VALUES).filter(|_| values.len() > MAX_LISTED_VALUES + 1) {
         Some(first) => format!("{} and {} more", first.join(", "), values.len() - MAX_LISTED_VALUES),

@@ -30,7 +30,8 @@ macro_rules! built_ins {
                 }
             }
 
-            /// Minimum and maximum number of arguments, and the kind. `None` for a custom built-in.
+            /// Returns the minimum and maximum number of arguments, and the direction of computation.
+            /// `None` for a custom built-in.
             pub(super) fn shape(self) -> Option<(usize, usize, Kind)> {
                 match self {
                     $(Self::$variant => Some(($minimum, $maximum, Kind::$kind)),)*
@@ -64,17 +65,18 @@ built_ins! {
     /// datatype. This is the complement of a data range, which exists in OWL but not in SWRL. Rule text:
     /// `not xsd:decimal(?x)`.
     OutsideDataRange "outsideDataRange" 2..=2 Test,
-    /// Equal values.
+    /// Tests that the values are equal.
     Equal "equal" 2..=2 Test,
-    /// Values that do not compare equal, including incomparable values. False for ill-typed literals.
+    /// Tests that the values do not compare equal; incomparable values pass. False for ill-typed
+    /// literals.
     NotEqual "notEqual" 2..=2 Test,
-    /// First < second.
+    /// Tests first < second.
     LessThan "lessThan" 2..=2 Test,
-    /// First <= second.
+    /// Tests first <= second.
     LessThanOrEqual "lessThanOrEqual" 2..=2 Test,
-    /// First > second.
+    /// Tests first > second.
     GreaterThan "greaterThan" 2..=2 Test,
-    /// First >= second.
+    /// Tests first >= second.
     GreaterThanOrEqual "greaterThanOrEqual" 2..=2 Test,
     /// Sum of the second and all further arguments.
     Add "add" 3..=32 Function,
@@ -86,7 +88,7 @@ built_ins! {
     Divide "divide" 3..=3 Function,
     /// Second divided by third, truncated to an integer.
     IntegerDivide "integerDivide" 3..=3 Function,
-    /// Remainder of the truncating division.
+    /// Remainder of the truncating division of the second by the third.
     Mod "mod" 3..=3 Function,
     /// Second to the power of the third.
     Pow "pow" 3..=3 Function,
@@ -94,62 +96,64 @@ built_ins! {
     UnaryPlus "unaryPlus" 2..=2 Function,
     /// The second, negated.
     UnaryMinus "unaryMinus" 2..=2 Function,
-    /// Absolute value.
+    /// Absolute value of the second.
     Abs "abs" 2..=2 Function,
-    /// Smallest integer not below.
+    /// Smallest integer that is not below the second.
     Ceiling "ceiling" 2..=2 Function,
-    /// Largest integer not above.
+    /// Largest integer that is not above the second.
     Floor "floor" 2..=2 Function,
-    /// Nearest integer, halves towards positive infinity.
+    /// Integer nearest to the second, halves towards positive infinity.
     Round "round" 2..=2 Function,
-    /// Nearest value with as many fractional digits as the third argument (by default 0), halves to even.
+    /// Value nearest to the second with the number of fractional digits in the third (by default 0),
+    /// halves to even.
     RoundHalfToEven "roundHalfToEven" 2..=3 Function,
-    /// Sine of radians.
+    /// Sine of the second, in radians.
     Sin "sin" 2..=2 Function,
-    /// Cosine of radians.
+    /// Cosine of the second, in radians.
     Cos "cos" 2..=2 Function,
-    /// Tangent of radians.
+    /// Tangent of the second, in radians.
     Tan "tan" 2..=2 Function,
-    /// Negation.
+    /// Boolean negation of the second.
     BooleanNot "booleanNot" 2..=2 Function,
-    /// Equal strings, ignoring case.
+    /// Tests that two strings are equal, ignoring case.
     StringEqualIgnoreCase "stringEqualIgnoreCase" 2..=2 Test,
     /// Concatenation of the second and all further arguments.
     StringConcat "stringConcat" 2..=32 Function,
     /// Substring of the second, from the position in the third (counted from 1), with the length in the
     /// fourth.
     Substring "substring" 3..=4 Function,
-    /// Number of characters.
+    /// Number of characters of the second.
     StringLength "stringLength" 2..=2 Function,
-    /// Removes white space at the ends and collapses it inside.
+    /// Removes white space at the ends of the second, and collapses white space inside.
     NormalizeSpace "normalizeSpace" 2..=2 Function,
-    /// Conversion to upper case.
+    /// Converts the second to upper case.
     UpperCase "upperCase" 2..=2 Function,
-    /// Conversion to lower case.
+    /// Converts the second to lower case.
     LowerCase "lowerCase" 2..=2 Function,
-    /// Replaces each character of the third by the character at the same position in the fourth, or removes
-    /// it.
+    /// Replaces in the second each character of the third by the character at the same position in the
+    /// fourth. A character without a counterpart is removed.
     Translate "translate" 4..=4 Function,
-    /// The first contains the second.
+    /// Tests that the first contains the second.
     Contains "contains" 2..=2 Test,
-    /// The first contains the second, ignoring case.
+    /// Tests that the first contains the second, ignoring case.
     ContainsIgnoreCase "containsIgnoreCase" 2..=2 Test,
-    /// The first starts with the second.
+    /// Tests that the first starts with the second.
     StartsWith "startsWith" 2..=2 Test,
-    /// The first ends with the second.
+    /// Tests that the first ends with the second.
     EndsWith "endsWith" 2..=2 Test,
     /// Part of the second before the third; empty if the third does not occur.
     SubstringBefore "substringBefore" 3..=3 Function,
     /// Part of the second after the third; empty if the third does not occur.
     SubstringAfter "substringAfter" 3..=3 Function,
-    /// The first contains a match of the regular expression in the second. The optional third contains
-    /// `XPath` flags.
+    /// Tests that the first contains a match of the regular expression in the second. The optional third
+    /// contains `XPath` flags.
     Matches "matches" 2..=3 Test,
-    /// Replaces each match of the third, a regular expression, in the second by the fourth. Flags are
-    /// optional.
+    /// Replaces each match of the third, a regular expression, in the second by the fourth. The fifth,
+    /// which is optional, contains flags.
     Replace "replace" 4..=5 Function,
-    /// One of the substrings of the second between matches of the third, a regular expression. Flags are
-    /// optional. In SWRL the result is a sequence, for which the engine has no value.
+    /// One of the substrings of the second between matches of the third, a regular expression. The
+    /// fourth, which is optional, contains flags. In SWRL the result is a sequence, for which the engine
+    /// has no value.
     Tokenize "tokenize" 3..=4 Choice,
     /// URI from scheme, host, port, path, query and fragment. Absent parts are empty.
     AnyUri "anyURI" 7..=7 Parts,
@@ -181,9 +185,9 @@ built_ins! {
     MultiplyDayTimeDuration "multiplyDayTimeDurations" 3..=3 Function,
     /// Quotient of a duration in seconds and a number.
     DivideDayTimeDuration "divideDayTimeDuration" 3..=3 Function,
-    /// Duration from the third date to the second.
+    /// Second date minus third date, as a duration.
     SubtractDates "subtractDates" 3..=3 Function,
-    /// Duration from the third time to the second.
+    /// Second time minus third time, as a duration.
     SubtractTimes "subtractTimes" 3..=3 Function,
     /// Date and time plus a duration in months.
     AddYearMonthDurationToDateTime "addYearMonthDurationToDateTime" 3..=3 Function,
@@ -205,9 +209,9 @@ built_ins! {
     AddDayTimeDurationToTime "addDayTimeDurationToTime" 3..=3 Function,
     /// Time minus a duration in seconds, modulo one day.
     SubtractDayTimeDurationFromTime "subtractDayTimeDurationFromTime" 3..=3 Function,
-    /// Whole months from the third moment to the second.
+    /// Second moment minus third moment, in whole months.
     SubtractDateTimesYieldingYearMonthDuration "subtractDateTimesYieldingYearMonthDuration" 3..=3 Function,
-    /// Seconds from the third moment to the second.
+    /// Second moment minus third moment, in seconds.
     SubtractDateTimesYieldingDayTimeDuration "subtractDateTimesYieldingDayTimeDuration" 3..=3 Function,
 }
 
@@ -224,14 +228,16 @@ const LIST_BUILT_INS: [&str; 9] = [
     "sublist",
 ];
 
-/// Returns `true` for a local name of a SWRL built-in on lists, for which the engine has no values.
+/// Returns `true` for the local name of a SWRL built-in on lists. The engine rejects these built-ins,
+/// because it has no list values.
 pub(crate) fn is_refused(local: &str) -> bool {
     LIST_BUILT_INS.contains(&local)
 }
 
 impl BuiltIn {
-    /// Creates a built-in from a definition, for rules as data or for [`crate::Syntax::built_ins`]. A
-    /// definition lives until the end of the process: it is a `static` or a leaked box.
+    /// Creates a custom built-in from a definition, for rules that are built in Rust or, by
+    /// [`crate::Syntax::built_ins`], for rule texts. A definition lives until the end of the process: it
+    /// is a `static` or a leaked box.
     pub fn custom(definition: &'static dyn Definition) -> Self {
         Self::Custom(CustomBuiltIn(definition))
     }
@@ -260,6 +266,7 @@ impl BuiltIn {
     }
 
     /// Returns `true` if the values of the unknown arguments can be computed from the known arguments.
+    /// `known` has a flag for each argument.
     pub fn binds(self, known: &[bool]) -> bool {
         let kind = self.shape().map(|(.., kind)| kind);
         let inputs_known = known.get(1..).is_some_and(|inputs_known| inputs_known.iter().all(|known| *known));
