@@ -75,7 +75,7 @@ pub enum Error {
         /// IRI of the built-in.
         name: String,
     },
-    /// An atom that is neither a class, a property, nor derived by a rule.
+    /// A relation atom that is neither a class, a property, nor derived by a rule.
     #[error(
         "{file}:{line}:{column}: R104 <{name}> with {count} arguments is not a class, a property or anything that a rule \
          concludes, and a built-in of this name is not known"
@@ -117,7 +117,7 @@ pub enum Error {
     UnsafeBody {
         /// The rule.
         rule: RuleIdentity,
-        /// The rule.
+        /// Name of the variable, without question mark.
         variable: String,
     },
     /// A built-in with too few or too many arguments.

@@ -14,11 +14,12 @@ use crate::vocab::owl;
 pub struct SchemaEntity {
     /// IRI of the class or property.
     pub iri: String,
-    /// Named classes or properties that contain it, without itself; sorted.
+    /// Named classes or properties that contain the entity, without the entity itself; sorted.
     pub above: Vec<String>,
-    /// Direct ones: no other member of `above` is strictly between; sorted.
+    /// Members of `above` that contain the entity directly: no other member lies strictly between;
+    /// sorted.
     pub direct: Vec<String>,
-    /// Explanation if it is unsatisfiable (has no instance in any model).
+    /// Explanation if the entity is unsatisfiable, i.e. has no instance in any model.
     pub empty: Option<String>,
 }
 
@@ -33,8 +34,8 @@ pub struct Schema {
     pub data_properties: Vec<SchemaEntity>,
 }
 
-/// Computes the hierarchy from the consequences for a fresh instance of each class, and for a fresh pair of
-/// each property. If the knowledge is inconsistent, `empty` is always `None`.
+/// Computes the class and property hierarchy from the consequences for a fresh instance of each class,
+/// and for a fresh pair of each property. If the knowledge is inconsistent, `empty` is always `None`.
 ///
 /// # Errors
 /// Returns an error if a rule exceeds its budget.

@@ -64,7 +64,7 @@ fn take_all(graph: &mut Graph, node: &NamedOrBlankNode) {
     }
 }
 
-/// Moves the triples of axioms with an IRI to blank nodes.
+/// Moves the triples of n-ary axioms with an IRI to blank nodes.
 fn remove_axiom_iris(graph: &mut Graph) {
     let kinds = [owl::ALL_DIFFERENT, owl::NEGATIVE_PROPERTY_ASSERTION, owl::AXIOM, owl::ANNOTATION];
     let named: Vec<NamedOrBlankNode> = kinds

@@ -88,7 +88,6 @@ pub fn clear_component_status(engine: &mut Engine, component: &str) -> Result<De
 /// Builds the update that states that a function design, given by its IRI or local name, is not
 /// realisable, independently of component states and measurements. If `realisable`, the update removes
 /// this statement.
-/// statement.
 ///
 /// # Errors
 /// Returns [`Error::Unknown`] if the knowledge base has no such design.

@@ -63,8 +63,8 @@ fn requirements(facts: Facts) -> Vec<Warning> {
     without_value.into_iter().map(warning).collect()
 }
 
-/// Reports attributes without a measurement that designs bound, or that have a comparison operator and
-/// estimations of designs.
+/// Reports attributes without a measurement that are needed for a comparison: a design bounds the
+/// attribute, or the attribute has a comparison operator and an estimation of a design.
 fn measurements(facts: Facts) -> Vec<Warning> {
     let estimated = |kind: Symbol| {
         let mut values = facts.subjects(kind, terms::IS_TYPE).into_iter();
@@ -164,8 +164,9 @@ fn kind(value: &Value) -> &'static str {
     }
 }
 
-/// Reports asserted statuses of another kind than the property's ranges allow or, if it has no range, than
-/// rules compare it with.
+/// Reports asserted status values of an unexpected kind (boolean, number or string). The expected kind
+/// is given by the ranges of the property or, without a range, by the constants with which rules compare
+/// the property.
 fn statuses(ontology: &Ontology) -> Vec<Warning> {
     let properties =
         [terms::STATUS, terms::OBJECTIVE_STATUS, terms::GROUNDING_STATUS, terms::REALISABILITY].concat();
@@ -215,7 +216,7 @@ fn kinds_of_ranges(ontology: &Ontology, property: &str) -> BTreeSet<&'static str
     kinds
 }
 
-/// Returns the kinds of constants that rules compare the values of a property with.
+/// Returns the kinds of the constants with which rules compare the values of a property.
 fn tested_kinds(ontology: &Ontology, property: &str) -> BTreeSet<&'static str> {
     let atoms = ontology.rules.iter().flat_map(|rule| &rule.body);
     let constants = atoms.filter_map(|atom| match atom {
