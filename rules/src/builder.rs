@@ -43,8 +43,8 @@ pub struct EngineBuilder {
 }
 
 impl EngineBuilder {
-    /// Sets the interner of [`EngineBuilder::program`] and [`EngineBuilder::facts`]. Symbols of rule texts
-    /// are added to it.
+    /// Sets the interner to which the symbols of [`EngineBuilder::program`] and [`EngineBuilder::facts`]
+    /// refer. Symbols of rule texts are added to the interner.
     #[must_use]
     pub fn symbols(self, symbols: Symbols) -> Self {
         Self { symbols, ..self }

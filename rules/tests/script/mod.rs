@@ -25,7 +25,8 @@ const DIFFERENCE: u8 = 4;
 const DIFFERENT_FROM: &str = "http://www.w3.org/2002/07/owl#differentFrom";
 const VARIABLES: u8 = 4;
 const CONSTANTS: u8 = 4;
-/// Predicates of changes and of heads. There are few, so that different conclusions interact.
+/// Predicates of changes and of heads. There are only few predicates, so that different conclusions
+/// interact.
 const CHANGED: [u8; 16] = [0, 0, 0, 0, 1, 1, 1, 1, 0, 1, 2, 3, 3, 4, 6, 7];
 const CONCLUDED: [u8; 9] = [0, 1, 2, 3, 3, 4, 4, 6, 7];
 
@@ -448,7 +449,7 @@ fn assert_difference(change: &Delta, before: &BTreeSet<Fact>, after: &BTreeSet<F
     assert_eq!(change.delete, before.difference(after).cloned().collect::<Vec<_>>());
 }
 
-/// Removes an active rule, or adds an absent one, by one of several functions.
+/// Removes an active rule, or adds an absent rule, by one of several functions of the engine.
 fn switch(
     engine: &mut Engine,
     program: &Program,
