@@ -1,6 +1,6 @@
-//! Small documents for errors that a reasoner or reader of OWL 2 can have, with the result that the standard
-//! requires: OWL 2 Syntax and Direct Semantics, the tables of OWL 2 RL, the mapping from RDF (including the
-//! forms of OWL 1).
+//! Small documents on which a reader or reasoner of OWL 2 can err, each with the result that the
+//! standard requires: OWL 2 Syntax and Direct Semantics, the tables of OWL 2 RL, the mapping from RDF
+//! (including the forms of OWL 1).
 
 use std::collections::BTreeSet;
 

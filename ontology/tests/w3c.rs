@@ -15,8 +15,8 @@ use rules::{Engine, Symbols};
 
 const TEST: &str = "http://www.w3.org/2007/OWL/testOntology#";
 
-/// Cases with another result than the W3C's, with the reason. No other case of the profile RL may differ, and
-/// in no case may a statement be entailed that is not.
+/// Cases with another result than the W3C's: identifier, kind of the question, reason. No other case of
+/// the profile RL may differ, and no case may entail a statement that does not follow.
 const OPEN: [(&str, &str, &str); 3] = [
     ("WebOnt-I4.6-005-Direct", "entailed", ANNOTATIONS),
     ("WebOnt-equivalentClass-008-Direct", "entailed", ANNOTATIONS),
