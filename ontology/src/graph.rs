@@ -13,7 +13,7 @@ pub(crate) struct Graph {
     fresh: usize,
 }
 
-/// An `rdf:List` that was followed to its end.
+/// Items of a complete `rdf:List`, and the triples that form the list.
 #[derive(Debug)]
 pub(crate) struct List {
     pub items: Vec<Term>,
@@ -78,8 +78,8 @@ impl Graph {
             .map(|(_, triple)| &triple.object)
     }
 
-    /// Returns the object of the only triple with this subject and predicate. The error describes that
-    /// there is no such triple, or that there are several.
+    /// Returns the object of the only triple with this subject and predicate. The error message
+    /// distinguishes a missing triple from several triples.
     pub(crate) fn object<'a>(
         &'a self,
         subject: &NamedOrBlankNode,
@@ -157,7 +157,7 @@ impl Graph {
         self.triples.into_iter().flatten().collect()
     }
 
-    /// Writes the triples that were not removed as an N-Triples document.
+    /// Returns the triples that were not removed as an N-Triples document.
     pub(crate) fn to_ntriples(&self) -> Vec<u8> {
         use std::io::Write;
         let mut text = Vec::with_capacity(self.triples.len() * 128);

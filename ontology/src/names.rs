@@ -56,12 +56,12 @@ impl Names {
         self.number(&format!("{BLANK}{name}"))
     }
 
-    /// Returns the number of an interned IRI.
+    /// Returns the number of an IRI, if the IRI is interned.
     pub(crate) fn find(&self, name: &str) -> Option<u32> {
         self.numbers.get(name).copied()
     }
 
-    /// Returns the text of a number. Blank nodes begin with `_:`.
+    /// Returns the text of the name with this number. The text of a blank node begins with `_:`.
     pub(crate) fn text(&self, number: u32) -> &Iri {
         &self.texts[number as usize]
     }

@@ -44,7 +44,7 @@ pub enum ObjectPropertyExpression {
     Inverse(Iri),
 }
 
-/// A set of data values.
+/// Data range: a set of data values.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum DataRange {
     /// All values of a datatype.
@@ -72,7 +72,7 @@ pub enum Bound {
     Exact,
 }
 
-/// A set of individuals.
+/// Class expression: a set of individuals.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ClassExpression {
     /// A named class.
@@ -91,7 +91,7 @@ pub enum ClassExpression {
     AllValuesFrom(ObjectPropertyExpression, Box<ClassExpression>),
     /// Individuals with the given property value.
     HasValue(ObjectPropertyExpression, Iri),
-    /// Individuals that are their own property value.
+    /// Individuals that the property relates to themselves.
     HasSelf(ObjectPropertyExpression),
     /// Individuals with at least, at most or exactly n property values in the class.
     Cardinality(Bound, u32, ObjectPropertyExpression, Box<ClassExpression>),
@@ -258,9 +258,9 @@ pub struct Rule {
 pub struct Source {
     /// Path of the file, or the name given for a text.
     pub name: String,
-    /// The ontology IRI that the document declares.
+    /// The ontology IRI, if the document declares one.
     pub iri: Option<Iri>,
-    /// Value of `owl:versionIRI`.
+    /// Value of `owl:versionIRI`, if stated.
     pub version: Option<Iri>,
     /// The detected syntax.
     pub syntax: Syntax,

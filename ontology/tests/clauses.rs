@@ -16,7 +16,7 @@ const HEAD: &str = "@prefix : <http://e/#> .
 :d a owl:DatatypeProperty . :e a owl:DatatypeProperty . :f a owl:DatatypeProperty , owl:FunctionalProperty .
 ";
 
-/// The derived facts in short form; `None` if the knowledge is inconsistent.
+/// Returns the derived facts in short form; `None` if the knowledge is inconsistent.
 fn inferred(ontology: &Ontology) -> Option<Vec<String>> {
     let mut symbols = Symbols::new();
     let lowered = lower(ontology, &mut symbols);

@@ -13,7 +13,7 @@ const SAMPLE: usize = 1024;
 /// Assumed number of rows of a relation without statistics.
 const UNKNOWN_ROWS: usize = 64;
 
-/// Number of rows of each relation, and numbers of distinct values of its columns.
+/// Number of rows of each relation, and number of distinct values of each column.
 pub(crate) struct Costs {
     relations: Vec<(f64, Vec<f64>)>,
 }

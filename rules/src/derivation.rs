@@ -6,8 +6,8 @@ use crate::fact::Fact;
 use crate::rule::RuleIdentity;
 use crate::symbol::{Symbol, Symbols};
 
-/// A derivation as a directed acyclic graph: each fact occurs once, so that the size is that of the facts
-/// and not of the derivation tree.
+/// A derivation as a directed acyclic graph: each fact occurs only once, whereas it may occur many times
+/// in the corresponding tree.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Derivation {
     /// Steps of the derivation; the first step is the explained fact. The order is breadth-first: every
@@ -77,9 +77,9 @@ pub struct Violation {
 pub enum Cause {
     /// A rule with an empty head whose body holds.
     Constraint(RuleIdentity),
-    /// A literal whose lexical form is outside its datatype.
+    /// A literal whose lexical form is invalid for its datatype.
     IllTyped(Symbol),
-    /// A literal stated or derived to equal a different literal or an individual.
+    /// A literal that is stated or derived to equal a different literal or an individual.
     Clash,
 }
 

@@ -16,7 +16,7 @@ use crate::symbol::{Symbol, Symbols};
 /// A change: facts to insert and delete (input), or facts that start and cease to hold (output).
 #[derive(Clone, PartialEq, Eq, Default, Debug)]
 pub struct Delta {
-    /// Facts that are added.
+    /// Facts that are added (to the stated facts, or to the facts that hold).
     pub insert: Vec<Fact>,
     /// Facts that are removed. A fact in both lists of an input is stated afterwards.
     pub delete: Vec<Fact>,
@@ -24,8 +24,9 @@ pub struct Delta {
 
 /// Rule engine: stated facts, rules, and all facts that follow from them.
 ///
-/// A clone answers hypothetical queries. The clone shares all data with its original. Each of them
-/// copies a relation, the recorded bindings of a rule or the symbols before its first change of them.
+/// A clone answers hypothetical queries. The clone shares all data with its original. Original and clone
+/// copy a relation, the recorded bindings of a rule or the symbols only before their first change of
+/// these data.
 #[derive(Clone, Debug)]
 pub struct Engine {
     pub(crate) symbols: Arc<Symbols>,

@@ -1,6 +1,6 @@
 //! Evaluates one semi-naive round with a fixed crepe program that interprets join plans.
 //!
-//! The tuples of the program are block numbers, so evaluation is set-at-a-time: crepe's bookkeeping
+//! The tuples of the program contain block numbers, so evaluation is set-at-a-time: crepe's bookkeeping
 //! costs nothing per match, and the store is never copied. `Delta` is a seed of a plan, usually a range
 //! of changed rows. `Match` is a block of partial matches with the number of plan steps that the block
 //! has passed. A block is extended by the next atom through a look-up in the persistent store, to which
@@ -67,7 +67,7 @@ pub(crate) struct Matches {
 pub(crate) struct Round<'a> {
     pub store: &'a Store,
     pub plans: &'a [Plan],
-    /// Number of variables per match, by compiled rule.
+    /// Number of variables per match, indexed by compiled rule.
     pub widths: &'a [usize],
     pub symbols: RefCell<&'a mut Arc<Symbols>>,
     /// Changed rows. Each [`Seed`] refers to a range.
@@ -445,7 +445,7 @@ struct Lookup<'a> {
     index: Option<usize>,
     key: &'a [Source],
     pattern: &'a Pattern,
-    /// See [`crate::plan::Lowered::is_closure`].
+    /// Whether rows that the rule itself derived are skipped; see [`crate::plan::Lowered::is_closure`].
     is_link: bool,
 }
 

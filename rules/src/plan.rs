@@ -158,7 +158,7 @@ impl Condition {
     }
 }
 
-/// Set of the bound variables, indexed by variable number.
+/// Set of the bound variables: a flag for each variable number.
 #[derive(Clone, PartialEq, Eq)]
 pub(crate) struct Bound(pub Vec<bool>);
 

@@ -16,7 +16,7 @@ use crate::source::Source;
 pub(crate) struct Scope {
     /// Position of the aggregate in the body.
     pub position: usize,
-    /// Variables that atoms outside the aggregate bind, in ascending order.
+    /// Variables of the aggregate that atoms outside the aggregate bind, in ascending order.
     pub group: Vec<u16>,
     /// Other variables of the aggregate, in ascending order.
     pub locals: Vec<u16>,

@@ -108,7 +108,7 @@ impl Store {
         id
     }
 
-    /// Number of stored facts, including matches of constraints.
+    /// Returns the number of stored facts, including the matches of constraints and aggregates.
     pub fn len(&self) -> usize {
         self.relations.iter().map(|relation| relation.len()).sum()
     }
@@ -180,17 +180,17 @@ impl Relation {
         }
     }
 
-    /// Number of stored facts in any state.
+    /// Returns the number of stored facts in any state.
     pub fn len(&self) -> usize {
         self.rows.len()
     }
 
-    /// Number of arguments per fact.
+    /// Returns the number of arguments per fact.
     pub fn arity(&self) -> usize {
         self.arity
     }
 
-    /// Upper bound (exclusive) on the numbers of rows in use.
+    /// Returns an upper bound (exclusive) on the numbers of the rows in use.
     pub fn bound(&self) -> Row {
         self.states.len() as Row
     }
@@ -297,8 +297,8 @@ impl Relation {
         self.index_without(columns, None)
     }
 
-    /// Returns the number of the index that covers all rows except those derived by `excluded_rule`.
-    /// `columns` is a bit mask. Builds the index on first use.
+    /// Returns the number of the index on the columns of a bit mask that omits the rows derived by
+    /// `excluded_rule`. Builds the index on first use.
     pub fn index_without(&mut self, columns: u32, excluded_rule: Option<u32>) -> usize {
         let is_same = |index: &Index| index.columns == columns && index.excluded_rule == excluded_rule;
         if let Some(position) = self.indexes.iter().position(is_same) {
@@ -342,7 +342,7 @@ impl Relation {
     }
 }
 
-/// Iterator over the rows of one key.
+/// Iterator over the rows with equal key columns in an index.
 pub(crate) struct Rows<'a> {
     links: &'a [Row],
     next: Row,

@@ -14,7 +14,7 @@ use crate::literal::Literal;
 pub struct Symbol(pub(crate) u32);
 
 impl Symbol {
-    /// Position of the symbol in its interner, counted from 0.
+    /// Returns the position of the symbol in its interner, counted from 0.
     pub fn index(self) -> usize {
         self.0 as usize
     }

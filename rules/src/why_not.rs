@@ -78,7 +78,7 @@ pub enum Obstacle {
         left: Symbol,
         /// Second term.
         right: Symbol,
-        /// `true` if the terms must be equal.
+        /// Whether the terms must be equal.
         wanted: bool,
     },
 }

@@ -1,4 +1,4 @@
-//! Class expressions as assumptions about an individual, and as goals.
+//! Assumes and proves that an individual is in a class expression.
 
 use rules::{Delta, Engine, Error, Fact, Literal};
 
@@ -186,7 +186,7 @@ impl Prover {
     }
 }
 
-/// Returns the named values of a property for an individual.
+/// Returns the names of the individuals that are values of a property for an individual.
 pub(super) fn values(engine: &mut Engine, property: &ObjectPropertyExpression, individual: &Iri) -> Vec<Iri> {
     let subject = engine.symbols_mut().name(individual);
     let (ObjectPropertyExpression::Property(iri) | ObjectPropertyExpression::Inverse(iri)) = property;

@@ -70,7 +70,7 @@ pub fn entailments(engine: &Engine, conclusions: &Ontology) -> Result<Vec<Entail
 }
 
 /// Decides for every annotation of `conclusions` if it occurs in `stated`, about its subject or about an
-/// individual that is the same. No other annotation is entailed.
+/// individual equal to its subject. No other annotation is entailed.
 pub fn annotations(engine: &Engine, stated: &[(Iri, Annotation)], conclusions: &Ontology) -> Vec<Entailment> {
     conclusions
         .annotations

@@ -31,7 +31,7 @@ pub(super) fn contradiction(engine: &Engine) -> Option<String> {
 
 /// Proves statements from the knowledge of an engine.
 pub(super) struct Prover {
-    /// The knowledge, with equality reasoning.
+    /// Engine with the facts and rules of the knowledge base, in which `owl:sameAs` is equality.
     pub(super) base: Engine,
 }
 
@@ -48,7 +48,8 @@ impl Prover {
         Ok(Self { base })
     }
 
-    /// Returns a name that occurs nowhere else. `number` distinguishes the names of one proof.
+    /// Returns the name of a fresh individual, which occurs nowhere else. `number` distinguishes the
+    /// fresh individuals of one proof.
     pub(super) fn fresh(number: usize) -> Iri {
         format!("urn:metaplan:any:{number}").into()
     }
@@ -82,7 +83,7 @@ pub(super) fn same(engine: &mut Engine, left: &str, right: &str) -> Fact {
     Fact::new(symbols.name(owl::SAME_AS), [symbols.name(left), symbols.name(right)])
 }
 
-/// Computes the value of a literal.
+/// Converts a literal of an ontology to the value that the rule engine uses.
 pub(super) fn literal(literal: &crate::owl::Literal) -> Literal {
     Literal::parse(&literal.lexical, literal.datatype.as_deref(), literal.language.as_deref())
 }

@@ -10,7 +10,7 @@ use crate::owl::{ANONYMOUS, Axiom, ClassExpression, Iri, ObjectPropertyExpressio
 /// Maximum number of partial answers that the search visits.
 const MAX_PARTIAL_ANSWERS: usize = 100_000;
 
-/// Maps anonymous individuals to named ones.
+/// Partial answer of a query: maps anonymous individuals to named individuals.
 type Assignment = BTreeMap<Iri, Iri>;
 
 impl Prover {

@@ -23,7 +23,8 @@ pub struct SchemaEntity {
     pub empty: Option<String>,
 }
 
-/// The classes, object properties and data properties of some entities, in the given order.
+/// Hierarchy of the classes, object properties and data properties of a knowledge base, each in the
+/// given order.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Schema {
     /// Classes.

@@ -295,7 +295,8 @@ impl AxiomLowering<'_, '_> {
         Err("that the parts cover the class")
     }
 
-    /// Merges two members of the class that agree on all key properties (prp-key).
+    /// Adds the rules of a key axiom: two members of the class with equal values of all key properties
+    /// are the same individual (rule prp-key).
     fn key(&mut self, class: &ClassExpression, objects: &[Property], data: &[Iri]) {
         let mut variables = Variables::default();
         let (x, y) = (variables.fresh("x"), variables.fresh("y"));

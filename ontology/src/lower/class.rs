@@ -302,7 +302,8 @@ fn relation_of(restriction: &ClassExpression) -> String {
 
 const EXISTS: &str = "an existential restriction as a conclusion";
 
-/// Returns a contradiction if `x` has more than `limit` (0 or 1) values of `property` in `range`.
+/// Returns the contradiction that follows if `x` has more than `limit` (0 or 1) values of `property` in
+/// `range`.
 fn at_most(
     context: &mut Context,
     limit: u32,

@@ -17,7 +17,7 @@ pub const INTERNAL: &str = "urn:metaplan:";
 /// functional-style syntax.
 pub const AXIOM_SOURCE: &str = "http://www.w3.org/2002/07/owl";
 
-/// Semantics of names.
+/// Semantics of the names of individuals.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Equality {
     /// Two names can denote the same individual: the semantics of OWL.
@@ -30,7 +30,8 @@ pub enum Equality {
 /// Conjunction of atoms.
 pub(crate) type Conjunction = Vec<Atom>;
 
-/// Combines every conjunction of the first list with every conjunction of the second.
+/// Returns the Cartesian product of two lists: each conjunction of the first list joined with each
+/// conjunction of the second.
 pub(crate) fn cross(left: &[Conjunction], right: &[Conjunction]) -> Vec<Conjunction> {
     left.iter().flat_map(|l| right.iter().map(move |r| l.iter().chain(r).cloned().collect())).collect()
 }
@@ -52,7 +53,7 @@ pub(crate) struct Context<'a> {
     gaps: Vec<&'static str>,
     /// Inclusions between restrictions.
     pub inclusions: Inclusions,
-    /// Names of the auxiliary relations whose rules exist.
+    /// Names of the auxiliary relations whose rules have already been added.
     pub abbreviated: HashSet<String>,
     /// Maps the address of an IRI's text to the symbol of the IRI. An ontology keeps each text once, so
     /// the look-up need not read the text.
@@ -207,8 +208,8 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// Builds the atom that two individuals differ. In OWL, the difference is stated or derived; under
-    /// the unique name assumption, different names suffice.
+    /// Builds the atom for the condition that two individuals differ. In OWL, the difference is stated
+    /// or derived; under the unique name assumption, different names suffice.
     pub(crate) fn different(&mut self, first: Term, second: Term) -> Atom {
         match self.equality {
             Equality::Owl => self.relation(owl::DIFFERENT_FROM, [first, second]),

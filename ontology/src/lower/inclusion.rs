@@ -51,8 +51,8 @@ impl Inclusions {
         inclusions
     }
 
-    /// Returns the restriction that is equivalent to `class`, if it is a condition that includes a
-    /// concluded restriction.
+    /// Returns the restriction that is equivalent to `class`, if the restriction is a condition that
+    /// includes a concluded restriction.
     pub(crate) fn condition(&self, class: &ClassExpression) -> Option<ClassExpression> {
         restriction(class, false).filter(|restriction| self.conditions.contains(restriction))
     }
@@ -87,7 +87,8 @@ fn restriction(class: &ClassExpression, is_concluded: bool) -> Option<ClassExpre
     }
 }
 
-/// The restrictions that axioms and rules conclude, and the restrictions that are their conditions.
+/// Restrictions that axioms and rules conclude, and restrictions that are conditions of axioms and
+/// rules.
 #[derive(Default)]
 struct Uses {
     concluded: BTreeSet<ClassExpression>,
@@ -274,7 +275,8 @@ impl InclusionGraph {
         }
     }
 
-    /// Returns the conditions that include a restriction.
+    /// Returns the conditions that include a restriction. Restrictions nested in it are compared up to
+    /// `depth` levels.
     fn including(
         &self,
         restriction: &ClassExpression,
@@ -312,7 +314,8 @@ impl InclusionGraph {
         including
     }
 
-    /// Returns the classes that include a class, and the class itself.
+    /// Returns the classes that include a class, and the class itself. Nested restrictions are compared
+    /// up to `depth` levels.
     fn supers(&self, class: &ClassExpression, depth: usize, memo: &mut Memo) -> BTreeSet<ClassExpression> {
         let key = (class.clone(), depth);
         if let Some(supers) = memo.supers.get(&key) {

@@ -31,7 +31,8 @@ pub(crate) fn condition(context: &mut Context, range: &DataRange, value: Term) -
     RangeLowering { context, value }.tests(range, true, MAX_DEFINITION_DEPTH)
 }
 
-/// Returns the rule bodies of which one holds if all `edges` hold and `value` is outside `range`.
+/// Returns rule bodies for the violation of `range`: one of them holds if all `edges` hold and `value`
+/// is outside `range`.
 pub(crate) fn violations(context: &mut Context, range: &DataRange, edges: &[Atom], value: Term) -> Tests {
     let outside = RangeLowering { context, value }.tests(range, false, MAX_DEFINITION_DEPTH)?;
     Ok(outside.into_iter().map(|tests| edges.iter().cloned().chain(tests).collect()).collect())
@@ -43,8 +44,8 @@ struct RangeLowering<'c, 'a> {
 }
 
 impl RangeLowering<'_, '_> {
-    /// Returns alternative conjunctions of tests. The value is in `range` (if `inside`), or outside
-    /// `range` otherwise, if one of the conjunctions holds.
+    /// Returns alternative conjunctions of tests. If one of them holds, the value is in `range`
+    /// (`inside` is true) or outside `range` (`inside` is false).
     fn tests(&mut self, range: &DataRange, inside: bool, depth: usize) -> Tests {
         if depth == 0 {
             return Err("datatypes that are defined by each other");

@@ -83,7 +83,7 @@ impl Usage {
         }
     }
 
-    /// Returns `true` if no other pass has to process a triple.
+    /// Returns `true` if no other normalisation pass has to process the triple.
     pub(super) fn is_bulk(&self, triple: &Compact) -> bool {
         let uses = |number: u32| self.uses[number as usize];
         let subject = uses(triple.subject);

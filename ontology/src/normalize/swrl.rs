@@ -95,7 +95,7 @@ struct Pass {
     /// Indices of the triples that canonical triples replace.
     replaced: HashSet<usize>,
     rule: usize,
-    /// Canonical variables of all rules.
+    /// Variables in the canonical forms of all rules.
     canonical_variables: Vec<NamedNode>,
     /// Arguments of the current rule that are neither variables nor described individuals.
     unknown: Vec<String>,

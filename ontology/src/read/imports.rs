@@ -29,7 +29,7 @@ use crate::triples::Document;
 /// Name of the catalog that Protégé writes.
 const CATALOG: &str = "catalog-v001.xml";
 
-/// Limit on the depth of the search in a directory.
+/// Maximum depth of the subdirectories that are searched for imports.
 const MAX_DEPTH: usize = 4;
 
 /// Number of ancestor directories in which directories named like segments of the URL are searched.
@@ -209,7 +209,7 @@ fn candidates(directory: &Path, depth: usize) -> Vec<OntologyFile> {
     files
 }
 
-/// Returns the ontology IRI that the start of a file declares.
+/// Returns the ontology IRI that the start of a file declares, if there is one.
 fn declared_iri(path: &Path) -> Option<String> {
     use std::io::Read;
     if !path.is_file() {

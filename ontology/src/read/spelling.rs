@@ -4,8 +4,7 @@
 use super::text::Text;
 use crate::error::{Error, Position, Warning};
 
-/// Number of warnings, from the first one, that are considered for a position, because each search
-/// visits all documents.
+/// Maximum number of warnings that get a position, because each search visits all documents.
 const MAX_SEARCHES: usize = 100;
 
 /// Sets the position of each warning about an undeclared name to the first occurrence of the name in the
@@ -29,7 +28,8 @@ pub(super) fn locate(warnings: &mut [Warning], texts: &[(String, Text)]) {
     }
 }
 
-/// Adds a position to an error without one, if its document contains the IRI that the error describes.
+/// Adds a position to an error without one, if its document contains the IRI that is the subject of the
+/// error.
 pub(super) fn placed(error: Error, texts: &[(String, Text)]) -> Error {
     match error {
         Error::TooDeep { file, about: Some(iri), position: None, deepest } => {
@@ -41,7 +41,8 @@ pub(super) fn placed(error: Error, texts: &[(String, Text)]) -> Error {
     }
 }
 
-/// Returns the position in the documents of the IRI that the message contains first in angle brackets.
+/// Returns the position of an IRI in the documents: of the first IRI that `message` contains in angle
+/// brackets.
 pub(super) fn place(message: &str, texts: &[(String, Text)]) -> Option<Position> {
     let iri = message.split_once('<')?.1.split_once('>')?.0;
     texts.iter().find_map(|(name, text)| {

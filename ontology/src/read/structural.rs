@@ -141,8 +141,8 @@ fn undeclared_prefix(words: Words) -> Option<(usize, String)> {
     None
 }
 
-/// Removes a duplicate `_:` from blank nodes: horned-owl's readers keep the prefix as part of the label,
-/// and the writer adds another prefix.
+/// Removes a duplicate `_:` from the labels of blank nodes: horned-owl's readers keep the prefix as part
+/// of the label, and the writer adds another prefix.
 fn relabelled(ntriples: Vec<u8>) -> Vec<u8> {
     const DOUBLE_PREFIX: &[u8] = b"_:_:";
     if !ntriples.windows(DOUBLE_PREFIX.len()).any(|window| window == DOUBLE_PREFIX) {

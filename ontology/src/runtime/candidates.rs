@@ -56,7 +56,7 @@ pub enum Rejection {
         attribute: String,
         /// Measured value, in the unit of the attribute type.
         measured: BigRational,
-        /// The comparison `measured operator estimation` that excludes the design.
+        /// Comparison operator. The design is excluded because `measured operator estimation` is true.
         operator: String,
         /// Estimated value of the design.
         estimation: BigRational,
@@ -224,7 +224,7 @@ fn rejections(facts: Facts, design: Symbol, objective: Symbol) -> Vec<Rejection>
     rejections
 }
 
-/// Returns the reason why an estimation excludes its design, if it does.
+/// Returns the reason why an estimation excludes its design; `None` if it does not.
 fn violation(facts: Facts, estimation: Symbol) -> Option<Rejection> {
     let &kind = facts.objects(estimation, terms::IS_TYPE).first()?;
     let operator = facts.texts(kind, terms::OPERATOR).pop()?;

@@ -8,7 +8,7 @@ use crate::tomasys::Individual;
 use crate::tomasys::facts::Facts;
 use crate::tomasys::terms::{self, Term};
 
-/// Statuses that require another design, in MROS and its predecessor Metacontrol.
+/// Statuses of an objective that require another design, in MROS and its predecessor Metacontrol.
 const ERRORS: [&str; 6] =
     ["IN_ERROR_COMPONENT", "IN_ERROR_FR", "IN_ERROR_NFR", "INTERNAL_ERROR", "EXTERNAL_ERROR", "UPDATABLE"];
 
@@ -31,12 +31,12 @@ pub struct Objective {
 }
 
 impl Objective {
-    /// Returns `true` if a status is an error.
+    /// Returns `true` if a status of the objective is an error.
     pub fn is_in_error(&self) -> bool {
         self.statuses.iter().any(|status| ERRORS.contains(&status.as_str()))
     }
 
-    /// Returns `true` if a design should be selected now.
+    /// Returns `true` if a design should be selected for the objective now.
     pub fn wants_design(&self) -> bool {
         self.is_in_error()
             || self.updatable

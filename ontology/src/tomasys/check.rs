@@ -14,7 +14,8 @@ use crate::owl::{
     ObjectPropertyExpression as Property, Ontology,
 };
 
-/// Checks a model. `engine` contains the consequences of `ontology`. The warnings are sorted.
+/// Checks a model for probable mistakes. `engine` contains the consequences of `ontology`. Returns the
+/// warnings, sorted.
 pub fn check(ontology: &Ontology, engine: &Engine) -> Vec<Warning> {
     let facts = Facts::new(engine);
     let mut warnings = functions(facts);
@@ -122,7 +123,7 @@ fn any_differ(axioms: &[AnnotatedAxiom]) -> bool {
         .any(|(index, first)| values[index + 1..].iter().any(|second| first.differs(second)))
 }
 
-/// Returns the property of a functionality axiom.
+/// Returns the property of a functionality axiom; `None` for other axioms.
 fn functional(annotated: &AnnotatedAxiom) -> Option<&Iri> {
     match &annotated.axiom {
         Axiom::FunctionalDataProperty(property)
@@ -133,7 +134,7 @@ fn functional(annotated: &AnnotatedAxiom) -> Option<&Iri> {
     }
 }
 
-/// Returns property and subject of an assertion.
+/// Returns property and subject of a property assertion; `None` for other axioms.
 fn edge(annotated: &AnnotatedAxiom) -> Option<(&Iri, &Iri)> {
     match &annotated.axiom {
         Axiom::ObjectPropertyAssertion(Property::Property(property), subject, _)
@@ -142,7 +143,7 @@ fn edge(annotated: &AnnotatedAxiom) -> Option<(&Iri, &Iri)> {
     }
 }
 
-/// Returns the value of an assertion in N-Triples syntax.
+/// Returns the value of a property assertion in N-Triples syntax; `None` for other axioms.
 fn object(annotated: &AnnotatedAxiom) -> Option<String> {
     match &annotated.axiom {
         Axiom::ObjectPropertyAssertion(_, _, to) => Some(format!("<{to}>")),
@@ -155,7 +156,7 @@ fn value(literal: &Literal) -> Value {
     Value::parse(&literal.lexical, literal.datatype.as_deref(), literal.language.as_deref())
 }
 
-/// Kind of a status value, for messages.
+/// Returns the kind of a status value, for messages.
 fn kind(value: &Value) -> &'static str {
     match value {
         Value::Boolean(_) => "a boolean",

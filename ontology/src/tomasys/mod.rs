@@ -174,22 +174,22 @@ impl<'a> View<'a> {
         values
     }
 
-    /// All functions, sorted by IRI.
+    /// Returns all functions, sorted by IRI.
     pub fn functions(&self) -> Vec<Individual> {
         self.members(terms::FUNCTION)
     }
 
-    /// All quality attribute types, sorted by IRI.
+    /// Returns all quality attribute types, sorted by IRI.
     pub fn attribute_types(&self) -> Vec<Individual> {
         self.members(terms::ATTRIBUTE_TYPE)
     }
 
-    /// All function designs.
+    /// Returns all function designs, sorted by IRI.
     pub fn function_designs(&self) -> Vec<FunctionDesign> {
         self.members(terms::FUNCTION_DESIGN).into_iter().map(|design| self.function_design(design)).collect()
     }
 
-    /// All components with their statuses.
+    /// Returns all components with their statuses, sorted by IRI.
     pub fn components(&self) -> Vec<Component> {
         let status = |component: &Individual| {
             let value = self.literals(&component.iri, terms::STATUS).into_iter().next();
@@ -199,7 +199,8 @@ impl<'a> View<'a> {
         components.map(|individual| Component { status: status(&individual), individual }).collect()
     }
 
-    /// All measured values: individuals with `isMeasured` true, and individuals named `obs_…` as in MROS.
+    /// Returns all measured values: of individuals with `isMeasured` true, and of individuals named
+    /// `obs_…` as in MROS.
     pub fn measurements(&self) -> Vec<Measurement> {
         let measured = |value: &Individual| {
             value.name.starts_with("obs_")
@@ -213,7 +214,7 @@ impl<'a> View<'a> {
         self.members(terms::QA_VALUE).into_iter().filter(measured).filter_map(measurement).collect()
     }
 
-    /// All actions with the functions that they require.
+    /// Returns all actions with the functions that they require, sorted by IRI.
     pub fn actions(&self) -> Vec<Action> {
         let action = |individual: Individual| {
             let requires = self.objects(&individual.iri, terms::REQUIRES_F);

@@ -38,8 +38,9 @@ pub(super) fn replace(arguments: &[&Literal]) -> Option<Literal> {
     Some(Literal::String(regex.replace_all(text, expand(replacement)?.as_str()).into()))
 }
 
-/// Distinct parts of the first argument between matches of the second, in order of occurrence. Empty for
-/// the empty text and for a pattern that matches the empty text ([2], section 7.6.4).
+/// Returns the distinct parts of the first argument between matches of the second, in order of
+/// occurrence. Empty for the empty text and for a pattern that matches the empty text ([2], section
+/// 7.6.4).
 pub(super) fn tokens(arguments: &[&Literal]) -> Vec<Literal> {
     let texts = arguments.iter().map(|argument| as_text(argument)).collect::<Option<Vec<&str>>>();
     let (text, pattern, flags) = match texts.as_deref() {

@@ -215,7 +215,7 @@ built_ins! {
     SubtractDateTimesYieldingDayTimeDuration "subtractDateTimesYieldingDayTimeDuration" 3..=3 Function,
 }
 
-/// Members of `swrlb` on lists.
+/// Local names of the members of `swrlb` on lists.
 const LIST_BUILT_INS: [&str; 9] = [
     "empty",
     "first",

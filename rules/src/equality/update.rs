@@ -409,7 +409,8 @@ impl<'e> Update<'e> {
         }
     }
 
-    /// Stores the stated facts that a row represents. Returns `true` if the row itself is stated.
+    /// Stores the stated facts that a row represents. Returns `true` if the row has to be asserted in
+    /// the store.
     fn update_originals(&mut self, row: &Fact, facts: BTreeSet<Fact>) -> bool {
         let equality = &mut self.equality;
         if equality.is_reflexive(row) && equality.is_pair(row, &self.engine.symbols) {
@@ -473,8 +474,8 @@ impl<'e> Update<'e> {
         }
     }
 
-    /// Returns the change of the facts since the start of the update, sorted. The facts contain all
-    /// names of a class, not only its representative. `added` and `removed` are the changed stated
+    /// Returns the change of the facts since the start of the update, sorted. The facts are about all
+    /// names of a class, not only about its representative. `added` and `removed` are the changed stated
     /// facts.
     fn report(&mut self, added: &[Fact], removed: &[Fact]) -> Delta {
         let mut after: FxHashSet<Fact> = FxHashSet::default();

@@ -243,7 +243,7 @@ impl Matcher<'_> {
     }
 }
 
-/// Returns the aggregate with the only column of its rows as value.
+/// Returns the aggregate function, applied to the only column of the rows.
 fn column(aggregate: Aggregate) -> Aggregate {
     aggregate.map(&|_| Term::Variable(Variable(0)))
 }

@@ -1,5 +1,5 @@
-//! Recursive-descent parser of rule texts. After an error it continues with the next rule, so that all
-//! errors are reported.
+//! Recursive-descent parser of rule texts. After an error, the parser continues with the next rule, so
+//! that all errors are reported.
 
 use std::sync::Arc;
 
@@ -19,7 +19,7 @@ const LIBRARIES: [&str; 2] =
 /// Syntax options of rule texts.
 #[derive(Clone, PartialEq, Eq, Default, Debug)]
 pub struct Syntax {
-    /// Rejects extensions of SWRL: `not` and aggregates.
+    /// Whether the extensions of SWRL, `not` and aggregates, are rejected.
     pub swrl_only: bool,
     /// Built-ins in addition to those of SWRL, see [`BuiltIn::custom`].
     pub built_ins: Vec<BuiltIn>,
@@ -164,7 +164,7 @@ impl Parser<'_> {
         is_match
     }
 
-    /// Line and column of the next token.
+    /// Returns line and column of the next token.
     fn position(&self) -> (u32, u32) {
         let spanned = &self.tokens[self.cursor.min(self.tokens.len() - 1)];
         (spanned.line, spanned.column)

@@ -301,7 +301,7 @@ static ALLEN_RELATIONS: &[AllenRelation] = table!(AllenRelation {
     "notIntersects" true => relation: |a, b| a.0 <= b.1 && b.0 <= a.1,
 });
 
-/// All built-ins of the library.
+/// Returns the definitions of all built-ins of the library.
 pub(super) fn all() -> Vec<&'static dyn Definition> {
     let mut definitions: Vec<&'static dyn Definition> = vec![&DurationFunction, &AddFunction];
     definitions.extend(DURATION_COMPARISONS.iter().map(|definition| definition as &dyn Definition));
