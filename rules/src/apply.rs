@@ -103,7 +103,8 @@ impl Engine {
     /// effect.
     ///
     /// # Errors
-    /// Returns R301 if the step budget is exhausted, R304 if the evaluation was interrupted, R302 or R303.
+    /// Returns R301 if the step budget is exhausted, R302 for an unknown symbol, R303 for a fact with too
+    /// many arguments, and R304 if the evaluation was interrupted.
     /// After an error, the engine is in its previous state.
     pub fn apply(&mut self, delta: Delta) -> Result<Delta, Error> {
         let span = info_span!("update", stated = delta.insert.len() + delta.delete.len(), changed = Empty);

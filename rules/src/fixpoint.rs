@@ -313,8 +313,8 @@ impl Round<'_> {
         })
     }
 
-    /// Returns the state bits of the rows that a step skips: `skip`, or only free rows while retracting,
-    /// because all rows that held before the update are visible then.
+    /// Returns the state bits of the rows that a step skips: normally `skip`; while retracting only unused
+    /// rows, because all rows that held before the update are visible then.
     fn visibility(&self, skip: u8) -> u8 {
         if self.retracting { state::FREE } else { skip }
     }

@@ -201,7 +201,8 @@ impl<'a> Maintenance<'a> {
         Ok(())
     }
 
-    /// Removes the rows that are still doomed. Returns the net change of the facts.
+    /// Removes the doomed rows, i.e. the over-deleted rows that were not rederived. Returns the net change of
+    /// the facts.
     pub fn finish(self) -> Delta {
         let Engine { store, records, .. } = self.engine;
         let mut delta = Delta::default();
@@ -227,8 +228,8 @@ impl<'a> Maintenance<'a> {
         touch(&mut self.touched, &self.network, relation);
     }
 
-    /// Marks as doomed the rows whose recorded derivation depends on a doomed row, on the absence of a
-    /// new row, or on a changed group of an aggregate.
+    /// Over-deletes rows, i.e. marks them as doomed: all rows whose recorded derivation depends on a doomed
+    /// row, on the absence of a new row, or on a changed group of an aggregate.
     fn over_delete(&mut self, stratum: &Stratum) -> Result<(), Error> {
         // A new row invalidates derivations that depend on its absence.
         let appeared = self.added.clone();
@@ -262,7 +263,7 @@ impl<'a> Maintenance<'a> {
         self.run(&changed, |relation| stratum.aggregated.get(&relation).map(Vec::as_slice), retracting)
     }
 
-    /// Runs the rules backwards from the doomed rows, to find other derivations of these rows.
+    /// Runs the rules backwards from the doomed (over-deleted) rows, to find other derivations of these rows.
     fn rederive(&mut self, stratum: &Stratum) -> Result<(), Error> {
         let doomed = self.still_doomed();
         self.run(&doomed, |relation| stratum.rederive.get(&relation).map(Vec::as_slice), false)
@@ -436,8 +437,8 @@ impl<'a> Maintenance<'a> {
         }
     }
 
-    /// Marks as doomed the head rows whose recorded derivation is one of these matches. Stated rows only
-    /// lose their record.
+    /// Marks the heads of the matches as doomed (over-deleted) if the match is the recorded derivation of the
+    /// head. Stated rows only lose the record.
     fn retract(&mut self, matches: &Matches) {
         let network = Arc::clone(&self.network);
         let number = network.plans[matches.plan as usize].rule;

@@ -130,7 +130,8 @@ pub(crate) fn revise(
             rule.rule = position;
             compiled.insert(position);
         } else {
-            // An empty rule keeps its number free; numbers of other rules do not shift.
+            // An empty rule takes the place of a removed rule, so that the numbers of other rules do not
+            // shift.
             let (heads, body) = (Vec::new(), Vec::new());
             *rule = Lowered { rule: 0, width: rule.width, heads, body, is_closure: false };
             removed.insert(number as u32);

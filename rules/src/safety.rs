@@ -2,7 +2,8 @@
 //! and atoms that an aggregate shares with the rest of the body.
 //!
 //! Relation atoms bind their variables. An equality, a built-in function or an aggregate binds another
-//! variable once its inputs are bound. Aggregates are ordered such that the group of each is bound before.
+//! variable once its inputs are bound. Aggregates are ordered such that the group variables of each are bound
+//! before its evaluation.
 
 use std::collections::BTreeSet;
 
@@ -195,7 +196,7 @@ fn unbound(rule: &Rule) -> Vec<Error> {
         };
         let result_variables = variables(&atom.terms()[..1]);
         missing.extend(result_variables.into_iter().filter(|n| !is_bound(n)).map(|n| (false, n)));
-        // An aggregate without a scope waits for the result of another aggregate, which is reported itself.
+        // An aggregate without a scope needs the result of another aggregate, which has an error of its own.
         let Some(scope) = scopes.iter().find(|scope| scope.position == position) else { continue };
         let mut inner = Bound(vec![false; bound.0.len()]);
         scope.group.iter().for_each(|&number| inner.bind(number));

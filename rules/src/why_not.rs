@@ -248,7 +248,7 @@ impl Search<'_> {
                 _ => 0,
             }
         };
-        // Of equal scores the last in iteration wins, which is the first condition because of `rev`.
+        // `max_by_key` returns the last of several maxima; because of `rev`, this is the first condition.
         (0..state.open_conditions.len()).rev().max_by_key(|&at| score(state.open_conditions[at]))
     }
 

@@ -72,7 +72,7 @@ fn build_here(
     }
     let unread = builder.leftovers(&incomplete);
     let Builder { mut parts, mut rules, names, .. } = builder;
-    // Document order.
+    // Restores the document order.
     rules.sort_by_key(|(index, _)| *index);
     parts.rules =
         rules.into_iter().filter_map(|(index, rule)| Some(located(rule, origins.get(index)?))).collect();

@@ -83,8 +83,8 @@ pub(crate) fn condition(
         }
         C::ComplementOf(_) => context.gap("a complement as a condition"),
         C::AllValuesFrom(..) | C::DataAllValuesFrom(..) => {
-            // Under the open-world assumption, further values are always possible. Only an included
-            // restriction can prove it.
+            // Under the open-world assumption, an individual may always have further values. Therefore only a
+            // membership in an included restriction proves a universal restriction.
             context.gap::<()>("a universal restriction as a condition");
             let restriction = context.inclusions.condition(class);
             let atom = restriction.map(|restriction| context.relation(&relation_of(&restriction), [x]));

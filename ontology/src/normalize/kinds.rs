@@ -122,7 +122,7 @@ impl Kinds<'_> {
             })
             .filter(|(_, first, second)| !is_reserved(first) && !is_reserved(second))
             .collect();
-        // A round propagates at least one step along a path of pairs.
+        // In each round, a kind propagates at least one step along a path of related properties.
         for _ in 0..pairs.len().min(MAX_PROPAGATION_ROUNDS) {
             for (_, first, second) in &pairs {
                 match (self.of(first), self.of(second)) {

@@ -95,7 +95,7 @@ struct Expansion<'a> {
     entities: &'a HashMap<&'a [u8], &'a [u8]>,
     /// Expansions of entities, so that each one is computed once.
     cache: HashMap<&'a [u8], Vec<u8>>,
-    /// Number of bytes that may still be added.
+    /// Number of bytes that the expansions may still add to the document.
     budget: usize,
 }
 
@@ -105,7 +105,7 @@ impl<'a> Expansion<'a> {
         let Some((&name, &value)) = self.entities.get_key_value(name) else {
             return Err(format!("the entity `&{};` is not declared", display_name()));
         };
-        // This also stops cycles.
+        // The depth limit also stops cyclic entities.
         if depth == MAX_ENTITY_DEPTH {
             return Err(format!(
                 "the entity `&{};` contains itself, or others more than {MAX_ENTITY_DEPTH} deep",

@@ -116,7 +116,7 @@ pub fn measured_value(engine: &mut Engine, attribute: &str, value: Literal) -> R
     if holders.is_empty() {
         let iri = facts.name(kind).unwrap_or_default();
         let name = local_name(iri);
-        // The namespace of the attribute type, and the prefix of MROS.
+        // The IRI has the namespace of the attribute type and the prefix `obs_` of MROS.
         let holder = format!("{}obs_{name}", &iri[..iri.len() - name.len()]);
         let holder = engine.symbols_mut().name(&holder);
         delta.insert = observation(engine.symbols_mut(), holder, kind, class);

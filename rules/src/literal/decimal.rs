@@ -228,7 +228,7 @@ pub(crate) fn ten_to(exponent: u32) -> BigInt {
 mod tests {
     use super::{BigInt, BigRational, DIVISION_DIGITS, Decimal, power_of_ten};
 
-    /// The fast path gives the same representation as the general path.
+    /// The fast conversion from rational numbers gives the same representation as the general conversion.
     #[test]
     fn short_conversion_equals_general_conversion() {
         let mut values = vec![(i64::MAX, 1), (i64::MIN, 1), (i64::MAX, 10), (1, i64::MAX), (0, 7), (100, 1)];
