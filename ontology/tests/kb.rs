@@ -23,7 +23,7 @@ fn engine(text: &str, name: &str) -> Engine {
     engine
 }
 
-/// One line per design: name, functions, components, estimations, availability.
+/// Describes each design in one line: name, functions, components, estimations, availability.
 fn designs(engine: &Engine) -> Vec<String> {
     let line = |design: ontology::tomasys::FunctionDesign| {
         let names = |individuals: &[ontology::tomasys::Individual]| {

@@ -10,7 +10,7 @@ const NODES: usize = 7;
 
 type Pairs = BTreeSet<(usize, usize)>;
 
-/// The xorshift generator.
+/// A pseudorandom number generator (xorshift).
 struct Random(u64);
 
 impl Random {

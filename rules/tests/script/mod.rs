@@ -206,7 +206,7 @@ impl World {
 }
 
 /// Checks that the first step follows from its supports by its rule, and that no fact supports itself. The
-/// other steps are the first steps of their own derivations.
+/// other steps need no check here, because each of them is the first step of the derivation of its own fact.
 fn check_derivation(engine: &Engine, derivation: &Derivation, facts: &BTreeSet<Fact>) {
     let mut supported = vec![false; derivation.steps.len()];
     // The number of passes is at most the length of the longest chain. A circle is never resolved.
@@ -302,7 +302,7 @@ fn check_equality(engine: &Engine, fact: &Fact, supporting: &[&Fact]) {
     }
 }
 
-/// Violated constraints, with the number of matches of each.
+/// Returns the positions of the violated constraints, each with the number of its distinct matches.
 fn violations(program: &Program, symbols: &mut Symbols, facts: &BTreeSet<Fact>) -> BTreeMap<u32, usize> {
     let random = program.rules.iter().filter(|rule| is_random(rule));
     let constraints = random.filter(|rule| rule.head.is_empty());
