@@ -18,7 +18,6 @@ fn main() -> Result<(), Box<dyn Error>> {
         println!("{warning}");
     }
     let designs = runtime.view().function_designs();
-    // Cloning is cheap: the copy shares unchanged data.
     println!("{} designs", designs.len());
     for component in runtime.view().components() {
         // A copy shares everything that does not change.

@@ -1,4 +1,4 @@
-//! Intermediate form of an ontology's contents.
+//! Intermediate form of an ontology's contents, between the readers and the public `Ontology`.
 
 use crate::error::Warning;
 use crate::owl::{AnnotatedAxiom, Annotation, EntityKind, Iri, Rule};

@@ -122,7 +122,7 @@ pub enum Error {
     /// O106: a name is not in the knowledge base.
     #[error("error[O106]: the knowledge base has no {kind} `{name}`; it has {}", listed(known))]
     Unknown {
-        /// Kind of the entity.
+        /// Kind of the entity, for example `component`.
         kind: &'static str,
         /// The unknown name.
         name: String,
@@ -132,7 +132,7 @@ pub enum Error {
     /// O107: a name cannot be part of an IRI.
     #[error("error[O107]: `{name}` cannot name an individual: `{character}` is not allowed in an IRI")]
     BadName {
-        /// The name.
+        /// The rejected name.
         name: String,
         /// The first character that IRIs do not allow.
         character: char,
@@ -140,15 +140,15 @@ pub enum Error {
     /// O108: an objective with this name exists.
     #[error("error[O108]: there is already an objective `{name}`")]
     Exists {
-        /// The name.
+        /// Name of the existing objective.
         name: String,
     },
     /// O110: a measured value is not a number.
     #[error("error[O110]: the value `{value}` of {attribute} is not a number")]
     NotANumber {
-        /// The attribute type.
+        /// The attribute type, as named by the caller.
         attribute: String,
-        /// The value.
+        /// The rejected value.
         value: String,
     },
     /// O111: the output syntax cannot express the knowledge base.
@@ -173,7 +173,7 @@ pub enum Error {
 }
 
 impl Error {
-    /// Stable code, `O1xx`.
+    /// Returns the stable code of the error, `O1xx`.
     pub fn code(&self) -> &'static str {
         match self {
             Self::Unreadable { .. } => "O101",
@@ -193,7 +193,7 @@ impl Error {
         }
     }
 
-    /// Position in a document, if the error has one.
+    /// Returns the position in a document, if the error has one.
     pub fn position(&self) -> Option<&Position> {
         match self {
             Self::Malformed { position, .. } | Self::OtherSyntax { position, .. } => Some(position),
@@ -205,8 +205,8 @@ impl Error {
     }
 }
 
-/// A statement that was not read, or was read in another way than it is written. The rest of the knowledge base
-/// is used.
+/// A problem that does not prevent the use of a knowledge base: a statement that was not read or was
+/// read in another way than it is written, or a questionable part of the model.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
 #[non_exhaustive]
 pub enum Warning {
@@ -304,7 +304,7 @@ pub enum Warning {
     OutsideProfile {
         /// The axiom in functional-style syntax.
         axiom: String,
-        /// `true` if a part of the axiom is used.
+        /// Whether a part of the axiom is used.
         partly: bool,
         /// The unsupported construct.
         reason: String,
@@ -348,7 +348,7 @@ pub enum Warning {
         /// IRI of the design.
         design: String,
     },
-    /// O402: no design solves a function.
+    /// O402: a function is solved by no design.
     #[error(
         "warning[O402]: no function design solves the function <{function}>, so nothing that needs it can run"
     )]
@@ -403,18 +403,18 @@ pub enum Warning {
     },
 }
 
-/// Formats a position as a prefix of a message.
+/// Formats a position as a prefix of a message; empty without a position.
 fn before(position: Option<&Position>) -> String {
     position.map_or_else(String::new, |position| format!("{position}: "))
 }
 
-/// Returns the position, or the file if the position is unknown.
+/// Returns the position as text, or the file if the position is unknown.
 fn place(file: &str, position: Option<&Position>) -> String {
     position.map_or_else(|| file.to_owned(), ToString::to_string)
 }
 
 impl Warning {
-    /// Stable code, `O2xx` to `O4xx`.
+    /// Returns the stable code of the warning, `O2xx` to `O4xx`.
     pub fn code(&self) -> &'static str {
         match self {
             Self::Undeclared { .. } => "O201",
@@ -447,8 +447,8 @@ fn label_suffix(label: Option<&str>) -> String {
     label.map_or_else(String::new, |label| format!(" ({label})"))
 }
 
-/// Joins the values; beyond `MAX_LISTED_VALUES` + 1 of them, only the first `MAX_LISTED_VALUES` and the number
-/// of the others.
+/// Joins the values with commas. If there are more than `MAX_LISTED_VALUES` + 1 values, lists only the
+/// first `MAX_LISTED_VALUES` and the number of the others.
 fn abbreviated(values: &[String]) -> String {
     match values.get(..MAX_LISTED_VALUES).filter(|_| values.len() > MAX_LISTED_VALUES + 1) {
         Some(first) => format!("{} and {} more", first.join(", "), values.len() - MAX_LISTED_VALUES),

@@ -1,4 +1,4 @@
-//! Triples in document order, with an index by subject. Triples can be removed.
+//! RDF graph: triples in document order, with an index by subject. Triples can be removed.
 
 use oxrdf::{BlankNode, NamedNode, NamedOrBlankNode, Term, Triple};
 use rustc_hash::{FxHashMap as HashMap, FxHashSet as HashSet};
@@ -13,7 +13,7 @@ pub(crate) struct Graph {
     fresh: usize,
 }
 
-/// An `rdf:List` that was followed to its end.
+/// Items of a complete `rdf:List`, and the triples that form the list.
 #[derive(Debug)]
 pub(crate) struct List {
     pub items: Vec<Term>,
@@ -35,12 +35,12 @@ impl Graph {
         index
     }
 
-    /// Adds the triple `subject predicate object`.
+    /// Adds the triple with this subject, predicate and object.
     pub(crate) fn state(&mut self, subject: &NamedOrBlankNode, predicate: &str, object: impl Into<Term>) {
         self.add(Triple::new(subject.clone(), NamedNode::new_unchecked(predicate), object));
     }
 
-    /// Number of indices in use, including indices of removed triples.
+    /// Returns the number of indices in use, including the indices of removed triples.
     pub(crate) fn len(&self) -> usize {
         self.triples.len()
     }
@@ -53,12 +53,12 @@ impl Graph {
         self.triples.get_mut(index).and_then(Option::as_mut)
     }
 
-    /// All triples with their indices, in order.
+    /// Returns all triples with their indices, in order.
     pub(crate) fn iter(&self) -> impl Iterator<Item = (usize, &Triple)> {
         self.triples.iter().enumerate().filter_map(|(index, triple)| Some((index, triple.as_ref()?)))
     }
 
-    /// The triples of a subject with their indices, in order.
+    /// Returns the triples of a subject with their indices, in order.
     pub(crate) fn of<'a>(
         &'a self,
         subject: &NamedOrBlankNode,
@@ -67,7 +67,7 @@ impl Graph {
         indices.iter().filter_map(|&index| Some((index, self.triples[index].as_ref()?)))
     }
 
-    /// The objects of `subject predicate`, in order.
+    /// Returns the objects of all triples with this subject and predicate, in order.
     pub(crate) fn objects<'a>(
         &'a self,
         subject: &NamedOrBlankNode,
@@ -78,8 +78,8 @@ impl Graph {
             .map(|(_, triple)| &triple.object)
     }
 
-    /// Returns the only object of `subject predicate`; the error says if it is missing, or if there
-    /// are several.
+    /// Returns the object of the only triple with this subject and predicate. The error message
+    /// distinguishes a missing triple from several triples.
     pub(crate) fn object<'a>(
         &'a self,
         subject: &NamedOrBlankNode,
@@ -93,7 +93,7 @@ impl Graph {
         }
     }
 
-    /// The subjects of type `class` with the indices of their type triples, in order.
+    /// Returns the subjects of type `class` with the indices of their type triples, in order.
     pub(crate) fn instances(&self, class: &str) -> Vec<(usize, NamedOrBlankNode)> {
         let typed = self.iter().filter(|(_, triple)| is_type(triple, class));
         typed.map(|(index, triple)| (index, triple.subject.clone())).collect()
@@ -118,7 +118,8 @@ impl Graph {
         }
     }
 
-    /// Adds a list and returns its head. `class` is the type of each list node.
+    /// Adds an `rdf:List` and returns its head. `class` is the type of each list node, if the nodes have
+    /// one.
     pub(crate) fn add_list(&mut self, items: impl IntoIterator<Item = Term>, class: Option<&str>) -> Term {
         let nodes: Vec<_> = items.into_iter().map(|item| (self.fresh(), item)).collect();
         let nil = Term::from(NamedNode::new_unchecked(rdf::NIL));
@@ -140,7 +141,7 @@ impl Graph {
         BlankNode::new_unchecked(format!("n{}", self.fresh))
     }
 
-    /// Counts for each blank node the triples with this object.
+    /// Returns for each blank node the number of triples with this node as object.
     pub(crate) fn references(&self) -> HashMap<BlankNode, usize> {
         let mut counts = HashMap::default();
         for (_, triple) in self.iter() {
@@ -156,7 +157,7 @@ impl Graph {
         self.triples.into_iter().flatten().collect()
     }
 
-    /// Writes the triples that were not removed as an N-Triples document.
+    /// Returns the triples that were not removed as an N-Triples document.
     pub(crate) fn to_ntriples(&self) -> Vec<u8> {
         use std::io::Write;
         let mut text = Vec::with_capacity(self.triples.len() * 128);
@@ -183,7 +184,7 @@ pub(crate) fn subject_of(term: &Term) -> Option<NamedOrBlankNode> {
     }
 }
 
-/// Returns the IRI of a named node.
+/// Returns the IRI of a named node; `None` for other terms.
 pub(crate) fn iri_of(term: &Term) -> Option<&str> {
     match term {
         Term::NamedNode(node) => Some(node.as_str()),

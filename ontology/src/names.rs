@@ -1,5 +1,5 @@
-//! Interns IRIs: each one is stored once and has a number. Triples of numbers take a tenth of the memory of
-//! triples of text.
+//! Interns IRIs: each IRI is stored once and has a number. Triples of numbers take a tenth of the memory
+//! of triples of text.
 
 use oxrdf::{BlankNode, NamedNode, NamedOrBlankNode, Term, Triple};
 use rustc_hash::FxHashMap;
@@ -31,7 +31,7 @@ pub(crate) enum Object {
     Literal(Box<Literal>),
 }
 
-// Numbers are indices in `texts`.
+// Numbers of names are indices in `texts`.
 impl Names {
     /// Interns an IRI and returns its shared text.
     pub(crate) fn iri(&mut self, name: &str) -> Iri {
@@ -56,12 +56,12 @@ impl Names {
         self.number(&format!("{BLANK}{name}"))
     }
 
-    /// Returns the number of an interned IRI.
+    /// Returns the number of an IRI, if the IRI is interned.
     pub(crate) fn find(&self, name: &str) -> Option<u32> {
         self.numbers.get(name).copied()
     }
 
-    /// Returns the text of a number. Blank nodes begin with `_:`.
+    /// Returns the text of the name with this number. The text of a blank node begins with `_:`.
     pub(crate) fn text(&self, number: u32) -> &Iri {
         &self.texts[number as usize]
     }
@@ -75,7 +75,8 @@ impl Names {
         self.texts.len()
     }
 
-    /// Ranks of all names in alphabetical order. The keys are the addresses of the shared texts.
+    /// Returns the rank of each name in alphabetical order. The keys are the addresses of the shared
+    /// texts.
     pub(crate) fn ranks(&self) -> FxHashMap<*const u8, u32> {
         let mut sorted: Vec<&Iri> = self.texts.iter().collect();
         // Interned texts are distinct, so an unstable sort is deterministic.
@@ -83,7 +84,7 @@ impl Names {
         sorted.into_iter().zip(0..).map(|(iri, rank)| (iri.as_ptr(), rank)).collect()
     }
 
-    /// Converts a triple to numbers. `blank` returns the number of a blank node.
+    /// Converts a triple of text to a triple of numbers. `blank` returns the number of a blank node.
     pub(crate) fn compact(
         &mut self,
         triple: Triple,
@@ -111,7 +112,7 @@ impl Names {
         }
     }
 
-    /// Converts a triple of numbers to text.
+    /// Converts a triple of numbers to a triple of text.
     pub(crate) fn triple(&self, compact: Compact) -> Triple {
         let named = |number| NamedNode::new_unchecked(&**self.text(number));
         let node = |number| match self.text(number).strip_prefix(BLANK) {

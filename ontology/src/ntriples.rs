@@ -7,7 +7,8 @@ use crate::lower::INTERNAL;
 use crate::owl::ANONYMOUS;
 use crate::vocab::{owl, rdf};
 
-/// Writes facts about individuals: unary facts as `rdf:type`, binary facts as properties.
+/// Formats facts about individuals: unary facts as `rdf:type` triples, binary facts as triples of
+/// properties.
 ///
 /// Omits facts of other arities, the auxiliary relations of [`crate::lower`], membership in `owl:Thing`, and
 /// `sameAs` of an individual with itself. Anonymous individuals become blank nodes again.
@@ -32,9 +33,10 @@ pub fn ntriples<'a>(symbols: &Symbols, facts: impl IntoIterator<Item = &'a Fact>
 /// The distinct terms of the triples.
 struct Terms<'a> {
     symbols: &'a Symbols,
-    /// Text of each term with a trailing space, so that the order of the terms is the order of the lines.
+    /// Text of each term with a trailing space, so that the order of the terms is the order of the
+    /// lines. Indexed by term number.
     texts: Vec<String>,
-    /// Term numbers by symbol; `None` if there are too many terms for a number.
+    /// Maps symbols to term numbers; `None` if there are too many terms for a number.
     numbers: FxHashMap<Symbol, Option<u32>>,
 }
 
@@ -46,7 +48,8 @@ impl<'a> Terms<'a> {
         Self { symbols, texts: vec![format!("<{}> ", rdf::TYPE)], numbers: FxHashMap::default() }
     }
 
-    /// Converts a fact to the numbers of subject, predicate and object.
+    /// Converts a fact to the term numbers of subject, predicate and object. Returns `None` for a fact
+    /// to omit.
     fn triple(&mut self, fact: &Fact) -> Option<[u32; 3]> {
         let name = |symbol| self.symbols.value(symbol).as_name();
         let predicate = name(fact.predicate).filter(|name| !name.starts_with(INTERNAL))?;
@@ -83,7 +86,8 @@ impl<'a> Terms<'a> {
         number
     }
 
-    /// Replaces the numbers in `triples` by the ranks of the terms' texts. Returns the sorted texts.
+    /// Replaces the term numbers in `triples` by the ranks of the terms' texts. Returns the sorted
+    /// texts.
     fn rank(self, triples: &mut [[u32; 3]]) -> Vec<String> {
         let mut texts: Vec<(String, u32)> = self.texts.into_iter().zip(0..).collect();
         texts.sort_unstable();

@@ -44,7 +44,7 @@ pub enum ObjectPropertyExpression {
     Inverse(Iri),
 }
 
-/// A set of data values.
+/// Data range: a set of data values.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum DataRange {
     /// All values of a datatype.
@@ -72,7 +72,7 @@ pub enum Bound {
     Exact,
 }
 
-/// A set of individuals.
+/// Class expression: a set of individuals.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ClassExpression {
     /// A named class.
@@ -91,9 +91,9 @@ pub enum ClassExpression {
     AllValuesFrom(ObjectPropertyExpression, Box<ClassExpression>),
     /// Individuals with the given property value.
     HasValue(ObjectPropertyExpression, Iri),
-    /// Individuals that are their own property value.
+    /// Individuals that the property relates to themselves.
     HasSelf(ObjectPropertyExpression),
-    /// Individuals with a number of property values in the class.
+    /// Individuals with at least, at most or exactly n property values in the class.
     Cardinality(Bound, u32, ObjectPropertyExpression, Box<ClassExpression>),
     /// Individuals with a data property value in the range.
     DataSomeValuesFrom(Iri, DataRange),
@@ -101,7 +101,7 @@ pub enum ClassExpression {
     DataAllValuesFrom(Iri, DataRange),
     /// Individuals with the given data property value.
     DataHasValue(Iri, Literal),
-    /// Individuals with a number of data property values in the range.
+    /// Individuals with at least, at most or exactly n data property values in the range.
     DataCardinality(Bound, u32, Iri, DataRange),
 }
 
@@ -116,15 +116,15 @@ pub enum Characteristic {
     Reflexive,
     /// No individual is its own value.
     Irreflexive,
-    /// Holds in both directions.
+    /// If x is related to y, y is related to x.
     Symmetric,
-    /// Never holds in both directions.
+    /// If x is related to y, y is not related to x.
     Asymmetric,
-    /// Composes with itself.
+    /// If x is related to y and y to z, x is related to z.
     Transitive,
 }
 
-/// A logical axiom; field names follow the structural specification.
+/// A logical axiom. Names and arguments of the variants follow the structural specification.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[allow(missing_docs)] // the variants are the specification's axioms, one to one
 pub enum Axiom {
@@ -219,15 +219,15 @@ pub enum Atom {
     Class(ClassExpression, Argument),
     /// The argument is in the data range.
     DataRange(DataRange, Argument),
-    /// The arguments are related.
+    /// The property relates the first argument to the second.
     ObjectProperty(ObjectPropertyExpression, Argument, Argument),
-    /// The individual has the value.
+    /// The first argument has the second, a data value, as a value of the property.
     DataProperty(Iri, Argument, Argument),
-    /// The arguments are one individual.
+    /// The arguments denote the same individual.
     SameIndividual(Argument, Argument),
-    /// The arguments are two individuals.
+    /// The arguments denote different individuals.
     DifferentIndividuals(Argument, Argument),
-    /// The built-in predicate holds of the arguments.
+    /// The arguments satisfy the built-in predicate.
     BuiltIn(Iri, Vec<Argument>),
 }
 
@@ -258,9 +258,9 @@ pub struct Rule {
 pub struct Source {
     /// Path of the file, or the name given for a text.
     pub name: String,
-    /// The ontology IRI that the document declares.
+    /// The ontology IRI, if the document declares one.
     pub iri: Option<Iri>,
-    /// Value of `owl:versionIRI`.
+    /// Value of `owl:versionIRI`, if stated.
     pub version: Option<Iri>,
     /// The detected syntax.
     pub syntax: Syntax,
@@ -286,18 +286,19 @@ pub struct Ontology {
 }
 
 impl Ontology {
-    /// IRI of the first document, if it declares one.
+    /// Returns the IRI of the first document, if it declares one.
     pub fn iri(&self) -> Option<&Iri> {
         self.sources.first().and_then(|source| source.iri.as_ref())
     }
 
-    /// The SWRL rules. An equal rule of two ontologies is contained twice; [`crate::lower`] removes the
-    /// duplicate.
+    /// Returns the SWRL rules. A rule that two ontologies state occurs twice; [`crate::lower`] removes
+    /// the duplicate.
     pub fn rules(&self) -> &[Rule] {
         &self.rules
     }
 
-    /// Named individuals: declared ones, and ones with a class assertion; sorted.
+    /// Returns the named individuals, sorted: declared individuals, and individuals with a class
+    /// assertion.
     pub fn individuals(&self) -> BTreeSet<&Iri> {
         let typed = self.axioms.iter().filter_map(|annotated| match &annotated.axiom {
             Axiom::ClassAssertion(_, individual) if !individual.starts_with(ANONYMOUS) => Some(individual),
@@ -306,7 +307,7 @@ impl Ontology {
         self.entities(EntityKind::NamedIndividual).chain(typed).collect()
     }
 
-    /// The IRIs of one kind, sorted.
+    /// Returns the IRIs of the entities of one kind, sorted.
     pub fn entities(&self, kind: EntityKind) -> impl Iterator<Item = &Iri> {
         self.entities.iter().filter(move |(entity_kind, _)| *entity_kind == kind).map(|(_, iri)| iri)
     }

@@ -1,10 +1,10 @@
-//! Computes the change of an engine for asserted and retracted documents. After the change, the engine holds
-//! the consequences of the remaining statements only.
+//! Computes the delta that updates the rule engine when documents are asserted and retracted. After the
+//! update, the engine holds exactly the consequences of the remaining statements.
 //!
-//! [`Stated`] keeps the stated axioms and rules. They are lowered before and after the change with the code
-//! that lowers a new knowledge base ([`lower_together`]), and the engine receives the differences between the
-//! two results. A change that consists of assertions about named classes and properties skips these lowerings,
-//! unless rules depend on the set of stated names.
+//! [`Stated`] keeps the stated axioms and rules. [`lower_together`], which also translates a new
+//! knowledge base, translates them to facts and rules before and after the change. The engine receives
+//! the differences between the two results. A change that consists of assertions about named classes and
+//! properties skips these translations, unless rules depend on the set of stated names.
 //!
 //! Axioms form a set: an axiom of two documents is stated once, and one retraction removes it. Declarations are
 //! never retracted, because many documents repeat them.
@@ -25,11 +25,11 @@ use crate::owl::{
 use crate::read::{ReadOptions, read_files};
 use crate::vocab::{is_reserved, owl};
 
-/// The stated knowledge: documents, and rules of other origin.
+/// The stated knowledge: the axioms and rules of all documents, and additional rules.
 #[derive(Clone, Debug, Default)]
 pub struct Stated {
     ontology: Ontology,
-    /// Rules of other origin. Their names are symbols of the engine.
+    /// Additional rules, which come from no document. Their names are symbols of the engine.
     rules: Vec<EngineRule>,
     equality: Equality,
 }
@@ -53,13 +53,13 @@ impl Stated {
         Self { ontology, rules, equality }
     }
 
-    /// The merged documents.
+    /// Returns the ontology that merges all stated documents.
     pub fn ontology(&self) -> &Ontology {
         &self.ontology
     }
 
-    /// Computes the change that asserts the first documents and retracts the second ones. A statement in both
-    /// is asserted. Imports of these documents are not followed.
+    /// Computes the change that asserts the documents in `asserted` and retracts the documents in
+    /// `retracted`. A statement in both lists is asserted. Imports of these documents are not followed.
     ///
     /// # Errors
     /// Returns all errors of the documents, and O114 for a retracted statement with an anonymous individual.
@@ -88,7 +88,7 @@ impl Stated {
         self.change_by(&assertions, &retractions, engine)
     }
 
-    /// Computes the change for documents that have been read; see [`Stated::change`].
+    /// Computes the change for documents that have already been read, like [`Stated::change`].
     ///
     /// # Errors
     /// Returns O114 for a retracted statement with an anonymous individual.
@@ -164,8 +164,8 @@ impl Stated {
         self.ontology.sources.extend_from_slice(&assertions.sources);
     }
 
-    /// Removes the statements of documents, and warns about those that are not stated. Returns the removed
-    /// axioms.
+    /// Removes the statements of `retractions`, and adds a warning for each statement that was not
+    /// stated. Returns the removed axioms.
     fn remove(
         &mut self,
         retractions: &Ontology,
@@ -204,8 +204,9 @@ impl Stated {
         removed
     }
 
-    /// Removes the assertions that state the same fact as a missing axiom with different literals: literals are
-    /// compared by value.
+    /// Removes the assertions that state the same fact as an axiom in `missing` with differently written
+    /// literals (literals are compared by value). Adds a warning for each axiom whose fact is not stated
+    /// at all. Returns the removed axioms.
     fn remove_by_value(
         &mut self,
         missing: Vec<Axiom>,
@@ -236,8 +237,9 @@ impl Stated {
         removed
     }
 
-    /// Returns `true` if the axioms state only facts, and no rule of the program depends on the set of stated
-    /// names.
+    /// Returns `true` if the change can be computed without a translation of the whole ontology:
+    /// `axioms` are only assertions about named classes and properties, and no rule of `program` depends
+    /// on the set of stated names.
     fn is_plain(&self, axioms: &[AnnotatedAxiom], program: &Program, symbols: &Symbols) -> bool {
         // The rules and facts of `owl:Thing` depend on all names that are stated.
         let thing = symbols.find_name(owl::THING);
@@ -267,7 +269,8 @@ impl Stated {
         })
     }
 
-    /// Removes the facts that a remaining axiom states, too.
+    /// Removes from `deleted` the facts that a remaining axiom also states. `change` contains the
+    /// changed axioms.
     fn keep_supported(
         &self,
         change: &[AnnotatedAxiom],
@@ -315,8 +318,8 @@ fn resembles(first: &Axiom, second: &Axiom) -> bool {
     individuals_of(second).into_iter().any(|individual| individuals_of(first).contains(&individual))
 }
 
-/// Rejects retracted statements with anonymous individuals: a blank node of one document never names an
-/// individual of another.
+/// Returns an error for each retracted statement with an anonymous individual: a blank node of one
+/// document never denotes an individual of another document.
 fn reject_anonymous(retractions: &Ontology) -> Result<(), Errors> {
     let is_anonymous = |statement: &dyn Debug| format!("{statement:?}").contains(ANONYMOUS);
     let axioms =
@@ -326,8 +329,9 @@ fn reject_anonymous(retractions: &Ontology) -> Result<(), Errors> {
     Errors::unless_empty(statements.map(|statement| Error::Nameless { statement }))
 }
 
-/// Replaces the rules of `before` by the rules of `after`. Returns `None` if nothing changes. The position of
-/// an axiom is ignored, so that the rules of remaining axioms keep their derivations.
+/// Returns `program` with the rules of `before` replaced by the rules of `after`, or `None` if nothing
+/// changes. The comparison ignores the positions of axioms, so that the rules of remaining axioms keep
+/// their derivations.
 fn revised_program(program: &Program, before: &Program, after: &Program) -> Option<Program> {
     let content = |rule: &EngineRule| {
         let mut copy = rule.clone();
@@ -349,7 +353,8 @@ fn revised_program(program: &Program, before: &Program, after: &Program) -> Opti
     (rules != program.rules || equality != program.equality).then_some(Program { rules, equality })
 }
 
-/// Returns body and head with variables numbered by their first occurrence.
+/// Returns the body and the head of a rule, with the variables numbered by their first occurrence. Rules
+/// that differ only in variable names have equal content.
 fn content(rule: &Rule) -> (Vec<Atom>, Vec<Atom>) {
     let mut variables: Vec<Iri> = Vec::new();
     let mut renumbered = |argument: &Argument| match argument {
@@ -381,8 +386,8 @@ fn with_arguments(atom: &Atom, map: &mut impl FnMut(&Argument) -> Argument) -> A
     }
 }
 
-/// Returns the axiom in a canonical form: members of sets are sorted, and assertions of inverses are turned
-/// around.
+/// Returns the axiom in a canonical form: the members of sets are sorted, and an assertion of an inverse
+/// property becomes an assertion of the property with swapped individuals.
 fn canonical(axiom: &Axiom) -> Axiom {
     fn ordered<T: Ord + Clone>(items: &[T]) -> Vec<T> {
         items.iter().cloned().collect::<BTreeSet<T>>().into_iter().collect()
@@ -429,7 +434,8 @@ fn canonical(axiom: &Axiom) -> Axiom {
     }
 }
 
-/// Returns the expression with sorted members of its sets.
+/// Returns the class expression with the members of its intersections, unions and enumerations sorted,
+/// at every depth.
 fn sorted(class: &ClassExpression) -> ClassExpression {
     use ClassExpression as C;
     let sorted_set =

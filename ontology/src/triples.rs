@@ -9,7 +9,7 @@ use crate::read::syntax::Syntax;
 /// The triples of a document, and its header.
 #[derive(Debug)]
 pub(crate) struct Document {
-    /// Path or name for messages.
+    /// Path of the document, or the name given for a text.
     pub name: String,
     pub syntax: Syntax,
     /// The ontology IRI, if the document declares one.

@@ -165,8 +165,8 @@ vocabulary! {
     }
 }
 
-/// Returns the part of an IRI after the last `#`, otherwise after the last `/`, or the whole IRI if this part
-/// is empty.
+/// Returns the local name of an IRI: the part after the last `#` or, without `#`, after the last `/`.
+/// Returns the whole IRI if that part is empty.
 ///
 /// ```
 /// assert_eq!(ontology::vocab::local_name("http://metacontrol.org/tomasys#Function"), "Function");

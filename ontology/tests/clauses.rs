@@ -1,6 +1,6 @@
-//! Small documents for errors that a reasoner or reader of OWL 2 can have, with the result that the standard
-//! requires: OWL 2 Syntax and Direct Semantics, the tables of OWL 2 RL, the mapping from RDF (including the
-//! forms of OWL 1).
+//! Small documents on which a reader or reasoner of OWL 2 can err, each with the result that the
+//! standard requires: OWL 2 Syntax and Direct Semantics, the tables of OWL 2 RL, the mapping from RDF
+//! (including the forms of OWL 1).
 
 use std::collections::BTreeSet;
 
@@ -16,7 +16,7 @@ const HEAD: &str = "@prefix : <http://e/#> .
 :d a owl:DatatypeProperty . :e a owl:DatatypeProperty . :f a owl:DatatypeProperty , owl:FunctionalProperty .
 ";
 
-/// The derived facts in short form; `None` if the knowledge is inconsistent.
+/// Returns the derived facts in short form; `None` if the knowledge is inconsistent.
 fn inferred(ontology: &Ontology) -> Option<Vec<String>> {
     let mut symbols = Symbols::new();
     let lowered = lower(ontology, &mut symbols);

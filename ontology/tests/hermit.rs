@@ -25,7 +25,7 @@ use rules::{Engine, Fact, Symbols};
 use crate::common;
 use crate::w3c::premises;
 
-/// Limit on the conclusions of one document that HermiT has to prove.
+/// Maximum number of conclusions from one document that HermiT has to prove.
 const MAX_CONCLUSIONS: usize = 60;
 
 /// Documents that are inconsistent according to the W3C and consistent according to HermiT, with the reason.

@@ -23,7 +23,7 @@ fn engine(text: &str, name: &str) -> Engine {
     engine
 }
 
-/// One line per design: name, functions, components, estimations, availability.
+/// Describes each design in one line: name, functions, components, estimations, availability.
 fn designs(engine: &Engine) -> Vec<String> {
     let line = |design: ontology::tomasys::FunctionDesign| {
         let names = |individuals: &[ontology::tomasys::Individual]| {
@@ -201,8 +201,9 @@ fn our_knowledge_bases_are_owl_2_dl() {
     }
 }
 
-/// `python3 -m venv pellet && pellet/bin/pip install owlready2==0.47`, Java 17, and then
-/// `METAPLAN_PYTHON=$PWD/pellet/bin/python cargo test -p metaplan-ontology --test all kb:: -- --ignored`.
+/// Setup: `python3 -m venv pellet && pellet/bin/pip install owlready2==0.47`, and Java 17. Command:
+/// `METAPLAN_PYTHON=$PWD/pellet/bin/python cargo test -p metaplan-ontology --test all kb:: --
+/// --ignored`.
 #[test]
 #[ignore = "needs owlready2 and Java"]
 fn our_knowledge_bases_load_in_owlready2_and_are_consistent_in_pellet() {

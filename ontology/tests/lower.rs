@@ -39,7 +39,7 @@ fn derived(engine: &Engine) -> BTreeSet<String> {
     short.lines().map(|line| line.trim_end_matches(" .").replace(['<', '>'], "")).collect()
 }
 
-/// Each text has exactly these conclusions. It is consistent and causes no warnings.
+/// Each text has exactly these conclusions. The text is consistent and causes no warnings.
 #[test]
 fn axioms_have_their_conclusions() {
     for (text, expected) in [

@@ -96,8 +96,8 @@ fn survives(text: &[u8]) -> (bool, Duration) {
     (accepted, start.elapsed())
 }
 
-/// Damages random seeds until `enough` returns `true` for the number of cases. A failing text remains in a
-/// file.
+/// Damages random seeds until `enough` returns `true` for the number of cases. Returns the numbers of
+/// cases and of accepted texts. A failing text remains in a file.
 fn run(mut numbers: Numbers, enough: impl Fn(usize) -> bool) -> (usize, usize) {
     let seeds = seeds();
     let (mut cases, mut accepted) = (0, 0);
@@ -121,7 +121,8 @@ fn damaged_documents_never_panic() {
     assert!(accepted > cases / 20, "{accepted} of {cases} were still knowledge bases");
 }
 
-/// `METAPLAN_SECONDS=900 METAPLAN_SEED=7 cargo test --release -p metaplan-ontology --test all mutations:: -- --ignored --nocapture`
+/// Command: `METAPLAN_SECONDS=900 METAPLAN_SEED=7 cargo test --release -p metaplan-ontology --test all
+/// mutations:: -- --ignored --nocapture`
 #[test]
 #[ignore = "runs as long as METAPLAN_SECONDS says"]
 fn many_damaged_documents_never_panic() {

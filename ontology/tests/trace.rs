@@ -218,7 +218,7 @@ impl Replay {
         })
     }
 
-    /// The asserted failures: objectives by design.
+    /// Returns the asserted failures: maps each design to the objectives for which it failed.
     fn error_log(&self) -> BTreeMap<String, Vec<String>> {
         let engine = self.runtime.engine();
         let mut log = BTreeMap::<String, Vec<String>>::new();

@@ -15,8 +15,8 @@ use rules::{Engine, Symbols};
 
 const TEST: &str = "http://www.w3.org/2007/OWL/testOntology#";
 
-/// Cases with another result than the W3C's, with the reason. No other case of the profile RL may differ, and
-/// in no case may a statement be entailed that is not.
+/// Cases with another result than the W3C's: identifier, kind of the question, reason. No other case of
+/// the profile RL may differ, and no case may entail a statement that does not follow.
 const OPEN: [(&str, &str, &str); 3] = [
     ("WebOnt-I4.6-005-Direct", "entailed", ANNOTATIONS),
     ("WebOnt-equivalentClass-008-Direct", "entailed", ANNOTATIONS),
@@ -33,7 +33,8 @@ const ANNOTATIONS: &str = "a conclusion has an annotation, which was not stated;
 struct Suite(BTreeMap<String, BTreeMap<String, Vec<String>>>);
 
 impl Suite {
-    /// Reads the suite. It declares entities in single quotes, which the RDF/XML parser does not support.
+    /// Reads the suite. Its entity declarations have single quotes, which the RDF/XML parser does not
+    /// support.
     fn read(text: &str) -> Self {
         let mut properties: BTreeMap<String, BTreeMap<String, Vec<String>>> = BTreeMap::new();
         let (head, tail) = text.split_once("]>").expect("a document type");
@@ -92,7 +93,7 @@ fn engine(ontology: &Ontology) -> Result<Engine, String> {
     Engine::new(symbols, lowered.program, lowered.facts).map_err(|errors| errors[0].to_string())
 }
 
-/// The premises of all cases by identifier; empty if the suite does not exist.
+/// Returns the premises of all cases, with their identifiers; empty if the suite does not exist.
 pub fn premises() -> Vec<(String, String)> {
     let path = Path::new(common::SHARED).join("real/owl_w3c/semantics-direct.rdf");
     let Ok(text) = std::fs::read_to_string(&path) else { return Vec::new() };

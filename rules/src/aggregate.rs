@@ -1,6 +1,6 @@
 //! Evaluation of aggregates over a group of matches.
 //!
-//! The result depends on the values alone and not on their order: numbers are compared by their exact
+//! The result depends only on the values and not on their order: numbers are compared by their exact
 //! values, and floating-point sums are computed in ascending order.
 
 use std::cmp::Ordering;
@@ -21,7 +21,7 @@ pub(crate) struct Function {
 }
 
 impl Function {
-    /// Aggregate of rows; `None` if it has no value.
+    /// Returns the aggregate of rows; `None` if the aggregate has no value.
     pub fn evaluate<'r>(
         &self,
         rows: impl Iterator<Item = &'r [Symbol]>,
@@ -71,8 +71,8 @@ fn as_decimal(value: &Literal) -> Option<&Decimal> {
     }
 }
 
-/// First value in the given direction. Among equal values, a decimal is preferred, and then the first by
-/// datatype and lexical form.
+/// Returns the minimum (for `Ordering::Less`) or maximum of the values; `None` if there is none. Among
+/// equal values, a decimal is preferred, and then the first by datatype and lexical form.
 fn extreme(values: &[&Literal], direction: Ordering) -> Option<Literal> {
     let mut best: Option<&Literal> = None;
     for &value in values {
@@ -114,7 +114,7 @@ fn compare(left: &Literal, right: &Literal) -> Option<Ordering> {
     }
 }
 
-/// Maps infinities to themselves, and finite numbers to 0.
+/// Maps infinities and NaN to themselves, and finite numbers to 0. Returns `None` for other literals.
 fn infinite(value: &Literal) -> Option<f64> {
     match value {
         Literal::Decimal(_) => Some(0.0),

@@ -27,14 +27,15 @@ use crate::store::Store;
 use crate::symbol::Symbols;
 use crate::vocabulary::SAME_AS;
 
-/// Growth factor of the number of facts since the last planning, beyond which the joins are planned again.
+/// The joins are planned again if the number of facts exceeds this multiple of the number at the last
+/// planning.
 const REPLAN_FACTOR: usize = 4;
-/// Minimum number of facts assumed for the last planning. Small engines are then not planned after every
-/// update.
+/// Minimum number of facts assumed for the last planning, so that small engines are not planned after
+/// every update.
 const REPLAN_FROM: usize = 32;
 
 impl Engine {
-    /// Derives all facts that follow.
+    /// Creates an engine and derives all facts that follow from stated facts.
     ///
     /// # Errors
     /// Returns all errors of all rules (R2xx, R302, R303), or R301 if the derivation exceeds the step
@@ -47,7 +48,8 @@ impl Engine {
         Self::with_limits(symbols, program, facts, Limits::default())
     }
 
-    /// Derives all facts that follow, within limits for this derivation and for each later update.
+    /// Creates an engine and derives all facts that follow from stated facts. The limits apply to this
+    /// derivation and to each later update.
     ///
     /// # Errors
     /// Returns the errors of [`Engine::new`], or R304 if the evaluation was interrupted.
@@ -74,7 +76,7 @@ impl Engine {
         Ok(engine)
     }
 
-    /// Derives all facts from stated facts, in an engine without facts.
+    /// Adds stated facts to an engine without facts, and derives all facts that follow.
     fn build(&mut self, facts: Vec<Fact>) -> Result<(), Errors> {
         let mut evaluated = Arc::clone(&self.program);
         if self.equality.is_some() {
@@ -101,7 +103,8 @@ impl Engine {
     /// effect.
     ///
     /// # Errors
-    /// Returns R301 if the step budget is exhausted, R304 if the evaluation was interrupted, R302 or R303.
+    /// Returns R301 if the step budget is exhausted, R302 for an unknown symbol, R303 for a fact with too
+    /// many arguments, and R304 if the evaluation was interrupted.
     /// After an error, the engine is in its previous state.
     pub fn apply(&mut self, delta: Delta) -> Result<Delta, Error> {
         let span = info_span!("update", stated = delta.insert.len() + delta.delete.len(), changed = Empty);
@@ -128,7 +131,8 @@ impl Engine {
         })
     }
 
-    /// Applies a change without equality. An error comes with the change that restores the stated facts.
+    /// Applies a change of the stated facts without equality. An error comes with the delta that
+    /// restores the stated facts.
     pub(crate) fn apply_plainly(&mut self, delta: Delta) -> Result<Delta, (Error, Delta)> {
         self.replan().map_err(|error| (error, Delta::default()))?;
         let stated = state_change(self, delta);
@@ -139,8 +143,8 @@ impl Engine {
         }
     }
 
-    /// Applies a change like [`Engine::apply`], to rows of the store. After an error, the store is in an
-    /// undefined state.
+    /// Applies a change of the stated rows of the store, like [`Engine::apply`] without the translation
+    /// between names and representatives. After an error, the store is in an undefined state.
     pub(crate) fn apply_rows(&mut self, delta: Delta) -> Result<Delta, Error> {
         self.replan()?;
         let stated = state_change(self, delta);
@@ -149,7 +153,7 @@ impl Engine {
         Ok(maintenance.finish())
     }
 
-    /// Plans the joins again if the number of facts has grown by [`REPLAN_FACTOR`].
+    /// Plans the joins again if the number of facts has grown by more than the factor [`REPLAN_FACTOR`].
     fn replan(&mut self) -> Result<(), Error> {
         if self.store.len() <= REPLAN_FACTOR * self.network.planned_for.max(REPLAN_FROM) {
             return Ok(());
@@ -158,7 +162,8 @@ impl Engine {
         network.plan(&mut self.store, true, (&self.program, &self.limits))
     }
 
-    /// Derives all facts again after an aborted update, from the facts stated before it.
+    /// Derives all facts again after an aborted update. `undo` restores the facts that were stated
+    /// before the update.
     pub(crate) fn restore(&mut self, undo: &Delta) {
         let (stated, undone) = (self.stated(), FxHashSet::from_iter(&undo.delete));
         let previous = stated.into_iter().filter(|fact| !undone.contains(fact));
@@ -182,7 +187,7 @@ impl Engine {
     }
 }
 
-/// Checks the arity of a fact, and that its symbols are interned.
+/// Returns an error if a fact has too many arguments, or a symbol that is not interned.
 pub(crate) fn check_fact(fact: &Fact, symbols: &Symbols) -> Result<(), Error> {
     // An index holds the set of its columns as the bits of a `u32`.
     if fact.arguments.len() > 32 {

@@ -10,7 +10,7 @@ use crate::rule::Program;
 use crate::swrl::{Prefixes, Syntax, parse_rules_as};
 use crate::symbol::{Symbol, Symbols};
 
-/// Collects rules and facts; created by [`Engine::builder`].
+/// Builder of an engine from rule texts, rules as data and facts; created by [`Engine::builder`].
 ///
 /// ```
 /// use metaplan_rules::{Delta, Engine, Fact};
@@ -43,8 +43,8 @@ pub struct EngineBuilder {
 }
 
 impl EngineBuilder {
-    /// Sets the interner of [`EngineBuilder::program`] and [`EngineBuilder::facts`]. Symbols of rule texts
-    /// are added to it.
+    /// Sets the interner to which the symbols of [`EngineBuilder::program`] and [`EngineBuilder::facts`]
+    /// refer. Symbols of rule texts are added to the interner.
     #[must_use]
     pub fn symbols(self, symbols: Symbols) -> Self {
         Self { symbols, ..self }
@@ -93,7 +93,7 @@ impl EngineBuilder {
         Self { limits, ..self }
     }
 
-    /// Derives all facts that follow.
+    /// Parses the rule texts, and creates an engine with all facts that follow.
     ///
     /// # Errors
     /// Returns all errors of all texts (R101 to R105). If the texts have none, returns the errors of

@@ -13,7 +13,7 @@ const SAMPLE: usize = 1024;
 /// Assumed number of rows of a relation without statistics.
 const UNKNOWN_ROWS: usize = 64;
 
-/// Number of rows of each relation, and numbers of distinct values of its columns.
+/// Number of rows of each relation, and number of distinct values of each column.
 pub(crate) struct Costs {
     relations: Vec<(f64, Vec<f64>)>,
 }
@@ -35,12 +35,12 @@ impl Costs {
         Self { relations: sizes.collect() }
     }
 
-    /// Expected number of rows of a relation.
+    /// Returns the expected number of rows of a relation.
     pub fn rows(&self, relation: RelationId) -> f64 {
         self.relations[relation.0 as usize].0
     }
 
-    /// Expected number of rows that agree on the given columns.
+    /// Returns the expected number of rows that agree with given values in the columns `bound_columns`.
     pub fn matches(&self, relation: RelationId, bound_columns: impl Iterator<Item = usize>) -> f64 {
         let (rows, distinct) = &self.relations[relation.0 as usize];
         let keys: f64 = bound_columns.map(|column| distinct[column]).product();
@@ -48,8 +48,8 @@ impl Costs {
     }
 }
 
-/// Number of distinct values of each column. It is scaled up if more than half of the
-/// sampled values are distinct.
+/// Estimates the number of distinct values of each column from a sample of the rows. The number is
+/// scaled up if more than half of the sampled values are distinct.
 fn sample(relation: &Relation) -> Vec<f64> {
     let stride = (relation.bound() as usize / SAMPLE).max(1);
     let rows: Vec<Row> =

@@ -6,11 +6,11 @@ use crate::fact::Fact;
 use crate::rule::RuleIdentity;
 use crate::symbol::{Symbol, Symbols};
 
-/// A derivation as a directed acyclic graph: each fact occurs once, so that the size is that of the facts
-/// and not of the derivation tree.
+/// A derivation as a directed acyclic graph: each fact occurs only once, whereas it may occur many times
+/// in the corresponding tree.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Derivation {
-    /// Steps of the derivation. The first one is the explained fact. The order is breadth-first: every
+    /// Steps of the derivation; the first step is the explained fact. The order is breadth-first: every
     /// other fact comes after the first fact that it supports.
     pub steps: Vec<DerivationStep>,
 }
@@ -20,19 +20,19 @@ pub struct Derivation {
 pub struct DerivationStep {
     /// The fact.
     pub fact: Fact,
-    /// Its reason.
+    /// Reason why the fact holds.
     pub reason: Reason,
 }
 
-/// Reason of a fact.
+/// Reason why a fact holds.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Reason {
     /// The fact is stated.
     Asserted,
-    /// The corresponding fact holds about other names of the individuals.
+    /// The corresponding fact about other names of the same individuals holds.
     Equality {
         /// Positions in [`Derivation::steps`] of the corresponding fact and of the equal pairs of names.
-        /// For an equality: positions of the pairs on a path between its names.
+        /// If the explained fact is an equality: positions of the pairs on a path between its names.
         supports: Vec<usize>,
     },
     /// A rule derives the fact.
@@ -57,8 +57,8 @@ pub enum Reason {
 pub struct Aggregated {
     /// Value of the aggregate.
     pub result: Symbol,
-    /// By match: positions in [`Derivation::steps`] of the facts matched by the relation atoms of the
-    /// aggregate.
+    /// One entry per match: positions in [`Derivation::steps`] of the facts matched by the relation
+    /// atoms of the aggregate.
     pub matches: Vec<Vec<usize>>,
 }
 
@@ -77,9 +77,9 @@ pub struct Violation {
 pub enum Cause {
     /// A rule with an empty head whose body holds.
     Constraint(RuleIdentity),
-    /// A literal whose lexical form is outside its datatype.
+    /// A literal whose lexical form is invalid for its datatype.
     IllTyped(Symbol),
-    /// A literal stated or derived to equal a different literal or an individual.
+    /// A literal that is stated or derived to equal a different literal or an individual.
     Clash,
 }
 

@@ -16,16 +16,17 @@ use crate::symbol::{Symbol, Symbols};
 /// A change: facts to insert and delete (input), or facts that start and cease to hold (output).
 #[derive(Clone, PartialEq, Eq, Default, Debug)]
 pub struct Delta {
-    /// Facts that are added.
+    /// Facts that are added (to the stated facts, or to the facts that hold).
     pub insert: Vec<Fact>,
     /// Facts that are removed. A fact in both lists of an input is stated afterwards.
     pub delete: Vec<Fact>,
 }
 
-/// Facts, rules, and all facts that follow from them.
+/// Rule engine: stated facts, rules, and all facts that follow from them.
 ///
-/// A clone answers hypothetical queries. It shares all data with its original. Either of the two copies a
-/// relation, the recorded bindings of a rule or the symbols when it first changes them.
+/// A clone answers hypothetical queries. The clone shares all data with its original. Original and clone
+/// copy a relation, the recorded bindings of a rule or the symbols only before their first change of
+/// these data.
 #[derive(Clone, Debug)]
 pub struct Engine {
     pub(crate) symbols: Arc<Symbols>,
@@ -39,7 +40,7 @@ pub struct Engine {
 }
 
 impl Engine {
-    /// Limits of later updates.
+    /// Returns the limits of later updates.
     pub fn limits(&self) -> &Limits {
         &self.limits
     }
@@ -50,7 +51,7 @@ impl Engine {
         self.limits = limits;
     }
 
-    /// All stated facts.
+    /// Returns all stated facts.
     pub(crate) fn stated(&self) -> Vec<Fact> {
         match &self.equality {
             Some(equality) => equality.stated(self),
@@ -74,13 +75,13 @@ impl Engine {
         }
     }
 
-    /// State bits of a row; `None` if the row is not in the store.
+    /// Returns the state bits of a row; `None` if the row is not in the store.
     pub(crate) fn row_state(&self, row: &Fact) -> Option<u8> {
         let relation = self.store.get(self.store.find(row.predicate, row.arguments.len())?);
         Some(relation.state(relation.find(&row.arguments)?))
     }
 
-    /// All facts that hold, in the order of symbols.
+    /// Returns all facts that hold, in the order of symbols.
     pub fn facts(&self) -> impl Iterator<Item = Fact> {
         let mut facts: Vec<Fact> = match &self.equality {
             Some(equality) => equality.facts(self, usize::MAX),
@@ -90,9 +91,9 @@ impl Engine {
         facts.into_iter()
     }
 
-    /// All facts that hold and are not stated, in the order of the engine's history: equal histories give
-    /// equal orders. For an individual with more than `max_names` names, the result contains only the
-    /// equalities with its first name, from which the others follow.
+    /// Returns all facts that hold and are not stated, in the order of the engine's history: equal
+    /// histories give equal orders. For an individual with more than `max_names` names, the result
+    /// contains only the equalities with its first name, from which the other equalities follow.
     pub fn inferred_in_brief(&self, max_names: usize) -> Vec<Fact> {
         match &self.equality {
             Some(equality) => {
@@ -104,14 +105,15 @@ impl Engine {
         }
     }
 
-    /// Predicates of all facts that hold, each with its number of arguments, in no particular order. The
-    /// result may contain predicates whose facts no longer hold.
+    /// Returns the predicates of all facts that hold, each with its number of arguments, in no
+    /// particular order. The result may contain predicates whose facts no longer hold.
     pub fn predicates(&self) -> impl Iterator<Item = (Symbol, usize)> {
         let relations = self.store.relations.iter();
         relations.filter_map(|relation| Some((relation.predicate?, relation.arity())))
     }
 
-    /// Rows of the store with these state bits, except those of constraints and aggregates.
+    /// Returns the rows of the store that have all these state bits, except rows of constraints and
+    /// aggregates.
     pub(crate) fn rows_with(&self, bits: u8) -> impl Iterator<Item = Fact> {
         self.rows_where(move |state| state & bits == bits)
     }
@@ -125,9 +127,9 @@ impl Engine {
         })
     }
 
-    /// Arguments of the facts of a predicate that agree with the pattern in all columns that are not
-    /// `None`. Uses an index if one exists. The order is that of the engine's history: equal histories give
-    /// equal orders.
+    /// Returns the arguments of the facts of a predicate that agree with the pattern in all columns that
+    /// are not `None`. Uses an index if one exists. The order is that of the engine's history: equal
+    /// histories give equal orders.
     pub fn matching<'a>(
         &'a self,
         predicate: Symbol,
@@ -140,7 +142,7 @@ impl Engine {
         named.into_iter().flatten().chain(rows)
     }
 
-    /// Rows of the store that agree with a pattern, like [`Engine::matching`].
+    /// Returns the rows of the store that agree with a pattern, like [`Engine::matching`].
     pub(crate) fn matching_rows<'a>(
         &'a self,
         predicate: Symbol,
@@ -163,22 +165,22 @@ impl Engine {
         })
     }
 
-    /// Interner to which facts and rules refer.
+    /// Returns the interner of names and literals to which facts and rules refer.
     pub fn symbols(&self) -> &Symbols {
         &self.symbols
     }
 
-    /// Interner, to add names and literals for new facts.
+    /// Returns the interner, to add names and literals for new facts.
     pub fn symbols_mut(&mut self) -> &mut Symbols {
         Arc::make_mut(&mut self.symbols)
     }
 
-    /// Adopts the interner of an engine that is a clone of this engine and has interned more symbols since.
+    /// Adopts the interner of `other`, a clone of this engine that has interned more symbols since.
     pub fn adopt_symbols(&mut self, other: &Self) {
         self.symbols = Arc::clone(&other.symbols);
     }
 
-    /// The rules.
+    /// Returns the rules.
     pub fn program(&self) -> &Program {
         &self.program
     }

@@ -15,9 +15,9 @@ pub enum Error {
     Syntax {
         /// The source as named by the caller.
         file: String,
-        /// Counted from 1.
+        /// Line, counted from 1.
         line: u32,
-        /// In characters, counted from 1.
+        /// Column in characters, counted from 1.
         column: u32,
         /// Expected and actual token.
         message: String,
@@ -27,11 +27,11 @@ pub enum Error {
     UndeclaredPrefix {
         /// The source as named by the caller.
         file: String,
-        /// Counted from 1.
+        /// Line, counted from 1.
         line: u32,
-        /// In characters, counted from 1.
+        /// Column in characters, counted from 1.
         column: u32,
-        /// Without the colon.
+        /// Undeclared prefix, without the colon.
         prefix: String,
     },
     /// A `swrlb` name without a built-in.
@@ -39,9 +39,9 @@ pub enum Error {
     UnknownBuiltIn {
         /// The source as named by the caller.
         file: String,
-        /// Counted from 1.
+        /// Line, counted from 1.
         line: u32,
-        /// In characters, counted from 1.
+        /// Column in characters, counted from 1.
         column: u32,
         /// Name as written.
         name: String,
@@ -53,9 +53,9 @@ pub enum Error {
     RefusedBuiltIn {
         /// The source as named by the caller.
         file: String,
-        /// Counted from 1.
+        /// Line, counted from 1.
         line: u32,
-        /// In characters, counted from 1.
+        /// Column in characters, counted from 1.
         column: u32,
         /// Name as written.
         name: String,
@@ -68,14 +68,14 @@ pub enum Error {
     ForeignBuiltIn {
         /// The source as named by the caller.
         file: String,
-        /// Counted from 1.
+        /// Line, counted from 1.
         line: u32,
-        /// In characters, counted from 1.
+        /// Column in characters, counted from 1.
         column: u32,
         /// IRI of the built-in.
         name: String,
     },
-    /// An atom that is neither a class, a property, nor derived by a rule.
+    /// A relation atom that is neither a class, a property, nor derived by a rule.
     #[error(
         "{file}:{line}:{column}: R104 <{name}> with {count} arguments is not a class, a property or anything that a rule \
          concludes, and a built-in of this name is not known"
@@ -83,9 +83,9 @@ pub enum Error {
     UnknownRelation {
         /// The source as named by the caller.
         file: String,
-        /// Counted from 1.
+        /// Line, counted from 1.
         line: u32,
-        /// In characters, counted from 1.
+        /// Column in characters, counted from 1.
         column: u32,
         /// IRI of the relation.
         name: String,
@@ -97,9 +97,9 @@ pub enum Error {
     NotSwrl {
         /// The source as named by the caller.
         file: String,
-        /// Counted from 1.
+        /// Line, counted from 1.
         line: u32,
-        /// In characters, counted from 1.
+        /// Column in characters, counted from 1.
         column: u32,
         /// The kind of atom.
         what: &'static str,
@@ -109,7 +109,7 @@ pub enum Error {
     UnsafeHead {
         /// The rule.
         rule: RuleIdentity,
-        /// Without question mark.
+        /// Name of the variable, without question mark.
         variable: String,
     },
     /// A variable that occurs only in negated, comparison or equality atoms.
@@ -117,7 +117,7 @@ pub enum Error {
     UnsafeBody {
         /// The rule.
         rule: RuleIdentity,
-        /// The rule.
+        /// Name of the variable, without question mark.
         variable: String,
     },
     /// A built-in with too few or too many arguments.
@@ -125,7 +125,7 @@ pub enum Error {
     BuiltInArity {
         /// The rule.
         rule: RuleIdentity,
-        /// Local name.
+        /// Local name of the built-in.
         built_in: &'static str,
         /// Number of arguments.
         count: usize,

@@ -16,9 +16,9 @@ use crate::symbol::Symbol;
 use crate::vocabulary::{DIFFERENT_FROM, SAME_AS};
 
 impl Engine {
-    /// Returns the first derivation of a fact, down to stated facts, or `None` if it does not hold. The
-    /// time is proportional to the size of the result. A fact that is both stated and derived is reported
-    /// as stated.
+    /// Returns the derivation that was recorded when the fact was derived, down to stated facts, or
+    /// `None` if the fact does not hold. The time is proportional to the size of the result. A fact that
+    /// is both stated and derived is reported as stated.
     ///
     /// ```
     /// use metaplan_rules::{Engine, Fact};
@@ -88,7 +88,8 @@ impl Engine {
         })
     }
 
-    /// Ground relation atoms of the body of a recorded derivation, positive or negated.
+    /// Returns the ground relation atoms in the body of a recorded derivation: the negated atoms if
+    /// `negated`, otherwise the positive ones.
     pub(crate) fn body_facts(&self, record: Record, negated: bool) -> Vec<Fact> {
         let bound = self.records.get(record);
         self.body(record, negated)
@@ -99,7 +100,7 @@ impl Engine {
             .collect()
     }
 
-    /// Fact that a head atom derives under the bindings of a record.
+    /// Returns the fact that a head atom derives if the variables have the values `bound`.
     pub(crate) fn concluded(&self, head: &Atom, bound: &[Symbol]) -> Option<Fact> {
         let predicate = match head {
             Atom::Relation { predicate, .. } => *predicate,
@@ -111,7 +112,8 @@ impl Engine {
         Some(Fact::new(predicate, arguments))
     }
 
-    /// Aggregates in the body of a recorded derivation: relation of the matches, group and result.
+    /// Returns the aggregates in the body of a recorded derivation: relation of the matches, group and
+    /// result.
     pub(crate) fn aggregates(
         &self,
         record: Record,
@@ -136,7 +138,7 @@ impl Engine {
         })
     }
 
-    /// Rows of a relation that begin with the values of a key.
+    /// Returns the rows of a relation whose first columns equal `key`, with their numbers.
     pub(crate) fn group(
         &self,
         relation: RelationId,
@@ -159,7 +161,7 @@ impl Engine {
     }
 }
 
-/// Breadth-first traversal of recorded derivations.
+/// Breadth-first traversal of recorded derivations, from a fact to its supports.
 struct Search<'a> {
     engine: &'a Engine,
     positions: FxHashMap<(RelationId, Row), usize>,
@@ -190,7 +192,7 @@ impl Search<'_> {
         Reason::Rule { identity: rule.identity.clone(), bindings, supports, absent, aggregates }
     }
 
-    /// Positions of the facts matched by the relation atoms of a recorded derivation.
+    /// Returns the step positions of the facts that the relation atoms of a recorded derivation matched.
     fn supports(&mut self, record: Record) -> Vec<usize> {
         let engine = self.engine;
         let bound = engine.records.get(record);

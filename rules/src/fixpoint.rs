@@ -1,14 +1,15 @@
-//! Evaluates one semi-naive round by a fixed crepe program that interprets plans.
+//! Evaluates one semi-naive round with a fixed crepe program that interprets join plans.
 //!
-//! A change enters as `Delta`: ranges of changed rows, per plan. `Match` is a block of partial matches with
-//! the number of steps that it has passed. The extension of a block by the next atom is a look-up in the
-//! persistent store, to which the program has a reference. `Head` is a block of complete matches.
-//! Evaluation is set-at-a-time: crepe's tuples contain block numbers, so crepe's bookkeeping costs nothing
-//! per match, and the store is never copied.
+//! The tuples of the program contain block numbers, so evaluation is set-at-a-time: crepe's bookkeeping
+//! costs nothing per match, and the store is never copied. `Delta` is a seed of a plan, usually a range
+//! of changed rows. `Match` is a block of partial matches with the number of plan steps that the block
+//! has passed. A block is extended by the next atom through a look-up in the persistent store, to which
+//! the program has a reference. `Head` is a block of complete matches.
 //!
-//! A block has one owner: the rule that extends it consumes it. A small block passes the following steps of
-//! its plan within one rule application, until it is large or complete. A typical update starts plans on
-//! one or two matches each; bookkeeping for each step would then take longer than the steps.
+//! A block has one owner: the rule that extends a block consumes it. A small block passes the following
+//! steps of its plan within one rule application, until the block is large or complete. A typical update
+//! starts plans on one or two matches each; bookkeeping for each step would then take longer than the
+//! steps.
 
 use std::cell::RefCell;
 use std::hash::{BuildHasherDefault, Hash, Hasher};
@@ -28,7 +29,7 @@ use crate::symbol::{Symbol, Symbols};
 /// Index into the plans of a round.
 pub(crate) type PlanId = u32;
 
-/// Start of the evaluation of a plan.
+/// A plan to evaluate, with its initial matches.
 #[derive(Clone, Debug)]
 pub(crate) struct Seed {
     pub plan: PlanId,
@@ -50,10 +51,12 @@ pub(crate) enum Start {
 /// deferred.
 const BLOCK_MATCHES: usize = 1 << 16;
 
-/// Number of partial matches up to which a block is small.
+/// Maximum number of partial matches in a small block, which passes several steps within one rule
+/// application.
 const SMALL_MATCHES: usize = 64;
 
-/// Complete matches of a plan: `bindings` contains the variables of all matches, one match after the other.
+/// Complete matches of a plan: `bindings` contains the values of all variables, one match after the
+/// other.
 #[derive(Debug)]
 pub(crate) struct Matches {
     pub plan: PlanId,
@@ -64,12 +67,13 @@ pub(crate) struct Matches {
 pub(crate) struct Round<'a> {
     pub store: &'a Store,
     pub plans: &'a [Plan],
-    /// Number of variables per match, by compiled rule.
+    /// Number of variables per match, indexed by compiled rule.
     pub widths: &'a [usize],
     pub symbols: RefCell<&'a mut Arc<Symbols>>,
     /// Changed rows. Each [`Seed`] refers to a range.
     pub rows: &'a [Row],
-    /// Selects the state before the update, of which the store holds a superset.
+    /// Whether the plans match against the state before the update, to find invalid derivations. The
+    /// store holds a superset of that state.
     pub retracting: bool,
     pub budget: &'a Budget,
     pub blocks: RefCell<Vec<Vec<Symbol>>>,
@@ -104,12 +108,13 @@ mod program {
     }
 }
 
-/// Reference to a round. It is compared by address, because crepe requires equality and a hash.
+/// Reference to a round in tuples of the crepe program. Compared and hashed by address, because crepe
+/// requires equality and a hash.
 #[derive(Clone, Copy)]
 pub(crate) struct Handle<'a>(&'a dyn Evaluate);
 
 /// Operations of a round that the crepe program calls. `seed` and `extend` return the next step and the
-/// extended block.
+/// number of the extended block, or `None` if no match remains.
 trait Evaluate {
     fn seed(&self, seed: u32) -> Option<(u32, BlockId)>;
     fn extend(&self, plan: PlanId, step: u32, block: BlockId) -> Option<(u32, BlockId)>;
@@ -148,7 +153,7 @@ impl Hash for Handle<'_> {
     }
 }
 
-/// Evaluates the plans from their seeds. The matches are in the order of plans and blocks.
+/// Evaluates the plans from their seeds. Returns the complete matches, ordered by plan and block number.
 pub(crate) fn run(round: &Round, seeds: &[Seed]) -> Vec<Matches> {
     let seeded = Seeded { round, seeds };
     let mut runtime = program::Crepe::new();
@@ -162,7 +167,7 @@ pub(crate) fn run(round: &Round, seeds: &[Seed]) -> Vec<Matches> {
     heads.into_iter().map(matches).collect()
 }
 
-/// A round with the seeds of one run.
+/// A round together with the seeds of one run.
 struct Seeded<'r, 'a> {
     round: &'r Round<'a>,
     seeds: &'r [Seed],
@@ -189,13 +194,14 @@ impl Evaluate for Seeded<'_, '_> {
 }
 
 impl Round<'_> {
-    /// Moves a block out of the round.
+    /// Removes a block from the round, and returns its partial matches.
     fn take(&self, block: BlockId) -> Vec<Symbol> {
         std::mem::take(&mut self.blocks.borrow_mut()[block as usize])
     }
 
-    /// Stores a block before a step of its plan, for the program. A small block first passes as many steps
-    /// as possible, since the program's bookkeeping would take longer than these steps.
+    /// Stores a block that has reached `step` of its plan. Returns the step reached and the block
+    /// number, or `None` if no match remains. A small block first passes as many steps as possible,
+    /// since the program's bookkeeping would take longer than these steps.
     fn pass(&self, plan: PlanId, mut step: u32, mut block: Vec<Symbol>) -> Option<(u32, BlockId)> {
         let (steps, width) = (self.plans[plan as usize].steps.len(), self.width(&self.plans[plan as usize]));
         while (step as usize) < steps && !block.is_empty() && block.len() <= SMALL_MATCHES * width {
@@ -210,12 +216,12 @@ impl Round<'_> {
         Some((step, blocks.len() as BlockId - 1))
     }
 
-    /// Number of variables per match of a plan.
+    /// Returns the number of variables per match of a plan.
     fn width(&self, plan: &Plan) -> usize {
         self.widths[plan.rule as usize]
     }
 
-    /// First block of a seed.
+    /// Returns the initial matches of a seed as a block.
     fn seed(&self, seed: &Seed) -> Vec<Symbol> {
         let plan = &self.plans[seed.plan as usize];
         let empty = vec![Symbol(0); self.width(plan)];
@@ -236,7 +242,8 @@ impl Round<'_> {
         }
     }
 
-    /// Matches that pass a step. `None` if the plan has no such step, or if evaluation has to stop.
+    /// Applies a step of a plan to a block, and returns the matches that pass, extended by their new
+    /// bindings. Returns `None` if the plan has no such step, or if the budget is exhausted.
     fn extend(&self, plan: PlanId, step: u32, block: Vec<Symbol>) -> Option<Vec<Symbol>> {
         let (id, number) = (plan, step);
         let plan = &self.plans[id as usize];
@@ -306,13 +313,14 @@ impl Round<'_> {
         })
     }
 
-    /// Row states to skip. All rows that held before the update are visible while retracting.
+    /// Returns the state bits of the rows that a step skips: normally `skip`; while retracting only unused
+    /// rows, because all rows that held before the update are visible then.
     fn visibility(&self, skip: u8) -> u8 {
         if self.retracting { state::FREE } else { skip }
     }
 
-    /// Extends matches by the fitting rows, up to about [`BLOCK_MATCHES`] matches. Also returns the length
-    /// of the processed part of the block.
+    /// Extends each match of a block by the rows that fit, until there are about [`BLOCK_MATCHES`]
+    /// matches. Returns the extended matches and the length of the processed part of the block.
     fn join(&self, lookup: &Lookup, block: &[Symbol], width: usize, rule: u32) -> (Vec<Symbol>, usize) {
         let (relation, skip) = (lookup.relation, self.visibility(lookup.skip));
         let mut extended = Vec::with_capacity(block.len());
@@ -346,7 +354,8 @@ impl Round<'_> {
         (extended, block.len())
     }
 
-    /// Binds or checks the result of an aggregate; while retracting, its result before the update.
+    /// Computes an aggregate for each match, and binds its result (if `binds`) or keeps only the matches
+    /// with an equal result. While retracting, the aggregate ranges over the rows before the update.
     fn aggregate(
         &self,
         mut block: Vec<Symbol>,
@@ -389,7 +398,8 @@ impl Round<'_> {
         block
     }
 
-    /// Binds the result of a function for each match. A match for which the function is undefined is dropped.
+    /// Binds the variable `result` of each match to the value of `function`. Drops the matches for which
+    /// the function is undefined.
     fn compute(
         &self,
         mut block: Vec<Symbol>,
@@ -415,12 +425,13 @@ impl Round<'_> {
     }
 }
 
-/// Symbol of a computed value. A shared interner is cloned only for a new symbol.
+/// Returns the symbol of a computed value. A shared interner is cloned only if the value has no symbol
+/// yet.
 pub(crate) fn intern(symbols: &mut Arc<Symbols>, value: Literal) -> Symbol {
     symbols.find_literal(&value).unwrap_or_else(|| Arc::make_mut(symbols).literal(value))
 }
 
-/// Rows whose first columns have the values of a key.
+/// Group of an aggregate: the rows of a relation whose first columns equal a key.
 struct Group<'a> {
     relation: &'a Relation,
     index: Option<usize>,
@@ -434,11 +445,11 @@ struct Lookup<'a> {
     index: Option<usize>,
     key: &'a [Source],
     pattern: &'a Pattern,
-    /// See [`crate::plan::Lowered::is_closure`].
+    /// Whether rows that the rule itself derived are skipped; see [`crate::plan::Lowered::is_closure`].
     is_link: bool,
 }
 
-/// Appends a partial match extended by a row, if the row fits the pattern.
+/// Appends to the block the partial match `bound`, extended by a row, if the row fits the pattern.
 fn extend_match(block: &mut Vec<Symbol>, bound: &[Symbol], row: &[Symbol], pattern: &Pattern) {
     // A variable may occur twice in the row, so the columns are checked only after all variables are bound.
     let start = block.len();
@@ -452,7 +463,7 @@ fn extend_match(block: &mut Vec<Symbol>, bound: &[Symbol], row: &[Symbol], patte
     }
 }
 
-/// Value of an operand under a match.
+/// Returns the value of an operand; `bound` contains the values of the variables.
 pub(crate) fn resolve(source: Source, bound: &[Symbol]) -> Symbol {
     match source {
         Source::Variable(number) => bound[usize::from(number)],
@@ -468,7 +479,7 @@ fn find(relation: &Relation, key: &[Source], bound: &[Symbol]) -> Option<Row> {
     relation.find(&arguments[..key.len()])
 }
 
-/// Literals of operands. `None` if one of them is a name.
+/// Returns the literals that the operands denote, or `None` if an operand is the name of an individual.
 fn literals<'s>(symbols: &'s Symbols, sources: &[Source], bound: &[Symbol]) -> Option<Vec<&'s Literal>> {
     sources.iter().map(|&source| symbols.as_literal(resolve(source, bound))).collect()
 }

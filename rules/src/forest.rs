@@ -12,7 +12,7 @@ impl Forest {
     fn root(&mut self, symbol: Symbol) -> Symbol {
         let mut current = symbol;
         while let Some(&above) = self.0.get(&current) {
-            // Path halving: the node skips its parent.
+            // Path splitting: links each symbol on the path to its grandparent.
             if let Some(&higher) = self.0.get(&above) {
                 self.0.insert(current, higher);
             }

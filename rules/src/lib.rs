@@ -51,7 +51,7 @@ pub use why_not::{NearMiss, Obstacle};
 pub use {num_rational::BigRational, smallvec::SmallVec};
 
 /// Status rules of the `TOMASys` metamodel as rule text. Every status is derived, so it is retracted
-/// with its cause. All names are in `http://metacontrol.org/tomasys#`.
+/// when its cause no longer holds. All names are in `http://metacontrol.org/tomasys#`.
 pub const TOMASYS_RULES: &str = include_str!("../swrl/tomasys.swrl");
 
 /// Rules for the availability of function designs, as rule text over `http://metacontrol.org/tomasys#`.

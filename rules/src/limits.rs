@@ -15,8 +15,8 @@ pub const DEFAULT_STEP_BUDGET: u64 = 10_000_000_000;
 /// rule that counts upwards, and each of its rounds is expensive.
 const STEPS_PER_NEW_VALUE: u64 = 25_000;
 
-/// Number of bytes of a value for which [`STEPS_PER_NEW_VALUE`] is charged once more. A rule that doubles a
-/// number creates longer and longer values.
+/// Number of bytes of a value for which [`STEPS_PER_NEW_VALUE`] is charged once more, because a rule
+/// that doubles a number creates longer and longer values.
 const BYTES_PER_CHARGE: u64 = 8;
 
 /// Maximum length of a value in an error message, in characters.
@@ -32,7 +32,8 @@ pub struct Limits {
     /// that a recursive rule computes for the first time costs 25,000 steps, and 25,000 more for every 8
     /// bytes of its digits or text.
     pub steps: u64,
-    /// Called after about every 16,000 visited rows, that is every few microseconds to a millisecond.
+    /// Function that can stop an update. It is called after about every 16,000 visited rows, i.e. every
+    /// few microseconds to a millisecond.
     pub interrupt: Option<Interrupt>,
 }
 
@@ -73,7 +74,7 @@ pub(crate) struct Budget {
     limits: Limits,
     remaining_steps: Cell<u64>,
     rows_until_check: Cell<u64>,
-    /// `true` during semi-naive rounds, in which rules may use their own conclusions.
+    /// Whether semi-naive rounds are running, in which rules may use their own conclusions.
     pub recursive: Cell<bool>,
     stopped: Cell<Option<(Stop, u32)>>,
     /// Last value that a recursive rule computed before the budget was exhausted.
@@ -139,7 +140,8 @@ impl Budget {
         }
     }
 
-    /// Returns an error if evaluation has stopped. `identity` maps compiled rules to rules.
+    /// Returns an error if evaluation has stopped. `identity` maps the number of a compiled rule to the
+    /// identity of the rule.
     pub fn error(&self, identity: impl Fn(u32) -> RuleIdentity) -> Option<Error> {
         self.stopped.get().map(|(stop, rule)| match stop {
             Stop::Exhausted => Error::BudgetExhausted {
@@ -152,7 +154,7 @@ impl Budget {
     }
 }
 
-/// Text of a value for error messages. A long value is cut, and its length is appended.
+/// Returns the text of a value for error messages. A long value is cut, and its length is appended.
 fn abbreviated(value: &Literal) -> Box<str> {
     let text = value.lexical();
     let length = text.chars().count();

@@ -22,7 +22,7 @@ pub(crate) struct Lowering<'a> {
     constraints: &'a mut Vec<(RelationId, usize)>,
     /// Relations without a name that are in use.
     used: FxHashSet<RelationId>,
-    /// By arity: number below which no relation without a name is free.
+    /// Maps each arity to a number below which all relations without a name are in use.
     first_candidates: FxHashMap<usize, u32>,
     pub lowered: Vec<Lowered>,
 }
@@ -85,7 +85,7 @@ impl<'a> Lowering<'a> {
         self.store.relation(predicate, terms.len())
     }
 
-    /// Returns `None` for aggregates.
+    /// Lowers a body atom. Returns `None` for aggregates.
     fn condition(&mut self, atom: &Atom) -> Option<Condition> {
         Some(match atom {
             Atom::Relation { predicate, arguments } => {
@@ -101,7 +101,7 @@ impl<'a> Lowering<'a> {
         })
     }
 
-    /// Returns `None` for atoms that cannot be derived.
+    /// Lowers a head atom. Returns `None` for atoms that no rule can derive.
     fn template(&mut self, atom: &Atom) -> Option<Template> {
         let (predicate, terms) = match atom {
             Atom::Relation { predicate, arguments } => (*predicate, arguments.clone()),
@@ -112,8 +112,8 @@ impl<'a> Lowering<'a> {
         Some(Template { relation: self.relation(predicate, &terms), arguments: sources(&terms) })
     }
 
-    /// Adds the rule that derives the matches of an aggregate. `outer_conditions` contains the conditions
-    /// lowered so far.
+    /// Adds the rule that derives the matches of an aggregate, and returns the condition of the
+    /// aggregate. `outer_conditions` contains the conditions lowered so far.
     fn aggregate(
         &mut self,
         position: usize,

@@ -22,16 +22,17 @@ use crate::plan::HIDDEN;
 use crate::store::{Record, RelationId, Row, state};
 use crate::symbol::{Symbol, Symbols};
 
-/// Number of rows that start one run of the crepe program. Bounds the memory of partial matches.
+/// Upper limit on the number of start rows per run of the crepe (Datalog) program; bounds the memory of
+/// partial matches.
 const CHUNK: usize = 2048;
 
-/// Rows with their relations.
+/// Rows, each with its relation.
 type Rows = Vec<(RelationId, Row)>;
 
-/// Effective change of the stated facts, with the affected rows.
+/// A change of the stated facts that has been applied to the store, with the affected rows.
 #[derive(Default)]
 pub(crate) struct Stated {
-    /// Change without insertions and deletions that have no effect.
+    /// The change without insertions of stated facts and deletions of facts that are not stated.
     effective: Delta,
     added: Rows,
     doomed: Rows,
@@ -44,7 +45,8 @@ impl Stated {
     }
 }
 
-/// Applies a change of the stated facts to the state bits of the store. Derives nothing.
+/// Marks the facts of `delta` in the store as stated or no longer stated, without running any rule.
+/// Returns the part of the change that had an effect.
 pub(crate) fn state_change(engine: &mut Engine, delta: Delta) -> Stated {
     let store = &mut engine.store;
     let mut stated = Stated::default();
@@ -80,7 +82,7 @@ pub(crate) fn state_change(engine: &mut Engine, delta: Delta) -> Stated {
     stated
 }
 
-/// State of an update in progress.
+/// An incremental update of the derived facts, in progress.
 pub(crate) struct Maintenance<'a> {
     engine: &'a mut Engine,
     network: Arc<Network>,
@@ -88,12 +90,12 @@ pub(crate) struct Maintenance<'a> {
     added: Rows,
     /// Rows that held before the update and may no longer hold.
     doomed: Rows,
-    /// Rows derived in the current round.
+    /// Rows derived in the current semi-naive round; the rules cannot match them before the next round.
     pending: Rows,
-    /// By stratum: `true` if a change affects its rules.
+    /// Indexed by stratum: `true` if a change affects the rules of the stratum.
     touched: Vec<bool>,
-    /// Names whose equality was derived in this update. Of the derived pairs of a class, only those of a
-    /// spanning tree are stored.
+    /// Union-find structure of the names whose equality was derived in this update. Of the derived
+    /// `owl:sameAs` pairs of a class, only the pairs of a spanning tree are stored.
     joined: Forest,
     budget: Budget,
 }
@@ -120,8 +122,8 @@ impl<'a> Maintenance<'a> {
         Ok(())
     }
 
-    /// Updates the derived facts after a change of the stated facts. Rows that no longer hold remain marked
-    /// as doomed.
+    /// Updates the derived facts after a change of the stated facts. Rows that no longer hold remain
+    /// marked as doomed; [`Maintenance::finish`] removes them.
     pub fn update(&mut self, stated: &Stated) -> Result<(), Error> {
         self.start_update(stated);
         self.propagate(&FxHashSet::default())
@@ -135,8 +137,9 @@ impl<'a> Maintenance<'a> {
         }
     }
 
-    /// Updates the derived facts after a change of facts and rules. `heads` contains the head relations of
-    /// the removed rules; `removed` and `added` contain the numbers of compiled rules.
+    /// Updates the derived facts after a change of stated facts and rules. `removed` and `added` contain
+    /// the numbers of the removed and the new compiled rules, `heads` the head relations of the removed
+    /// rules.
     pub fn update_with_rules(
         &mut self,
         stated: &Stated,
@@ -182,7 +185,8 @@ impl<'a> Maintenance<'a> {
         Ok(())
     }
 
-    /// Runs plans from the empty match, or from all visible rows of a relation.
+    /// Runs each plan from all visible rows of its relation, or from the empty match if the relation is
+    /// `None`.
     fn run_initial_plans(&mut self, plans: &[(Option<RelationId>, PlanId)]) -> Result<(), Error> {
         for (relation, plan) in plans {
             if let Some(id) = *relation {
@@ -197,7 +201,8 @@ impl<'a> Maintenance<'a> {
         Ok(())
     }
 
-    /// Removes the doomed rows and returns the net change.
+    /// Removes the doomed rows, i.e. the over-deleted rows that were not rederived. Returns the net change of
+    /// the facts.
     pub fn finish(self) -> Delta {
         let Engine { store, records, .. } = self.engine;
         let mut delta = Delta::default();
@@ -223,7 +228,8 @@ impl<'a> Maintenance<'a> {
         touch(&mut self.touched, &self.network, relation);
     }
 
-    /// Dooms the rows whose recorded derivation lost an atom.
+    /// Over-deletes rows, i.e. marks them as doomed: all rows whose recorded derivation depends on a doomed
+    /// row, on the absence of a new row, or on a changed group of an aggregate.
     fn over_delete(&mut self, stratum: &Stratum) -> Result<(), Error> {
         // A new row invalidates derivations that depend on its absence.
         let appeared = self.added.clone();
@@ -238,7 +244,7 @@ impl<'a> Maintenance<'a> {
         Ok(())
     }
 
-    /// Runs the plans of aggregates, once for each group with a change.
+    /// Runs the plans of aggregates, once for each group with a new or doomed row.
     fn run_groups(&mut self, stratum: &Stratum, retracting: bool) -> Result<(), Error> {
         if stratum.aggregated.is_empty() {
             return Ok(());
@@ -257,7 +263,7 @@ impl<'a> Maintenance<'a> {
         self.run(&changed, |relation| stratum.aggregated.get(&relation).map(Vec::as_slice), retracting)
     }
 
-    /// Runs the rules backwards from doomed heads, to find other derivations.
+    /// Runs the rules backwards from the doomed (over-deleted) rows, to find other derivations of these rows.
     fn rederive(&mut self, stratum: &Stratum) -> Result<(), Error> {
         let doomed = self.still_doomed();
         self.run(&doomed, |relation| stratum.rederive.get(&relation).map(Vec::as_slice), false)
@@ -269,7 +275,8 @@ impl<'a> Maintenance<'a> {
         self.doomed.iter().filter(is_doomed).copied().collect()
     }
 
-    /// Derives the consequences of rows that are new, rederived, or absent since this update.
+    /// Derives the consequences of new rows, of rederived rows, and of the absence of removed rows in a
+    /// stratum.
     fn insert(&mut self, stratum: &Stratum) -> Result<(), Error> {
         let disappeared = self.still_doomed();
         let relevant = |&&(id, row): &&(RelationId, Row)| {
@@ -303,7 +310,7 @@ impl<'a> Maintenance<'a> {
         Ok(())
     }
 
-    /// Makes derived rows visible.
+    /// Makes derived rows visible to the rules.
     fn promote(&mut self, rows: &Rows) {
         for &(relation, row) in rows {
             self.engine.store.get_mut(relation).clear(row, state::PENDING);
@@ -318,7 +325,8 @@ impl<'a> Maintenance<'a> {
         }
     }
 
-    /// Runs the plans that rows start, in chunks of [`CHUNK`] starts.
+    /// Starts from each row the plans that `plans` returns for its relation, in chunks of [`CHUNK`]
+    /// starts. The matches derive their heads, or doom them if `retracting`.
     fn run<'p>(
         &mut self,
         rows: &[(RelationId, Row)],
@@ -354,7 +362,8 @@ impl<'a> Maintenance<'a> {
         Ok(())
     }
 
-    /// Runs seeds, and then the deferred matches. Depth-first order (last in, first out) bounds the memory.
+    /// Runs seeds (plans with their start rows), then the partial matches that these runs deferred.
+    /// Depth-first order (last in, first out) bounds the memory.
     fn run_chunk(&mut self, seeds: &[Seed], rows: &[Row], retracting: bool) -> Result<(), Error> {
         let mut deferred = self.run_once(seeds, rows, retracting)?;
         while let Some(seed) = deferred.pop() {
@@ -363,7 +372,7 @@ impl<'a> Maintenance<'a> {
         Ok(())
     }
 
-    /// Runs seeds and processes the complete matches. Returns the deferred matches.
+    /// Runs seeds and processes the complete matches. Returns the deferred partial matches as seeds.
     fn run_once(&mut self, seeds: &[Seed], rows: &[Row], retracting: bool) -> Result<Vec<Seed>, Error> {
         let round = Round {
             store: &self.engine.store,
@@ -389,7 +398,7 @@ impl<'a> Maintenance<'a> {
         Ok(deferred)
     }
 
-    /// Inserts or rederives the heads of complete matches, unless they hold already.
+    /// Inserts or rederives the heads of complete matches, unless the heads already hold.
     fn conclude(&mut self, matches: &Matches) {
         let network = Arc::clone(&self.network);
         let number = network.plans[matches.plan as usize].rule;
@@ -428,7 +437,8 @@ impl<'a> Maintenance<'a> {
         }
     }
 
-    /// Dooms heads whose recorded derivation is one of these matches.
+    /// Marks the heads of the matches as doomed (over-deleted) if the match is the recorded derivation of the
+    /// head. Stated rows only lose the record.
     fn retract(&mut self, matches: &Matches) {
         let network = Arc::clone(&self.network);
         let number = network.plans[matches.plan as usize].rule;
@@ -459,7 +469,7 @@ impl<'a> Maintenance<'a> {
     }
 }
 
-/// Marks the strata that read a relation.
+/// Marks the strata whose rules read a relation.
 fn touch(touched: &mut [bool], network: &Network, relation: RelationId) {
     for &stratum in network.readers.get(relation.0 as usize).into_iter().flatten() {
         touched[stratum as usize] = true;

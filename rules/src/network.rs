@@ -23,31 +23,36 @@ pub(crate) struct Network {
     pub widths: Vec<usize>,
     pub plans: Vec<Plan>,
     pub strata: Vec<Stratum>,
-    /// Stratum of each relation, dependencies first. Strata without rules are not in `strata`.
+    /// Number of the stratum of each relation, in dependency order. These numbers also count strata
+    /// without rules, which `strata` omits.
     stratum_of: Vec<usize>,
     /// Relation of `owl:sameAs`, if it is interpreted as equality.
     pub same_as: Option<RelationId>,
-    /// Number of facts at the time of planning.
+    /// Number of facts in the store when the plans were created.
     pub planned_for: usize,
-    /// By relation: the strata that read it.
+    /// Indexed by relation: the strata whose rules read the relation.
     pub readers: Vec<Vec<u32>>,
     /// Relation of the matches of each integrity constraint, with the position of the constraint in the
     /// program.
     pub constraints: Vec<(RelationId, usize)>,
 }
 
-/// Mutually dependent relations, and the plans that derive them.
+/// Plans of the rules that derive a set of mutually dependent relations.
 #[derive(Clone, Default, Debug)]
 pub(crate) struct Stratum {
-    /// Plans from the empty match or from all rows of a relation, for the first evaluation.
+    /// Plans for the first evaluation, which start from all rows of a relation or (`None`) from the
+    /// empty match.
     pub initial: Vec<(Option<RelationId>, PlanId)>,
-    /// Plans from inserted or deleted rows of a relation.
+    /// Plans that start from an inserted or deleted row of a positive body atom, by the relation of the
+    /// row.
     pub positive: FxHashMap<RelationId, Vec<PlanId>>,
-    /// Plans from deleted or inserted rows of a negated relation.
+    /// Plans that start from a deleted or inserted row of a negated body atom, by the relation of the
+    /// row.
     pub negative: FxHashMap<RelationId, Vec<PlanId>>,
-    /// Plans from a row of an aggregated relation, to the group of the row.
+    /// Plans that compute the aggregate of the group of a changed row, by the relation of the row.
     pub aggregated: FxHashMap<RelationId, Vec<PlanId>>,
-    /// Plans from a row that lost its support.
+    /// Plans that search for another derivation of a row that lost its support, by the relation of the
+    /// row.
     pub rederive: FxHashMap<RelationId, Vec<PlanId>>,
 }
 
@@ -85,7 +90,7 @@ pub(crate) fn compile(
 /// Result of a change of rules.
 pub(crate) struct Revision {
     pub network: Network,
-    /// Numbers of removed compiled rules, unused until the next revision.
+    /// Numbers of the removed compiled rules; the numbers are not reused before the next revision.
     pub removed: FxHashSet<u32>,
     /// Numbers of new compiled rules.
     pub added: FxHashSet<u32>,
@@ -125,7 +130,8 @@ pub(crate) fn revise(
             rule.rule = position;
             compiled.insert(position);
         } else {
-            // An empty rule keeps its number free; numbers of other rules do not shift.
+            // An empty rule takes the place of a removed rule, so that the numbers of other rules do not
+            // shift.
             let (heads, body) = (Vec::new(), Vec::new());
             *rule = Lowered { rule: 0, width: rule.width, heads, body, is_closure: false };
             removed.insert(number as u32);
@@ -160,8 +166,8 @@ pub(crate) fn revise(
     Ok(Some(Revision { network: revised, removed, added }))
 }
 
-/// Key by which equal rules are merged. Integrity constraints differ by identity, because each reports its
-/// own violations.
+/// Returns the key by which equal rules are merged. Integrity constraints with different identities are
+/// not merged, because each constraint reports its own violations.
 fn content(rule: &Rule) -> (&[Atom], &[Atom], Option<&RuleIdentity>) {
     (&rule.head, &rule.body, rule.head.is_empty().then_some(&rule.identity))
 }
@@ -197,7 +203,8 @@ fn bad_pattern(rule: &Rule, symbols: &Symbols) -> Option<Error> {
 }
 
 /// Computes the stratum of each relation. Every relation depends on equality, but needs no later stratum
-/// for this reason, since the rows are rewritten when equality changes.
+/// for this reason, since the rows are rewritten when equality changes. Returns an error for each
+/// negation or aggregate within a stratum.
 fn stratify(
     program: &Program,
     symbols: &Symbols,
@@ -266,8 +273,8 @@ impl Network {
         self.rules.iter().filter(|rule| !rule.heads.is_empty()).count()
     }
 
-    /// Plans all rules again, by the current sizes of the relations. `complete` is `true` if the rules have
-    /// been evaluated.
+    /// Creates the plans of all rules for the current sizes of the relations. `complete` is `true` if
+    /// the rules have been evaluated, so that the sizes of derived relations are known.
     ///
     /// # Errors
     /// Returns R304 if planning was interrupted. The previous plans then remain.

@@ -1,5 +1,5 @@
-//! Compiles a rule into join plans: one plan for each way in which a change can affect it. A plan is a list
-//! of steps.
+//! Compiles a rule into join plans: one plan for each body atom whose relation may change, one for each
+//! head atom to be rederived, and one for the first evaluation. A plan is a list of steps.
 //!
 //! A plan starts from a row of one atom (its seed) and extends partial matches by one atom at a time in a
 //! greedy order: tests as soon as their variables are bound, then the atom with the smallest expected
@@ -13,20 +13,21 @@ use crate::source::Source;
 use crate::store::{RelationId, Store, state};
 use crate::symbol::Symbol;
 
-/// Row states that are invisible to insertions.
+/// State bits of the rows that are invisible to plans that derive facts.
 pub(crate) const HIDDEN: u8 = state::FREE | state::PENDING | state::DOOMED;
 
 /// Conditions on a row, and the variables that the row binds.
 #[derive(Clone, Default, Debug)]
 pub(crate) struct Pattern {
-    /// Columns that bind a variable.
+    /// Columns that bind a variable, each with the number of the variable.
     pub binds: Vec<(usize, u16)>,
-    /// Columns that must equal a constant or a variable that is already bound.
+    /// Columns that must equal an operand: a constant, or a variable that is already bound.
     pub checks: Vec<(usize, Source)>,
 }
 
 impl Pattern {
-    /// Returns `true` if a row has the required constants, so that it may start a match.
+    /// Returns `true` if a row has the constants of the pattern, so that it may start a match. Variables
+    /// are not compared.
     pub fn may_fit(&self, row: &[Symbol]) -> bool {
         self.checks.iter().all(|&(column, source)| match source {
             Source::Constant(symbol) => row[column] == symbol,
@@ -35,11 +36,11 @@ impl Pattern {
     }
 }
 
-/// One extension of a partial match.
+/// One step of a plan, which extends or tests a partial match.
 #[derive(Clone, Debug)]
 pub(crate) enum Step {
-    /// Extends a match by the fitting rows of a relation. `index` is on the columns of `key`, in ascending
-    /// order.
+    /// Extends a match by the rows of a relation that fit `pattern`. `index` is the index on the columns
+    /// of `key`, which are in ascending order; without an index, all rows are visited.
     Join {
         relation: RelationId,
         skip: u8,
@@ -60,7 +61,8 @@ pub(crate) enum Step {
     Solve { built_in: BuiltIn, arguments: Vec<Source>, known: Vec<bool> },
     /// Binds a variable to the value of an operand.
     Equate { variable: u16, source: Source },
-    /// Computes an aggregate of a group: the rows that agree on their first columns.
+    /// Computes an aggregate over the rows of `matches` whose first columns equal `group`. The result
+    /// binds a variable (`binds`) or is compared with an operand.
     Aggregate {
         matches: RelationId,
         function: Function,
@@ -73,13 +75,14 @@ pub(crate) enum Step {
     Compare { left: Source, right: Source, equal: bool },
 }
 
-/// A seed and its extensions, up to a complete match of the rule's body.
+/// A join plan: the pattern of the start row (seed), and the steps to a complete match of the rule's
+/// body.
 #[derive(Clone, Debug)]
 pub(crate) struct Plan {
     /// Number of the compiled rule.
     pub rule: u32,
     pub seed: Pattern,
-    /// `true` if only links can be seeds, see [`Lowered::is_closure`].
+    /// Whether only links can be seeds, see [`Lowered::is_closure`].
     pub seed_is_link: bool,
     pub steps: Vec<Step>,
 }
@@ -100,10 +103,10 @@ pub(crate) struct Lowered {
     pub width: usize,
     pub heads: Vec<Template>,
     pub body: Vec<Condition>,
-    /// `true` if the rule states only that a relation is transitive. Its conclusions are chains of *links*,
-    /// that is, rows that this rule did not derive. Therefore its second condition needs links only. Each
-    /// conclusion is then found once for each last link of a chain, and not once for each row in the
-    /// middle.
+    /// Whether the rule states only that a relation is transitive. Its conclusions are chains of
+    /// *links*, that is, rows that this rule did not derive. Therefore the second atom of the body is
+    /// matched with links only. Each conclusion is then found once for each last link of a chain, and
+    /// not once for each row in the middle.
     pub is_closure: bool,
 }
 
@@ -144,7 +147,8 @@ pub(crate) enum Condition {
 }
 
 impl Condition {
-    /// Relation on whose changes the condition depends.
+    /// Returns the relation on whose changes the condition depends; `None` for built-ins and
+    /// comparisons.
     pub fn relation(&self) -> Option<RelationId> {
         match self {
             Self::Relation(relation, _) | Self::Not(relation, _) => Some(*relation),
@@ -154,7 +158,7 @@ impl Condition {
     }
 }
 
-/// Set of the bound variables.
+/// Set of the bound variables: a flag for each variable number.
 #[derive(Clone, PartialEq, Eq)]
 pub(crate) struct Bound(pub Vec<bool>);
 
@@ -166,7 +170,7 @@ impl Bound {
         }
     }
 
-    /// For each operand, `true` if it is bound.
+    /// Returns a flag for each operand: `true` if it is bound.
     pub fn bound_flags(&self, sources: &[Source]) -> Vec<bool> {
         sources.iter().map(|&source| self.is_bound(source)).collect()
     }
@@ -179,7 +183,8 @@ impl Bound {
         self.0[usize::from(number)] = true;
     }
 
-    /// Matches a row with operands: bound operands are checked, and variables are bound.
+    /// Creates the pattern of the given columns: bound operands become checks, and unbound variables
+    /// become bound.
     fn pattern(&mut self, columns: impl Iterator<Item = (usize, Source)>) -> Pattern {
         let mut pattern = Pattern::default();
         let (known, unknown): (Vec<_>, Vec<_>) = columns.partition(|&(_, source)| self.is_bound(source));
@@ -211,9 +216,9 @@ pub(crate) struct Planner<'a> {
 }
 
 impl Planner<'_> {
-    /// Creates a plan that starts from a row of the condition at `position`. If `exactly_once`, the
-    /// conditions before it do not see fresh rows, so that each match is found from exactly one of its
-    /// fresh rows.
+    /// Creates a plan that starts from a row of the body condition at `position`. If `exactly_once`, the
+    /// conditions before `position` match no fresh rows, so that each match is found from exactly one of
+    /// its fresh rows. Returns `None` if the plan cannot be completed.
     pub fn start_at_condition(&mut self, position: usize, exactly_once: bool) -> Option<Plan> {
         let fresh_from = if exactly_once { position } else { 0 };
         match &self.lowered.body[position] {
@@ -236,8 +241,9 @@ impl Planner<'_> {
         self.plan(Vec::new(), None, 0)
     }
 
-    /// Returns `None` if the budget is exhausted, or if a condition remains unbound, which [`check`] rules
-    /// out.
+    /// Creates a plan that starts from a row with the operands `seed`, which is the row of condition
+    /// `skip` if given. Conditions before `fresh_from` match no fresh rows. Returns `None` if the budget
+    /// is exhausted, or if a condition remains unbound, which [`check`] rules out.
     fn plan(&mut self, seed: Vec<Source>, skip: Option<usize>, fresh_from: usize) -> Option<Plan> {
         if !self.budget.visit(1, self.number) {
             return None;
@@ -268,7 +274,7 @@ impl Planner<'_> {
         self.lowered.is_closure && position == Some(1)
     }
 
-    /// Index within `remaining` of the relation condition with the fewest expected matches.
+    /// Returns the index within `remaining` of the relation condition with the fewest expected matches.
     fn cheapest(&self, remaining: &[usize], bound: &Bound) -> Option<usize> {
         let mut best: Option<(f64, usize)> = None;
         for (index, &position) in remaining.iter().enumerate() {

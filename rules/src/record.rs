@@ -57,7 +57,7 @@ impl Records {
         }
     }
 
-    /// Bindings of a record; empty for [`Record::NONE`].
+    /// Returns the bindings of a record; empty for [`Record::NONE`].
     pub fn get(&self, record: Record) -> &[Symbol] {
         // `Record::NONE` has a rule number beyond the table.
         self.rules.get(record.rule as usize).map_or(&[], |slots| {

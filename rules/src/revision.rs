@@ -1,10 +1,10 @@
 //! Revision of the rules of a running engine: computes the change of all facts from a change of the
 //! program.
 //!
-//! Unchanged rules keep their recorded derivations. The conclusions of a removed rule lose their support,
-//! as if a fact of its body was deleted, and are rederived if another rule derives them. A new rule is
-//! evaluated once over all facts. Only two changes derive all facts again: strata of unchanged rules that
-//! split, and equality that is switched off.
+//! Unchanged rules keep their recorded derivations. The conclusions of a removed rule lose their
+//! support, as if a fact of its body was deleted, and are rederived if another rule derives them. A new
+//! rule is evaluated once over all facts. All facts are derived again only if strata of unchanged rules
+//! split, if equality is switched off, or if [`Engine::set_program`] switches equality on.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -72,7 +72,8 @@ impl Engine {
         change
     }
 
-    /// Deletes first, so that new rules do not match deleted facts.
+    /// Changes the stated facts and the rules of an engine without equality. Deletes facts first, so
+    /// that new rules do not match deleted facts.
     fn change_plainly(&mut self, delta: Delta, program: Program) -> Result<Delta, Errors> {
         let inserted: FxHashSet<&Fact> = delta.insert.iter().collect();
         let delete = delta.delete.iter().filter(|fact| !inserted.contains(fact)).cloned().collect();
@@ -91,8 +92,9 @@ impl Engine {
         Ok(net([switched, change]))
     }
 
-    /// Switches equality on, if no rule derives a pair. The stated pairs are retracted, and added to the
-    /// change.
+    /// Switches equality on, under the condition that no rule derives an `owl:sameAs` pair yet. The
+    /// stated pairs are retracted and added to the insertions of `delta`. Returns the change of the
+    /// facts.
     fn switch_on(&mut self, delta: &mut Delta) -> Result<Delta, Error> {
         let same_as = self.symbols_mut().name(SAME_AS);
         let equality = Equality::new(same_as, &self.program);
@@ -131,12 +133,12 @@ impl Engine {
         self.set_program(program)
     }
 
-    /// Changes the stated rows and the rules over representatives, and returns the net change of rows.
-    /// After an error, the engine is in an undefined state.
+    /// Changes the stated rows and replaces the rules `old` by `new`, in which representatives replace
+    /// names. Returns the net change of rows. After an error, the engine is in an undefined state.
     ///
-    /// All unsupported conclusions are deleted before any rule derives new ones. Of the pairs of an
-    /// equality class only a spanning tree is stored, so none of these may be deleted after the other pairs
-    /// have been derived and dropped.
+    /// All unsupported conclusions are deleted before any rule derives new ones. The reason is that only
+    /// a spanning tree of the pairs of an equality class is stored: no pair of the tree may be deleted
+    /// after the other pairs have been derived and dropped.
     pub(crate) fn replace_rules(
         &mut self,
         delta: Delta,
@@ -183,7 +185,7 @@ impl Engine {
         Ok(change)
     }
 
-    /// Derives all facts again with another program.
+    /// Replaces the program and derives all facts again. Returns the change of the facts.
     fn rebuild(&mut self, program: Program) -> Result<Delta, Errors> {
         // Sorted, so that the order does not depend on the history.
         let mut stated = self.stated();
@@ -196,7 +198,7 @@ impl Engine {
     }
 }
 
-/// Composes consecutive changes into one, sorted.
+/// Composes consecutive changes into one net change, sorted.
 fn net(changes: impl IntoIterator<Item = Delta>) -> Delta {
     let mut signs: BTreeMap<Fact, i8> = BTreeMap::new();
     for Delta { insert, delete } in changes {
@@ -217,8 +219,8 @@ fn net(changes: impl IntoIterator<Item = Delta>) -> Delta {
     net
 }
 
-/// First of several errors. Rules that were compiled before can fail only because they have no common
-/// stratification.
+/// Returns the first of several errors. Rules that were compiled before can fail only because they have
+/// no common stratification.
 fn first(errors: Errors) -> Error {
     errors.into_iter().next().unwrap_or(Error::UnknownSymbol { index: 0 })
 }

@@ -14,7 +14,7 @@ pub struct Variable(pub u16);
 /// An argument of an atom.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Debug)]
 pub enum Term {
-    /// Ranges over the symbols that occur in facts (DL-safety holds by construction).
+    /// A variable. It ranges over the symbols that occur in facts, so every rule is DL-safe.
     Variable(Variable),
     /// A name or literal.
     Constant(Symbol),
@@ -68,17 +68,19 @@ pub enum Atom {
 pub enum Aggregate {
     /// Number of matches, possibly 0.
     Count,
-    /// Sum of a term over all matches; 0 without matches. It is exact for decimals. Otherwise it has the
-    /// widest floating-point type among the values. It has no value if one of them is not a number.
+    /// Sum of a term over all matches; 0 without matches. The sum is exact for decimals, and otherwise
+    /// has the widest floating-point type among the values. There is no sum if a value is not a number.
     Sum(Term),
-    /// Minimum of a term. It has no value without matches, or if two values are incomparable.
+    /// Minimum of a term over all matches. There is no minimum without matches, or if two values are
+    /// incomparable.
     Min(Term),
-    /// Maximum of a term, with the conditions of the minimum.
+    /// Maximum of a term over all matches. There is no maximum without matches, or if two values are
+    /// incomparable.
     Max(Term),
 }
 
 impl Aggregate {
-    /// Keyword of the aggregate in rule text.
+    /// Returns the keyword of the aggregate in rule text.
     pub fn name(self) -> &'static str {
         match self {
             Self::Count => "count",
@@ -88,7 +90,7 @@ impl Aggregate {
         }
     }
 
-    /// Applies a function to the aggregated term.
+    /// Returns the aggregate with `term` applied to the aggregated term.
     pub(crate) fn map(self, term: &impl Fn(Term) -> Term) -> Self {
         match self {
             Self::Count => Self::Count,
@@ -158,7 +160,7 @@ impl Rule {
         Self { identity, head, body, variables: Vec::new() }
     }
 
-    /// Number of variables: one more than the largest variable number in the rule.
+    /// Returns the number of variables: one more than the largest variable number in the rule.
     pub fn variable_count(&self) -> usize {
         let terms = self.head.iter().chain(&self.body).flat_map(Atom::terms);
         terms.filter_map(Term::as_variable).map(|v| usize::from(v.0) + 1).max().unwrap_or(0)
@@ -177,26 +179,26 @@ impl Rule {
 pub struct Program {
     /// Rules in any order.
     pub rules: Vec<Rule>,
-    /// `true` if `owl:sameAs` is equality, see [`Program::with_equality`]: all names of an individual then
-    /// share its facts. Otherwise it is an ordinary relation, and different names denote different
-    /// individuals.
+    /// Whether `owl:sameAs` is equality, see [`Program::with_equality`]: all names of an individual then
+    /// share its facts. Otherwise `owl:sameAs` is an ordinary relation, and different names denote
+    /// different individuals.
     pub equality: bool,
 }
 
 impl Program {
-    /// Relations in rule heads, with their numbers of arguments.
+    /// Returns the relations in rule heads, with their numbers of arguments.
     pub(crate) fn concluded(&self, symbols: &Symbols) -> BTreeSet<(String, usize)> {
         relations(self.rules.iter().flat_map(|rule| &rule.head), symbols)
     }
 
-    /// Relations in rule bodies, with their numbers of arguments.
+    /// Returns the relations in rule bodies and within aggregates, with their numbers of arguments.
     pub(crate) fn queried(&self, symbols: &Symbols) -> BTreeSet<(String, usize)> {
         let bodies = self.rules.iter().flat_map(|rule| &rule.body);
         relations(bodies.flat_map(|atom| std::iter::once(atom).chain(atom.parts())), symbols)
     }
 }
 
-/// Names and arities of the relations in atoms.
+/// Returns the names and arities of the relations in atoms.
 fn relations<'a>(atoms: impl Iterator<Item = &'a Atom>, symbols: &Symbols) -> BTreeSet<(String, usize)> {
     let relation = |atom: &Atom| match atom {
         Atom::Relation { predicate, arguments } | Atom::Not { predicate, arguments } => {
@@ -235,7 +237,7 @@ impl Atom {
         Self::Relation { predicate, arguments: arguments.into_iter().collect() }
     }
 
-    /// Atoms within an aggregate; empty for any other atom.
+    /// Returns the atoms within an aggregate; empty for any other atom.
     pub fn parts(&self) -> &[Self] {
         match self {
             Self::Aggregate { body, .. } => body,
@@ -243,7 +245,8 @@ impl Atom {
         }
     }
 
-    /// Arguments in order. For an aggregate: its result, its value and the arguments of its atoms.
+    /// Returns the arguments in order. For an aggregate: its result, its aggregated term and the
+    /// arguments of its atoms.
     pub fn terms(&self) -> Vec<Term> {
         match self {
             Self::Aggregate { aggregate, result, body } => {

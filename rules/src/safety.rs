@@ -2,7 +2,8 @@
 //! and atoms that an aggregate shares with the rest of the body.
 //!
 //! Relation atoms bind their variables. An equality, a built-in function or an aggregate binds another
-//! variable once its inputs are bound. Aggregates are ordered such that the group of each is bound before.
+//! variable once its inputs are bound. Aggregates are ordered such that the group variables of each are bound
+//! before its evaluation.
 
 use std::collections::BTreeSet;
 
@@ -16,11 +17,12 @@ use crate::source::Source;
 pub(crate) struct Scope {
     /// Position of the aggregate in the body.
     pub position: usize,
-    /// Variables that atoms outside the aggregate bind, in ascending order.
+    /// Variables of the aggregate that atoms outside the aggregate bind, in ascending order.
     pub group: Vec<u16>,
     /// Other variables of the aggregate, in ascending order.
     pub locals: Vec<u16>,
-    /// Positions of the outer atoms that bind group variables if the aggregate's own atoms do not.
+    /// Positions of the atoms outside the aggregate that bind the group variables that its own atoms do
+    /// not bind.
     pub context: Vec<usize>,
 }
 
@@ -35,7 +37,7 @@ fn sources(terms: &[Term]) -> Vec<Source> {
     terms.iter().copied().map(Source::from).collect()
 }
 
-/// Variables among terms, in ascending order.
+/// Returns the variables among terms, in ascending order.
 fn variables(terms: &[Term]) -> Vec<u16> {
     let mut numbers: Vec<u16> = terms.iter().filter_map(|term| Some(term.as_variable()?.0)).collect();
     numbers.sort_unstable();
@@ -43,7 +45,7 @@ fn variables(terms: &[Term]) -> Vec<u16> {
     numbers
 }
 
-/// Variables within an aggregate, except its result.
+/// Returns the variables within an aggregate, except its result. Empty for other atoms.
 fn inner_variables(atom: &Atom) -> Vec<u16> {
     match atom {
         Atom::Aggregate { .. } => variables(&atom.terms()[1..]),
@@ -51,8 +53,8 @@ fn inner_variables(atom: &Atom) -> Vec<u16> {
     }
 }
 
-/// Computes the closure of the bound variables under the atoms. Aggregates bind their results only if
-/// `optimistic`.
+/// Adds to `bound` all variables that the atoms bind, until no further variable is bound. Aggregates
+/// bind their results only if `optimistic`.
 fn close(atoms: &[Atom], bound: &mut Bound, optimistic: bool) {
     loop {
         let before = bound.clone();
@@ -116,9 +118,9 @@ fn scope(rule: &Rule, position: usize, bound: &Bound, earlier: &[Scope]) -> Scop
     Scope { position, group, locals, context }
 }
 
-/// Positions of atoms that bind variables for an aggregate. Prefers one relation atom per variable, so that
-/// the aggregate depends on few relations. If some variable occurs in no relation atom, returns all atoms
-/// that can be evaluated.
+/// Returns the positions of atoms that bind `variables` for an aggregate. Prefers one relation atom per
+/// variable, so that the aggregate depends on few relations. If some variable occurs in no relation
+/// atom, returns all atoms that can be evaluated.
 fn context(rule: &Rule, variables: &[u16], bound: &Bound, earlier: &[Scope]) -> Vec<usize> {
     let relation_with = |&number: &u16| {
         rule.body.iter().position(|atom| {
@@ -137,7 +139,8 @@ fn context(rule: &Rule, variables: &[u16], bound: &Bound, earlier: &[Scope]) -> 
     }
 }
 
-/// By variable: `true` if the body binds it. Variables local to aggregates are not bound.
+/// Returns a flag for each variable: `true` if the body binds it. Variables local to aggregates are not
+/// bound.
 pub(crate) fn bound_variables(rule: &Rule) -> Vec<bool> {
     binding(rule).bound.0
 }
@@ -193,7 +196,7 @@ fn unbound(rule: &Rule) -> Vec<Error> {
         };
         let result_variables = variables(&atom.terms()[..1]);
         missing.extend(result_variables.into_iter().filter(|n| !is_bound(n)).map(|n| (false, n)));
-        // An aggregate without a scope waits for the result of another aggregate, which is reported itself.
+        // An aggregate without a scope needs the result of another aggregate, which has an error of its own.
         let Some(scope) = scopes.iter().find(|scope| scope.position == position) else { continue };
         let mut inner = Bound(vec![false; bound.0.len()]);
         scope.group.iter().for_each(|&number| inner.bind(number));

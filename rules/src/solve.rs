@@ -7,7 +7,7 @@ use crate::source::Source;
 use crate::symbol::Symbol;
 
 impl Round<'_> {
-    /// Extends matches by all values that a built-in admits for its unbound arguments.
+    /// Extends each match of a block by all values that a built-in admits for its unbound arguments.
     pub fn solve(
         &self,
         block: &[Symbol],
@@ -41,7 +41,8 @@ impl Round<'_> {
     }
 }
 
-/// Extends a match by values for the unbound arguments. `None` if a variable would have two values.
+/// Extends a match by values for the unbound arguments. Returns `None` if a variable would have two
+/// values.
 fn bind_open(
     bound: &[Symbol],
     (arguments, is_known): (&[Source], &[bool]),

@@ -27,9 +27,9 @@ const NO_ROW: Row = Row::MAX;
 pub(crate) mod state {
     /// The row is unused.
     pub const FREE: u8 = 1;
-    /// The row is in the delta of the current round.
+    /// The row is in the delta of the current semi-naive round.
     pub const FRESH: u8 = 2;
-    /// The row was derived in the current round, and is invisible until the next.
+    /// The row was derived in the current round; rules cannot match it before the next round.
     pub const PENDING: u8 = 4;
     /// The row lost its support in this update. It is removed at the end of the update unless it is
     /// rederived.
@@ -52,7 +52,8 @@ impl Record {
     pub const NONE: Self = Self { rule: u32::MAX, slot: 0 };
 }
 
-/// All relations. A clone shares each relation until one of the two changes it.
+/// All relations of an engine. A clone of the store shares each relation until the original or the clone
+/// changes it.
 #[derive(Clone, Default, Debug)]
 pub(crate) struct Store {
     pub relations: Vec<Arc<Relation>>,
@@ -64,7 +65,7 @@ impl Store {
         self.by_predicate.get(&(predicate, arity as u32)).copied()
     }
 
-    /// Relation of a predicate, created on first use.
+    /// Returns the relation of a predicate with the given arity, and creates it on first use.
     pub fn relation(&mut self, predicate: Symbol, arity: usize) -> RelationId {
         if let Some(id) = self.find(predicate, arity) {
             return id;
@@ -74,7 +75,7 @@ impl Store {
         id
     }
 
-    /// Inserts stated rows, unless they exist.
+    /// Inserts facts as stated rows, unless the rows exist.
     pub fn insert_stated(&mut self, facts: Vec<Fact>) {
         for fact in facts {
             let relation = self.relation(fact.predicate, fact.arguments.len());
@@ -85,8 +86,8 @@ impl Store {
         }
     }
 
-    /// Relation without a predicate, for the matches of an integrity constraint or of an aggregate. Reuses
-    /// an empty unused relation with a number of at least `first`, if there is one.
+    /// Returns a relation without a predicate, for the matches of an integrity constraint or of an
+    /// aggregate. Reuses an empty unused relation with a number of at least `first`, if there is one.
     pub fn anonymous(
         &mut self,
         arity: usize,
@@ -107,7 +108,7 @@ impl Store {
         id
     }
 
-    /// Number of stored facts, including matches of constraints.
+    /// Returns the number of stored facts, including the matches of constraints and aggregates.
     pub fn len(&self) -> usize {
         self.relations.iter().map(|relation| relation.len()).sum()
     }
@@ -124,7 +125,7 @@ impl Store {
 /// Facts of one predicate and arity.
 #[derive(Clone, Debug)]
 pub(crate) struct Relation {
-    /// `None` for the matches of a constraint or an aggregate.
+    /// Predicate of the facts; `None` for the matches of a constraint or an aggregate.
     pub predicate: Option<Symbol>,
     arity: usize,
     arguments: Vec<Symbol>,
@@ -135,7 +136,7 @@ pub(crate) struct Relation {
     free: Vec<Row>,
 }
 
-/// Hash index: rows by the values of some columns.
+/// Hash index, which maps the values of some columns to the rows with these values.
 #[derive(Clone, Debug)]
 struct Index {
     columns: u32,
@@ -146,7 +147,7 @@ struct Index {
     previous: Vec<Row>,
 }
 
-/// Columns of a bit mask, in ascending order.
+/// Returns the columns of a bit mask, in ascending order.
 pub(crate) fn columns(mask: u32) -> impl Iterator<Item = usize> {
     let mut remaining = mask;
     std::iter::from_fn(move || {
@@ -179,17 +180,17 @@ impl Relation {
         }
     }
 
-    /// Number of stored facts in any state.
+    /// Returns the number of stored facts in any state.
     pub fn len(&self) -> usize {
         self.rows.len()
     }
 
-    /// Number of arguments per fact.
+    /// Returns the number of arguments per fact.
     pub fn arity(&self) -> usize {
         self.arity
     }
 
-    /// Upper bound (exclusive) on the numbers of rows in use.
+    /// Returns an upper bound (exclusive) on the numbers of the rows in use.
     pub fn bound(&self) -> Row {
         self.states.len() as Row
     }
@@ -199,7 +200,7 @@ impl Relation {
         &self.arguments[start..start + self.arity]
     }
 
-    /// Returns the row as a fact; `None` for the matches of a constraint.
+    /// Returns the row as a fact; `None` for the matches of a constraint or an aggregate.
     pub fn fact(&self, row: Row) -> Option<Fact> {
         Some(Fact { predicate: self.predicate?, arguments: Arguments::from_slice(self.row(row)) })
     }
@@ -247,7 +248,7 @@ impl Relation {
         self.rows.find(hash(arguments.iter().copied()), |&row| self.row(row) == arguments).copied()
     }
 
-    /// Inserts a row that does not exist yet.
+    /// Inserts a row that does not exist yet, and returns its number.
     pub fn insert(&mut self, arguments: &[Symbol], state: u8, record: Record) -> Row {
         let row = if let Some(row) = self.free.pop() {
             let start = row as usize * self.arity;
@@ -291,13 +292,13 @@ impl Relation {
         self.indexes.iter().any(|index| index.columns == columns && index.excluded_rule.is_none())
     }
 
-    /// Number of the index on these columns, which is built on first use.
+    /// Returns the number of the index on the columns of a bit mask. Builds the index on first use.
     pub fn index(&mut self, columns: u32) -> usize {
         self.index_without(columns, None)
     }
 
-    /// Number of the index on these columns of all rows except those derived by a rule. It is built on
-    /// first use.
+    /// Returns the number of the index on the columns of a bit mask that omits the rows derived by
+    /// `excluded_rule`. Builds the index on first use.
     pub fn index_without(&mut self, columns: u32, excluded_rule: Option<u32>) -> usize {
         let is_same = |index: &Index| index.columns == columns && index.excluded_rule == excluded_rule;
         if let Some(position) = self.indexes.iter().position(is_same) {
@@ -315,7 +316,8 @@ impl Relation {
         self.indexes.len() - 1
     }
 
-    /// Index on the largest subset of the given columns, with its columns.
+    /// Returns the index on the largest subset of the columns `bound`, and the columns of this index
+    /// (bit masks).
     pub fn best_index(&self, bound: u32) -> Option<(usize, u32)> {
         let fits = |index: &Index| index.columns & !bound == 0 && index.excluded_rule.is_none();
         let usable = self.indexes.iter().enumerate().filter(|(_, index)| fits(index));
@@ -324,7 +326,7 @@ impl Relation {
             .map(|(position, index)| (position, index.columns))
     }
 
-    /// Rows whose indexed columns have the values of the key, in ascending order of the columns.
+    /// Returns the rows whose indexed columns equal `key`. The key is in ascending order of the columns.
     pub fn lookup<'a>(&'a self, index: usize, key: &[Symbol]) -> Rows<'a> {
         let index = &self.indexes[index];
         let has_key = |&row: &Row| {
@@ -334,13 +336,13 @@ impl Relation {
         Rows { links: &index.next, next }
     }
 
-    /// All rows in use.
+    /// Returns all rows in use.
     pub fn scan(&self) -> impl Iterator<Item = Row> + '_ {
         (0..self.bound()).filter(|&row| self.state(row) & state::FREE == 0)
     }
 }
 
-/// Iterator over the rows of one key.
+/// Iterator over the rows with equal key columns in an index.
 pub(crate) struct Rows<'a> {
     links: &'a [Row],
     next: Row,

@@ -6,7 +6,8 @@
 //!
 //! [1] Tarjan, "Depth-first search and linear graph algorithms", SIAM Journal on Computing 1(2), 1972.
 
-/// Component of each node, numbered such that every edge leads to the same or a larger number.
+/// Returns the strongly connected component of each node. Components are numbered such that every edge
+/// leads to the same or a larger number.
 pub(crate) fn components(successors: &[Vec<usize>]) -> Vec<usize> {
     let mut search = Search {
         successors,
@@ -37,8 +38,8 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Depth-first search with an explicit stack, so that long chains of rules cannot overflow the thread's
-    /// stack.
+    /// Visits the nodes reachable from `root`, depth first. The explicit stack prevents that long chains
+    /// of rules overflow the thread's stack.
     fn visit(&mut self, root: usize) {
         let mut path = vec![(root, 0)];
         self.open(root);

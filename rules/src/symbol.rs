@@ -14,13 +14,13 @@ use crate::literal::Literal;
 pub struct Symbol(pub(crate) u32);
 
 impl Symbol {
-    /// Position of the symbol in its interner, counted from 0.
+    /// Returns the position of the symbol in its interner, counted from 0.
     pub fn index(self) -> usize {
         self.0 as usize
     }
 }
 
-/// Meaning of a symbol.
+/// Name or literal that a symbol denotes.
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 pub enum Value {
     /// An individual, class or property: usually an IRI, and any text in plain Datalog.
@@ -109,7 +109,7 @@ impl Symbols {
         symbol
     }
 
-    /// Returns the meaning of a symbol.
+    /// Returns the name or literal that a symbol denotes.
     ///
     /// # Panics
     /// If the symbol belongs to another, longer interner.
@@ -127,7 +127,7 @@ impl Symbols {
         self.literals.get(literal).copied()
     }
 
-    /// Number of symbols. Every smaller [`Symbol::index`] is in use.
+    /// Returns the number of symbols. Every smaller [`Symbol::index`] is in use.
     pub fn len(&self) -> usize {
         self.values.len()
     }
@@ -137,8 +137,8 @@ impl Symbols {
         self.values.is_empty()
     }
 
-    /// Returns `true` if two symbols certainly have different meanings, under the unique name assumption.
-    /// Returns `false` for two literals whose difference is undecided.
+    /// Returns `true` if two symbols certainly denote different things, under the unique name
+    /// assumption. Returns `false` for two literals whose difference is undecided.
     pub(crate) fn differ(&self, left: Symbol, right: Symbol) -> bool {
         left != right
             && match (self.as_literal(left), self.as_literal(right)) {
@@ -147,7 +147,8 @@ impl Symbols {
             }
     }
 
-    /// Returns `true` if a literal with a lexical form outside its datatype is interned.
+    /// Returns `true` if an ill-typed literal is interned, i.e. a literal with a lexical form invalid
+    /// for its datatype.
     pub(crate) fn any_ill_typed(&self) -> bool {
         self.ill_typed > 0
     }

@@ -32,7 +32,7 @@ pub struct NearMiss {
     /// Variables of the rule, named without question mark, with their values in the best binding. `None` if
     /// an obstacle leaves a variable unbound.
     pub bindings: Vec<(String, Option<Symbol>)>,
-    /// Facts that satisfy a part of the body.
+    /// Facts that satisfy atoms of the body in the best binding.
     pub supports: Vec<Fact>,
     /// Unsatisfied atoms, without tests that have unbound variables.
     pub obstacles: Vec<Obstacle>,
@@ -46,7 +46,7 @@ pub enum Obstacle {
     Missing {
         /// Class, property or relation.
         predicate: Symbol,
-        /// `None` for an argument with any value.
+        /// Arguments of the missing fact; `None` for an argument that may have any value.
         arguments: Vec<Option<Symbol>>,
     },
     /// A negated fact holds.
@@ -55,10 +55,10 @@ pub enum Obstacle {
     False {
         /// The built-in.
         built_in: BuiltIn,
-        /// Its arguments. The result of a function is the first one. It is `None` if it is undefined, or a
-        /// value that is not interned.
+        /// Arguments of the built-in; a function has its result first. An argument without a value, such
+        /// as the result of a function that is undefined or not interned, is `None`.
         arguments: Vec<Option<Symbol>>,
-        /// Exact difference of two compared numbers.
+        /// Exact absolute difference of two compared numbers; `None` for other comparisons.
         gap: Option<BigRational>,
     },
     /// An aggregate has a different value, or no value.
@@ -67,9 +67,9 @@ pub enum Obstacle {
         aggregate: Aggregate,
         /// Required value; `None` for any value.
         wanted: Option<Symbol>,
-        /// Actual value.
+        /// Actual value; `None` if the aggregate has no value.
         found: Option<Literal>,
-        /// Exact difference of the two numbers.
+        /// Exact absolute difference of the required and the actual number.
         gap: Option<BigRational>,
     },
     /// Two terms are equal but must differ, or differ but must be equal.
@@ -78,7 +78,7 @@ pub enum Obstacle {
         left: Symbol,
         /// Second term.
         right: Symbol,
-        /// `true` if the terms must be equal.
+        /// Whether the terms must be equal.
         wanted: bool,
     },
 }
@@ -141,8 +141,9 @@ impl fmt::Display for DisplayObstacle<'_> {
 }
 
 impl Engine {
-    /// Returns, for each rule head that unifies with the fact, the nearest miss of its body, in the order
-    /// of rules. Empty if the fact holds, or if no rule could derive it.
+    /// Returns the nearest miss of each rule head that unifies with the fact, in the order of rules: the
+    /// binding of the rule body with the fewest unsatisfied atoms. Empty if the fact holds, or if no
+    /// rule could derive it.
     pub fn why_not(&self, fact: &Fact) -> Vec<NearMiss> {
         let relation = self.store.find(fact.predicate, fact.arguments.len());
         let Some(relation) = relation.filter(|_| !self.holds(fact)) else { return Vec::new() };
@@ -187,7 +188,8 @@ impl State {
         (self.weight(), self.distance) < (other.weight(), other.distance)
     }
 
-    /// Weighs a missing fact as two failed tests, because it hides the tests of its unbound variables.
+    /// Returns the weight of the unsatisfied atoms. A missing fact weighs as much as two failed tests,
+    /// because it hides the tests of its unbound variables.
     fn weight(&self) -> usize {
         let weigh = |obstacle: &Obstacle| if matches!(obstacle, Obstacle::Missing { .. }) { 2 } else { 1 };
         self.obstacles.iter().map(weigh).sum()
@@ -226,8 +228,8 @@ impl Search<'_> {
         self.best.is_some() && self.visited > SEARCH_LIMIT
     }
 
-    /// Index of the next condition: a test with bound arguments, then the relation with the most bound
-    /// columns, then any other condition.
+    /// Returns the position in `open_conditions` of the next condition to visit: a test with bound
+    /// arguments, then the relation with the most bound columns, then any other condition.
     fn next(&self, state: &State) -> Option<usize> {
         let score = |position: usize| {
             let bound_count =
@@ -246,11 +248,12 @@ impl Search<'_> {
                 _ => 0,
             }
         };
-        // Of equal scores the last in iteration wins, which is the first condition because of `rev`.
+        // `max_by_key` returns the last of several maxima; because of `rev`, this is the first condition.
         (0..state.open_conditions.len()).rev().max_by_key(|&at| score(state.open_conditions[at]))
     }
 
-    /// Tries every fitting row, and finally the branch in which the fact is missing.
+    /// Visits the search nodes of a relation atom: one for each row that fits, and a last one in which
+    /// the fact is missing.
     fn branch(&mut self, state: &State, relation: RelationId, sources: &[Source]) {
         let Some(predicate) = self.engine.store.get(relation).predicate else { return };
         let arguments: Vec<Option<Symbol>> =
@@ -390,7 +393,8 @@ fn bind(source: Source, symbol: Symbol, bound: &mut [Option<Symbol>]) {
     }
 }
 
-/// Binds the variables of operands to a row's values. Returns `false` if a value does not match.
+/// Binds the operands that are unbound variables to the values of a row. Returns `false` if another
+/// operand differs from its value in the row.
 fn unify(sources: &[Source], row: &[Symbol], bound: &mut [Option<Symbol>]) -> bool {
     sources.iter().zip(row).all(|(&source, &symbol)| {
         let previous = value(source, bound);

@@ -1,6 +1,6 @@
-//! Transitive relation with pairs that are stated, derived by another rule, or both, under random changes.
-//! After each change, it equals the closure by Warshall's algorithm. A link of a chain can become a
-//! conclusion of the closure later.
+//! Transitive relation with pairs that are stated, derived by another rule, or both, under random
+//! changes. After each change, the relation equals the closure by Warshall's algorithm. A link of a
+//! chain can become a conclusion of the closure later.
 
 use std::collections::BTreeSet;
 
@@ -10,7 +10,7 @@ const NODES: usize = 7;
 
 type Pairs = BTreeSet<(usize, usize)>;
 
-/// The xorshift generator.
+/// A pseudorandom number generator (xorshift).
 struct Random(u64);
 
 impl Random {

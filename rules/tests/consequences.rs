@@ -105,8 +105,9 @@ fn a_violated_requirement_makes_designs_unavailable() {
     check(COADAPTATION_RULES, stated, &script);
 }
 
-/// Designs are excluded as in MROS: if a measurement compares with the estimation by the attribute's
-/// operator. Other estimations and requirements of objectives are no measurements.
+/// As in MROS, a design is excluded if a measurement is on the wrong side of the design's estimation,
+/// according to the operator of the attribute. Other estimations and requirements of objectives are no
+/// measurements.
 #[test]
 fn a_missed_estimation_makes_designs_unavailable() {
     for (operator, missed, met) in [
@@ -178,8 +179,8 @@ fn constraints_and_ill_typed_literals_are_violations() {
     assert_eq!(violations(&engine), ["<p>(<a>) and <q>(<a>)", ill_typed]);
 }
 
-/// Doubling also increases the size of the values. The default budget stops it within two seconds in a
-/// release build.
+/// A rule that doubles a number also increases the size of the values. The default budget stops the rule
+/// within two seconds in a release build.
 #[test]
 fn growing_values_exhaust_the_default_budget() {
     let rules = "[double] v(?x, ?n) ^ swrlb:multiply(?m, ?n, 2) -> v(?x, ?m) .";
@@ -250,8 +251,9 @@ fn only_recursive_rules_are_charged_for_new_values() {
     assert!(!counted(recursive, 1_000_000) && counted(recursive, 2_000_000));
 }
 
-/// The engine is interrupted at each call of the interrupt function in turn. It then equals the engine
-/// before, and a repeated update has the same result.
+/// The engine is interrupted at each call of the interrupt function in turn. After an interrupt, the
+/// engine is in its state before the update, and a repeated update has the result of an update without
+/// interrupt.
 #[test]
 fn evaluation_can_be_interrupted() {
     use std::sync::Arc;

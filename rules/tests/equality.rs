@@ -303,7 +303,7 @@ fn equality_is_switched_on_by_a_change() {
     assert!(!displayed(&engine).contains("r(b)"));
 }
 
-/// A derived pair that mentions a name is deleted when the name becomes equal to another one. The pairs
+/// A derived pair that mentions a name is deleted when the name becomes equal to another name. Pairs
 /// that follow without that name must be derived again.
 #[test]
 fn pairs_are_derived_again_when_constants_of_rules_become_equal() {

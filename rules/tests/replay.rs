@@ -20,7 +20,8 @@ fn stated(engine: &Engine) -> Vec<Fact> {
     engine.facts().filter(|fact| engine.is_asserted(fact)).collect()
 }
 
-/// Replays the modified derivation of all facts.
+/// Replays the derivation of all facts after `change` has modified it. Compares the number of derived
+/// facts, or the fault, with `expected`.
 fn check(change: impl Fn(&mut Derivation, &Engine), expected: Result<usize, &str>) {
     let engine = engine(RULES, STATED).expect("rules");
     let mut derivation = engine.everything();
@@ -34,13 +35,13 @@ fn check(change: impl Fn(&mut Derivation, &Engine), expected: Result<usize, &str
     }
 }
 
-/// Position of the step for a fact, given as displayed.
+/// Returns the position of the step for a fact, given as displayed.
 fn position(derivation: &Derivation, engine: &Engine, fact: &str) -> usize {
     let display = |step: &metaplan_rules::DerivationStep| step.fact.display(engine.symbols()).to_string();
     derivation.steps.iter().position(|step| display(step) == fact).expect("a step")
 }
 
-/// Removes a step that supports no other step.
+/// Returns a change that removes the step of a fact, which must not support another step.
 fn without(fact: &'static str) -> impl Fn(&mut Derivation, &Engine) {
     move |derivation, engine| {
         let removed = position(derivation, engine, fact);

@@ -3,7 +3,8 @@
 use crate::text::literal;
 use metaplan_rules::{BuiltIn, Literal};
 
-/// Relations: `=` identical; `<` and `>` ordered; `~` equal in order but not identical; `#` incomparable.
+/// Checks the relation of two literals: `=` identical; `<` and `>` ordered; `~` equal in order but not
+/// identical; `#` incomparable.
 fn check(left: &str, relation: &str, right: &str) {
     let (a, b) = (literal(left), literal(right));
     let order = a.compare(&b);

@@ -29,7 +29,8 @@ impl Random {
     }
 }
 
-/// Number of equal names from which equalities are listed only as pairs with the first name.
+/// Maximum number of equal names of which all equalities are listed. Of more names, only the pairs with
+/// the first name are listed.
 const MANY_NAMES: usize = 32;
 
 fn metaplan(files: &[PathBuf], write: bool) -> usize {

@@ -103,7 +103,7 @@ fn iri(name: &str) -> String {
     format!("{NS}{name}")
 }
 
-/// The schema.
+/// Returns the triples of the schema.
 pub fn schema() -> Vec<Triple> {
     let mut triples = Vec::new();
     let mut add = |subject: &str, predicate: &str, object: Object| {

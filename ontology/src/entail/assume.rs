@@ -1,4 +1,4 @@
-//! Class expressions as assumptions about an individual, and as goals.
+//! Assumes and proves that an individual is in a class expression.
 
 use rules::{Delta, Engine, Error, Fact, Literal};
 
@@ -9,12 +9,13 @@ use crate::lower::lower;
 use crate::owl::{AnnotatedAxiom, Axiom, Bound, ClassExpression, Iri, ObjectPropertyExpression, Ontology};
 use crate::vocab::owl;
 
-/// Limit on the members of a union or enumeration that are assumed case by case.
+/// Maximum number of members of a union or enumeration that is assumed case by case.
 const MAX_CASES: usize = 64;
 
 impl Prover {
-    /// Assumes that an individual is in a class. Returns an engine for each case: a disjunction gives several
-    /// cases. `next` is the number of the last fresh name.
+    /// Assumes that an individual is in a class: adds the facts to copies of the engine. Returns one
+    /// engine for each case, because a disjunction gives several cases. `next` is the number of the last
+    /// fresh name.
     pub(super) fn assume(
         engine: &Engine,
         class: &ClassExpression,
@@ -75,6 +76,7 @@ impl Prover {
     }
 
     /// Assumes `count` pairwise different fresh values of a property, all of them in the class `filler`.
+    /// Returns one engine for each case.
     fn witnesses(
         engine: &Engine,
         property: &ObjectPropertyExpression,
@@ -184,7 +186,7 @@ impl Prover {
     }
 }
 
-/// Returns the named values of a property for an individual.
+/// Returns the names of the individuals that are values of a property for an individual.
 pub(super) fn values(engine: &mut Engine, property: &ObjectPropertyExpression, individual: &Iri) -> Vec<Iri> {
     let subject = engine.symbols_mut().name(individual);
     let (ObjectPropertyExpression::Property(iri) | ObjectPropertyExpression::Inverse(iri)) = property;
@@ -195,7 +197,7 @@ pub(super) fn values(engine: &mut Engine, property: &ObjectPropertyExpression, i
     engine.matching(predicate, &pattern).filter_map(|row| name(row[usize::from(forward)])).collect()
 }
 
-/// Returns the first proof that an attempt finds.
+/// Returns the proof of the first attempt that succeeds; `None` if all attempts fail.
 pub(super) fn first_proof<T>(attempts: &[T], mut prove: impl FnMut(&T) -> ProofResult) -> ProofResult {
     for attempt in attempts {
         if let Some(reason) = prove(attempt)? {
@@ -205,13 +207,13 @@ pub(super) fn first_proof<T>(attempts: &[T], mut prove: impl FnMut(&T) -> ProofR
     Ok(None)
 }
 
-/// Explains why all cases are contradictory; `None` if one of them is consistent.
+/// Explains why all cases are contradictory. Returns `None` if a case is consistent.
 pub(super) fn refuted(cases: &[Engine]) -> Option<String> {
     let reasons: Option<Vec<String>> = cases.iter().map(contradiction).collect();
     Some(format!("the opposite is impossible: {}\n", reasons?.join("; and ")))
 }
 
-/// The facts that names denote pairwise different individuals.
+/// Returns the facts that the names denote pairwise different individuals.
 pub(super) fn pairwise_different(engine: &mut Engine, names: &[Iri]) -> Vec<Fact> {
     let symbols = engine.symbols_mut();
     let different = symbols.name(owl::DIFFERENT_FROM);
@@ -223,7 +225,7 @@ pub(super) fn pairwise_different(engine: &mut Engine, names: &[Iri]) -> Vec<Fact
     pairs.map(|pair| Fact::new(different, pair)).collect()
 }
 
-/// Adds the rules and facts of a class assertion to an engine.
+/// Adds the rules and facts of the assertion that `individual` is in `class` to an engine.
 fn by_rules(mut engine: Engine, class: &ClassExpression, individual: &Iri) -> Result<Engine, Error> {
     let axiom = Axiom::ClassAssertion(class.clone(), individual.clone());
     let axioms = vec![AnnotatedAxiom { axiom, annotations: Vec::new() }];

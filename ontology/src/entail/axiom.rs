@@ -1,4 +1,5 @@
-//! Proves axioms: their conditions become assumptions, their conclusions become goals.
+//! Proves axioms: the conditions of an axiom become assumptions, i.e. facts in a copy of the engine. Its
+//! conclusions become goals, which the copy has to derive.
 
 use rules::{Engine, Error, Fact, Literal};
 
@@ -8,7 +9,8 @@ use crate::owl::{Axiom, Characteristic, ClassExpression, Iri, ObjectPropertyExpr
 use crate::vocab::owl;
 
 impl Prover {
-    /// Decides if the rules prove an axiom.
+    /// Decides if the rules prove an axiom. The answer contains an explanation of the proof, or the
+    /// reason why the axiom is open.
     pub(super) fn axiom(&self, axiom: &Axiom) -> Result<Answer, Error> {
         if let Axiom::DatatypeDefinition(..) = axiom {
             return Ok(Answer::Open("what a datatype is defined to be is not asked for"));
@@ -93,8 +95,8 @@ impl Prover {
         })
     }
 
-    /// Proves a property axiom: assumes the edges of `body` between fresh individuals, then proves the edge
-    /// `head`. Individuals are given by number.
+    /// Proves a property axiom: assumes the edges of `body` between fresh individuals, then proves the
+    /// edge `head`. An edge consists of a property and the numbers of two fresh individuals.
     fn implies(&self, body: &[(&Property, usize, usize)], head: (&Property, usize, usize)) -> ProofResult {
         let mut copy = self.assumed(body)?;
         let (property, from, to) = head;
@@ -111,7 +113,7 @@ impl Prover {
         with_facts(&copy, facts)
     }
 
-    /// Proves that the edges of `body` imply that two of the fresh individuals are the same.
+    /// Proves that the edges of `body` imply that the fresh individuals `left` and `right` are the same.
     fn merges(&self, body: &[(&Property, usize, usize)], left: usize, right: usize) -> ProofResult {
         let mut copy = self.assumed(body)?;
         let goal = same(&mut copy, &Self::fresh(left), &Self::fresh(right));
@@ -244,12 +246,13 @@ impl Prover {
     }
 }
 
-/// Explains a goal by its derivation, or by a contradiction of the assumptions.
+/// Explains a goal by its derivation, or by a contradiction of the assumptions. Returns `None` without
+/// either.
 fn explain_or_refute(engine: &Engine, goal: &Fact) -> Option<String> {
     explain(engine, goal).or_else(|| refuted(std::slice::from_ref(engine)))
 }
 
-/// Proves all goals; returns the concatenated explanations.
+/// Proves all goals. Returns the concatenated explanations, or `None` if a goal is not proved.
 fn prove_all<T>(goals: impl Iterator<Item = T>, mut prove: impl FnMut(T) -> ProofResult) -> ProofResult {
     let mut reasons = String::new();
     for goal in goals {

@@ -69,8 +69,8 @@ pub fn entailments(engine: &Engine, conclusions: &Ontology) -> Result<Vec<Entail
     Ok(entailments)
 }
 
-/// Decides for every annotation of `conclusions` if it is `stated` about its subject, or about an individual
-/// that is the same. No other annotation is entailed.
+/// Decides for every annotation of `conclusions` if it occurs in `stated`, about its subject or about an
+/// individual equal to its subject. No other annotation is entailed.
 pub fn annotations(engine: &Engine, stated: &[(Iri, Annotation)], conclusions: &Ontology) -> Vec<Entailment> {
     conclusions
         .annotations
@@ -105,8 +105,8 @@ fn annotation_entailment(
     Entailment { statement: format!("AnnotationAssertion(<{property}> <{subject}> {value})"), answer }
 }
 
-/// Reports a statement of the conclusions that could not be read as not entailed. An unused class expression
-/// claims nothing.
+/// Reports a statement of the conclusions that could not be read as not entailed. Returns `None` for
+/// other warnings, and for an unused class expression, which claims nothing.
 fn unread(warning: &Warning) -> Option<Entailment> {
     let statement = match warning {
         Warning::Unread { statement, .. } if statement.starts_with(UNUSED_CLASS) => return None,

@@ -14,7 +14,7 @@ pub enum Answer {
     Open(&'static str),
 }
 
-/// Explains the first violation if the knowledge is inconsistent.
+/// Explains the first violation if the knowledge is inconsistent; otherwise returns `None`.
 pub(super) fn contradiction(engine: &Engine) -> Option<String> {
     let violation = engine.violations().into_iter().next()?;
     let facts: Vec<_> =
@@ -31,11 +31,11 @@ pub(super) fn contradiction(engine: &Engine) -> Option<String> {
 
 /// Proves statements from the knowledge of an engine.
 pub(super) struct Prover {
-    /// The knowledge, with equality reasoning.
+    /// Engine with the facts and rules of the knowledge base, in which `owl:sameAs` is equality.
     pub(super) base: Engine,
 }
 
-/// The explanation of a proved goal; `None` if it is not proved.
+/// Explanation of a proved goal; `None` if the goal is not proved.
 pub(super) type ProofResult = Result<Option<String>, Error>;
 
 impl Prover {
@@ -48,19 +48,20 @@ impl Prover {
         Ok(Self { base })
     }
 
-    /// Returns a name that occurs nowhere else. `number` distinguishes the names of one proof.
+    /// Returns the name of a fresh individual, which occurs nowhere else. `number` distinguishes the
+    /// fresh individuals of one proof.
     pub(super) fn fresh(number: usize) -> Iri {
         format!("urn:metaplan:any:{number}").into()
     }
 }
 
-/// Fact: an individual is in a named class.
+/// Returns the fact that an individual is in a named class.
 pub(super) fn member(engine: &mut Engine, class: &str, individual: &str) -> Fact {
     let symbols = engine.symbols_mut();
     Fact::new(symbols.name(class), [symbols.name(individual)])
 }
 
-/// Fact: a property, or its inverse, relates two individuals.
+/// Returns the fact that a property, or its inverse, relates two individuals.
 pub(super) fn edge(engine: &mut Engine, property: &ObjectPropertyExpression, from: &str, to: &str) -> Fact {
     let symbols = engine.symbols_mut();
     let (from, to) = (symbols.name(from), symbols.name(to));
@@ -70,24 +71,24 @@ pub(super) fn edge(engine: &mut Engine, property: &ObjectPropertyExpression, fro
     }
 }
 
-/// Fact: a data property has a value.
+/// Returns the fact that a data property of an individual has a value.
 pub(super) fn value(engine: &mut Engine, property: &str, from: &str, value: Literal) -> Fact {
     let symbols = engine.symbols_mut();
     Fact::new(symbols.name(property), [symbols.name(from), symbols.literal(value)])
 }
 
-/// Fact: two names denote the same individual.
+/// Returns the fact that two names denote the same individual.
 pub(super) fn same(engine: &mut Engine, left: &str, right: &str) -> Fact {
     let symbols = engine.symbols_mut();
     Fact::new(symbols.name(owl::SAME_AS), [symbols.name(left), symbols.name(right)])
 }
 
-/// Computes the value of a literal.
+/// Converts a literal of an ontology to the value that the rule engine uses.
 pub(super) fn literal(literal: &crate::owl::Literal) -> Literal {
     Literal::parse(&literal.lexical, literal.datatype.as_deref(), literal.language.as_deref())
 }
 
-/// Adds facts to a copy of an engine.
+/// Returns a copy of an engine with additional facts and their consequences.
 pub(super) fn with_facts(engine: &Engine, facts: impl IntoIterator<Item = Fact>) -> Result<Engine, Error> {
     let mut copy = engine.clone();
     let insert = facts.into_iter().collect();
@@ -95,7 +96,7 @@ pub(super) fn with_facts(engine: &Engine, facts: impl IntoIterator<Item = Fact>)
     Ok(copy)
 }
 
-/// Returns the derivation of a fact; `None` if the fact does not hold.
+/// Returns the derivation of a fact as text; `None` if the fact does not hold.
 pub(super) fn explain(engine: &Engine, fact: &Fact) -> Option<String> {
     // The engine does not store that an individual is the same as itself.
     if fact.arguments.len() == 2

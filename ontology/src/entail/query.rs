@@ -7,14 +7,15 @@ use rules::{Error, Symbol};
 use super::prover::{Answer, Prover, edge, explain, literal, same, value};
 use crate::owl::{ANONYMOUS, Axiom, ClassExpression, Iri, ObjectPropertyExpression as Property};
 
-/// Limit on the partial answers that the search visits.
+/// Maximum number of partial answers that the search visits.
 const MAX_PARTIAL_ANSWERS: usize = 100_000;
 
-/// Maps anonymous individuals to named ones.
+/// Partial answer of a query: maps anonymous individuals to named individuals.
 type Assignment = BTreeMap<Iri, Iri>;
 
 impl Prover {
-    /// Decides if the conjunctive query `statements` has an answer.
+    /// Decides if the conjunctive query `statements` has an answer. Its variables are the anonymous
+    /// individuals.
     pub(super) fn conjunctive_query(&self, statements: &[&Axiom]) -> Result<Answer, Error> {
         let mut budget = MAX_PARTIAL_ANSWERS;
         let explanation = self.extend(&Assignment::new(), statements.to_vec(), &mut budget)?;
@@ -64,7 +65,7 @@ impl Prover {
         Ok(None)
     }
 
-    /// Returns the individuals that one statement admits for `name`.
+    /// Returns the individuals that a statement admits as values of the anonymous individual `name`.
     fn candidates(&self, assignment: &Assignment, axiom: &Axiom, name: &Iri) -> Vec<Iri> {
         let engine = &self.base;
         let symbol = |iri: &str| engine.symbols().find_name(iri);
@@ -107,7 +108,8 @@ impl Prover {
         }
     }
 
-    /// Explains a statement without unassigned individuals; `None` if it is not proved.
+    /// Explains a statement without unassigned individuals. Returns `None` if the statement is not
+    /// proved.
     fn holds(&self, assignment: &Assignment, axiom: &Axiom) -> Result<Option<String>, Error> {
         let mut copy = self.base.clone();
         let name = |iri: &Iri| assignment.get(iri).cloned().unwrap_or_else(|| iri.clone());
@@ -149,7 +151,7 @@ fn is_open(assignment: &Assignment, name: &Iri) -> bool {
     name.starts_with(ANONYMOUS) && !assignment.contains_key(name)
 }
 
-/// The individuals of an assertion.
+/// Returns the individuals of an assertion.
 fn names(axiom: &Axiom) -> Vec<Iri> {
     match axiom {
         Axiom::ClassAssertion(_, individual) | Axiom::DataPropertyAssertion(_, individual, _) => {

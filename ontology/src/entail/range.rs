@@ -1,5 +1,5 @@
-//! Proves data property ranges: a fresh value must violate only the datatype constraints of its property, and
-//! the intersection of these datatypes must be contained in the range.
+//! Proves data property ranges: a fresh value of the property is assumed, and the intersection of the
+//! datatypes that constraints require of this value must be contained in the range.
 
 use rules::{Atom, BuiltIn, Literal, Rule, Symbol, Term, is_subsumed};
 
@@ -42,7 +42,8 @@ fn contains(datatypes: &[&str], range: &DataRange) -> bool {
     }
 }
 
-/// Returns property and datatype of a rule that only constrains the values of the property to the datatype.
+/// Returns the property and the datatype of a constraint that only restricts the values of the property
+/// to the datatype; `None` for other rules.
 fn datatype_constraint(rule: &Rule) -> Option<(Symbol, Symbol)> {
     let (predicate, object, arguments) = match &rule.body[..] {
         [

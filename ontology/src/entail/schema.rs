@@ -14,15 +14,17 @@ use crate::vocab::owl;
 pub struct SchemaEntity {
     /// IRI of the class or property.
     pub iri: String,
-    /// Named classes or properties that contain it, without itself; sorted.
+    /// Named classes or properties that contain the entity, without the entity itself; sorted.
     pub above: Vec<String>,
-    /// Direct ones: no other member of `above` is strictly between; sorted.
+    /// Members of `above` that contain the entity directly: no other member lies strictly between;
+    /// sorted.
     pub direct: Vec<String>,
-    /// Explanation if it is unsatisfiable (has no instance in any model).
+    /// Explanation if the entity is unsatisfiable, i.e. has no instance in any model.
     pub empty: Option<String>,
 }
 
-/// The classes, object properties and data properties of some entities, in the given order.
+/// Hierarchy of the classes, object properties and data properties of a knowledge base, each in the
+/// given order.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Schema {
     /// Classes.
@@ -33,8 +35,8 @@ pub struct Schema {
     pub data_properties: Vec<SchemaEntity>,
 }
 
-/// Computes the hierarchy from the consequences for a fresh instance of each class, and for a fresh pair of
-/// each property. If the knowledge is inconsistent, `empty` is always `None`.
+/// Computes the class and property hierarchy from the consequences for a fresh instance of each class,
+/// and for a fresh pair of each property. If the knowledge is inconsistent, `empty` is always `None`.
 ///
 /// # Errors
 /// Returns an error if a rule exceeds its budget.
@@ -81,7 +83,7 @@ fn entities(
     let name = |symbol: &Symbol| engine.symbols().value(*symbol).as_name().unwrap_or_default().to_owned();
     let entity = |(iri, symbol, empty): (String, Symbol, Option<String>)| {
         let supers = &above[&symbol];
-        // Returns `true` if an entity lies strictly between this one and `candidate`.
+        // Returns `true` if a third entity lies strictly between the current entity and `candidate`.
         let between = |candidate: &Symbol| {
             supers.iter().any(|middle| {
                 middle != candidate && above[middle].contains(candidate) && !above[candidate].contains(middle)

@@ -1,8 +1,9 @@
-//! The interface to horned-owl, which no other module uses: its RDF reader converts normalised triples to our
-//! own structures; its OWL/XML and functional-style readers convert documents to triples (`transcribe`).
+//! Wraps horned-owl; no other module uses that crate. The RDF reader of horned-owl converts normalised
+//! triples to the axioms and rules of this crate. Its OWL/XML and functional-style readers convert
+//! documents to triples (`transcribe`).
 //!
-//! horned-owl returns sets in hash order, so this module sorts them. Triples that it cannot place become
-//! warnings.
+//! horned-owl returns sets in hash order, so this module sorts the axioms, entities and annotations.
+//! Triples that horned-owl assigns to no axiom or rule become warnings.
 
 mod annotations;
 mod sort;
@@ -28,12 +29,13 @@ use crate::owl::{
 };
 use crate::vocab::{rdfs, swrla};
 
-/// Prefix of the warning about a class expression that no axiom uses.
+/// Start of the warning text about a class expression that no axiom uses; the expression follows.
 pub(crate) const UNUSED_CLASS: &str = "the class expression ";
 
-/// Reads the normalised N-Triples document of the ontology `about` and adds its axioms, annotations and rules
-/// to `plain`. `names` are the IRIs that `plain` uses. `origins` has the source of each rule, by the index in
-/// its `ORIGIN` annotation.
+/// Reads the normalised N-Triples document of the ontology with the IRI `about`. Returns `plain`,
+/// extended by the axioms, annotations, entities and rules of the document. `names` are the interned
+/// IRIs of `plain`. `origins` holds the source of each rule, indexed by the number in the rule's
+/// `ORIGIN` annotation.
 pub(crate) fn build(
     ntriples: &[u8],
     about: &str,
@@ -70,7 +72,7 @@ fn build_here(
     }
     let unread = builder.leftovers(&incomplete);
     let Builder { mut parts, mut rules, names, .. } = builder;
-    // Document order.
+    // Restores the document order.
     rules.sort_by_key(|(index, _)| *index);
     parts.rules =
         rules.into_iter().filter_map(|(index, rule)| Some(located(rule, origins.get(index)?))).collect();
@@ -89,13 +91,13 @@ fn located(rule: Rule, origin: &Origin) -> Rule {
     Rule { ontology: origin.ontology.clone(), position: origin.position, iri: origin.iri.clone(), ..rule }
 }
 
-/// Converts components of horned-owl. Equal IRIs share one text.
+/// Converts horned-owl components to the structures of this crate. Equal IRIs share one string.
 struct Builder {
     /// IRI of the first document; empty if it declares none.
     ontology: Iri,
     names: Names,
     parts: Parts,
-    /// Rules with their indices in `origins`.
+    /// Rules, each with its index in `origins` of [`build`].
     rules: Vec<(usize, Rule)>,
 }
 
@@ -176,7 +178,8 @@ impl Builder {
         self.rules.extend(indices.map(|index| (index, rule.clone())));
     }
 
-    /// Returns `None` for the marker atom that normalisation adds to an empty body or head.
+    /// Converts a rule atom. Returns `None` for the marker atom that normalisation adds to an empty body
+    /// or head.
     fn atom(&mut self, atom: &ho::Atom<RcStr>) -> Option<Atom> {
         Some(match atom {
             ho::Atom::BuiltInAtom { pred, args } => {
@@ -345,7 +348,8 @@ impl Builder {
         }
     }
 
-    /// Returns `None` if the component is not an axiom (ontology header, annotation axiom).
+    /// Converts a component to an axiom. Returns `None` for components that are not axioms (ontology
+    /// header, annotation axiom).
     fn axiom(&mut self, component: &Component<RcStr>) -> Option<Axiom> {
         use Characteristic as C;
         let characteristic =
@@ -416,7 +420,8 @@ impl Builder {
         })
     }
 
-    /// Returns one warning for each statement that horned-owl could not place.
+    /// Returns one warning for each triple, list, class expression or annotation that horned-owl
+    /// assigned to no axiom or rule.
     fn leftovers(&mut self, incomplete: &IncompleteParse<RcStr>) -> Vec<Warning> {
         let triple = |[subject, predicate, object]: &[Term<RcStr>; 3]| {
             format!("{} {} {}", term(subject), term(predicate), term(object))

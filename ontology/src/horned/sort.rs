@@ -8,10 +8,10 @@ use std::cmp::Ordering;
 use crate::names::Names;
 use crate::owl::{AnnotatedAxiom, Axiom, ClassExpression, Iri, ObjectPropertyExpression};
 
-/// Kind of data property assertions in a [`Key`].
+/// Number of the kind "data property assertion" in a [`Key`].
 const DATA: u8 = 2;
 
-/// Kind of assertion, then the ranks of up to three names.
+/// Sort key: kind of the assertion, then the ranks of up to three names.
 type Key = (u8, u32, u32, u32);
 
 /// Sorts axioms and removes duplicates in place, because there may be millions.
@@ -54,7 +54,8 @@ fn arrange<T>(items: &mut [T], mut order: Vec<u32>) {
     }
 }
 
-/// Sort key of an assertion of names without annotations, in the order of the variants of [`Axiom`].
+/// Returns the sort key of an assertion of names without annotations; `None` for other axioms. The kinds
+/// are in the order of the variants of [`Axiom`].
 fn key(annotated: &AnnotatedAxiom, rank: impl Fn(&Iri) -> Option<u32>) -> Option<Key> {
     if !annotated.annotations.is_empty() {
         return None;

@@ -1,9 +1,11 @@
-//! Runs horned-owl on a thread with a large stack: it recurses along lists and expressions.
+//! Runs horned-owl on a thread with a large stack, because horned-owl recurses along lists and
+//! expressions.
 
 /// Stack size in bytes. Only address space is reserved; pages are committed on use.
 const STACK_BYTES: usize = 1 << 29;
 
-/// Runs a reader or writer on the large stack. Returns an error if it panics or the thread cannot be started.
+/// Runs a reader or writer of horned-owl on a thread with the large stack. Returns an error if the
+/// reader or writer panics, or if the thread cannot be started.
 pub(super) fn with_stack<T: Send>(run: impl FnOnce() -> T + Send) -> Result<T, String> {
     std::thread::scope(|scope| {
         let thread = std::thread::Builder::new().stack_size(STACK_BYTES).spawn_scoped(scope, run);

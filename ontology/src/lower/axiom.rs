@@ -16,8 +16,8 @@ use crate::vocab::owl;
 /// Result of lowering an axiom. The error is the reason why the axiom, or a part of it, has no rule form.
 type LoweringResult = Result<(), &'static str>;
 
-/// Adds the rules of all axioms that are not plain assertions. Axioms without a complete rule form cause a
-/// warning each, and one summary.
+/// Adds the rules of all axioms that are not plain assertions to `context`. Adds a warning for each
+/// axiom without a complete rule form, and one summary warning.
 pub(crate) fn lower_rules(axioms: &[AnnotatedAxiom], context: &mut Context) {
     let mut outside = 0;
     for (position, annotated) in axioms.iter().enumerate() {
@@ -41,7 +41,7 @@ pub(crate) fn lower_rules(axioms: &[AnnotatedAxiom], context: &mut Context) {
     }
 }
 
-/// Adds the facts of the plain assertions.
+/// Adds the facts of the assertions about named classes and properties to `context`.
 pub(crate) fn lower_assertions(axioms: &[AnnotatedAxiom], context: &mut Context) {
     for annotated in axioms {
         assertion(context, &annotated.axiom);
@@ -269,8 +269,8 @@ impl AxiomLowering<'_, '_> {
         }
     }
 
-    /// Classes and properties that are stated to be the same individual have the same members (rule eq-rep of
-    /// OWL 2 RL).
+    /// Adds rules by which classes, or properties, that are stated to be the same individual have the
+    /// same members (rule eq-rep of OWL 2 RL).
     fn same_entities(&mut self, entities: &[Iri]) {
         let any_is = |context: &Context, kind| entities.iter().any(|iri| context.is(kind, iri));
         let named = |iri: &Iri| Property::Property(iri.clone());
@@ -295,7 +295,8 @@ impl AxiomLowering<'_, '_> {
         Err("that the parts cover the class")
     }
 
-    /// Merges two members of the class that agree on all key properties (prp-key).
+    /// Adds the rules of a key axiom: two members of the class with equal values of all key properties
+    /// are the same individual (rule prp-key).
     fn key(&mut self, class: &ClassExpression, objects: &[Property], data: &[Iri]) {
         let mut variables = Variables::default();
         let (x, y) = (variables.fresh("x"), variables.fresh("y"));
@@ -357,7 +358,7 @@ impl AxiomLowering<'_, '_> {
         }
     }
 
-    /// Lowers the domain of a property (`subject` is true) or its range.
+    /// Lowers the domain axiom of a property (if `subject`), or its range axiom.
     fn domain_or_range(&mut self, property: &Property, class: &ClassExpression, subject: bool) {
         let mut variables = Variables::default();
         let (x, y) = (variables.fresh("x"), variables.fresh("y"));

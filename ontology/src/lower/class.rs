@@ -8,12 +8,12 @@ use super::range;
 use crate::owl::{Axiom, Bound, ClassExpression, DataRange, ObjectPropertyExpression};
 use crate::vocab::owl;
 
-/// Consequences of membership in a class: additional conditions and head atoms. An empty head is a
-/// contradiction.
+/// Consequences of membership in a class: pairs of additional conditions and head atoms. An empty head
+/// is a contradiction.
 pub(crate) type Conclusions = Vec<(Conjunction, Vec<Atom>)>;
 
-/// Returns alternative conjunctions; `x` is in `class` if one of them holds. A part without a rule form is
-/// recorded as a gap.
+/// Lowers a class as a condition. Returns alternative conjunctions of atoms: `x` is in `class` if one of
+/// them holds. Each part without a rule form is recorded as a gap in `context`.
 pub(crate) fn condition(
     context: &mut Context,
     class: &ClassExpression,
@@ -83,8 +83,8 @@ pub(crate) fn condition(
         }
         C::ComplementOf(_) => context.gap("a complement as a condition"),
         C::AllValuesFrom(..) | C::DataAllValuesFrom(..) => {
-            // Under the open-world assumption, further values are always possible. Only an included
-            // restriction can prove it.
+            // Under the open-world assumption, an individual may always have further values. Therefore only a
+            // membership in an included restriction proves a universal restriction.
             context.gap::<()>("a universal restriction as a condition");
             let restriction = context.inclusions.condition(class);
             let atom = restriction.map(|restriction| context.relation(&relation_of(&restriction), [x]));
@@ -94,7 +94,8 @@ pub(crate) fn condition(
     }
 }
 
-/// Returns alternative conjunctions for: `x` has a value in the class `filler`.
+/// Returns alternative conjunctions for the condition that `x` has a value of `property` in the class
+/// `filler`.
 fn some_value(
     context: &mut Context,
     property: &ObjectPropertyExpression,
@@ -107,11 +108,12 @@ fn some_value(
     cross(&edge, &condition(context, filler, y, variables))
 }
 
-/// Limit on the alternatives of a conjunction of unions that is expanded; larger ones use auxiliary relations.
+/// Limit on the number of alternatives to which a conjunction of unions is expanded. Larger conjunctions
+/// use auxiliary relations.
 pub(crate) const MAX_ALTERNATIVES: usize = 16;
 
-/// Replaces several alternatives by one atom of an auxiliary relation, which a rule concludes from each
-/// alternative.
+/// Replaces the alternative conjunctions for `x` in `class` by one atom of an auxiliary relation. A rule
+/// for each alternative derives the relation.
 pub(crate) fn abbreviated(
     context: &mut Context,
     class: &ClassExpression,
@@ -138,13 +140,14 @@ pub(crate) fn abbreviated(
     vec![vec![context.relation(&name, [x])]]
 }
 
-/// Calls [`range::condition`]; a range without a rule form is recorded as a gap.
+/// Returns the alternative conjunctions of [`range::condition`]. A data range without a rule form is
+/// recorded as a gap.
 fn range_condition(context: &mut Context, range: &DataRange, value: Term) -> Vec<Conjunction> {
     range::condition(context, range, value).unwrap_or_else(|reason| context.gap(reason))
 }
 
-/// Returns the consequences of `x` being in `class`. Consequences that rules cannot express are recorded as
-/// gaps.
+/// Lowers a class as a conclusion: returns the consequences of `x` being in `class`. Consequences that
+/// rules cannot express are recorded as gaps.
 pub(crate) fn conclusions(
     context: &mut Context,
     class: &ClassExpression,
@@ -246,7 +249,8 @@ pub(crate) fn conclusions(
     }
 }
 
-/// Returns the consequences of all values of `x` being in the class `filler`.
+/// Returns the consequences of a universal restriction: all values of `property` for `x` are in the
+/// class `filler`.
 fn all_values(
     context: &mut Context,
     property: &ObjectPropertyExpression,
@@ -260,14 +264,16 @@ fn all_values(
     inner.into_iter().map(|(body, head)| (with_atom(edge.clone(), body), head)).collect()
 }
 
-/// Concludes the auxiliary relation of a restriction, if a condition includes the restriction.
+/// Concludes that `x` is in the auxiliary relation of the restriction `class`, if a condition includes
+/// the restriction.
 fn included(context: &mut Context, class: &ClassExpression, x: Term) -> Conclusions {
     let restriction = context.inclusions.conclusion(class);
     let atom = restriction.map(|restriction| context.relation(&relation_of(&restriction), [x]));
     atom.map(|atom| (Vec::new(), vec![atom])).into_iter().collect()
 }
 
-/// Calls [`included`] for a class without any other rule form, which is recorded as a gap.
+/// Records a gap for a class without a rule form as a conclusion, and returns the consequences of
+/// [`included`].
 fn only_included(
     context: &mut Context,
     class: &ClassExpression,
@@ -278,7 +284,7 @@ fn only_included(
     included(context, class, x)
 }
 
-/// Adds a rule for each inclusion between restrictions.
+/// Adds a rule for each inclusion between two restrictions with auxiliary relations.
 pub(crate) fn lower_inclusions(context: &mut Context, position: usize) {
     for [sub, sup] in context.inclusions.pairs() {
         let mut variables = Variables::default();
@@ -296,7 +302,8 @@ fn relation_of(restriction: &ClassExpression) -> String {
 
 const EXISTS: &str = "an existential restriction as a conclusion";
 
-/// Returns a contradiction for `x` with more than `limit` (0 or 1) values in a range.
+/// Returns the contradiction that follows if `x` has more than `limit` (0 or 1) values of `property` in
+/// `range`.
 fn at_most(
     context: &mut Context,
     limit: u32,

@@ -1,4 +1,4 @@
-//! State of the lowering, and constructors for rules that the other files of this folder use.
+//! State of the lowering, and constructors of rules and atoms that the other files of this folder use.
 
 use std::collections::{HashMap, HashSet};
 
@@ -10,14 +10,14 @@ use crate::error::Warning;
 use crate::owl::{Axiom, DataRange, EntityKind, Iri, Literal, ObjectPropertyExpression, Ontology};
 use crate::vocab::{local_name, owl};
 
-/// Namespace of auxiliary relations. They are not part of the knowledge base.
+/// Prefix of the IRIs of auxiliary relations, which are not part of the knowledge base.
 pub const INTERNAL: &str = "urn:metaplan:";
 
 /// Source in the identity of a rule that is lowered from an axiom. The label of such a rule is the axiom in
 /// functional-style syntax.
 pub const AXIOM_SOURCE: &str = "http://www.w3.org/2002/07/owl";
 
-/// Semantics of names.
+/// Semantics of the names of individuals.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Equality {
     /// Two names can denote the same individual: the semantics of OWL.
@@ -27,10 +27,11 @@ pub enum Equality {
     UniqueNames,
 }
 
-/// Atoms that must all hold.
+/// Conjunction of atoms.
 pub(crate) type Conjunction = Vec<Atom>;
 
-/// Combines every conjunction of the first list with every conjunction of the second.
+/// Returns the Cartesian product of two lists: each conjunction of the first list joined with each
+/// conjunction of the second.
 pub(crate) fn cross(left: &[Conjunction], right: &[Conjunction]) -> Vec<Conjunction> {
     left.iter().flat_map(|l| right.iter().map(move |r| l.iter().chain(r).cloned().collect())).collect()
 }
@@ -42,9 +43,9 @@ pub(crate) struct Context<'a> {
     pub facts: Vec<Fact>,
     pub warnings: Vec<Warning>,
     pub equality: Equality,
-    /// Data ranges of the datatype definitions.
+    /// Maps each datatype with a definition to its data range.
     pub definitions: HashMap<Iri, DataRange>,
-    /// The IRIs of classes and of properties.
+    /// All entities of the ontology, with their kinds.
     entities: HashSet<(EntityKind, Iri)>,
     /// Identity of the axiom or rule that is being lowered.
     pub identity: RuleIdentity,
@@ -52,16 +53,16 @@ pub(crate) struct Context<'a> {
     gaps: Vec<&'static str>,
     /// Inclusions between restrictions.
     pub inclusions: Inclusions,
-    /// Names of the auxiliary relations whose rules exist.
+    /// Names of the auxiliary relations whose rules have already been added.
     pub abbreviated: HashSet<String>,
-    /// Symbols of IRIs by the address of their text. An ontology keeps each text once, so the lookup does not
-    /// read it.
+    /// Maps the address of an IRI's text to the symbol of the IRI. An ontology keeps each text once, so
+    /// the look-up need not read the text.
     shared: FxHashMap<*const u8, Symbol>,
 }
 
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Variables {
-    /// Names by variable number; IRIs for variables of SWRL rules.
+    /// Names, indexed by variable number; the names of variables of SWRL rules are IRIs.
     keys: Vec<Iri>,
 }
 
@@ -79,7 +80,7 @@ impl Variables {
         }
     }
 
-    /// Names for output, by variable number.
+    /// Returns the local names of the variables for output, indexed by variable number.
     fn names(&self) -> Vec<Box<str>> {
         self.keys.iter().map(|key| local_name(key).into()).collect()
     }
@@ -88,7 +89,7 @@ impl Variables {
 /// Limit on the length of a rule's label, in characters: an axiom can have thousands of members.
 const MAX_LABEL_CHARS: usize = 2_000;
 
-/// Identity of the rules of an axiom.
+/// Returns the identity of the rules that are lowered from the axiom at `position`.
 pub(crate) fn identity(axiom: &Axiom, position: usize) -> RuleIdentity {
     let mut label = axiom.to_string();
     if let Some((end, _)) = label.char_indices().nth(MAX_LABEL_CHARS) {
@@ -125,7 +126,7 @@ impl<'a> Context<'a> {
         self.entities.contains(&(kind, iri.clone()))
     }
 
-    /// The entities of a kind, sorted.
+    /// Returns the entities of a kind, sorted.
     pub(crate) fn entities_of_kind(&self, kind: EntityKind) -> Vec<Iri> {
         let mut iris: Vec<Iri> =
             self.entities.iter().filter(|(other, _)| *other == kind).map(|(_, iri)| iri.clone()).collect();
@@ -138,14 +139,14 @@ impl<'a> Context<'a> {
         self.relation(owl::THING, [term])
     }
 
-    /// Records that a part of the current axiom or rule has no rule form. Returns the empty value, which has no
-    /// consequences.
+    /// Records that a part of the current axiom or rule has no rule form. Returns an empty result, which
+    /// has no consequences.
     pub(crate) fn gap<T: Default>(&mut self, reason: &'static str) -> T {
         self.gaps.push(reason);
         T::default()
     }
 
-    /// Returns the reason of the first gap since the last call as an error.
+    /// Returns the reason of the first recorded gap as an error, and clears the gaps.
     pub(crate) fn take_gaps(&mut self) -> Result<(), &'static str> {
         let first = self.gaps.first().copied();
         self.gaps.clear();
@@ -156,7 +157,8 @@ impl<'a> Context<'a> {
         self.symbols.name(iri)
     }
 
-    /// Returns the symbol of an IRI of the ontology, without reading its text if it occurred before.
+    /// Returns the symbol of an IRI of the ontology. An IRI that occurred before is found by its
+    /// address, without reading its text.
     pub(crate) fn iri(&mut self, iri: &Iri) -> Symbol {
         let symbols = &mut *self.symbols;
         *self.shared.entry(iri.as_ptr()).or_insert_with(|| symbols.name(iri))
@@ -177,7 +179,7 @@ impl<'a> Context<'a> {
         Atom::relation(self.symbols.name(name), arguments)
     }
 
-    /// Builds the atom `property(first, second)`, with exchanged arguments for an inverse.
+    /// Builds the atom `property(first, second)`; an inverse property exchanges the arguments.
     pub(crate) fn property(
         &mut self,
         property: &ObjectPropertyExpression,
@@ -206,8 +208,8 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// Builds the condition that two individuals differ: stated or derived difference in OWL, else different
-    /// names.
+    /// Builds the atom for the condition that two individuals differ. In OWL, the difference is stated
+    /// or derived; under the unique name assumption, different names suffice.
     pub(crate) fn different(&mut self, first: Term, second: Term) -> Atom {
         match self.equality {
             Equality::Owl => self.relation(owl::DIFFERENT_FROM, [first, second]),
@@ -215,8 +217,9 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// Returns the relation that contains the members of a data range. Its name contains the range, so two
-    /// ontologies that are lowered with the same symbols share the relation only if they have equal ranges.
+    /// Returns the auxiliary relation that contains the members of a data range. Its name contains the
+    /// range, so two ontologies that are lowered with the same symbols share the relation only if they
+    /// have equal ranges.
     pub(crate) fn members_of(&mut self, range: &DataRange) -> Symbol {
         self.symbols.name(&format!("{INTERNAL}range:{range}"))
     }
@@ -236,7 +239,7 @@ impl<'a> Context<'a> {
         self.rules.push(Rule { identity: identity.clone(), head, body, variables });
     }
 
-    /// Reports that an axiom is omitted (or used in part, if `partly`) with the reason.
+    /// Adds a warning that an axiom is omitted, or used in part if `partly`, with the reason.
     pub(crate) fn outside(&mut self, axiom: &Axiom, partly: bool, reason: &str) {
         let (axiom, reason) = (axiom.to_string(), reason.to_owned());
         self.warnings.push(Warning::OutsideProfile { axiom, partly, reason });

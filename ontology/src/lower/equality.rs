@@ -40,9 +40,9 @@ pub(crate) fn lower(axioms: &[AnnotatedAxiom], context: &mut Context) -> bool {
     merges
 }
 
-/// Adds rule eq-rep of OWL 2 RL for classes and properties that are individuals, too: names that become equal
-/// have the same members. For names that are stated to be equal, the lowering of `SameIndividual` adds the
-/// rules.
+/// Adds rule eq-rep of OWL 2 RL for classes and properties that are individuals, too: names that become
+/// equal have the same members. If names are stated to be equal, the lowering of `SameIndividual` adds
+/// these rules instead.
 fn entities(context: &mut Context) {
     let identity = RuleIdentity { source: AXIOM_SOURCE.into(), label: Some("eq-rep".into()), position: 0 };
     let mut variables = Variables::default();
@@ -77,7 +77,8 @@ fn entities(context: &mut Context) {
     }
 }
 
-/// Limit on the number of names of one kind that are individuals, too: each pair of them has a rule.
+/// Limit on the number of names of one kind that are individuals, too, because each pair of these names
+/// has a rule.
 const MAX_PUNNED_NAMES: usize = 32;
 
 fn identity(label: &str, position: usize) -> RuleIdentity {

@@ -6,7 +6,8 @@ use rules::{Atom, RuleIdentity, Symbol, Term};
 use super::context::{Context, INTERNAL, Variables};
 use crate::vocab::owl;
 
-/// Number of members up to which pairs are used, because explanations with pairs are easier to read.
+/// Maximum number of members for which pairs are used, because explanations with pairs are easier to
+/// read.
 pub(crate) const MAX_PAIRED_MEMBERS: usize = 16;
 
 /// Returns the relation between the members and the numbers of an axiom's group. Its name is a hash of the
@@ -19,24 +20,24 @@ pub(crate) fn relation(context: &mut Context, axiom: &str) -> Symbol {
     context.name(&format!("{INTERNAL}member:{hash:016x}"))
 }
 
-/// Returns the symbol of a member's number.
+/// Returns the symbol of the number of the member at `index`.
 pub(crate) fn number(context: &mut Context, index: usize) -> Symbol {
     context.symbols.literal(rules::Literal::integer(index as i64))
 }
 
-/// Builds the atoms for two members with different numbers.
+/// Builds the body atoms that match two members with different numbers.
 fn differently_numbered(member: Symbol, [x, y]: [Term; 2], [i, j]: [Term; 2]) -> Vec<Atom> {
     vec![Atom::relation(member, [x, i]), Atom::relation(member, [y, j]), Atom::Different(i, j)]
 }
 
-/// Adds the constraint that no individual has two numbers.
+/// Adds the constraint that no individual has two numbers in the relation `member`.
 pub(crate) fn forbid(context: &mut Context, identity: &RuleIdentity, member: Symbol) {
     let mut variables = Variables::default();
     let [x, i, j] = ["x", "i", "j"].map(|name| variables.fresh(name));
     context.rule(identity, Vec::new(), differently_numbered(member, [x, x], [i, j]), &variables);
 }
 
-/// Adds the rule that individuals with different numbers differ.
+/// Adds the rule that individuals with different numbers in the relation `member` differ.
 pub(crate) fn differ(context: &mut Context, identity: &RuleIdentity, member: Symbol) {
     let mut variables = Variables::default();
     let [x, y, i, j] = ["x", "y", "i", "j"].map(|name| variables.fresh(name));

@@ -1,10 +1,11 @@
 //! Inclusions between restrictions: rules scm-svf1, scm-svf2, scm-avf1 and scm-avf2 of OWL 2 RL ([1], table 9).
 //!
-//! An individual of `∃p.C` has a value that rules cannot name, but the individual is in `∃q.D` if `p ⊑ q` and
-//! `C ⊑ D`. If an axiom concludes the first restriction and another one has the second as a condition, both
-//! restrictions get an auxiliary relation, and a rule derives the second from the first. Universal restrictions
-//! are analogous, with `q ⊑ p`. The inclusions of classes and properties are the transitive closure of the
-//! stated ones, of `C ⊓ D ⊑ C` and `C ⊑ C ⊔ D`, and of inclusions between restrictions that are found here.
+//! An individual of `∃p.C` has a value that rules cannot name, but the individual is in `∃q.D` if `p ⊑
+//! q` and `C ⊑ D`. If one axiom concludes the first restriction and another axiom has the second
+//! restriction as a condition, both restrictions get an auxiliary relation, and a rule derives the
+//! second relation from the first. Universal restrictions are analogous, with `q ⊑ p`. The inclusions of
+//! classes and properties are the transitive closure of the stated ones, of `C ⊓ D ⊑ C` and `C ⊑ C ⊔ D`,
+//! and of the inclusions between restrictions that this module finds.
 //!
 //! [1] OWL 2 Web Ontology Language Profiles, W3C 2012, section 4.3.
 
@@ -13,10 +14,12 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use crate::owl::{Atom, Axiom, Bound, ClassExpression, Iri, ObjectPropertyExpression as Property, Ontology};
 use crate::vocab::owl;
 
-/// Restrictions that get an auxiliary relation.
+/// The existential and universal restrictions that get an auxiliary relation, with the inclusions
+/// between them.
 #[derive(Default)]
 pub(crate) struct Inclusions {
-    /// For each restriction that an axiom concludes, the conditions that include it.
+    /// Maps each restriction that an axiom concludes to the restrictions that include it and are
+    /// conditions of axioms or rules.
     concluded: BTreeMap<ClassExpression, BTreeSet<ClassExpression>>,
     /// All conditions in the values of `concluded`.
     conditions: HashSet<ClassExpression>,
@@ -48,17 +51,18 @@ impl Inclusions {
         inclusions
     }
 
-    /// Returns the class as a restriction if the class is a condition that includes a conclusion.
+    /// Returns the restriction that is equivalent to `class`, if the restriction is a condition that
+    /// includes a concluded restriction.
     pub(crate) fn condition(&self, class: &ClassExpression) -> Option<ClassExpression> {
         restriction(class, false).filter(|restriction| self.conditions.contains(restriction))
     }
 
-    /// Returns the class as a restriction if the class is a conclusion that is included in a condition.
+    /// Returns the restriction that follows from `class`, if a condition includes this restriction.
     pub(crate) fn conclusion(&self, class: &ClassExpression) -> Option<ClassExpression> {
         restriction(class, true).filter(|restriction| self.concluded.contains_key(restriction))
     }
 
-    /// Pairs of different restrictions; the second includes the first.
+    /// Returns the pairs of different restrictions `[sub, sup]` with `sub ⊑ sup`.
     pub(crate) fn pairs(&self) -> Vec<[ClassExpression; 2]> {
         let pairs =
             self.concluded.iter().flat_map(|(sub, including)| including.iter().map(move |sup| (sub, sup)));
@@ -66,8 +70,9 @@ impl Inclusions {
     }
 }
 
-/// Returns the existential or universal restriction that is equivalent to a class, or follows from it if
-/// `is_concluded`.
+/// Returns the existential or universal restriction that is equivalent to a class. If `is_concluded`, it
+/// is sufficient that the restriction follows from the class. Returns `None` if there is no such
+/// restriction.
 fn restriction(class: &ClassExpression, is_concluded: bool) -> Option<ClassExpression> {
     use ClassExpression as C;
     match class {
@@ -82,12 +87,13 @@ fn restriction(class: &ClassExpression, is_concluded: bool) -> Option<ClassExpre
     }
 }
 
-/// The restrictions that axioms and rules conclude, and the restrictions that are their conditions.
+/// Restrictions that axioms and rules conclude, and restrictions that are conditions of axioms and
+/// rules.
 #[derive(Default)]
 struct Uses {
     concluded: BTreeSet<ClassExpression>,
     conditions: HashSet<ClassExpression>,
-    /// For each restriction, the position of the first axiom or rule that contains it.
+    /// Maps each restriction to the position of the first axiom or rule that contains it.
     positions: HashMap<ClassExpression, usize>,
     /// Restrictions that occur in several axioms or rules.
     shared: HashSet<ClassExpression>,
@@ -252,7 +258,7 @@ impl InclusionGraph {
         self.members(sup);
     }
 
-    /// Adds the inclusions of the members of a union in the union.
+    /// Adds the inclusion of each member in the union, if the class is a union.
     fn members(&mut self, class: &ClassExpression) {
         if let ClassExpression::UnionOf(members) = class {
             for member in members {
@@ -269,7 +275,8 @@ impl InclusionGraph {
         }
     }
 
-    /// Returns the conditions that include a restriction.
+    /// Returns the conditions that include a restriction. Restrictions nested in it are compared up to
+    /// `depth` levels.
     fn including(
         &self,
         restriction: &ClassExpression,
@@ -307,7 +314,8 @@ impl InclusionGraph {
         including
     }
 
-    /// Returns the classes that include a class, the class itself among them.
+    /// Returns the classes that include a class, and the class itself. Nested restrictions are compared
+    /// up to `depth` levels.
     fn supers(&self, class: &ClassExpression, depth: usize, memo: &mut Memo) -> BTreeSet<ClassExpression> {
         let key = (class.clone(), depth);
         if let Some(supers) = memo.supers.get(&key) {

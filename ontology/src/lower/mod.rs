@@ -35,18 +35,19 @@ pub use context::{AXIOM_SOURCE, Equality, INTERNAL};
 /// An ontology as rules and facts.
 #[derive(Clone, Debug)]
 pub struct Lowered {
-    /// Rules of the knowledge base, then rules lowered from axioms, then additional rules.
+    /// SWRL rules of the knowledge base, then rules lowered from axioms, then additional rules.
     pub program: Program,
-    /// The assertions.
+    /// Facts of the assertions.
     pub facts: Vec<Fact>,
-    /// Number of SWRL rules omitted because another ontology states an equal rule.
+    /// Number of SWRL rules omitted because an equal rule occurs before, in any of the ontologies.
     pub duplicates: usize,
     /// Warnings about omitted axioms and rules, and about rules that are used although their annotation
     /// disables them.
     pub warnings: Vec<Warning>,
 }
 
-/// Lowers an ontology with the semantics of OWL; names and literals are interned in `symbols`.
+/// Lowers an ontology to rules and facts with the semantics of OWL. Names and literals are interned in
+/// `symbols`.
 pub fn lower(ontology: &Ontology, symbols: &mut Symbols) -> Lowered {
     lower_with(ontology, Equality::Owl, symbols)
 }
@@ -56,9 +57,9 @@ pub fn lower_with(ontology: &Ontology, equality: Equality, symbols: &mut Symbols
     lower_together(ontology, Vec::new(), equality, symbols)
 }
 
-/// Lowers an ontology together with additional rules, whose names are in `symbols`; see [`lower_with`]. In
-/// these rules, `owl:Thing`, `owl:Nothing`, `sameAs` and `differentFrom` have the semantics of OWL. They come
-/// last in the program.
+/// Lowers an ontology like [`lower_with`], together with additional rules, whose names are in `symbols`.
+/// In the additional rules, `owl:Thing`, `owl:Nothing`, `sameAs` and `differentFrom` have the semantics
+/// of OWL. These rules come last in the program.
 pub fn lower_together(
     ontology: &Ontology,
     additional: Vec<Rule>,
@@ -94,8 +95,8 @@ pub(crate) fn lower_assertions(axioms: &[AnnotatedAxiom], symbols: &mut Symbols)
 }
 
 impl Context<'_> {
-    /// Adds rules of other origin. Under the semantics of OWL, two different names can denote the same
-    /// individual, so a comparison of names becomes the relation `differentFrom`.
+    /// Adds rules that come from no document. Under the semantics of OWL, two different names can denote
+    /// the same individual, so a comparison of names becomes the relation `differentFrom`.
     fn add_rules(&mut self, additional: Vec<Rule>) {
         let owl = self.equality == Equality::Owl;
         for mut rule in additional {
@@ -108,9 +109,9 @@ impl Context<'_> {
         }
     }
 
-    /// Removes the rules that the engine rejects (because of unsafe variables, for example); it would reject
-    /// the whole program. A rule lowered from an axiom is safe if a relation or a constant binds its variables,
-    /// and is not tested.
+    /// Removes the rules that the engine rejects, for example because of unsafe variables, since one
+    /// such rule would make the engine reject the whole program. A rule lowered from an axiom is not
+    /// tested if a relation or a constant binds its variables.
     fn drop_unusable(&mut self) {
         let binds = |atom: &Atom| match atom {
             Atom::Relation { .. } => true,

@@ -13,7 +13,7 @@ use crate::vocab::{owl, rdf, rdfs, xsd};
 /// Limit on the nesting of datatype definitions. Deeper and cyclic definitions are rejected.
 const MAX_DEFINITION_DEPTH: usize = 16;
 
-/// Limit on the alternatives of an intersection of unions that is expanded.
+/// Limit on the number of alternatives to which an intersection of unions is expanded.
 const MAX_RANGE_ALTERNATIVES: usize = 1_024;
 
 /// Local names of the XML Schema datatypes whose value spaces the engine implements, each between spaces.
@@ -22,15 +22,17 @@ const DATATYPES: &str = " string normalizedString token language Name NCName NMT
     unsignedShort unsignedByte float double dateTime dateTimeStamp date time duration dayTimeDuration \
     yearMonthDuration anyURI hexBinary base64Binary gYear gYearMonth gMonth gMonthDay gDay ";
 
-/// Alternative conjunctions of tests, or the reason why the range cannot be tested.
+/// Alternative conjunctions of tests, or the reason why a value cannot be tested for membership in the
+/// range.
 type Tests = Result<Vec<Conjunction>, &'static str>;
 
-/// Returns alternatives; `value` is in `range` if one of them holds.
+/// Returns alternative conjunctions of tests: `value` is in `range` if one of them holds.
 pub(crate) fn condition(context: &mut Context, range: &DataRange, value: Term) -> Tests {
     RangeLowering { context, value }.tests(range, true, MAX_DEFINITION_DEPTH)
 }
 
-/// Returns the bodies that hold if all `edges` hold and `value` is outside `range`.
+/// Returns rule bodies for the violation of `range`: one of them holds if all `edges` hold and `value`
+/// is outside `range`.
 pub(crate) fn violations(context: &mut Context, range: &DataRange, edges: &[Atom], value: Term) -> Tests {
     let outside = RangeLowering { context, value }.tests(range, false, MAX_DEFINITION_DEPTH)?;
     Ok(outside.into_iter().map(|tests| edges.iter().cloned().chain(tests).collect()).collect())
@@ -42,7 +44,8 @@ struct RangeLowering<'c, 'a> {
 }
 
 impl RangeLowering<'_, '_> {
-    /// Returns alternatives; the value is in `range` (`inside`) or outside it if one of them holds.
+    /// Returns alternative conjunctions of tests. If one of them holds, the value is in `range`
+    /// (`inside` is true) or outside `range` (`inside` is false).
     fn tests(&mut self, range: &DataRange, inside: bool, depth: usize) -> Tests {
         if depth == 0 {
             return Err("datatypes that are defined by each other");

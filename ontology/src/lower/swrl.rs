@@ -11,8 +11,8 @@ use crate::error::Warning;
 use crate::owl::{Argument, Atom, ClassExpression, Rule};
 use crate::vocab::owl;
 
-/// Lowers the rules. Returns the number of duplicates, which differ from another rule at most in the names of
-/// variables.
+/// Adds the lowered rules to `context`, without duplicates. Returns the number of duplicates: rules that
+/// differ from another rule at most in the names of variables and in the order of body atoms.
 pub(crate) fn lower(rules: &[Rule], context: &mut Context) -> usize {
     let mut contents = HashSet::new();
     let mut duplicates = 0;
@@ -60,7 +60,7 @@ fn canonical(rule: &rules::Rule) -> (Vec<rules::Atom>, Vec<rules::Atom>) {
     (body, rule.head.iter().map(|atom| renamed(atom, &mut number)).collect())
 }
 
-/// Replaces the variables of an atom.
+/// Returns the atom with each variable replaced by the term that `name` returns.
 fn renamed(atom: &rules::Atom, name: &mut dyn FnMut(Variable) -> Term) -> rules::Atom {
     use rules::Atom as A;
     let mut term = |term: Term| match term {
@@ -123,7 +123,8 @@ fn lower_rule(rule: &Rule, identity: &RuleIdentity, context: &mut Context) -> Re
     Ok(())
 }
 
-/// Binds variables that occur only in `owl:Thing` or in an equality: they range over all individuals.
+/// Adds an `owl:Thing` atom for each variable that occurs only in `owl:Thing` or in an equality, because
+/// the variable ranges over all individuals.
 fn individuals(context: &mut Context, rule: &Rule, body: &mut Conjunction, variables: &mut Variables) {
     for atom in &rule.body {
         let argument = match atom {
@@ -139,7 +140,8 @@ fn individuals(context: &mut Context, rule: &Rule, body: &mut Conjunction, varia
     }
 }
 
-/// Returns `true` if a relation binds the variable, directly or through an equality.
+/// Returns `true` if a relation atom binds the variable `x`, or if `x` equals a constant or a variable
+/// of a relation atom.
 fn is_bound(body: &Conjunction, x: Term) -> bool {
     let binds = |atom: &rules::Atom| matches!(atom, rules::Atom::Relation { arguments, .. } if arguments.contains(&x));
     body.iter().any(|atom| match atom {
@@ -205,8 +207,8 @@ fn condition(
     })
 }
 
-/// Returns the arguments of a built-in. In `swrlm:eval`, the names of the rule's variables are prepended to the
-/// expression.
+/// Returns the arguments of a built-in. In `swrlm:eval`, the names of the argument variables are
+/// prepended to the expression.
 fn with_names(built_in: BuiltIn, mut arguments: Vec<Argument>) -> Vec<Argument> {
     if let [_, Argument::Literal(text), values @ ..] = arguments.as_mut_slice() {
         let name = |argument: &Argument| match argument {
@@ -222,7 +224,7 @@ fn with_names(built_in: BuiltIn, mut arguments: Vec<Argument>) -> Vec<Argument> 
     arguments
 }
 
-/// Lowers an atom of a head.
+/// Lowers an atom of a head to its conclusions: additional conditions and head atoms.
 fn conclusions(
     context: &mut Context,
     atom: &Atom,

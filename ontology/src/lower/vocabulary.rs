@@ -42,8 +42,8 @@ pub(crate) fn lower(ontology: &Ontology, context: &mut Context) {
     }
 }
 
-/// Returns the symbol of a name that a rule or fact mentions. The symbol table alone is not sufficient: it
-/// keeps the names of documents that have been retracted.
+/// Returns the symbol of `name` if a rule or fact mentions it. The symbol table alone is not sufficient,
+/// because it keeps the names of documents that have been retracted.
 fn mentioned_symbol(context: &Context, name: &str) -> Option<Symbol> {
     let symbol = context.symbols.find_name(name)?;
     let mentions = |atom: &Atom| {

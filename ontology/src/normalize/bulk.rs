@@ -11,7 +11,7 @@ use crate::names::{Compact, Names, Object};
 use crate::triples::Document;
 use crate::vocab::{is_reserved, owl, rdf, rdfs};
 
-/// Occurrences of a name that matter for this pass.
+/// Occurrences of a name in the documents that matter for this pass.
 #[derive(Clone, Copy, Default)]
 #[allow(clippy::struct_excessive_bools)] // independent observations
 struct NameUse {
@@ -27,7 +27,7 @@ struct NameUse {
     annotation: bool,
 }
 
-/// Uses of all names in the documents, by number.
+/// Uses of all names in the documents, indexed by the number of the name.
 pub(super) struct Usage {
     uses: Vec<NameUse>,
     kind: Option<u32>,
@@ -83,7 +83,7 @@ impl Usage {
         }
     }
 
-    /// Returns `true` if no other pass has to process a triple.
+    /// Returns `true` if no other normalisation pass has to process the triple.
     pub(super) fn is_bulk(&self, triple: &Compact) -> bool {
         let uses = |number: u32| self.uses[number as usize];
         let subject = uses(triple.subject);
@@ -104,7 +104,7 @@ impl Usage {
         }
     }
 
-    /// Returns the undeclared classes of these statements.
+    /// Returns the classes of `bulk` statements that have no declaration.
     pub(super) fn undeclared(&self, bulk: &[Compact], names: &Names) -> BTreeSet<String> {
         let typed = bulk.iter().filter(|triple| Some(triple.predicate) == self.kind);
         let classes: FxHashSet<u32> = typed

@@ -10,7 +10,8 @@ use crate::vocab::{owl, rdf};
 /// Maximum nesting depth. Expressions of real ontologies are nested less than 20 levels deep.
 pub(crate) const MAX_NESTING: usize = 128;
 
-/// Properties from an expression to its parts. The last two are the links of lists and do not count as a level.
+/// Properties that lead from a class expression to its parts. The last two are links of lists and do not
+/// count as a level.
 const NESTING_PROPERTIES: [&str; 10] = [
     owl::SOME_VALUES_FROM,
     owl::ALL_VALUES_FROM,
@@ -24,8 +25,8 @@ const NESTING_PROPERTIES: [&str; 10] = [
     rdf::REST,
 ];
 
-/// Returns the index of the first triple whose object is nested deeper than [`MAX_NESTING`], and an IRI that it
-/// describes.
+/// Returns the index of the first triple whose object is nested deeper than [`MAX_NESTING`], and an IRI
+/// that the nested expression describes. Returns `None` if no triple is nested too deeply.
 pub(crate) fn too_deep(graph: &Graph) -> Option<(usize, Option<String>)> {
     let mut depths: FxHashMap<NamedOrBlankNode, usize> = FxHashMap::default();
     for (index, triple) in graph.iter() {
@@ -40,7 +41,7 @@ pub(crate) fn too_deep(graph: &Graph) -> Option<(usize, Option<String>)> {
     None
 }
 
-/// Returns the first IRI with an expression that is nested too deeply.
+/// Returns the first IRI that an expression nested too deeply describes.
 fn described_iri(graph: &Graph, depths: &mut FxHashMap<NamedOrBlankNode, usize>) -> Option<String> {
     graph.iter().find_map(|(_, triple)| match (&triple.subject, nested(&triple.object)) {
         (NamedOrBlankNode::NamedNode(iri), Some(root)) if depth(graph, &root, depths) >= MAX_NESTING => {
@@ -54,7 +55,7 @@ fn nested(object: &Term) -> Option<NamedOrBlankNode> {
     matches!(object, Term::BlankNode(_)).then(|| subject_of(object)).flatten()
 }
 
-/// Computes the depth of the expression at a node. Lists do not count. A cycle is followed once.
+/// Returns the nesting depth of the expression at a node. Lists do not count. A cycle is followed once.
 fn depth(graph: &Graph, root: &NamedOrBlankNode, depths: &mut FxHashMap<NamedOrBlankNode, usize>) -> usize {
     // Iterative depth-first search; recursion could overflow the stack.
     let mut stack = vec![(root.clone(), false)];

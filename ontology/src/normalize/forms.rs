@@ -64,7 +64,7 @@ fn take_all(graph: &mut Graph, node: &NamedOrBlankNode) {
     }
 }
 
-/// Moves the triples of axioms with an IRI to blank nodes.
+/// Moves the triples of n-ary axioms with an IRI to blank nodes.
 fn remove_axiom_iris(graph: &mut Graph) {
     let kinds = [owl::ALL_DIFFERENT, owl::NEGATIVE_PROPERTY_ASSERTION, owl::AXIOM, owl::ANNOTATION];
     let named: Vec<NamedOrBlankNode> = kinds
@@ -82,7 +82,8 @@ fn remove_axiom_iris(graph: &mut Graph) {
     }
 }
 
-/// Makes a named class with the triples of an expression equivalent to a blank node with these triples.
+/// Makes each named class or datatype that is the subject of an expression's triples equivalent to a
+/// blank node with these triples.
 fn definitions(graph: &mut Graph) {
     let datatypes: FxHashSet<NamedOrBlankNode> =
         graph.instances(rdfs::DATATYPE).into_iter().map(|(_, node)| node).collect();
@@ -169,7 +170,7 @@ fn correct_types(graph: &mut Graph) {
     }
 }
 
-/// Returns `true` if the first member of a list is a value or a data range.
+/// Returns `true` if the first member of a list is a literal or a data range.
 fn has_values(graph: &Graph, list: &Term, datatypes: &FxHashSet<Term>) -> bool {
     let first = subject_of(list).and_then(|node| graph.objects(&node, rdf::FIRST).next());
     match first {

@@ -32,11 +32,12 @@ struct Use {
     object: bool,
     /// Used in a restriction of unknown kind.
     restricted: bool,
-    /// Its subject is not an individual.
+    /// Used with a subject that is not an individual, as annotation properties are.
     entity: bool,
 }
 
-/// Declares all undeclared entities. `classes` are undeclared classes of triples outside the graph.
+/// Adds a declaration and a warning for each undeclared class or property. `classes` contains undeclared
+/// classes that occur in triples outside of `graph`.
 pub(crate) fn declare(graph: &mut Graph, mut classes: BTreeSet<String>, warnings: &mut Vec<Warning>) {
     let (declared, mut properties) = (Declared::of(graph), BTreeMap::new());
     for (_, triple) in graph.iter() {
@@ -63,7 +64,7 @@ pub(crate) fn declare(graph: &mut Graph, mut classes: BTreeSet<String>, warnings
     state(graph, ORIGIN, owl::ANNOTATION_PROPERTY);
 }
 
-/// Declares the `known` entities that the documents mention without a declaration.
+/// Adds declarations of the `known` entities that the documents mention but do not declare.
 pub(crate) fn declare_known(graph: &mut Graph, known: &[(EntityKind, Iri)], names: &Names) {
     if known.is_empty() {
         return;
@@ -93,7 +94,8 @@ struct Kinds<'a> {
 }
 
 impl Kinds<'_> {
-    /// Returns the class that declares properties of this kind; `None` if the kind is unknown.
+    /// Returns the OWL class of the property's kind, such as `owl:ObjectProperty`, from its declaration
+    /// or its uses; `None` for an unknown property.
     fn of(&self, property: &str) -> Option<&'static str> {
         if self.declared.object_properties.contains(property) {
             Some(owl::OBJECT_PROPERTY)
@@ -120,7 +122,7 @@ impl Kinds<'_> {
             })
             .filter(|(_, first, second)| !is_reserved(first) && !is_reserved(second))
             .collect();
-        // A round propagates at least one step along a path of pairs.
+        // In each round, a kind propagates at least one step along a path of related properties.
         for _ in 0..pairs.len().min(MAX_PROPAGATION_ROUNDS) {
             for (_, first, second) in &pairs {
                 match (self.of(first), self.of(second)) {
@@ -154,7 +156,8 @@ impl Kinds<'_> {
     }
 }
 
-/// Returns the most probable kind as the declaring class and as text.
+/// Returns the most probable kind of a property with these uses: the OWL class for its declaration, and
+/// the kind as text.
 fn kind_of(usage: Use) -> (&'static str, &'static str) {
     let values_only = usage.literal && !usage.object;
     if usage.data || values_only && (!usage.entity || usage.restricted && !usage.individual) {
@@ -206,7 +209,8 @@ impl Declared {
             || iri.starts_with(rdf::NS)
     }
 
-    /// Returns `true` if the node is an ontology, class or property and not an individual.
+    /// Returns `true` if the node is an ontology, class or property and not an individual. Other blank
+    /// nodes count as classes.
     fn is_entity(&self, graph: &Graph, node: &NamedOrBlankNode) -> bool {
         // Statements about an ontology header are usually annotations.
         if graph.of(node).any(|(_, triple)| is_type(triple, owl::ONTOLOGY)) {

@@ -8,7 +8,8 @@ use crate::graph::{Graph, iri_of, subject_of};
 use crate::owl::{AnnotatedAxiom, Axiom, ClassExpression, Iri};
 use crate::vocab::{owl, rdf};
 
-/// Rewrites the lists. Returns the axioms that horned-owl does not have to read.
+/// Rewrites the axioms with lists in the graph. Returns the axioms with many members, which horned-owl
+/// does not have to read.
 pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) -> Vec<AnnotatedAxiom> {
     let groups = groups(graph);
     pairs(graph, owl::ALL_DISJOINT_CLASSES, owl::DISJOINT_WITH, warnings);
@@ -18,7 +19,7 @@ pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) -> Vec<Ann
     groups
 }
 
-/// Limit on the members of a group that is left to horned-owl or expanded to pairs.
+/// Maximum number of members of an axiom that is left to horned-owl or expanded to pairs.
 const MAX_PAIRED_MEMBERS: usize = 16;
 
 /// Removes and returns axioms about many disjoint named classes or many different named individuals. Pairs
@@ -113,8 +114,8 @@ fn chain_fault(graph: &Graph, item: &Term) -> Option<String> {
     }
 }
 
-/// Copies a list for every triple that refers to it, because horned-owl consumes lists. Removes the types of
-/// lists.
+/// Copies a list for every triple that refers to the list, because horned-owl consumes lists. Removes
+/// the types of list nodes.
 fn unshare(graph: &mut Graph) {
     let references = graph.references();
     let mut visited = std::collections::HashSet::new();

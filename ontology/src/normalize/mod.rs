@@ -1,9 +1,9 @@
 //! Normalises merged triples, so that horned-owl reads them without loss.
 //!
-//! Its RDF reader matches exact patterns and skips triples that deviate: rules with an IRI, atoms with an
-//! annotation, data atoms about an individual, empty bodies, shared lists, `AllDisjointClasses`, undeclared
-//! properties, blank nodes as individuals. Real knowledge bases contain most of these. The passes below rewrite
-//! them, one file each:
+//! horned-owl's RDF reader matches exact patterns and skips triples that deviate: rules with an IRI,
+//! atoms with an annotation, data atoms about an individual, empty bodies, shared lists,
+//! `AllDisjointClasses`, undeclared properties, blank nodes as individuals. Real knowledge bases contain
+//! most of these. The passes below rewrite such triples, one file each:
 //!
 //! | pass | rewrites |
 //! |---|---|
@@ -15,7 +15,7 @@
 //! | `anonymous` | blank-node individuals to IRIs |
 //! | `annotative` | axioms that use an annotation property as another kind of property (removed) |
 //! | `kinds` | undeclared entities to declared ones |
-//! | `plain` | statements that need no reader to our own structures |
+//! | `plain` | plain statements to axioms and annotations, without horned-owl |
 
 mod annotative;
 mod anonymous;
@@ -44,7 +44,7 @@ pub(crate) struct Normal {
     pub ntriples: Vec<u8>,
     /// Axioms and annotations that horned-owl does not have to read.
     pub plain: Parts,
-    /// The IRIs of `plain`.
+    /// The interned IRIs of `plain`.
     pub names: Names,
     /// Origin of each rule. The canonical form of a rule has its index in this list as an annotation.
     pub rules: Vec<Origin>,
@@ -54,7 +54,7 @@ pub(crate) struct Normal {
 /// The triples of all documents, with the header of the first document only.
 pub(crate) struct Merged {
     pub graph: Graph,
-    /// Statements that are not in the graph.
+    /// Triples that are not in the graph, because no pass before `plain` has to process them.
     pub bulk: Vec<Compact>,
     /// For each document, the index of its first triple in the graph, and its ontology.
     pub parts: Vec<(usize, Iri)>,

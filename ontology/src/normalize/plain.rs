@@ -1,4 +1,4 @@
-//! Converts plain assertions and annotations of the graph directly to our own structures.
+//! Converts plain assertions and annotations in the RDF graph directly to axioms, without horned-owl.
 //!
 //! Most triples of a large knowledge base state the class or a property value of an individual. Once the kinds
 //! of the terms are known, such a triple is an axiom by itself, and no pattern has to be matched. Triples that
@@ -37,8 +37,8 @@ struct DeclaredKinds {
     property: Option<Result<Statement, ()>>,
 }
 
-/// Removes the plain statements from a graph in which all entities are declared, and converts them together
-/// with the `bulk` statements.
+/// Removes the plain statements from a graph in which all entities are declared. Returns these
+/// statements and the `bulk` statements as axioms and annotations.
 pub(crate) fn take(graph: &mut Graph, bulk: Vec<Compact>, names: &mut Names) -> Parts {
     let mut parts = Parts::default();
     let (statements, declared) = (statements(graph), KindsByNumber::of(graph, names));
@@ -59,7 +59,7 @@ pub(crate) fn take(graph: &mut Graph, bulk: Vec<Compact>, names: &mut Names) -> 
     parts
 }
 
-/// Returns the plain statements with the indices of their triples, in order.
+/// Returns the plain statements of the graph with the indices of their triples, in order.
 fn statements(graph: &Graph) -> Vec<(usize, Statement)> {
     let (kinds, patterns, headers) = (kinds(graph), patterns(graph), headers(graph));
     let classify = |triple: &Triple| {
@@ -92,7 +92,7 @@ fn statements(graph: &Graph) -> Vec<(usize, Statement)> {
     graph.iter().filter_map(|(index, triple)| Some((index, classify(triple)?))).collect()
 }
 
-/// Declared kinds by the number of a name.
+/// Declared kinds of IRIs, by the number of the name.
 struct KindsByNumber {
     kinds: FxHashMap<u32, DeclaredKinds>,
     rdf_type: Option<u32>,
@@ -118,7 +118,7 @@ impl KindsByNumber {
     }
 }
 
-/// Converts a triple of numbers to an axiom.
+/// Converts a triple of numbered names to an axiom.
 fn axiom(triple: Compact, names: &Names) -> AnnotatedAxiom {
     let text = |number| names.text(number).clone();
     let (subject, predicate) = (text(triple.subject), text(triple.predicate));
@@ -169,14 +169,14 @@ fn kinds(graph: &Graph) -> FxHashMap<&str, DeclaredKinds> {
     kinds
 }
 
-/// Subjects with annotated axioms: their triples may be part of a pattern.
+/// Returns the subjects of annotated axioms, whose triples may be part of a pattern.
 fn patterns(graph: &Graph) -> FxHashSet<&str> {
     let annotated = graph.iter().filter(|(_, triple)| triple.predicate.as_str() == owl::ANNOTATED_SOURCE);
     annotated.filter_map(|(_, triple)| iri_of(&triple.object)).collect()
 }
 
-/// IRIs of ontologies. Their annotations are read elsewhere; their other triples are statements about
-/// individuals.
+/// Returns the IRIs of ontologies. Their annotations are read elsewhere; their other triples are
+/// statements about individuals.
 fn headers(graph: &Graph) -> FxHashSet<&str> {
     let typed = graph.iter().filter(|(_, triple)| crate::graph::is_type(triple, owl::ONTOLOGY));
     typed.filter_map(|(_, triple)| named(triple)).collect()

@@ -1,10 +1,10 @@
-//! Rewrites every SWRL rule to one canonical form: a blank node with typed lists, and a blank node for each
-//! atom with only its arguments.
+//! Rewrites every SWRL rule in the RDF graph to one canonical form: a blank node with typed lists of
+//! atoms, and for each atom a blank node that has only its arguments.
 //!
-//! IRIs encode facts that the form cannot express, and `crate::horned` decodes them. Variables and individuals
-//! have separate namespaces (in real files one IRI can be both). An individual as the first argument of a data
-//! atom becomes a variable with the individual's name. An empty body or head becomes one atom that always
-//! holds.
+//! Special IRIs encode information that this form cannot express; `crate::horned` decodes them.
+//! Variables and individuals have separate namespaces (in real files one IRI can be both). An individual
+//! as the first argument of a data atom becomes a variable with the individual's name. An empty body or
+//! head becomes one atom that always holds.
 
 use std::collections::HashSet;
 
@@ -32,11 +32,12 @@ pub(crate) const VARIABLE: &str = "urn:metaplan:variable:";
 pub(crate) const INDIVIDUAL: &str = "urn:metaplan:individual:";
 /// Individual of the atom `sameAs(TRUE, TRUE)`, the only atom of an empty body or head.
 pub(crate) const TRUE: &str = "urn:metaplan:true";
-/// Property of the annotation with a rule's index in the list of [`Origin`]s.
+/// Annotation property whose value is the index of a rule in the list of [`Origin`]s.
 pub(crate) const ORIGIN: &str = "urn:metaplan:origin";
 
-/// Rewrites the rules of `graph`. Each element of `parts` is a document: the index of its first triple, and its
-/// ontology.
+/// Rewrites the SWRL rules of `graph` and returns the origin of each rewritten rule. Each element of
+/// `parts` is a document: the index of its first triple, and its ontology IRI. Unreadable rules cause
+/// warnings.
 pub(crate) fn rewrite(graph: &mut Graph, parts: &[(usize, Iri)], warnings: &mut Vec<Warning>) -> Vec<Origin> {
     let mut pass = Pass::new(graph);
     let (mut origins, mut positions) = (Vec::new(), vec![0; parts.len()]);
@@ -89,12 +90,12 @@ struct Pass {
     variables: HashSet<Term>,
     /// Terms that occur outside of rules.
     described: HashSet<Term>,
-    /// Data properties that are not object properties, too.
+    /// Properties that are declared as data properties, but not as object properties.
     data_properties: HashSet<Term>,
-    /// Indices of the replaced triples.
+    /// Indices of the triples that canonical triples replace.
     replaced: HashSet<usize>,
     rule: usize,
-    /// Canonical variables of all rules.
+    /// Variables in the canonical forms of all rules.
     canonical_variables: Vec<NamedNode>,
     /// Arguments of the current rule that are neither variables nor described individuals.
     unknown: Vec<String>,
@@ -197,8 +198,8 @@ impl Pass {
         }
     }
 
-    /// Builds a property atom. The declaration of the property decides between data and object atoms if it
-    /// contradicts the type.
+    /// Builds a property atom. It is a data atom if the stated type, the declaration of the property or
+    /// a literal as second argument requires this, and otherwise an object atom.
     fn property_atom(
         &mut self,
         property: Term,
@@ -220,7 +221,7 @@ impl Pass {
         Ok(RdfAtom::new(class, arguments))
     }
 
-    /// Converts an argument that is an individual or an individual variable.
+    /// Converts an argument that has to be an individual or an individual variable.
     fn individual(&mut self, term: &Term) -> Result<Term, String> {
         if self.variables.contains(term) {
             return Ok(self.variable(term));
@@ -240,7 +241,7 @@ impl Pass {
         }
     }
 
-    /// Converts an argument that is a literal or a data variable.
+    /// Converts an argument that has to be a literal or a data variable.
     fn data(&mut self, term: &Term) -> Result<Term, String> {
         if self.variables.contains(term) {
             return Ok(self.variable(term));
@@ -262,7 +263,8 @@ impl Pass {
         self.canonical(format!("{VARIABLE}{}:{name}", self.rule))
     }
 
-    /// Converts the subject of a data atom: horned-owl admits only variables there.
+    /// Converts the subject of a data atom to a variable, because horned-owl admits only variables
+    /// there.
     fn as_variable(&mut self, term: Term) -> Term {
         match &term {
             Term::NamedNode(node) if !node.as_str().starts_with(VARIABLE) => {

@@ -43,8 +43,8 @@ pub(crate) fn require_syntax(text: &[u8], name: &str) -> Result<(), Errors> {
     }
 }
 
-/// Parses a document. Relative IRIs are resolved against `base`, and the names of blank nodes get `prefix`. All
-/// names are added to `names`.
+/// Parses a document to triples. Relative IRIs are resolved against `base`, and the names of blank nodes
+/// start with `prefix`. All names are added to `names`.
 pub(crate) fn parse(
     text: &[u8],
     name: &str,
@@ -92,8 +92,9 @@ pub(crate) fn parse(
     Ok(Document { name: name.to_owned(), syntax, iri: header, version, imports, triples })
 }
 
-/// Collects triples. Blank nodes are numbered in order of appearance, because parsers give anonymous ones
-/// random names, and two documents may use the same label for different nodes.
+/// Collects the triples of a document. Blank nodes are numbered in order of appearance, because parsers
+/// give random names to anonymous blank nodes, and two documents may use the same label for different
+/// nodes.
 struct Sink<'a> {
     names: &'a mut Names,
     prefix: &'a str,

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-/// Returns the text without a byte order mark. The error names an unknown encoding.
+/// Returns the document in UTF-8 without a byte order mark. The error names an unknown encoding.
 pub(super) fn decoded(bytes: &[u8]) -> Result<Cow<'_, [u8]>, String> {
     let marked = encoding_rs::Encoding::for_bom(bytes);
     let unmarked = match bytes {
@@ -26,7 +26,7 @@ pub(super) fn decoded(bytes: &[u8]) -> Result<Cow<'_, [u8]>, String> {
     Ok(Cow::Owned(as_utf8(text)))
 }
 
-/// Returns the encoding label of an XML declaration.
+/// Returns the encoding label of an XML declaration, if there is one.
 fn declared(text: &[u8]) -> Option<&[u8]> {
     let label = label(text)?;
     Some(&text[label])

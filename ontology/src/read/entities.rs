@@ -81,8 +81,8 @@ pub(super) fn expanded(text: &[u8]) -> Result<Flattened<'_>, EntityError> {
     Ok(Flattened { text: flat.into(), offsets })
 }
 
-/// Parses the entity reference at the start of a text. Returns the name of the entity and the length of the
-/// reference.
+/// Parses the entity reference (`&name;`) at the start of a text. Returns the name of the entity and the
+/// length of the reference; `None` if the text starts with no reference.
 fn reference(text: &[u8]) -> Option<(&[u8], usize)> {
     // Names of entities are short; a longer text is not a reference.
     let end = text.iter().take(256).position(|&byte| byte == b';')?;
@@ -95,7 +95,7 @@ struct Expansion<'a> {
     entities: &'a HashMap<&'a [u8], &'a [u8]>,
     /// Expansions of entities, so that each one is computed once.
     cache: HashMap<&'a [u8], Vec<u8>>,
-    /// Number of bytes that may still be added.
+    /// Number of bytes that the expansions may still add to the document.
     budget: usize,
 }
 
@@ -105,7 +105,7 @@ impl<'a> Expansion<'a> {
         let Some((&name, &value)) = self.entities.get_key_value(name) else {
             return Err(format!("the entity `&{};` is not declared", display_name()));
         };
-        // This also stops cycles.
+        // The depth limit also stops cyclic entities.
         if depth == MAX_ENTITY_DEPTH {
             return Err(format!(
                 "the entity `&{};` contains itself, or others more than {MAX_ENTITY_DEPTH} deep",
@@ -152,7 +152,8 @@ impl<'a> Expansion<'a> {
     }
 }
 
-/// Parses the document type declaration of a document with an internal subset. External entities are ignored.
+/// Parses the document type declaration of an XML document. Returns `None` if there is none, or if it
+/// has no internal subset. External entities are ignored.
 fn declarations(text: &[u8]) -> Option<Declarations<'_>> {
     let start = text.windows(9).position(|window| window == b"<!DOCTYPE")?;
     // Only the XML declaration, comments and processing instructions may precede it.
@@ -195,7 +196,8 @@ fn declarations(text: &[u8]) -> Option<Declarations<'_>> {
     }
 }
 
-/// Returns the length of a declaration. A `>` in quotes does not end it.
+/// Returns the length of the markup declaration (`<!…>`) at the start of a text. A `>` in quotes does
+/// not end the declaration.
 fn declaration_length(text: &[u8]) -> Option<usize> {
     let mut quote = None;
     for (index, &byte) in text.iter().enumerate() {
@@ -209,7 +211,8 @@ fn declaration_length(text: &[u8]) -> Option<usize> {
     None
 }
 
-/// Parses `<!ENTITY name "value">`, with quotes of either kind. Returns name and value.
+/// Parses an entity declaration `<!ENTITY name "value">`, with quotes of either kind. Returns name and
+/// value.
 fn entity(declaration: &[u8]) -> Option<(&[u8], &[u8])> {
     let tail = declaration.strip_prefix(b"<!ENTITY")?.trim_ascii_start();
     let end = tail.iter().position(u8::is_ascii_whitespace)?;

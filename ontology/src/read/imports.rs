@@ -29,7 +29,7 @@ use crate::triples::Document;
 /// Name of the catalog that Protégé writes.
 const CATALOG: &str = "catalog-v001.xml";
 
-/// Limit on the depth of the search in a directory.
+/// Maximum depth of the subdirectories that are searched for imports.
 const MAX_DEPTH: usize = 4;
 
 /// Number of ancestor directories in which directories named like segments of the URL are searched.
@@ -43,7 +43,7 @@ pub(crate) enum Resolution {
     /// A document that has already been read.
     Loaded,
     File(PathBuf),
-    /// An embedded text, with a name for messages.
+    /// An embedded document: its name for messages, and its text.
     Embedded(&'static str, &'static str),
 }
 
@@ -75,7 +75,8 @@ impl Resolver {
         Ok(Self { catalogs, files: OnceCell::new(), directories: options.directories.clone() })
     }
 
-    /// Resolves an import of the document at `importer` (`None` if the document has no path).
+    /// Resolves an import of the document at `importer` (`None` if the document has no path). Returns
+    /// `None` if the import is not found.
     pub(crate) fn resolve(
         &self,
         import: &str,
@@ -137,7 +138,7 @@ fn is_published_tomasys(import: &str) -> bool {
     })
 }
 
-/// Searches a file in a repository that is checked out next to the importer's repository.
+/// Searches for the imported file in a repository that is checked out next to the importer's repository.
 fn checked_out(import: &str, importer: &Path) -> Option<PathBuf> {
     let plain = |segment: &&str| {
         !segment.starts_with('.') && segment.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c))
@@ -159,7 +160,7 @@ fn checked_out(import: &str, importer: &Path) -> Option<PathBuf> {
     None
 }
 
-/// Compares ontology IRIs, which are written with and without a final `#` or `/`.
+/// Returns `true` if two ontology IRIs are equal, apart from a final `#` or `/`.
 fn same_iri(left: &str, right: &str) -> bool {
     left.trim_end_matches(['#', '/']) == right.trim_end_matches(['#', '/'])
 }
@@ -208,7 +209,7 @@ fn candidates(directory: &Path, depth: usize) -> Vec<OntologyFile> {
     files
 }
 
-/// Returns the ontology IRI that the start of a file declares.
+/// Returns the ontology IRI that the start of a file declares, if there is one.
 fn declared_iri(path: &Path) -> Option<String> {
     use std::io::Read;
     if !path.is_file() {
@@ -219,8 +220,8 @@ fn declared_iri(path: &Path) -> Option<String> {
     document::ontology_iri(&head)
 }
 
-/// Returns the file that matches an import best: by ontology IRI, otherwise by file name; ties are resolved by
-/// the number of common path segments.
+/// Returns the file that best matches an import: by ontology IRI, otherwise by file name. Among several
+/// matches, the path with the most segments of the import IRI wins.
 fn best_match(import: &str, files: &[OntologyFile]) -> Option<PathBuf> {
     let by_iri: Vec<_> =
         files.iter().filter(|file| file.iri.as_deref().is_some_and(|iri| same_iri(iri, import))).collect();

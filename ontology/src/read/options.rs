@@ -21,8 +21,8 @@ pub struct ReadOptions {
     pub closed: bool,
     /// If `true`, imports are not followed (for documents that change a knowledge base).
     pub without_imports: bool,
-    /// Number of documents that were read before. Blank nodes of the new documents get names that differ from
-    /// theirs.
+    /// Number of documents that were read before. Blank nodes of the new documents get names that differ
+    /// from those of the earlier documents.
     pub documents_before: usize,
     /// Entities that the documents need not declare (those of the knowledge base that they refer to).
     pub known: Vec<(EntityKind, Iri)>,

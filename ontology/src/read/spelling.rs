@@ -4,10 +4,11 @@
 use super::text::Text;
 use crate::error::{Error, Position, Warning};
 
-/// Number of warnings, from the first one, that are located: each one costs a search through all documents.
+/// Maximum number of warnings that get a position, because each search visits all documents.
 const MAX_SEARCHES: usize = 100;
 
-/// Sets the positions of undeclared names to their first occurrence.
+/// Sets the position of each warning about an undeclared name to the first occurrence of the name in the
+/// documents.
 pub(super) fn locate(warnings: &mut [Warning], texts: &[(String, Text)]) {
     let undeclared = |warning: &&mut Warning| matches!(warning, Warning::Undeclared { .. });
     let mut unlocated: Vec<&mut Warning> =
@@ -27,7 +28,8 @@ pub(super) fn locate(warnings: &mut [Warning], texts: &[(String, Text)]) {
     }
 }
 
-/// Adds a position to an error without one, if its document contains the IRI that the error is about.
+/// Adds a position to an error without one, if its document contains the IRI that is the subject of the
+/// error.
 pub(super) fn placed(error: Error, texts: &[(String, Text)]) -> Error {
     match error {
         Error::TooDeep { file, about: Some(iri), position: None, deepest } => {
@@ -39,7 +41,8 @@ pub(super) fn placed(error: Error, texts: &[(String, Text)]) -> Error {
     }
 }
 
-/// Returns the position of the first IRI that a message contains in angle brackets.
+/// Returns the position of an IRI in the documents: of the first IRI that `message` contains in angle
+/// brackets.
 pub(super) fn place(message: &str, texts: &[(String, Text)]) -> Option<Position> {
     let iri = message.split_once('<')?.1.split_once('>')?.0;
     texts.iter().find_map(|(name, text)| {
@@ -49,8 +52,8 @@ pub(super) fn place(message: &str, texts: &[(String, Text)]) -> Option<Position>
     })
 }
 
-/// Returns the offset of an IRI in a text: of the whole IRI in brackets or quotes, or of its local name after
-/// `:` or `#`.
+/// Returns the first offset of an IRI in a text: of the whole IRI in brackets or quotes, or of its local
+/// name after `:` or `#`.
 fn offset(iri: &str, text: &str) -> Option<usize> {
     let whole = spelled(text, iri, |c| matches!(c, '<' | '"' | '\''));
     let local = iri.rsplit(['#', '/', ':']).next().filter(|local| !local.is_empty());

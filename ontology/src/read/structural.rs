@@ -72,7 +72,8 @@ impl Structural<'_> {
     }
 }
 
-/// Nesting levels of elements or parentheses around an expression: ontology, axiom, annotations.
+/// Nesting levels allowed in addition to those of an expression: ontology, axiom and annotations around
+/// the expression.
 const NESTING_MARGIN: usize = 8;
 
 /// Iterates over the words of functional-style syntax with their offsets: parentheses, equality signs and
@@ -119,7 +120,8 @@ fn string_length(text: &[u8]) -> usize {
     text.len()
 }
 
-/// Returns the first name with an undeclared prefix. OWL's own prefixes need no declaration.
+/// Returns the offset and the prefix of the first name with an undeclared prefix. OWL's own prefixes
+/// need no declaration.
 fn undeclared_prefix(words: Words) -> Option<(usize, String)> {
     let mut declared: Vec<&[u8]> =
         vec![b"owl:", b"rdf:", b"rdfs:", b"xsd:", b"xml:", b"_:", b"swrl:", b"swrlb:"];
@@ -139,8 +141,8 @@ fn undeclared_prefix(words: Words) -> Option<(usize, String)> {
     None
 }
 
-/// Removes a duplicate `_:` from blank nodes: the readers keep it as part of the label, and the writer adds
-/// another one.
+/// Removes a duplicate `_:` from the labels of blank nodes: horned-owl's readers keep the prefix as part
+/// of the label, and the writer adds another prefix.
 fn relabelled(ntriples: Vec<u8>) -> Vec<u8> {
     const DOUBLE_PREFIX: &[u8] = b"_:_:";
     if !ntriples.windows(DOUBLE_PREFIX.len()).any(|window| window == DOUBLE_PREFIX) {

@@ -57,10 +57,10 @@ fn skip_comments(mut text: &[u8]) -> &[u8] {
     }
 }
 
-/// Returns `true` if a text with `<` at the start begins with an IRI (Turtle) and not with an XML tag. An IRI
-/// ends without white space, and contains a colon or a character that element names cannot contain. An element
-/// name with a colon is followed by white space for the declaration of its prefix, except after a document type
-/// declaration.
+/// Returns `true` if a text that starts with `<` begins with an IRI (Turtle) and not with an XML tag. An
+/// IRI ends without white space, and contains a colon or a character that element names cannot contain.
+/// An element name with a colon is followed by white space for the declaration of its prefix, except
+/// after a document type declaration.
 fn is_iri_reference(text: &[u8]) -> bool {
     let Some(end) = text.iter().position(|&byte| byte == b'>' || byte.is_ascii_whitespace()) else {
         return false;
@@ -76,8 +76,8 @@ fn is_iri_reference(text: &[u8]) -> bool {
             || inside.is_empty())
 }
 
-/// Returns the name of the root element, after XML declaration, comments and document type, and the text after
-/// the name.
+/// Returns the name of the root element of an XML document, and the text after the name. Skips XML
+/// declaration, comments and document type.
 fn xml_root(mut text: &[u8]) -> Option<(&[u8], &[u8])> {
     loop {
         text = &text[text.iter().position(|&byte| byte == b'<')? + 1..];
@@ -96,7 +96,7 @@ fn xml_root(mut text: &[u8]) -> Option<(&[u8], &[u8])> {
     }
 }
 
-/// Returns the name of the root element if it is not closed.
+/// Returns the name of the root element of an XML document, if the root element is not closed.
 pub(super) fn unclosed_root(text: &[u8]) -> Option<String> {
     let (root, tail) = xml_root(text)?;
     let close = [b"</", root].concat();
@@ -117,8 +117,9 @@ pub(super) fn unclosed_root(text: &[u8]) -> Option<String> {
     Some(String::from_utf8_lossy(root).into_owned())
 }
 
-/// Returns the offset of the first closing tag that does not match the open element, or the end of the text if
-/// an element is not closed. The error is the offset at which the nesting exceeds `max_depth`.
+/// Returns the offset of the first closing tag that does not match the open element or of markup that is
+/// not closed, or the end of the text if an element is not closed; `None` if all tags match. The error
+/// is the offset at which the nesting exceeds `max_depth`.
 pub(super) fn mismatched_tag(text: &[u8], max_depth: usize) -> Result<Option<usize>, usize> {
     let (mut open, mut cursor) = (Vec::new(), 0);
     while let Some((start, end)) = next_markup(text, cursor) {
@@ -140,12 +141,12 @@ pub(super) fn mismatched_tag(text: &[u8], max_depth: usize) -> Result<Option<usi
     Ok((!open.is_empty()).then_some(text.len()))
 }
 
-/// A rewritten document with a map of its offsets to the original text.
+/// A rewritten document, with a map from its offsets to offsets in the original text.
 #[derive(Debug)]
 pub(super) struct Flattened<'a> {
     pub text: Cow<'a, [u8]>,
-    /// Pairs of equal places after each change: offset in the rewritten text, offset in the original text;
-    /// increasing.
+    /// Corresponding positions after each change: offset in the rewritten text, and offset in the
+    /// original text. Both are increasing.
     pub offsets: Vec<(usize, usize)>,
 }
 
@@ -154,7 +155,7 @@ impl<'a> Flattened<'a> {
         Self { text: Cow::Borrowed(text), offsets: Vec::new() }
     }
 
-    /// Maps an offset in the rewritten text to the original text.
+    /// Converts an offset in the rewritten text to the offset in the original text.
     pub(super) fn origin(&self, offset: usize) -> usize {
         let after = self.offsets.partition_point(|&(rewritten, _)| rewritten <= offset);
         let (rewritten, original) = after.checked_sub(1).map_or((0, 0), |last| self.offsets[last]);
@@ -162,8 +163,8 @@ impl<'a> Flattened<'a> {
     }
 }
 
-/// Removes comments and converts CDATA sections to ordinary text: horned-owl includes their delimiters in
-/// literals.
+/// Removes comments from an XML document and converts CDATA sections to ordinary text, because
+/// horned-owl includes the delimiters of both in literals.
 pub(super) fn flattened(text: &[u8]) -> Flattened<'_> {
     const SECTION: &[u8] = b"<![CDATA[";
     let (mut flat, mut offsets, mut cursor, mut copied) = (Vec::new(), Vec::new(), 0, 0);
@@ -192,8 +193,8 @@ pub(super) fn flattened(text: &[u8]) -> Flattened<'_> {
     Flattened { text: Cow::Owned(flat), offsets }
 }
 
-/// Returns start and end of the next tag, comment, CDATA section or processing instruction after `from`. The
-/// end is `None` if the markup is not closed.
+/// Returns start and end of the next tag, comment, CDATA section or processing instruction after `from`,
+/// or `None` if there is none. The end is `None` if the markup is not closed.
 fn next_markup(text: &[u8], from: usize) -> Option<(usize, Option<usize>)> {
     let start = from + text[from..].iter().position(|&byte| byte == b'<')?;
     let markup = &text[start..];

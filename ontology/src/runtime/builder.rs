@@ -66,7 +66,7 @@ impl RuntimeBuilder {
         Self { equality, ..self }
     }
 
-    /// Sets the treatment of conclusions without a cause. Default: [`Mode::Retract`].
+    /// Sets the treatment of derived facts whose premises no longer hold. Default: [`Mode::Retract`].
     #[must_use]
     pub fn mode(self, mode: Mode) -> Self {
         Self { mode, ..self }
@@ -78,7 +78,8 @@ impl RuntimeBuilder {
         Self { limits, ..self }
     }
 
-    /// Reads all documents and rules and derives the consequences. Also returns the warnings.
+    /// Reads all documents and rules, and derives the consequences. Returns the runtime and the
+    /// warnings.
     ///
     /// # Errors
     /// Returns all errors of all documents and rules: the errors of [`read_files`], and

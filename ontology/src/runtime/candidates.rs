@@ -1,18 +1,19 @@
 //! The designs for an objective, with their utility and the reasons that exclude them: the selection rule of
 //! MROS.
 //!
-//! A design is excluded if it is unavailable, if the error log contains its failure for the objective, or if
-//! the comparison of a measurement with one of its estimations by the attribute's `qa_comparison_operator` is
-//! true (`<`: measured below estimated). An attribute without a measurement excludes no design. MROS raises an
-//! exception in this case, and for a design that violates two attributes. The utility is PLANTA's `fd_utility`
-//! if the knowledge base concludes it, otherwise the estimation of the attribute type `performance` if there is
+//! A design is excluded if it is unavailable, if the error log contains its failure for the objective,
+//! or if a measurement excludes one of its estimations. The last condition compares both values by the
+//! attribute's `qa_comparison_operator` (`<` excludes the design if the measured value is below the
+//! estimation). An attribute without a measurement excludes no design. MROS raises an exception in this
+//! case, and for a design that violates two attributes. The utility is PLANTA's `fd_utility` if the
+//! knowledge base concludes it, otherwise the estimation of the attribute type `performance` if there is
 //! exactly one, otherwise 0.001.
 //!
-//! Each design also has the requirements of the objective that its estimations do not meet. Only the rules of
-//! the knowledge base define on which side of a bound a value has to be (MROS's `QAenergy`: above the bound is
-//! an error). Therefore the rules are evaluated on a copy of the engine: the objective is grounded with the
-//! design, and the estimation is asserted as the measured value. The requirement is missed if the objective is
-//! then in error.
+//! Each design also has the requirements of the objective that its estimations do not meet. Only the
+//! rules of the knowledge base define on which side of a bound a value has to be (MROS's `QAenergy`: a
+//! value above the bound is an error). Therefore the rules are evaluated on a copy of the engine: the
+//! objective is grounded with the design, and the estimation is asserted as the measured value. The
+//! requirement is missed if the objective is then in error.
 
 use std::collections::BTreeMap;
 
@@ -35,9 +36,9 @@ pub struct Candidate {
     pub design: Individual,
     /// Utility; larger is better.
     pub utility: BigRational,
-    /// Reasons that exclude the design; empty if it can be selected.
+    /// Reasons that exclude the design; empty if the design can be selected.
     pub rejections: Vec<Rejection>,
-    /// Requirements of the objective that its estimations do not meet.
+    /// Requirements of the objective that the estimations of the design do not meet.
     pub missed: Vec<Missed>,
 }
 
@@ -49,13 +50,13 @@ pub enum Rejection {
     Unavailable,
     /// The error log contains a failure of the design for this objective.
     Failed,
-    /// A measurement is on the wrong side of an estimation.
+    /// The comparison of a measurement with an estimation excludes the design.
     Violates {
         /// Local name of the attribute type.
         attribute: String,
         /// Measured value, in the unit of the attribute type.
         measured: BigRational,
-        /// The comparison `measured operator estimation` that excludes the design.
+        /// Comparison operator. The design is excluded because `measured operator estimation` is true.
         operator: String,
         /// Estimated value of the design.
         estimation: BigRational,
@@ -76,8 +77,9 @@ pub struct Missed {
 }
 
 impl Runtime {
-    /// Returns the designs that solve an objective's function, sorted by IRI. Their utility is the estimation
-    /// of the attribute type with the local name `utility_attribute`, or MROS's utility if it is `None`.
+    /// Returns the designs that solve an objective's function, sorted by IRI. The utility of a design is
+    /// its estimation of the attribute type with the local name `utility_attribute` (0 without an
+    /// estimation), or MROS's utility if `utility_attribute` is `None`.
     ///
     /// # Errors
     /// Returns [`Error::Unknown`] if there is no such objective, [`Error::Engine`] if the rules exceed their
@@ -126,7 +128,7 @@ impl Runtime {
         designs
     }
 
-    /// Returns a design's estimation of the attribute type with this local name.
+    /// Returns a design's estimation of the attribute type with this local name, if there is one.
     fn estimation(&self, design: Symbol, attribute: &str) -> Option<BigRational> {
         let facts = self.facts();
         let is_of = |value: &Symbol| {
@@ -196,7 +198,8 @@ impl Runtime {
         copy.error_status(&name)
     }
 
-    /// Ends a cycle and returns the error status of an objective.
+    /// Ends the cycle, and returns the error status of an objective; `None` if the objective is not in
+    /// error.
     fn error_status(&mut self, objective: &str) -> Result<Option<String>, Error> {
         self.conclude()?;
         let objective_state = self.objectives().into_iter().find(|state| state.individual.iri == objective);
@@ -221,7 +224,7 @@ fn rejections(facts: Facts, design: Symbol, objective: Symbol) -> Vec<Rejection>
     rejections
 }
 
-/// Returns the reason why an estimation excludes its design, if it does.
+/// Returns the reason why an estimation excludes its design; `None` if it does not.
 fn violation(facts: Facts, estimation: Symbol) -> Option<Rejection> {
     let &kind = facts.objects(estimation, terms::IS_TYPE).first()?;
     let operator = facts.texts(kind, terms::OPERATOR).pop()?;

@@ -12,16 +12,17 @@ use crate::tomasys::terms::{self, Term};
 use crate::tomasys::{Individual, View};
 use crate::vocab::owl;
 
-/// Treatment of a conclusion whose cause no longer holds.
+/// Treatment of a derived fact whose premises no longer hold.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mode {
     /// The conclusion is retracted.
     #[default]
     Retract,
-    /// The conclusion remains, as in the MROS reasoner. Each [`Runtime::conclude`] turns conclusions into
-    /// assertions, and only assertions count for queries. A design's realisability is removed when a component
-    /// that had failed or recovered reports again, a grounding's status with the grounding, and an objective's
-    /// status when the objective is grounded. A design's error log is never removed.
+    /// The conclusion remains, as in the MROS reasoner. Each [`Runtime::conclude`] turns conclusions
+    /// into assertions, and only assertions count for queries. A design's realisability is removed when
+    /// a component that had failed or recovered reports again. The status of a grounding is removed with
+    /// the grounding, and the status of an objective when the objective is grounded. A design's error
+    /// log is never removed.
     Latch,
 }
 
@@ -30,9 +31,9 @@ pub enum Mode {
 pub struct Runtime {
     pub(super) engine: Engine,
     pub(super) mode: Mode,
-    /// In latch mode, facts that may have been concluded since the last cycle.
+    /// In latch mode, facts that may have been derived since the last cycle.
     pub(super) pending: BTreeSet<Fact>,
-    /// Derivations of latched facts.
+    /// Maps each latched fact, i.e. each conclusion that became an assertion, to its derivation.
     pub(super) reasons: BTreeMap<Fact, Derivation>,
     /// Relations with asserted facts, and their arities.
     pub(super) relations: BTreeSet<(Symbol, usize)>,
@@ -51,22 +52,22 @@ impl Runtime {
         Self { engine, mode, pending, reasons: BTreeMap::new(), relations }
     }
 
-    /// The engine, for queries of facts and derivations.
+    /// Returns the engine, for queries of facts and derivations.
     pub fn engine(&self) -> &Engine {
         &self.engine
     }
 
-    /// The engine, for interning names. Changes of facts must use [`Runtime::apply`].
+    /// Returns the engine, for interning names. Changes of facts must use [`Runtime::apply`].
     pub fn engine_mut(&mut self) -> &mut Engine {
         &mut self.engine
     }
 
-    /// The typed view of all facts that hold.
+    /// Returns the typed view of all facts that hold.
     pub fn view(&self) -> View<'_> {
         View::new(&self.engine)
     }
 
-    /// Changes assertions. Returns the resulting change of all facts.
+    /// Changes assertions. Returns the resulting change of all facts that hold.
     ///
     /// # Errors
     /// Returns [`Error::Engine`] if the rules exceed their limits; the runtime is then unchanged.
@@ -85,7 +86,8 @@ impl Runtime {
         Ok(net)
     }
 
-    /// Changes assertions and rules in one step; see [`crate::Stated::change`].
+    /// Changes assertions and, if `program` is given, the rules in one step; see
+    /// [`crate::Stated::change`].
     ///
     /// # Errors
     /// Returns the errors of [`Engine::change`]; the engine is then unchanged.
@@ -105,8 +107,9 @@ impl Runtime {
         Ok(net)
     }
 
-    /// Ends a cycle. Returns the violations. In latch mode without violations, turns conclusions into
-    /// assertions. The MROS reasoner does not adapt while there are violations.
+    /// Ends a cycle of the adaptation loop and returns the violated constraints. In latch mode without
+    /// violations, turns conclusions into assertions. The MROS reasoner does not adapt while there are
+    /// violations.
     ///
     /// # Errors
     /// Returns the errors of [`Runtime::apply`].
@@ -125,7 +128,8 @@ impl Runtime {
         Ok(violations)
     }
 
-    /// Returns `true` if a fact is a conclusion about individuals that a reasoner stores.
+    /// Returns `true` if a fact is derived, is not asserted, and belongs to a relation that reasoners
+    /// store: neither an auxiliary relation nor an equality.
     fn is_latched(&self, fact: &Fact) -> bool {
         let name = self.engine.symbols().value(fact.predicate).as_name().unwrap_or_default();
         let is_stored = !name.starts_with(INTERNAL) && ![owl::SAME_AS, owl::DIFFERENT_FROM].contains(&name);
@@ -187,12 +191,13 @@ impl Runtime {
         self.apply(delta)
     }
 
-    /// The facts that count for queries: assertions in latch mode, otherwise all facts that hold.
+    /// Returns the facts that count for queries: assertions in latch mode, otherwise all facts that
+    /// hold.
     pub(super) fn facts(&self) -> Facts<'_> {
         Facts::stated(&self.engine, self.mode == Mode::Latch)
     }
 
-    /// All facts that hold.
+    /// Returns all facts that hold.
     pub(super) fn all_facts(&self) -> Facts<'_> {
         Facts::new(&self.engine)
     }
@@ -201,7 +206,7 @@ impl Runtime {
         Individual::new(self.facts().name(symbol).unwrap_or_default())
     }
 
-    /// Returns the assertions of a property's values.
+    /// Returns the asserted facts with values of a property of `subject`.
     pub(super) fn statements(&self, subject: Symbol, property: Term) -> Vec<Fact> {
         let mut facts = Vec::new();
         for predicate in property.iter().filter_map(|name| self.engine.symbols().find_name(name)) {

@@ -21,12 +21,12 @@ pub struct NewObjective<'a> {
     pub function: &'a str,
     /// Non-functional requirements: IRI or local name of an attribute type, and a bound in its unit.
     pub requirements: Vec<(&'a str, Literal)>,
-    /// `true` if a better design is searched even without a problem.
+    /// Whether a better design is searched even while the objective has no problem.
     pub always_improve: bool,
 }
 
 impl Runtime {
-    /// Adds an objective, which is ungrounded at first.
+    /// Adds an objective. At first the objective is ungrounded, i.e. no design is selected for it.
     ///
     /// # Errors
     /// Returns [`Error::Unknown`] for an unknown function or attribute type, [`Error::Exists`],
@@ -80,9 +80,10 @@ impl Runtime {
         self.apply(Delta { insert: Vec::new(), delete })
     }
 
-    /// Grounds an objective: the design replaces any other design, and the objective's status is removed. In
-    /// retract mode, existing measurements are linked to the grounding, and recoveries count as noted. In latch
-    /// mode, as in MROS, only later measurements are linked.
+    /// Grounds an objective: selects the design, which replaces any other design, and removes the
+    /// objective's status. Returns the new grounding. In retract mode, existing measurements are linked
+    /// to the grounding, and recoveries count as noted if the objective is updatable. In latch mode, as
+    /// in MROS, only later measurements are linked.
     ///
     /// # Errors
     /// Returns [`Error::Unknown`] or [`Error::Engine`].
@@ -93,7 +94,7 @@ impl Runtime {
         self.ground_and_withdraw(objective, design, recoveries).map(|(grounding, _)| grounding)
     }
 
-    /// Grounds an objective like [`Runtime::ground`], but keeps all reports of components, including
+    /// Grounds an objective like [`Runtime::ground`], but keeps all reports about components, including
     /// recoveries. Returns the change of all facts.
     ///
     /// # Errors
@@ -140,8 +141,9 @@ impl Runtime {
         self.apply(Delta { insert, delete })
     }
 
-    /// Changes components that report their recovery to working, because the loop has noticed that objectives
-    /// are updatable. MROS does this before it plans for an updatable objective.
+    /// Withdraws the reports of components that have recovered, so that these components count as
+    /// working. MROS does this when its adaptation loop has noticed updatable objectives, before it
+    /// plans for them.
     ///
     /// # Errors
     /// Returns [`Error::Engine`].
@@ -150,9 +152,9 @@ impl Runtime {
         self.apply(Delta { insert: Vec::new(), delete })
     }
 
-    /// Unlinks measurements of the previous design's performance from the grounding of an objective, until they
-    /// are reported again. Measurements of the environment, whose attribute types have a
-    /// `qa_comparison_operator`, remain.
+    /// Unlinks measurements of the previous design's performance from the groundings of an objective,
+    /// until the values are reported again. Measurements of the environment, whose attribute types have
+    /// a `qa_comparison_operator`, remain.
     ///
     /// # Errors
     /// Returns [`Error::Unknown`] or [`Error::Engine`].
@@ -170,8 +172,9 @@ impl Runtime {
         self.apply(Delta { insert: Vec::new(), delete })
     }
 
-    /// Asserts the concluded failures of designs for an objective, so that they remain when its status is
-    /// removed. MROS keeps them indefinitely; here they are removed with the objective.
+    /// Asserts the derived failures of designs for an objective, so that the error log keeps them when
+    /// the objective's status is removed. MROS keeps failures indefinitely; here they are removed with
+    /// the objective.
     ///
     /// # Errors
     /// Returns [`Error::Unknown`] or [`Error::Engine`].
@@ -188,7 +191,7 @@ impl Runtime {
         self.apply(Delta { insert, delete: Vec::new() })
     }
 
-    /// Returns the assertions that components have recovered.
+    /// Returns the stated status facts of the components that have recovered.
     fn recoveries(&self) -> Vec<Fact> {
         let facts = self.facts();
         let recovered =
@@ -218,8 +221,8 @@ impl Runtime {
         kinds.flat_map(|kind| change::holders(facts, kind)).collect()
     }
 
-    /// Returns `fg_<design>`, with the objective's name as a suffix if another objective has a grounding with
-    /// this name.
+    /// Returns the IRI of a grounding: `fg_<design>`, with the objective's name as a suffix if another
+    /// objective has a grounding with this IRI.
     fn grounding_name(&self, objective: Symbol, design: Symbol) -> String {
         let facts = self.facts();
         let (design, owner) = (self.individual(design).name, self.individual(objective).name);
@@ -236,7 +239,8 @@ impl Runtime {
     }
 }
 
-/// Builds the IRI of a new individual. The error is O107.
+/// Converts the name of a new individual to an IRI. Returns O107 if the name has a character that IRIs
+/// do not allow.
 fn iri_of(name: &str) -> Result<String, Error> {
     let forbidden = |c: &char| c.is_whitespace() || c.is_control() || "<>\"{}|\\^`".contains(*c);
     match name.chars().find(forbidden) {

@@ -8,7 +8,7 @@ use crate::tomasys::Individual;
 use crate::tomasys::facts::Facts;
 use crate::tomasys::terms::{self, Term};
 
-/// Statuses that require another design, in MROS and its predecessor Metacontrol.
+/// Statuses of an objective that require another design, in MROS and its predecessor Metacontrol.
 const ERRORS: [&str; 6] =
     ["IN_ERROR_COMPONENT", "IN_ERROR_FR", "IN_ERROR_NFR", "INTERNAL_ERROR", "EXTERNAL_ERROR", "UPDATABLE"];
 
@@ -22,21 +22,21 @@ pub struct Objective {
     /// Statuses that the rules conclude (`UNGROUNDED`, `IN_ERROR_COMPONENT`, …); empty if there is no problem.
     /// Two statuses are a contradiction.
     pub statuses: Vec<String>,
-    /// `true` if a component has recovered, so that a better design may be available.
+    /// Whether a component has recovered, so that a better design may be available.
     pub updatable: bool,
-    /// `true` if a better design is searched even without a problem.
+    /// Whether a better design is searched even while the objective has no problem.
     pub always_improve: bool,
     /// Designs that currently provide the function.
     pub groundings: Vec<Grounding>,
 }
 
 impl Objective {
-    /// Returns `true` if a status is an error.
+    /// Returns `true` if a status of the objective is an error.
     pub fn is_in_error(&self) -> bool {
         self.statuses.iter().any(|status| ERRORS.contains(&status.as_str()))
     }
 
-    /// Returns `true` if a design should be selected now.
+    /// Returns `true` if a design should be selected for the objective now.
     pub fn wants_design(&self) -> bool {
         self.is_in_error()
             || self.updatable
@@ -59,7 +59,7 @@ pub struct Grounding {
 }
 
 impl Runtime {
-    /// All objectives, sorted by IRI.
+    /// Returns all objectives, sorted by IRI.
     pub fn objectives(&self) -> Vec<Objective> {
         let facts = self.facts();
         let mut objectives: Vec<Objective> =
@@ -68,7 +68,7 @@ impl Runtime {
         objectives
     }
 
-    /// Returns one derivation for each status of an objective, and for its being updatable.
+    /// Returns one derivation for each status of an objective, and one if the objective is updatable.
     ///
     /// # Errors
     /// Returns [`Error::Unknown`] if there is no such objective.
@@ -84,7 +84,8 @@ impl Runtime {
         Ok(derivations)
     }
 
-    /// The facts with the values of a property that the current [`Mode`](super::Mode) takes into account.
+    /// Returns the facts with the values of a property of `subject`, as far as they count in the current
+    /// [`Mode`](super::Mode).
     fn property_facts(&self, subject: Symbol, property: Term) -> Vec<Fact> {
         let values = self.facts().objects(subject, property);
         let symbols = self.engine.symbols();

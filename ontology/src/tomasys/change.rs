@@ -21,8 +21,8 @@ pub enum Status {
     Working,
 }
 
-/// Spellings of a status in the vocabularies in use: strings in MROS, other strings in PLANTA, booleans in
-/// older ones.
+/// Returns the spellings of a status in the supported vocabularies: a string in MROS, another string in
+/// PLANTA, and a boolean in older vocabularies.
 fn spellings(status: Status) -> Vec<Literal> {
     let (mros, planta, truth) = match status {
         Status::Failed => ("FALSE", "ERROR", false),
@@ -32,13 +32,13 @@ fn spellings(status: Status) -> Vec<Literal> {
     vec![Literal::string(mros), Literal::string(planta), Literal::Boolean(truth)]
 }
 
-/// Returns `true` if a status in any spelling is a failure.
+/// Returns `true` if a status, in any spelling, denotes a failure.
 pub(crate) fn is_failed(status: &str) -> bool {
     spells(Status::Failed, status)
 }
 
-/// Returns `true` if a status is a recovery. Vocabularies without a term for recovery use the status of a
-/// working component, which does not count.
+/// Returns `true` if a status denotes a recovery. Vocabularies without a term for recovery use the
+/// status of a working component, which does not count as a recovery.
 pub(crate) fn is_recovered(status: &str) -> bool {
     spells(Status::Recovered, status) && !spells(Status::Working, status)
 }
@@ -63,8 +63,8 @@ pub fn component_status(engine: &mut Engine, component: &str, status: Status) ->
     Ok(replace(engine, property, subject, Some(value)))
 }
 
-/// Builds the update that sets the status of a component in a given spelling. The spelling is not checked, so
-/// that a wrong one violates a constraint of the knowledge base.
+/// Builds the update that sets the status of a component in a given spelling. The spelling is not
+/// checked, so that a wrong spelling violates a constraint of the knowledge base.
 ///
 /// # Errors
 /// Returns the errors of [`component_status`].
@@ -85,9 +85,9 @@ pub fn clear_component_status(engine: &mut Engine, component: &str) -> Result<De
     Ok(replace(engine, property, subject, None))
 }
 
-/// Builds the update that states that a function design, given by its IRI or local name, is not realisable,
-/// whatever the states of its components and the measurements are. If `realisable`, the update removes this
-/// statement.
+/// Builds the update that states that a function design, given by its IRI or local name, is not
+/// realisable, independently of component states and measurements. If `realisable`, the update removes
+/// this statement.
 ///
 /// # Errors
 /// Returns [`Error::Unknown`] if the knowledge base has no such design.
@@ -116,7 +116,7 @@ pub fn measured_value(engine: &mut Engine, attribute: &str, value: Literal) -> R
     if holders.is_empty() {
         let iri = facts.name(kind).unwrap_or_default();
         let name = local_name(iri);
-        // The namespace of the attribute type, and the prefix of MROS.
+        // The IRI has the namespace of the attribute type and the prefix `obs_` of MROS.
         let holder = format!("{}obs_{name}", &iri[..iri.len() - name.len()]);
         let holder = engine.symbols_mut().name(&holder);
         delta.insert = observation(engine.symbols_mut(), holder, kind, class);
@@ -149,7 +149,8 @@ pub fn unmeasured(engine: &mut Engine, attribute: &str) -> Result<Delta, Error> 
     Ok(Delta { insert: Vec::new(), delete })
 }
 
-/// Builds the facts by which `holder` holds measurements of a type.
+/// Builds the facts that make `holder` an individual that holds measurements of the attribute type
+/// `kind`.
 fn observation(symbols: &mut Symbols, holder: Symbol, kind: Symbol, class: &str) -> Vec<Fact> {
     let mut facts = vec![
         Fact::new(symbols.name(term_for(terms::QA_VALUE, class)), [holder]),
@@ -162,8 +163,8 @@ fn observation(symbols: &mut Symbols, holder: Symbol, kind: Symbol, class: &str)
     facts
 }
 
-/// Returns the individuals that hold measurements of an attribute type: the ones with `isMeasured` true, and
-/// the ones named `obs_…` as in MROS.
+/// Returns the individuals that hold measurements of an attribute type: individuals with `isMeasured`
+/// true, and individuals named `obs_…` as in MROS.
 pub(crate) fn holders(facts: Facts, kind: Symbol) -> Vec<Symbol> {
     let named = |holder| facts.name(holder).is_some_and(|iri| local_name(iri).starts_with("obs_"));
     let mut holders = facts.subjects(kind, terms::IS_TYPE);
@@ -178,7 +179,8 @@ fn groundings(facts: Facts, kind: Symbol) -> Vec<Symbol> {
     designs.flat_map(|design| facts.subjects(design, terms::TYPE_FD)).collect()
 }
 
-/// Builds the update after which `subject` has one asserted value of a property, or no value if it is `None`.
+/// Builds the update after which `value` is the only asserted value of a property of `subject`. Without
+/// `value`, the update removes all asserted values.
 pub fn replace(engine: &Engine, property: Symbol, subject: Symbol, value: Option<Symbol>) -> Delta {
     let pattern = [Some(subject), None];
     let rows = engine.matching(property, &pattern);

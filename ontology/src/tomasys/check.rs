@@ -14,7 +14,8 @@ use crate::owl::{
     ObjectPropertyExpression as Property, Ontology,
 };
 
-/// Checks a model. `engine` contains the consequences of `ontology`. The warnings are sorted.
+/// Checks a model for probable mistakes. `engine` contains the consequences of `ontology`. Returns the
+/// warnings, sorted.
 pub fn check(ontology: &Ontology, engine: &Engine) -> Vec<Warning> {
     let facts = Facts::new(engine);
     let mut warnings = functions(facts);
@@ -63,8 +64,8 @@ fn requirements(facts: Facts) -> Vec<Warning> {
     without_value.into_iter().map(warning).collect()
 }
 
-/// Reports attributes without a measurement that designs bound, or that have a comparison operator and
-/// estimations of designs.
+/// Reports attributes without a measurement that are needed for a comparison: a design bounds the
+/// attribute, or the attribute has a comparison operator and an estimation of a design.
 fn measurements(facts: Facts) -> Vec<Warning> {
     let estimated = |kind: Symbol| {
         let mut values = facts.subjects(kind, terms::IS_TYPE).into_iter();
@@ -122,7 +123,7 @@ fn any_differ(axioms: &[AnnotatedAxiom]) -> bool {
         .any(|(index, first)| values[index + 1..].iter().any(|second| first.differs(second)))
 }
 
-/// Returns the property of a functionality axiom.
+/// Returns the property of a functionality axiom; `None` for other axioms.
 fn functional(annotated: &AnnotatedAxiom) -> Option<&Iri> {
     match &annotated.axiom {
         Axiom::FunctionalDataProperty(property)
@@ -133,7 +134,7 @@ fn functional(annotated: &AnnotatedAxiom) -> Option<&Iri> {
     }
 }
 
-/// Returns property and subject of an assertion.
+/// Returns property and subject of a property assertion; `None` for other axioms.
 fn edge(annotated: &AnnotatedAxiom) -> Option<(&Iri, &Iri)> {
     match &annotated.axiom {
         Axiom::ObjectPropertyAssertion(Property::Property(property), subject, _)
@@ -142,7 +143,7 @@ fn edge(annotated: &AnnotatedAxiom) -> Option<(&Iri, &Iri)> {
     }
 }
 
-/// Returns the value of an assertion in N-Triples syntax.
+/// Returns the value of a property assertion in N-Triples syntax; `None` for other axioms.
 fn object(annotated: &AnnotatedAxiom) -> Option<String> {
     match &annotated.axiom {
         Axiom::ObjectPropertyAssertion(_, _, to) => Some(format!("<{to}>")),
@@ -155,7 +156,7 @@ fn value(literal: &Literal) -> Value {
     Value::parse(&literal.lexical, literal.datatype.as_deref(), literal.language.as_deref())
 }
 
-/// Kind of a status value, for messages.
+/// Returns the kind of a status value, for messages.
 fn kind(value: &Value) -> &'static str {
     match value {
         Value::Boolean(_) => "a boolean",
@@ -164,8 +165,9 @@ fn kind(value: &Value) -> &'static str {
     }
 }
 
-/// Reports asserted statuses of another kind than the property's ranges allow or, if it has no range, than
-/// rules compare it with.
+/// Reports asserted status values of an unexpected kind (boolean, number or string). The expected kind
+/// is given by the ranges of the property or, without a range, by the constants with which rules compare
+/// the property.
 fn statuses(ontology: &Ontology) -> Vec<Warning> {
     let properties =
         [terms::STATUS, terms::OBJECTIVE_STATUS, terms::GROUNDING_STATUS, terms::REALISABILITY].concat();
@@ -215,7 +217,7 @@ fn kinds_of_ranges(ontology: &Ontology, property: &str) -> BTreeSet<&'static str
     kinds
 }
 
-/// Returns the kinds of constants that rules compare the values of a property with.
+/// Returns the kinds of the constants with which rules compare the values of a property.
 fn tested_kinds(ontology: &Ontology, property: &str) -> BTreeSet<&'static str> {
     let atoms = ontology.rules.iter().flat_map(|rule| &rule.body);
     let constants = atoms.filter_map(|atom| match atom {

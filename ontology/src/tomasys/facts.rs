@@ -7,21 +7,22 @@ use super::terms::Term;
 use crate::error::Error;
 use crate::vocab::local_name;
 
-/// Queries an engine with the terms of the vocabulary table. A query combines the facts of all IRIs of a term.
+/// Queries of an engine by TOMASys term. A term can have several IRIs; a query combines the facts of all
+/// of them.
 #[derive(Clone, Copy)]
 pub(crate) struct Facts<'a> {
     engine: &'a Engine,
-    /// If `true`, only asserted facts count.
+    /// Whether only asserted facts count.
     only_stated: bool,
 }
 
 impl<'a> Facts<'a> {
-    /// Queries all facts that hold.
+    /// Creates queries of all facts that hold.
     pub(crate) fn new(engine: &'a Engine) -> Self {
         Self { engine, only_stated: false }
     }
 
-    /// Queries only asserted facts if `only_stated`, otherwise all facts that hold.
+    /// Creates queries of only the asserted facts if `only_stated`, otherwise of all facts that hold.
     pub(crate) fn stated(engine: &'a Engine, only_stated: bool) -> Self {
         Self { engine, only_stated }
     }
@@ -30,7 +31,8 @@ impl<'a> Facts<'a> {
         self.engine.symbols().value(symbol).as_name()
     }
 
-    /// Returns one column of the matching rows of a term's relations, sorted and without duplicates.
+    /// Returns one column of the rows that match a pattern in any relation of a term, sorted and without
+    /// duplicates.
     fn column(self, term: Term, pattern: &[Option<Symbol>], column: usize) -> Vec<Symbol> {
         let mut symbols = Vec::new();
         for predicate in term.iter().filter_map(|name| self.engine.symbols().find_name(name)) {
@@ -45,17 +47,17 @@ impl<'a> Facts<'a> {
         symbols
     }
 
-    /// Members of a class.
+    /// Returns the members of a class.
     pub(crate) fn members(self, class: Term) -> Vec<Symbol> {
         self.column(class, &[None], 0)
     }
 
-    /// Values of a property.
+    /// Returns the values of a property of `subject`.
     pub(crate) fn objects(self, subject: Symbol, property: Term) -> Vec<Symbol> {
         self.column(property, &[Some(subject), None], 1)
     }
 
-    /// Subjects with this value of a property.
+    /// Returns the subjects for which `object` is a value of the property.
     pub(crate) fn subjects(self, object: Symbol, property: Term) -> Vec<Symbol> {
         self.column(property, &[None, Some(object)], 0)
     }
@@ -74,7 +76,7 @@ impl<'a> Facts<'a> {
         self.literals(subject, property).contains(&&Literal::Boolean(false))
     }
 
-    /// Numeric value of a property, if it has exactly one value.
+    /// Returns the numeric value of a property, if the property has exactly one value.
     pub(crate) fn number(self, subject: Symbol, property: Term) -> Option<BigRational> {
         match self.literals(subject, property)[..] {
             [value] => value.as_rational(),
@@ -82,14 +84,15 @@ impl<'a> Facts<'a> {
         }
     }
 
-    /// Lexical forms of the values of a property, sorted.
+    /// Returns the lexical forms of the values of a property, sorted.
     pub(crate) fn texts(self, subject: Symbol, property: Term) -> Vec<String> {
         let mut texts: Vec<_> = self.literals(subject, property).into_iter().map(Literal::lexical).collect();
         texts.sort();
         texts
     }
 
-    /// Finds the member of a class with this IRI or local name. Also returns the IRI of the class.
+    /// Finds the member of a class with this IRI or local name. Returns its symbol and the IRI of the
+    /// class.
     ///
     /// # Errors
     /// Returns [`Error::Unknown`] with the existing names.

@@ -31,7 +31,7 @@ pub struct Individual {
     pub name: String,
 }
 
-/// Names that replace the local names of individuals, by IRI.
+/// Maps the IRIs of individuals to names that replace their local names.
 pub type CalledNames = BTreeMap<String, String>;
 
 impl Individual {
@@ -45,12 +45,13 @@ impl Individual {
 pub struct FunctionDesign {
     /// The design.
     pub individual: Individual,
-    /// The functions that it solves. There is one, unless the knowledge base states that several functions are
-    /// the same.
+    /// The functions that the design solves. There is one, unless the knowledge base states that several
+    /// functions are the same.
     pub solves: Vec<Individual>,
-    /// The components that it requires.
+    /// The components that the design requires.
     pub components: Vec<Individual>,
-    /// Estimated values by the local name of the attribute type, in the unit of the type.
+    /// Maps the local name of each estimated attribute type to the estimated value, in the unit of the
+    /// type.
     pub estimations: BTreeMap<String, BigRational>,
     /// Bounds on measured attributes.
     pub requirements: Vec<Requirement>,
@@ -60,7 +61,7 @@ pub struct FunctionDesign {
     pub utility: Option<BigRational>,
 }
 
-/// Bounds on a measured attribute.
+/// Bounds on the value of an attribute.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Requirement {
     /// Local name of the attribute type.
@@ -98,7 +99,7 @@ pub struct Action {
     pub individual: Individual,
     /// The functions that are required while the action runs.
     pub requires: Vec<Individual>,
-    /// Bounds on the designs that are selected for these functions.
+    /// Bounds on estimated attributes of the designs that are selected for these functions.
     pub quality: Vec<Quality>,
 }
 
@@ -113,7 +114,7 @@ pub struct Quality {
     pub context: Option<String>,
 }
 
-/// Values of a property by subject.
+/// Maps each subject of a property to its values, or each value to its subjects.
 type Edges = Rc<HashMap<Symbol, Vec<Symbol>>>;
 
 /// A view of all facts that hold in an engine.
@@ -122,7 +123,8 @@ pub struct View<'a> {
     engine: &'a Engine,
     /// Names that replace the local names of individuals.
     called: Option<&'a CalledNames>,
-    /// Cache of properties by IRI and direction.
+    /// Cache of property values, by the IRI of the property and the direction (`true` from values to
+    /// subjects).
     edges: RefCell<HashMap<(&'static str, bool), Edges>>,
 }
 
@@ -132,20 +134,21 @@ impl<'a> View<'a> {
         Self { engine, called: None, edges: RefCell::default() }
     }
 
-    /// Replaces the local names of individuals by the given names.
+    /// Replaces the local names of individuals by the names that `called` assigns to their IRIs.
     #[must_use]
     pub fn calling(self, called: &'a CalledNames) -> Self {
         Self { called: (!called.is_empty()).then_some(called), ..self }
     }
 
-    /// The named individuals of the class with this IRI.
+    /// Returns the named individuals of the class with this IRI, sorted by IRI.
     pub fn individuals_of(&self, class_iri: &str) -> Vec<Individual> {
         let Some(class) = self.engine.symbols().find_name(class_iri) else { return Vec::new() };
         let members = self.engine.matching(class, &[None]).filter_map(|row| self.individual(row[0]));
         sorted(members)
     }
 
-    /// The named individuals of all classes with this local name, in any namespace.
+    /// Returns the named individuals of all classes with this local name, in any namespace, sorted by
+    /// IRI.
     pub fn individuals_of_class_named(&self, class_name: &str) -> Vec<Individual> {
         let is_class = |&(predicate, arity): &(Symbol, usize)| {
             arity == 1 && self.name(predicate).is_some_and(|iri| local_name(iri) == class_name)
@@ -155,7 +158,8 @@ impl<'a> View<'a> {
         sorted(members.filter_map(|row| self.individual(row[0])))
     }
 
-    /// The values of a property (given by IRIs): individuals first, then literals, each sorted.
+    /// Returns the values of a property of a subject (both given by IRI): individuals first, then
+    /// literals, each sorted.
     pub fn values(&self, subject_iri: &str, property_iri: &str) -> Vec<Value> {
         let symbols = self.engine.symbols();
         let (Some(subject), Some(property)) =
@@ -170,22 +174,22 @@ impl<'a> View<'a> {
         values
     }
 
-    /// All functions, sorted by IRI.
+    /// Returns all functions, sorted by IRI.
     pub fn functions(&self) -> Vec<Individual> {
         self.members(terms::FUNCTION)
     }
 
-    /// All quality attribute types, sorted by IRI.
+    /// Returns all quality attribute types, sorted by IRI.
     pub fn attribute_types(&self) -> Vec<Individual> {
         self.members(terms::ATTRIBUTE_TYPE)
     }
 
-    /// All function designs.
+    /// Returns all function designs, sorted by IRI.
     pub fn function_designs(&self) -> Vec<FunctionDesign> {
         self.members(terms::FUNCTION_DESIGN).into_iter().map(|design| self.function_design(design)).collect()
     }
 
-    /// All components with their statuses.
+    /// Returns all components with their statuses, sorted by IRI.
     pub fn components(&self) -> Vec<Component> {
         let status = |component: &Individual| {
             let value = self.literals(&component.iri, terms::STATUS).into_iter().next();
@@ -195,7 +199,8 @@ impl<'a> View<'a> {
         components.map(|individual| Component { status: status(&individual), individual }).collect()
     }
 
-    /// All measured values: individuals with `isMeasured` true, and individuals named `obs_…` as in MROS.
+    /// Returns all measured values: of individuals with `isMeasured` true, and of individuals named
+    /// `obs_…` as in MROS.
     pub fn measurements(&self) -> Vec<Measurement> {
         let measured = |value: &Individual| {
             value.name.starts_with("obs_")
@@ -209,7 +214,7 @@ impl<'a> View<'a> {
         self.members(terms::QA_VALUE).into_iter().filter(measured).filter_map(measurement).collect()
     }
 
-    /// All actions with the functions that they require.
+    /// Returns all actions with the functions that they require, sorted by IRI.
     pub fn actions(&self) -> Vec<Action> {
         let action = |individual: Individual| {
             let requires = self.objects(&individual.iri, terms::REQUIRES_F);
@@ -270,8 +275,8 @@ impl<'a> View<'a> {
         sorted(term.iter().flat_map(|class| self.individuals_of(class)))
     }
 
-    /// Returns the values of a property by subject, or its subjects by value if `inverse`. Reads the engine
-    /// only once.
+    /// Returns the map from subjects to values of a property, or from values to subjects if `inverse`.
+    /// Queries the engine only once per property and direction.
     fn edges(&self, property: &'static str, inverse: bool) -> Edges {
         if let Some(edges) = self.edges.borrow().get(&(property, inverse)) {
             return edges.clone();
@@ -302,7 +307,7 @@ impl<'a> View<'a> {
         sorted(self.related(iri, term, true).into_iter().filter_map(|symbol| self.individual(symbol)))
     }
 
-    /// Literal values, sorted by text.
+    /// Returns the literal values of a property of a subject, sorted by text.
     fn literals(&self, iri: &str, term: Term) -> Vec<&'a Literal> {
         let symbols = self.engine.symbols();
         let values = self.related(iri, term, false).into_iter();

@@ -39,7 +39,7 @@ pub(crate) const STATUS: Term = &[t::C_STATUS, www::C_STATUS, suave::C_STATUS];
 pub(crate) const REALISABILITY: Term = &[t::FD_REALISABILITY, www::FD_REALISABILITY, suave::FD_REALISABILITY];
 pub(crate) const AVAILABLE: Term = &[t::FD_AVAILABLE];
 pub(crate) const UTILITY: Term = &[www::FD_UTILITY, suave::FD_UTILITY, t::FD_EFFICACY];
-/// Utility that the rules of a knowledge base conclude.
+/// Utility of a design that the rules of a knowledge base conclude.
 pub(crate) const CONCLUDED_UTILITY: Term = &[www::FD_UTILITY, suave::FD_UTILITY];
 pub(crate) const TYPE_FD: Term = &[t::TYPE_FD];
 pub(crate) const HAS_QA_VALUE: Term = &[t::HAS_QA_VALUE];
@@ -56,8 +56,8 @@ pub(crate) const GROUNDING_STATUS: Term = &[t::FG_STATUS];
 pub(crate) const ERROR_LOG: Term = &[t::FD_ERROR_LOG];
 pub(crate) const OPERATOR: Term = &[t::QA_COMPARISON_OPERATOR];
 
-/// Returns the IRI of a term in the vocabulary that contains `other`, or the preferred IRI if the vocabulary
-/// lacks the term.
+/// Returns the IRI of a term in the vocabulary of the IRI `other`, or the preferred IRI if that
+/// vocabulary lacks the term.
 pub(crate) fn term_for(term: Term, other: &str) -> &'static str {
     let namespace = |iri: &str| iri.len() - crate::vocab::local_name(iri).len();
     let prefix = &other[..namespace(other)];

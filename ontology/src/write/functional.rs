@@ -7,7 +7,7 @@ use crate::owl::{
 };
 use crate::vocab::{is_reserved, rdfs, xsd};
 
-/// Writes the document. The order of the statements depends only on the ontology.
+/// Returns the document as text. The order of the statements depends only on the ontology.
 pub(super) fn document(ontology: &Ontology) -> String {
     let mut text = String::from("Prefix(xsd:=<http://www.w3.org/2001/XMLSchema#>)\n\n");
     let root = ontology.sources.first();
@@ -44,8 +44,8 @@ pub(super) fn document(ontology: &Ontology) -> String {
     text + ")\n"
 }
 
-/// Returns `false` for n-ary axioms with fewer than two members: they state nothing, and the syntax has no form
-/// for them.
+/// Returns `false` for n-ary axioms with fewer than two members: these axioms state nothing, and the
+/// syntax has no form for them.
 fn has_form(axiom: &Axiom) -> bool {
     let member_count = match axiom {
         Axiom::SameIndividual(items)
@@ -59,7 +59,7 @@ fn has_form(axiom: &Axiom) -> bool {
     member_count > 1
 }
 
-/// Returns the annotations of an annotation.
+/// Returns the annotations of an annotation as text, each with a trailing space.
 fn annotations_of(ontology: &Ontology, subject: &Iri, entry: &Annotation) -> String {
     let sorted = &ontology.annotation_annotations;
     let start = sorted
@@ -70,7 +70,8 @@ fn annotations_of(ontology: &Ontology, subject: &Iri, entry: &Annotation) -> Str
     nested.map(|(.., nested)| annotation(nested) + " ").collect()
 }
 
-/// Returns the axiom about an annotation property that an ontology stores as an annotation.
+/// Returns the axiom about an annotation property (subproperty, domain or range) that the ontology
+/// stores as the annotation `entry`; `None` for other annotations.
 fn annotation_axiom(ontology: &Ontology, subject: &Iri, entry: &Annotation) -> Option<String> {
     let AnnotationValue::Iri(value) = &entry.value else { return None };
     let is_annotative = |iri: &Iri| {

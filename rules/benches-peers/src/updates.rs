@@ -15,7 +15,7 @@ const RULES: &str = r#"
     solvesO(?fg, ?o) ^ fg_status(?fg, "IN_ERROR_COMPONENT") -> o_status(?o, "IN_ERROR_COMPONENT") .
 "#;
 
-/// Engine with three facts per design.
+/// Builds an engine with the given number of designs and three facts per design.
 pub fn build(designs: u32) -> Engine {
     let mut symbols = Symbols::new();
     let program = parse_rules(RULES, "status", &mut symbols, &Prefixes::new()).expect("rules");

@@ -119,7 +119,7 @@ impl Pairs {
     }
 }
 
-/// Relations, with flags for an index on the first and on the second column.
+/// Names of the relations, each with two flags: whether the first and the second column has an index.
 const INDEXES: [(&str, bool, bool); 19] = [
     ("requiresC", false, true),
     ("typeFD", true, true),

@@ -6,10 +6,10 @@ use std::hash::{Hash, Hasher};
 
 use crate::literal::Literal;
 
-/// Definition of a custom built-in: a test on literals, or a function of literals. It must be pure. The
-/// engine calls it in any order, and assumes that its results never change.
+/// Definition of a custom built-in: a test on literals, or a function of literals. A definition must be
+/// pure: the engine calls it in any order, and assumes that its results never change.
 pub trait Definition: Send + Sync {
-    /// IRI of the built-in in rules. It identifies the built-in.
+    /// Returns the IRI that denotes and identifies the built-in in rules.
     fn iri(&self) -> &'static str;
 
     /// Returns `true` if the built-in accepts this number of arguments, including the result of a function.
@@ -26,7 +26,8 @@ pub trait Definition: Send + Sync {
         false
     }
 
-    /// Returns the result of a function for its arguments (without the first). `None` if it is undefined.
+    /// Returns the result of a function. `arguments` omits the first argument, which is the result.
+    /// Returns `None` if the result is undefined.
     fn compute(&self, arguments: &[&Literal]) -> Option<Literal> {
         let _ = arguments;
         None

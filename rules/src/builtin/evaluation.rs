@@ -7,8 +7,8 @@ use super::{library, math, pattern, temporal, text, uri};
 use crate::literal::Literal;
 
 impl BuiltIn {
-    /// Returns the built-in of an IRI in `swrlb`, or in a version of the libraries `swrlm` and `temporal`
-    /// of `SWRLTab`.
+    /// Returns the built-in with an IRI of `swrlb`, or of any version of the libraries `swrlm` and
+    /// `temporal` of `SWRLTab`.
     pub fn from_iri(iri: &str) -> Option<Self> {
         match iri.strip_prefix(SWRLB) {
             Some(local) => Self::from_name(local),
@@ -71,7 +71,8 @@ impl BuiltIn {
         }
     }
 
-    /// Returns a constant pattern of the built-in with its error, if the pattern is invalid.
+    /// Returns the constant regular expression of the built-in with its error, if the expression is
+    /// invalid. `argument` returns the constant argument at a position.
     pub(crate) fn bad_pattern<'l>(
         self,
         argument: &impl Fn(usize) -> Option<&'l Literal>,
@@ -88,7 +89,8 @@ impl BuiltIn {
         Some((pattern.to_owned(), fault))
     }
 
-    /// Returns the result of a function for its arguments (without the first). `None` if it is undefined.
+    /// Returns the result of a function. `arguments` omits the first argument, which is the result.
+    /// Returns `None` if the result is undefined.
     pub fn compute(self, arguments: &[&Literal]) -> Option<Literal> {
         if !self.is_function() || !self.accepts(arguments.len() + 1) {
             return None;

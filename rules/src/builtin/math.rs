@@ -11,14 +11,15 @@ use crate::literal::{Decimal, Literal, ten_to};
 /// Maximum exponent of an exact power, and maximum number of digits for rounding.
 const MAX_EXPONENT: u32 = 1000;
 
-/// Numbers promoted to a common type.
+/// Numbers that are promoted to a common type.
 enum Numbers {
     Exact(Vec<BigRational>),
     Float(Vec<f64>),
     Double(Vec<f64>),
 }
 
-/// Value of a numeric or boolean function; `None` for other functions and unsuitable arguments.
+/// Returns the value of a numeric or boolean function; `None` for other functions and unsuitable
+/// arguments.
 pub(super) fn compute(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Literal> {
     if let (BuiltIn::BooleanNot, [Literal::Boolean(value)]) = (built_in, arguments) {
         return Some(Literal::Boolean(!value));

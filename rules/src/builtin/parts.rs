@@ -9,8 +9,8 @@ use super::uri;
 use crate::literal::{Decimal, Duration, Literal, Moment, MomentKind};
 
 impl BuiltIn {
-    /// Returns the values of the unknown parts. `None` if the whole cannot be composed of these and the
-    /// known parts.
+    /// Splits the value `whole` into its parts, and returns the values of the unknown parts. Returns
+    /// `None` if the value cannot be composed of these and the known parts.
     pub(super) fn parts(self, whole: &Literal, parts: &[Option<&Literal>]) -> Option<Vec<Literal>> {
         let canonical = match (self, whole) {
             (Self::AnyUri, Literal::Uri(text) | Literal::String(text)) => uri::parts(text)?,

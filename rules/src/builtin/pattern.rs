@@ -14,7 +14,8 @@ use crate::literal::Literal;
 /// Maximum compiled size of a pattern, in bytes.
 const SIZE_LIMIT: usize = 1 << 20;
 
-/// Returns `true` if the first argument contains a match of the second.
+/// Returns `true` if the first argument contains a match of the second, a regular expression. The third
+/// argument contains optional flags.
 pub(super) fn matches(arguments: &[&Literal]) -> bool {
     let texts: Option<Vec<&str>> = arguments.iter().map(|argument| as_text(argument)).collect();
     match texts.as_deref() {
@@ -37,8 +38,9 @@ pub(super) fn replace(arguments: &[&Literal]) -> Option<Literal> {
     Some(Literal::String(regex.replace_all(text, expand(replacement)?.as_str()).into()))
 }
 
-/// Distinct parts of the first argument between matches of the second, in order of occurrence. Empty for
-/// the empty text and for a pattern that matches the empty text ([2], section 7.6.4).
+/// Returns the distinct parts of the first argument between matches of the second, in order of
+/// occurrence. Empty for the empty text and for a pattern that matches the empty text ([2], section
+/// 7.6.4).
 pub(super) fn tokens(arguments: &[&Literal]) -> Vec<Literal> {
     let texts = arguments.iter().map(|argument| as_text(argument)).collect::<Option<Vec<&str>>>();
     let (text, pattern, flags) = match texts.as_deref() {
@@ -56,8 +58,8 @@ pub(super) fn tokens(arguments: &[&Literal]) -> Vec<Literal> {
         .collect()
 }
 
-/// Error of a pattern and its flags. A valid pattern above the size limit has no error, but matches
-/// nothing.
+/// Returns the error of a pattern and its flags. A valid pattern above the size limit has no error, but
+/// matches nothing.
 pub(super) fn fault(pattern: &str, flags: &str) -> Option<String> {
     build(pattern, flags).err().filter(|reason| !reason.contains("size limit"))
 }

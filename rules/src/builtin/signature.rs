@@ -19,7 +19,7 @@ macro_rules! built_ins {
         }
 
         impl BuiltIn {
-            /// All built-ins of SWRL and its data range atoms.
+            /// All built-ins of SWRL and the two data range tests, but no custom built-ins.
             pub const ALL: &'static [Self] = &[$(Self::$variant,)*];
 
             /// Returns the local name in the `swrlb` namespace, or the IRI of a custom built-in.
@@ -30,7 +30,8 @@ macro_rules! built_ins {
                 }
             }
 
-            /// Minimum and maximum number of arguments, and the kind. `None` for a custom built-in.
+            /// Returns the minimum and maximum number of arguments, and the direction of computation.
+            /// `None` for a custom built-in.
             pub(super) fn shape(self) -> Option<(usize, usize, Kind)> {
                 match self {
                     $(Self::$variant => Some(($minimum, $maximum, Kind::$kind)),)*
@@ -48,8 +49,8 @@ pub(super) enum Kind {
     Test,
     /// The first argument is computed from the others.
     Function,
-    /// The first argument is computed from the others, which are its parts; or the parts are computed from
-    /// the first.
+    /// The first argument is a value composed of the other arguments; or the other arguments are the parts
+    /// into which the first is split.
     Parts,
     /// The first argument is one of several values, which are computed from the others.
     Choice,
@@ -64,154 +65,161 @@ built_ins! {
     /// datatype. This is the complement of a data range, which exists in OWL but not in SWRL. Rule text:
     /// `not xsd:decimal(?x)`.
     OutsideDataRange "outsideDataRange" 2..=2 Test,
-    /// Equal values.
+    /// Tests that the two arguments are equal.
     Equal "equal" 2..=2 Test,
-    /// Values that do not compare equal, including incomparable values. False for ill-typed literals.
+    /// Tests that the two arguments do not compare equal; incomparable arguments pass. False for ill-typed
+    /// literals.
     NotEqual "notEqual" 2..=2 Test,
-    /// First < second.
+    /// Tests that the first argument is less than the second.
     LessThan "lessThan" 2..=2 Test,
-    /// First <= second.
+    /// Tests that the first argument is less than or equal to the second.
     LessThanOrEqual "lessThanOrEqual" 2..=2 Test,
-    /// First > second.
+    /// Tests that the first argument is greater than the second.
     GreaterThan "greaterThan" 2..=2 Test,
-    /// First >= second.
+    /// Tests that the first argument is greater than or equal to the second.
     GreaterThanOrEqual "greaterThanOrEqual" 2..=2 Test,
     /// Sum of the second and all further arguments.
     Add "add" 3..=32 Function,
-    /// Second minus third.
+    /// Second argument minus the third.
     Subtract "subtract" 3..=3 Function,
     /// Product of the second and all further arguments.
     Multiply "multiply" 3..=32 Function,
-    /// Second divided by third.
+    /// Second argument divided by the third.
     Divide "divide" 3..=3 Function,
-    /// Second divided by third, truncated to an integer.
+    /// Second argument divided by the third, truncated to an integer.
     IntegerDivide "integerDivide" 3..=3 Function,
-    /// Remainder of the truncating division.
+    /// Remainder of the truncating division of the second argument by the third.
     Mod "mod" 3..=3 Function,
-    /// Second to the power of the third.
+    /// Second argument to the power of the third.
     Pow "pow" 3..=3 Function,
-    /// The second, unchanged.
+    /// Second argument, unchanged.
     UnaryPlus "unaryPlus" 2..=2 Function,
-    /// The second, negated.
+    /// Second argument, negated.
     UnaryMinus "unaryMinus" 2..=2 Function,
-    /// Absolute value.
+    /// Absolute value of the second argument.
     Abs "abs" 2..=2 Function,
-    /// Smallest integer not below.
+    /// Smallest integer that is not below the second argument.
     Ceiling "ceiling" 2..=2 Function,
-    /// Largest integer not above.
+    /// Largest integer that is not above the second argument.
     Floor "floor" 2..=2 Function,
-    /// Nearest integer, halves towards positive infinity.
+    /// Integer nearest to the second argument; halves are rounded towards positive infinity.
     Round "round" 2..=2 Function,
-    /// Nearest value with as many fractional digits as the third argument (by default 0), halves to even.
+    /// Second argument, rounded to the number of fractional digits in the third argument (by default 0);
+    /// halves are rounded to even.
     RoundHalfToEven "roundHalfToEven" 2..=3 Function,
-    /// Sine of radians.
+    /// Sine of the second argument, in radians.
     Sin "sin" 2..=2 Function,
-    /// Cosine of radians.
+    /// Cosine of the second argument, in radians.
     Cos "cos" 2..=2 Function,
-    /// Tangent of radians.
+    /// Tangent of the second argument, in radians.
     Tan "tan" 2..=2 Function,
-    /// Negation.
+    /// Boolean negation of the second argument.
     BooleanNot "booleanNot" 2..=2 Function,
-    /// Equal strings, ignoring case.
+    /// Tests that the two arguments are equal strings, ignoring case.
     StringEqualIgnoreCase "stringEqualIgnoreCase" 2..=2 Test,
     /// Concatenation of the second and all further arguments.
     StringConcat "stringConcat" 2..=32 Function,
-    /// Substring of the second, from the position in the third (counted from 1), with the length in the
-    /// fourth.
+    /// Substring of the second argument, from the position in the third (counted from 1), with the length in
+    /// the optional fourth.
     Substring "substring" 3..=4 Function,
-    /// Number of characters.
+    /// Number of characters of the second argument.
     StringLength "stringLength" 2..=2 Function,
-    /// Removes white space at the ends and collapses it inside.
+    /// Second argument without white space at the ends, and with each white space inside collapsed to one
+    /// space.
     NormalizeSpace "normalizeSpace" 2..=2 Function,
-    /// Conversion to upper case.
+    /// Second argument in upper case.
     UpperCase "upperCase" 2..=2 Function,
-    /// Conversion to lower case.
+    /// Second argument in lower case.
     LowerCase "lowerCase" 2..=2 Function,
-    /// Replaces each character of the third by the character at the same position in the fourth, or removes
-    /// it.
+    /// Second argument in which each character of the third argument is replaced by the character at the
+    /// corresponding position of the fourth argument, or removed if there is none.
     Translate "translate" 4..=4 Function,
-    /// The first contains the second.
+    /// Tests that the first argument contains the second.
     Contains "contains" 2..=2 Test,
-    /// The first contains the second, ignoring case.
+    /// Tests that the first argument contains the second, ignoring case.
     ContainsIgnoreCase "containsIgnoreCase" 2..=2 Test,
-    /// The first starts with the second.
+    /// Tests that the first argument starts with the second.
     StartsWith "startsWith" 2..=2 Test,
-    /// The first ends with the second.
+    /// Tests that the first argument ends with the second.
     EndsWith "endsWith" 2..=2 Test,
-    /// Part of the second before the third; empty if the third does not occur.
+    /// Part of the second argument before the first occurrence of the third; empty if the third does not
+    /// occur.
     SubstringBefore "substringBefore" 3..=3 Function,
-    /// Part of the second after the third; empty if the third does not occur.
+    /// Part of the second argument after the first occurrence of the third; empty if the third does not
+    /// occur.
     SubstringAfter "substringAfter" 3..=3 Function,
-    /// The first contains a match of the regular expression in the second. The optional third contains
-    /// `XPath` flags.
+    /// Tests that the first argument contains a match of the second, a regular expression. The optional third
+    /// argument contains `XPath` flags.
     Matches "matches" 2..=3 Test,
-    /// Replaces each match of the third, a regular expression, in the second by the fourth. Flags are
-    /// optional.
+    /// Second argument in which each match of the third, a regular expression, is replaced by the fourth. The
+    /// optional fifth argument contains flags.
     Replace "replace" 4..=5 Function,
-    /// One of the substrings of the second between matches of the third, a regular expression. Flags are
-    /// optional. In SWRL the result is a sequence, for which the engine has no value.
+    /// One of the substrings of the second argument between matches of the third, a regular expression. The
+    /// optional fourth argument contains flags. In SWRL the result is a sequence, for which the engine has no
+    /// value.
     Tokenize "tokenize" 3..=4 Choice,
-    /// URI from scheme, host, port, path, query and fragment. Absent parts are empty.
+    /// URI composed of scheme, host, port, path, query and fragment. Absent parts are empty.
     AnyUri "anyURI" 7..=7 Parts,
-    /// Resolves the reference in the second against the base in the third (\[3\], section 5.2).
+    /// Resolves the reference in the second argument against the base URI in the third (\[3\], section 5.2).
     ResolveUri "resolveURI" 3..=3 Function,
-    /// Duration from years and months.
+    /// Duration composed of years and months.
     YearMonthDuration "yearMonthDuration" 3..=3 Parts,
-    /// Duration from days, hours, minutes and seconds.
+    /// Duration composed of days, hours, minutes and seconds.
     DayTimeDuration "dayTimeDuration" 5..=5 Parts,
-    /// Date and time from year, month, day, hour, minute, second and an optional time zone (`Z`, `+02:00`).
+    /// Date and time composed of year, month, day, hour, minute, second and an optional time zone (`Z`,
+    /// `+02:00`).
     DateTime "dateTime" 7..=8 Parts,
-    /// Date from year, month, day and an optional time zone.
+    /// Date composed of year, month, day and an optional time zone.
     Date "date" 4..=5 Parts,
-    /// Time from hour, minute, second and an optional time zone.
+    /// Time composed of hour, minute, second and an optional time zone.
     Time "time" 4..=5 Parts,
     /// Sum of two durations in months.
     AddYearMonthDurations "addYearMonthDurations" 3..=3 Function,
-    /// Difference of two durations in months.
+    /// Second argument minus the third, both durations in months.
     SubtractYearMonthDurations "subtractYearMonthDurations" 3..=3 Function,
-    /// Product of a duration in months and a number, rounded to months.
+    /// Second argument, a duration in months, times the number in the third; rounded to months.
     MultiplyYearMonthDuration "multiplyYearMonthDuration" 3..=3 Function,
-    /// Quotient of a duration in months and a number, rounded to months.
+    /// Second argument, a duration in months, divided by the number in the third; rounded to months.
     DivideYearMonthDuration "divideYearMonthDurations" 3..=3 Function,
     /// Sum of two durations in seconds.
     AddDayTimeDurations "addDayTimeDurations" 3..=3 Function,
-    /// Difference of two durations in seconds.
+    /// Second argument minus the third, both durations in seconds.
     SubtractDayTimeDurations "subtractDayTimeDurations" 3..=3 Function,
-    /// Product of a duration in seconds and a number.
+    /// Second argument, a duration in seconds, times the number in the third.
     MultiplyDayTimeDuration "multiplyDayTimeDurations" 3..=3 Function,
-    /// Quotient of a duration in seconds and a number.
+    /// Second argument, a duration in seconds, divided by the number in the third.
     DivideDayTimeDuration "divideDayTimeDuration" 3..=3 Function,
-    /// Duration from the third date to the second.
+    /// Second argument minus the third, both dates; the result is a duration.
     SubtractDates "subtractDates" 3..=3 Function,
-    /// Duration from the third time to the second.
+    /// Second argument minus the third, both times; the result is a duration.
     SubtractTimes "subtractTimes" 3..=3 Function,
-    /// Date and time plus a duration in months.
+    /// Second argument, a date with time, plus the third, a duration in months.
     AddYearMonthDurationToDateTime "addYearMonthDurationToDateTime" 3..=3 Function,
-    /// Date and time plus a duration in seconds.
+    /// Second argument, a date with time, plus the third, a duration in seconds.
     AddDayTimeDurationToDateTime "addDayTimeDurationToDateTime" 3..=3 Function,
-    /// Date and time minus a duration in months.
+    /// Second argument, a date with time, minus the third, a duration in months.
     SubtractYearMonthDurationFromDateTime "subtractYearMonthDurationFromDateTime" 3..=3 Function,
-    /// Date and time minus a duration in seconds.
+    /// Second argument, a date with time, minus the third, a duration in seconds.
     SubtractDayTimeDurationFromDateTime "subtractDayTimeDurationFromDateTime" 3..=3 Function,
-    /// Date plus a duration in months.
+    /// Second argument, a date, plus the third, a duration in months.
     AddYearMonthDurationToDate "addYearMonthDurationToDate" 3..=3 Function,
-    /// Date plus a duration in seconds, in whole days.
+    /// Second argument, a date, plus the third, a duration in seconds; rounded down to whole days.
     AddDayTimeDurationToDate "addDayTimeDurationToDate" 3..=3 Function,
-    /// Date minus a duration in months.
+    /// Second argument, a date, minus the third, a duration in months.
     SubtractYearMonthDurationFromDate "subtractYearMonthDurationFromDate" 3..=3 Function,
-    /// Date minus a duration in seconds, in whole days.
+    /// Second argument, a date, minus the third, a duration in seconds; rounded down to whole days.
     SubtractDayTimeDurationFromDate "subtractDayTimeDurationFromDate" 3..=3 Function,
-    /// Time plus a duration in seconds, modulo one day.
+    /// Second argument, a time, plus the third, a duration in seconds; modulo one day.
     AddDayTimeDurationToTime "addDayTimeDurationToTime" 3..=3 Function,
-    /// Time minus a duration in seconds, modulo one day.
+    /// Second argument, a time, minus the third, a duration in seconds; modulo one day.
     SubtractDayTimeDurationFromTime "subtractDayTimeDurationFromTime" 3..=3 Function,
-    /// Whole months from the third moment to the second.
+    /// Second argument minus the third, both dates with time, in whole months.
     SubtractDateTimesYieldingYearMonthDuration "subtractDateTimesYieldingYearMonthDuration" 3..=3 Function,
-    /// Seconds from the third moment to the second.
+    /// Second argument minus the third, both dates with time, in seconds.
     SubtractDateTimesYieldingDayTimeDuration "subtractDateTimesYieldingDayTimeDuration" 3..=3 Function,
 }
 
-/// Members of `swrlb` on lists.
+/// Local names of the built-ins of `swrlb` on lists, which the engine rejects.
 const LIST_BUILT_INS: [&str; 9] = [
     "empty",
     "first",
@@ -224,14 +232,16 @@ const LIST_BUILT_INS: [&str; 9] = [
     "sublist",
 ];
 
-/// Returns `true` for a local name of a SWRL built-in on lists, for which the engine has no values.
+/// Returns `true` for the local name of a SWRL built-in on lists. The engine rejects these built-ins,
+/// because it has no list values.
 pub(crate) fn is_refused(local: &str) -> bool {
     LIST_BUILT_INS.contains(&local)
 }
 
 impl BuiltIn {
-    /// Creates a built-in from a definition, for rules as data or for [`crate::Syntax::built_ins`]. A
-    /// definition lives until the end of the process: it is a `static` or a leaked box.
+    /// Creates a custom built-in from a definition, for rules that are built in Rust or, by
+    /// [`crate::Syntax::built_ins`], for rule texts. A definition lives until the end of the process: it
+    /// is a `static` or a leaked box.
     pub fn custom(definition: &'static dyn Definition) -> Self {
         Self::Custom(CustomBuiltIn(definition))
     }
@@ -260,6 +270,7 @@ impl BuiltIn {
     }
 
     /// Returns `true` if the values of the unknown arguments can be computed from the known arguments.
+    /// `known` has a flag for each argument.
     pub fn binds(self, known: &[bool]) -> bool {
         let kind = self.shape().map(|(.., kind)| kind);
         let inputs_known = known.get(1..).is_some_and(|inputs_known| inputs_known.iter().all(|known| *known));

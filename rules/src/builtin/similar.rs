@@ -21,7 +21,7 @@ impl BuiltIn {
     }
 }
 
-/// Part of an IRI after `#`, or all of a name without one.
+/// Returns the part of an IRI after `#`, or the whole name if it has no `#`.
 fn local(iri: &str) -> &str {
     iri.rsplit_once('#').map_or(iri, |(_, local)| local)
 }

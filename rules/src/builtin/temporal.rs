@@ -8,7 +8,7 @@ use num_traits::{ToPrimitive, Zero};
 use super::signature::BuiltIn;
 use crate::literal::{Decimal, Duration, Literal, Moment, MomentKind, XSD};
 
-/// Value of a temporal function; `None` for other functions and unsuitable arguments.
+/// Returns the value of a temporal function; `None` for other functions and unsuitable arguments.
 pub(super) fn compute(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Literal> {
     use BuiltIn as B;
     match built_in {
@@ -25,7 +25,7 @@ pub(super) fn compute(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Liter
     }
 }
 
-/// Composes a value of its parts, by parsing a lexical form.
+/// Composes a duration, date or time from its parts: builds the lexical form and parses it.
 fn construct(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Literal> {
     let mut texts: Vec<String> = arguments.iter().map(|argument| argument.lexical()).collect();
     let is_duration = matches!(built_in, BuiltIn::YearMonthDuration | BuiltIn::DayTimeDuration);
@@ -80,7 +80,7 @@ fn is_seconds(duration: &Duration) -> bool {
     duration.months() == 0
 }
 
-/// Sum or difference of two durations, both in months or both in seconds.
+/// Returns the sum or difference of two durations, both in months or both in seconds.
 fn durations(built_in: BuiltIn, left: &Duration, right: &Duration) -> Option<Literal> {
     use BuiltIn as B;
     let months = is_months(left) && is_months(right);
@@ -97,7 +97,7 @@ fn durations(built_in: BuiltIn, left: &Duration, right: &Duration) -> Option<Lit
     Some(Literal::Duration(Duration::new(months, Decimal::from_rational(&sum))))
 }
 
-/// Product or quotient of a duration and a number. Months are rounded, halves up.
+/// Returns the product or quotient of a duration and a number. Months are rounded, halves up.
 fn scaled(built_in: BuiltIn, duration: &Duration, factor: &BigRational) -> Option<Literal> {
     use BuiltIn as B;
     let divides = matches!(built_in, B::DivideYearMonthDuration | B::DivideDayTimeDuration);
@@ -119,7 +119,7 @@ fn scaled(built_in: BuiltIn, duration: &Duration, factor: &BigRational) -> Optio
     Some(Literal::Duration(duration))
 }
 
-/// Moment plus or minus a duration.
+/// Returns a moment plus or minus a duration.
 fn shifted(built_in: BuiltIn, moment: &Moment, duration: &Duration) -> Option<Literal> {
     use BuiltIn as B;
     let (kind, months, forward) = match built_in {
@@ -143,7 +143,7 @@ fn shifted(built_in: BuiltIn, moment: &Moment, duration: &Duration) -> Option<Li
     moment.later(&duration).map(Literal::Moment)
 }
 
-/// Duration between two moments.
+/// Returns the duration between two moments.
 fn difference(built_in: BuiltIn, left: &Moment, right: &Moment) -> Option<Literal> {
     use BuiltIn as B;
     let (kind, months) = match built_in {

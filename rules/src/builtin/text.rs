@@ -16,7 +16,7 @@ pub(super) fn test(built_in: BuiltIn, left: &Literal, right: &Literal) -> bool {
     }
 }
 
-/// Value of a string function; `None` for other functions and unsuitable arguments.
+/// Returns the value of a string function; `None` for other functions and unsuitable arguments.
 pub(super) fn compute(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Literal> {
     if built_in == BuiltIn::StringConcat {
         return Some(Literal::String(arguments.iter().map(|a| a.lexical()).collect::<String>().into()));

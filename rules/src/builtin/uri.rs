@@ -8,7 +8,7 @@ use super::signature::BuiltIn;
 use super::text::as_text;
 use crate::literal::Literal;
 
-/// Value of a URI function; `None` for other functions and invalid URIs.
+/// Returns the value of a URI function; `None` for other functions and invalid URIs.
 pub(super) fn compute(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Literal> {
     let text = match (built_in, arguments) {
         (BuiltIn::ResolveUri, [reference, base]) => {
@@ -23,7 +23,8 @@ pub(super) fn compute(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Liter
     Some(Literal::Uri(text.into()))
 }
 
-/// Composes a reference of its parts. `None` if the text would be parsed to other parts.
+/// Composes a URI reference from its parts. Returns `None` if the composed text has other parts when it
+/// is parsed.
 fn compose(components: &[String]) -> Option<String> {
     let [scheme, host, port, path, query, fragment] = components else { return None };
     let mark = |before: &str, part: &str, after: &str| {
@@ -36,8 +37,8 @@ fn compose(components: &[String]) -> Option<String> {
     parsed.iter().zip(components).all(|(parsed, component)| parsed.lexical() == *component).then_some(text)
 }
 
-/// Splits a reference into scheme, host, port, path, query and fragment. `None` for an invalid reference,
-/// and for one with a user name, for which there is no part.
+/// Splits a URI reference into scheme, host, port, path, query and fragment. Returns `None` for an
+/// invalid reference, and for a reference with a user name, because there is no part for it.
 pub(super) fn parts(text: &str) -> Option<Vec<Literal>> {
     let iri = IriRef::parse(text).ok()?;
     let authority = iri.authority().unwrap_or_default();

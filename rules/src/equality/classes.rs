@@ -1,5 +1,5 @@
-//! Equality classes of names: a union-find with a representative per class, and the edges that connect the
-//! names.
+//! Equality classes of names: a union-find structure with a representative per class, and the edges that
+//! connect the names.
 //!
 //! An edge is a pair of names that was stated or derived to denote one individual. It records its premises
 //! at the time of its derivation: stated facts and earlier edges. Therefore edges never support each other
@@ -15,8 +15,8 @@ use crate::fact::{Arguments, Fact};
 use crate::rule::RuleIdentity;
 use crate::symbol::Symbol;
 
-/// A fact with its reason. A derived equality occurs as if it was stated, because its edge keeps its own
-/// derivation.
+/// A derivation step: a fact with its reason. A derived equality occurs in it like a stated fact,
+/// because its edge keeps its own derivation.
 pub(super) type Step = DerivationStep;
 
 /// Number of an edge, in the order of creation.
@@ -31,31 +31,31 @@ pub(super) struct Edge {
     pub facts: Vec<Fact>,
     /// Earlier edges among the premises.
     pub edges: Vec<EdgeId>,
-    /// Derivation of the pair at the time, down to stated facts and other pairs, with the pair itself
-    /// first. Empty if the pair is stated.
+    /// Derivation of the pair when the edge was created, down to stated facts and other pairs; the first
+    /// step is the pair itself. Empty if the pair is stated.
     pub proof: Vec<Step>,
 }
 
-/// All classes with more than one name.
+/// All equality classes with more than one name, and the edges within the classes.
 #[derive(Clone, Default, Debug)]
 pub(super) struct Classes {
     representatives: FxHashMap<Symbol, Symbol>,
     members: FxHashMap<Symbol, Arc<[Symbol]>>,
     pub edges: FxHashMap<EdgeId, Edge>,
     next: EdgeId,
-    /// Edges by name.
+    /// Maps each name to its edges.
     edges_at: FxHashMap<Symbol, Vec<EdgeId>>,
     by_fact: FxHashMap<Fact, Vec<EdgeId>>,
     by_edge: FxHashMap<EdgeId, Vec<EdgeId>>,
 }
 
 impl Classes {
-    /// Representative of a name. A name without other equal names represents itself.
+    /// Returns the representative of a name. A name without other equal names represents itself.
     pub fn find(&self, name: Symbol) -> Symbol {
         self.representatives.get(&name).copied().unwrap_or(name)
     }
 
-    /// Names of a representative's class in ascending order; `None` for a class of one name.
+    /// Returns the names in a representative's class in ascending order; `None` for a class of one name.
     pub fn members(&self, representative: Symbol) -> Option<&Arc<[Symbol]>> {
         self.members.get(&representative)
     }
@@ -65,12 +65,12 @@ impl Classes {
         Fact::new(fact.predicate, fact.arguments.iter().map(|&name| self.find(name)))
     }
 
-    /// Names of the class of a name, in ascending order.
+    /// Returns the names in the class of a name, in ascending order.
     pub fn class(&self, name: Symbol) -> Arc<[Symbol]> {
         self.members(self.find(name)).map_or_else(|| Arc::from([name]), Arc::clone)
     }
 
-    /// Adds an edge. The classes change only with [`Classes::join`].
+    /// Adds an edge. The classes do not change; see [`Classes::join`].
     pub fn connect(&mut self, edge: Edge) {
         let id = self.next;
         self.next += 1;
@@ -86,7 +86,7 @@ impl Classes {
         self.edges.insert(id, edge);
     }
 
-    /// Edges that depend on any of these facts or rules, directly or through other edges.
+    /// Returns the edges that depend on any of these facts or rules, directly or through other edges.
     pub fn depending_on<'f>(
         &self,
         facts: impl Iterator<Item = &'f Fact>,
@@ -107,7 +107,7 @@ impl Classes {
         dependent
     }
 
-    /// Removes edges. The classes change only with [`Classes::split`].
+    /// Removes edges. The classes do not change; see [`Classes::split`].
     pub fn disconnect(&mut self, edges: &BTreeSet<EdgeId>) {
         fn forget<K: std::hash::Hash + Eq>(index: &mut FxHashMap<K, Vec<EdgeId>>, key: &K, edge: EdgeId) {
             if let Some(edges) = index.get_mut(key) {
@@ -163,8 +163,8 @@ impl Classes {
         }
     }
 
-    /// Shortest path between two names of a class, by breadth-first search over the edges with a number
-    /// below `before`.
+    /// Returns the shortest path between two names of a class, by breadth-first search over the edges
+    /// with a number below `before`.
     pub fn path(&self, from: Symbol, to: Symbol, before: EdgeId) -> Vec<EdgeId> {
         let mut predecessors: FxHashMap<Symbol, (EdgeId, Symbol)> = FxHashMap::default();
         let (mut visited, mut front) = (FxHashSet::from_iter([from]), vec![from]);
@@ -191,13 +191,14 @@ impl Classes {
         path
     }
 
-    /// Number of the next edge.
+    /// Returns the number of the next edge.
     pub fn next_edge_id(&self) -> EdgeId {
         self.next
     }
 }
 
-/// All rows that a row about representatives represents, given the names of each representative.
+/// Returns the arguments of all facts that a row about representatives represents. `names` returns the
+/// names in the class of a representative, or `None` if the symbol represents only itself.
 pub(super) fn expand<'n>(row: &[Symbol], names: impl Fn(Symbol) -> Option<&'n [Symbol]>) -> Vec<Arguments> {
     let mut rows: Vec<Arguments> = vec![Arguments::with_capacity(row.len())];
     for &symbol in row {

@@ -1,13 +1,14 @@
-//! Equality of individuals by representatives: facts are stored once for each class of equal names ([1]).
+//! Equality of individuals (`owl:sameAs`) by representatives: facts are stored once for each class of
+//! equal names ([1]).
 //!
-//! The engine's store, rules and recorded derivations mention representatives only. This module translates
-//! between names and representatives. A stated or derived pair merges two classes: the facts about one
-//! representative are restated about the other, and so are the constants of the rules. Each equality
-//! records its premises at the time of derivation: stated facts and earlier equalities ([`classes`]). If
-//! one of these facts or a rule of the derivation is deleted, the equalities that depend on it are deleted,
-//! too. Their classes are split, the stated facts about their names are restated, and all equalities that
-//! still follow are derived again.
-//! This differs from [2], which over-deletes along all derivations and needs no record of equalities.
+//! The engine's store, rules and recorded derivations mention only the representative of each class.
+//! This module translates between names and representatives. A stated or derived pair merges two
+//! classes: one representative replaces the other in the stated facts and in the constants of the rules.
+//! Each equality records its premises at the time of derivation: stated facts and earlier equalities
+//! ([`classes`]). If one of these facts or a rule of the derivation is deleted, the equalities that
+//! depend on it are deleted, too. Their classes are split, the stated facts about their names are
+//! restated, and all equalities that still follow are derived again. This differs from [2], which
+//! over-deletes along all derivations and needs no record of equalities.
 //!
 //! To a client, every name of an individual has all facts of the individual. A literal is never equal to a
 //! name or to another literal: a pair with a literal merges nothing and is reported as a violation. A pair
@@ -40,10 +41,10 @@ impl Program {
     /// rule bodies matches stated and derived facts of `owl:differentFrom`. Without equality,
     /// `differentFrom` compares names.
     ///
-    /// `sameAs` in a body compares individuals if one of its terms is a variable that another atom binds.
-    /// Otherwise (two constants, or variables that no other atom binds) it matches pairs of names of
-    /// individuals with several names. An individual with one name then equals itself only if that is
-    /// stated.
+    /// `sameAs` in a body compares individuals if one of its terms is a variable that another atom
+    /// binds. Otherwise (two constants, or variables that no other atom binds) the atom matches pairs of
+    /// names of individuals with several names. An individual with one name then equals itself only if
+    /// this pair is stated.
     #[must_use]
     pub fn with_equality(&self, symbols: &mut Symbols) -> Self {
         let (same_as, different) = (symbols.name(SAME_AS), symbols.name(DIFFERENT_FROM));
@@ -81,13 +82,13 @@ pub(crate) struct Equality {
     /// Symbol of `owl:sameAs`, the relation of stated and derived equalities.
     same_as: Symbol,
     classes: Classes,
-    /// Stated facts of each row, for rows whose stated facts are not just the row itself.
+    /// Maps each row to the stated facts that it represents, unless these are just the row itself.
     originals: FxHashMap<Fact, BTreeSet<Fact>>,
-    /// Stated pairs by name.
+    /// Maps each name to the stated `owl:sameAs` pairs that contain it.
     pairs: FxHashMap<Symbol, BTreeSet<Fact>>,
     /// Rules with representatives as constants, in the order of the engine's rules.
     pub program: Arc<Program>,
-    /// Constants of the rules.
+    /// Names and literals that the rules mention.
     constants: FxHashSet<Symbol>,
 }
 
@@ -98,12 +99,12 @@ impl Equality {
         Self { same_as, classes, originals, pairs, program: Arc::clone(program), constants }
     }
 
-    /// Returns an equality without facts.
+    /// Returns an equality in which no pair and no other fact is stated.
     pub fn without_facts(&self, program: &Arc<Program>) -> Self {
         Self::new(self.same_as, program)
     }
 
-    /// Returns `true` if a fact relates two names by equality, or anything to itself.
+    /// Returns `true` if a fact is an `owl:sameAs` pair of two names, or of anything with itself.
     fn is_pair(&self, fact: &Fact, symbols: &Symbols) -> bool {
         fact.predicate == self.same_as
             && fact.arguments.len() == 2
@@ -115,23 +116,23 @@ impl Equality {
         self.pairs.get(&fact.arguments[0]).is_some_and(|pairs| pairs.contains(fact))
     }
 
-    /// Returns `true` if a row about representatives equates an individual with itself. Rule bodies match
-    /// such rows.
+    /// Returns `true` if a row (a fact about representatives) is the `owl:sameAs` pair of an individual
+    /// with itself. Rule bodies match such rows.
     fn is_reflexive(&self, row: &Fact) -> bool {
         row.predicate == self.same_as && row.arguments.len() == 2 && row.arguments[0] == row.arguments[1]
     }
 
-    /// Replaces all names of a fact by their representatives.
+    /// Returns the fact with all names replaced by their representatives.
     pub fn normal(&self, fact: &Fact) -> Fact {
         self.classes.normal(fact)
     }
 
-    /// Names of a representative's class; `None` for a class of one name.
+    /// Returns the names in a representative's class; `None` for a class of one name.
     fn names(&self, representative: Symbol) -> Option<&[Symbol]> {
         self.classes.members(representative).map(|members| &**members)
     }
 
-    /// Replaces all constants of a program by their representatives.
+    /// Returns the program with all constants replaced by their representatives.
     pub fn normal_program(&self, program: &Program) -> Program {
         let term = |term: Term| match term {
             Term::Constant(symbol) => Term::Constant(self.classes.find(symbol)),
@@ -146,7 +147,7 @@ impl Equality {
     }
 }
 
-/// Names and literals that the rules mention.
+/// Returns the names and literals that the rules mention.
 fn constants(program: &Program) -> impl Iterator<Item = Symbol> {
     let atoms = program.rules.iter().flat_map(|rule| rule.head.iter().chain(&rule.body));
     atoms.flat_map(Atom::terms).filter_map(|term| match term {
@@ -156,7 +157,7 @@ fn constants(program: &Program) -> impl Iterator<Item = Symbol> {
 }
 
 impl Atom {
-    /// Applies a function to all terms.
+    /// Returns the atom with a function applied to all terms.
     fn map(&self, term: &impl Fn(Term) -> Term) -> Self {
         let map_terms = |terms: &[Term]| terms.iter().copied().map(term).collect();
         match self {

@@ -1,9 +1,9 @@
-//! Explanations of facts about names, and of equalities between names.
+//! Explanations of facts about names, and of equalities (`owl:sameAs`) between names.
 //!
-//! A recorded derivation mentions representatives, which are themselves names. A fact about other names of
-//! the individuals follows from it by equality. Each equality keeps its own derivation, which uses only
-//! earlier equalities. If a fact occurs in several derivations, the earliest one explains it, so that no
-//! fact supports itself.
+//! A recorded derivation contains the representatives of equality classes, which are names, too. A fact
+//! with other names of the same individuals follows from the derived fact by equality. Each equality
+//! keeps its own derivation, which uses only earlier equalities. If a fact occurs in several
+//! derivations, the earliest one explains it, so that no fact supports itself.
 
 use std::collections::BTreeMap;
 
@@ -20,7 +20,8 @@ use crate::safety::bound_variables;
 use crate::store::{Record, state};
 use crate::symbol::Symbol;
 
-/// Creates the edge of a derived pair, with its proof and premises.
+/// Creates the edge (recorded equality) of a derived `owl:sameAs` pair, with the derivation of the pair
+/// and the facts and edges on which the derivation depends.
 pub(super) fn edge_of(engine: &Engine, equality: &Equality, pair: &Fact) -> Edge {
     let proof = Builder::new(engine, equality).prove_derived(pair);
     let leaves = proof.iter().filter(|step| step.reason == Reason::Asserted).map(|step| &step.fact);
@@ -34,7 +35,7 @@ pub(super) fn edge_of(engine: &Engine, equality: &Equality, pair: &Fact) -> Edge
     Edge { left: pair.arguments[0], right: pair.arguments[1], facts, edges: edges.collect(), proof }
 }
 
-/// Reason of a fact, with the steps to which the indices of its supports refer.
+/// Reason of a fact. The supports of the reason are indices into `steps`.
 #[derive(Clone)]
 struct Ground<'a> {
     reason: &'a Reason,
@@ -42,7 +43,7 @@ struct Ground<'a> {
 }
 
 impl Equality {
-    /// Derivation of a fact that holds.
+    /// Returns a derivation of a fact that holds.
     pub fn why(&self, engine: &Engine, fact: &Fact) -> Derivation {
         let derivation = Builder::new(engine, self).prove(fact);
         let edges = self.edges_in(engine, &derivation);
@@ -84,8 +85,8 @@ impl Equality {
         Derivation { steps }
     }
 
-    /// All recorded equalities as `same_as` facts. Each equality follows the equalities that its
-    /// derivation uses.
+    /// Returns all recorded equalities as `owl:sameAs` facts. Each equality comes after the equalities
+    /// that its derivation uses.
     pub fn pairs_in_order(&self) -> Vec<Fact> {
         let edges: BTreeMap<EdgeId, &Edge> =
             self.classes.edges.iter().map(|(id, edge)| (*id, edge)).collect();
@@ -96,7 +97,8 @@ impl Equality {
         self.is_pair(fact, &engine.symbols) && fact.arguments[0] != fact.arguments[1]
     }
 
-    /// Edges that the steps use, and the edges that their derivations use, transitively.
+    /// Returns the equality edges that the steps use, and transitively the edges that the derivations of
+    /// these edges use.
     fn edges_in(&self, engine: &Engine, steps: &[Step]) -> BTreeMap<EdgeId, &Edge> {
         let mut used_edges: BTreeMap<EdgeId, &Edge> = BTreeMap::new();
         let mut stack: Vec<EdgeId> = Vec::new();
@@ -116,8 +118,8 @@ impl Equality {
         used_edges
     }
 
-    /// Stated fact that equals `row` after its names are replaced by their representatives; `None` if
-    /// there is no such fact.
+    /// Returns a stated fact that equals `row` after its names are replaced by their representatives;
+    /// `None` if there is no such fact.
     pub fn witness(&self, engine: &Engine, row: &Fact) -> Option<Fact> {
         match self.originals.get(row) {
             Some(facts) => facts.first().cloned(),
@@ -125,8 +127,8 @@ impl Equality {
         }
     }
 
-    /// Facts about names for the rows (facts about representatives) of a violation, preferably stated
-    /// facts, together with the equalities between different names of one individual.
+    /// Converts the rows (facts about representatives) of a violated constraint to facts about names,
+    /// preferably stated facts. Adds the equalities between different names of one individual.
     pub fn witnesses(&self, engine: &Engine, rows: Vec<Fact>) -> Vec<Fact> {
         let mut facts = Vec::new();
         for row in rows {
@@ -151,7 +153,7 @@ impl Equality {
     }
 }
 
-/// Renumbers the supports of a reason.
+/// Returns the reason with renumbered supports: `position` returns the new index of a fact.
 fn rebased(ground: &Ground, mut position: impl FnMut(&Fact) -> usize) -> Reason {
     let mut renumber =
         |supports: &[usize]| supports.iter().map(|&at| position(&ground.steps[at].fact)).collect::<Vec<_>>();
@@ -174,7 +176,7 @@ fn rebased(ground: &Ground, mut position: impl FnMut(&Fact) -> usize) -> Reason 
     }
 }
 
-/// Builds a derivation from the current records.
+/// Builds a derivation from the derivations that the engine has recorded.
 struct Builder<'a> {
     engine: &'a Engine,
     equality: &'a Equality,
@@ -187,7 +189,7 @@ impl<'a> Builder<'a> {
         Self { engine, equality, positions: FxHashMap::default(), queue: Vec::new() }
     }
 
-    /// Position of a fact among the steps. Queues the fact on its first occurrence.
+    /// Returns the index of a fact among the steps. Queues the fact on its first occurrence.
     fn position(&mut self, fact: &Fact) -> usize {
         let queue = &mut self.queue;
         *self.positions.entry(fact.clone()).or_insert_with(|| {
@@ -201,7 +203,7 @@ impl<'a> Builder<'a> {
         self.finish(Vec::new())
     }
 
-    /// Derives a pair whose names are not yet equal.
+    /// Explains a derived `owl:sameAs` pair whose names are not yet in one equality class.
     fn prove_derived(mut self, pair: &Fact) -> Vec<Step> {
         self.position(pair);
         // The pair itself is not stated, so its derivation starts with the recorded rule.
@@ -232,7 +234,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Explains a pair by a path of edges between its names.
+    /// Explains an `owl:sameAs` pair by a path of edges between its names.
     fn pair(&mut self, pair: &Fact) -> Reason {
         let (classes, same_as) = (&self.equality.classes, self.equality.same_as);
         let (from, mut to) = (pair.arguments[0], pair.arguments[1]);
@@ -266,7 +268,7 @@ impl<'a> Builder<'a> {
         Reason::Equality { supports }
     }
 
-    /// Explains a fact by the rule recorded for its row.
+    /// Explains a fact by the rule that is recorded for its row; `None` without a recorded rule.
     fn derived(&mut self, fact: &Fact, row: &Fact) -> Option<Reason> {
         let engine = self.engine;
         let relation = engine.store.get(engine.store.find(row.predicate, row.arguments.len())?);
@@ -301,9 +303,10 @@ impl<'a> Builder<'a> {
         })
     }
 
-    /// Values of a rule's variables, as the rule mentions them. If the rule compares a variable with a
-    /// constant, the recorded value is the constant's representative. It is replaced by the constant,
-    /// because no atom of the rule supports the equality between the two.
+    /// Returns the values of a rule's variables with the constants that the rule mentions. If the rule
+    /// compares a variable with a constant, the recorded value is the constant's representative. That
+    /// value is replaced by the constant, because no atom of the rule supports the equality between the
+    /// two.
     fn as_written(&self, rule: &Rule, bound: &[Symbol]) -> Vec<Symbol> {
         let mut values = bound.to_vec();
         for atom in &rule.body {

@@ -1,5 +1,6 @@
-//! Translates a change of the stated facts into a change of the facts that hold, while equality classes
-//! merge and split.
+//! Incremental updates under equality (`owl:sameAs`): computes from a change of the stated facts which
+//! facts start or cease to hold, while equality classes merge and split. The store has one row for all
+//! facts that differ only in equal names; the row contains the representatives of the classes.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -17,31 +18,33 @@ use crate::rule::{Program, Rule};
 use crate::store::{Record, state};
 use crate::symbol::Symbol;
 
-/// An update in progress.
+/// An update of an engine with equality, in progress.
 struct Update<'e> {
     engine: &'e mut Engine,
     equality: Equality,
-    /// Rows whose stated facts have changed since the last [`Update::flush`], with these facts.
+    /// Maps each row whose stated facts have changed since the last [`Update::flush`] to the stated
+    /// facts that the row represents now.
     pending_rows: BTreeMap<Fact, BTreeSet<Fact>>,
-    /// `true` if a rule mentions a name whose representative has changed.
+    /// Whether a rule mentions a name whose class has changed since the last [`Update::flush`].
     rules_changed: bool,
     /// Net change of each row in this update: inserted (1), removed (-1), or both (0).
     net_change: FxHashMap<Fact, i8>,
-    /// Names whose class has changed, with their class before the update.
+    /// Maps each name whose class has changed to the members of its class before the update.
     old_classes: FxHashMap<Symbol, Arc<[Symbol]>>,
     /// Facts that held before the update and may have ceased to hold. Not collected if `silent`.
     previous_facts: FxHashSet<Fact>,
-    /// Suppresses the report, during the first evaluation.
+    /// Whether the update reports no changes (during the first evaluation).
     silent: bool,
-    /// Derived pairs whose classes are still to be merged.
+    /// Derived `owl:sameAs` pairs; the classes of their names are still to be merged.
     pairs_to_join: Vec<Fact>,
     /// New rules, which the next [`Update::flush`] installs in the engine.
     program: Option<Program>,
 }
 
 impl Engine {
-    /// Applies a change like [`Engine::apply`], under equality. An error comes with the change that
-    /// restores the stated facts.
+    /// Applies a change of the stated facts like [`Engine::apply`], but under equality. Replaces the
+    /// rules if `program` is given. Returns the net change of the facts that hold; an error comes with
+    /// the delta that restores the stated facts.
     pub(crate) fn apply_equally(
         &mut self,
         equality: Arc<Equality>,
@@ -56,7 +59,8 @@ impl Engine {
         result
     }
 
-    /// Merges the classes of all pairs derived by the first evaluation, and reports nothing.
+    /// Merges the classes of all `owl:sameAs` pairs that the first evaluation derived, until no further
+    /// pair is derived. Reports no change of facts.
     pub(crate) fn join_derived_pairs(&mut self) -> Result<(), Error> {
         let Some(equality) = self.equality.take() else { return Ok(()) };
         let same_as = equality.same_as;
@@ -70,7 +74,8 @@ impl Engine {
         result
     }
 
-    /// States facts and merges the classes of the stated pairs, before the first evaluation.
+    /// Adds the stated facts of a new engine to the store and merges the classes of the stated
+    /// `owl:sameAs` pairs. Runs no rule.
     pub(crate) fn state_initial_facts(&mut self, facts: Vec<Fact>) {
         let Some(equality) = self.equality.take() else { return };
         let mut update = Update::new(self, equality);
@@ -127,8 +132,8 @@ impl<'e> Update<'e> {
         }
     }
 
-    /// Returns the net change of the facts that hold. An error comes with the change that restores the
-    /// stated facts.
+    /// Applies a change of the stated facts and returns the net change of the facts that hold. An error
+    /// comes with the delta that restores the stated facts.
     fn apply(&mut self, delta: &Delta) -> Result<Delta, (Error, Delta)> {
         // A fact in both lists remains stated.
         let inserted: FxHashSet<&Fact> = delta.insert.iter().collect();
@@ -152,8 +157,8 @@ impl<'e> Update<'e> {
         }
     }
 
-    /// Splits the classes whose equalities are no longer supported, merges the stated pairs, and updates
-    /// the store.
+    /// Splits the classes whose equalities depend on removed facts or rules, merges the classes of the
+    /// pairs in `added`, and updates the store.
     fn change_classes(&mut self, added: &[Fact], removed: &[Fact]) -> Result<(), Error> {
         let old_program = Arc::clone(&self.engine.program);
         let mut removed_rules = FxHashSet::default();
@@ -170,7 +175,8 @@ impl<'e> Update<'e> {
         self.flush()
     }
 
-    /// Stated facts that a row represents, marked as changed.
+    /// Returns the stated facts that a row represents, for modification. The row becomes pending until
+    /// the next [`Update::flush`].
     fn originals(&mut self, row: &Fact) -> &mut BTreeSet<Fact> {
         let Self { engine, equality, pending_rows, .. } = self;
         pending_rows.entry(row.clone()).or_insert_with(|| match equality.originals.get(row) {
@@ -222,7 +228,7 @@ impl<'e> Update<'e> {
         }
     }
 
-    /// Rows of the store with a representative among their arguments.
+    /// Returns the rows of the store with the argument `name`, which is the representative of a class.
     fn mentions(&mut self, name: Symbol) -> Vec<Fact> {
         let mut rows = Vec::new();
         for relation in &mut self.engine.store.relations {
@@ -245,7 +251,8 @@ impl<'e> Update<'e> {
         rows
     }
 
-    /// Records a class and the facts about its names, before either changes.
+    /// Saves the class of `representative`, and the facts about its names, before the class changes.
+    /// Does nothing more if this update has saved the class already.
     fn record_class(&mut self, representative: Symbol) {
         let class = self.equality.classes.class(representative);
         self.rules_changed |= class.iter().any(|name| self.equality.constants.contains(name));
@@ -269,7 +276,7 @@ impl<'e> Update<'e> {
         }
     }
 
-    /// Facts that a row represented before this update.
+    /// Returns the facts that a row represented before this update.
     fn facts_before(&self, row: &Fact) -> Vec<Fact> {
         let names = |symbol| match self.old_classes.get(&symbol) {
             Some(class) if class.len() > 1 => Some(&**class),
@@ -279,7 +286,8 @@ impl<'e> Update<'e> {
         self.equality.facts_of(row, &names)
     }
 
-    /// Takes the stated facts out of all rows that mention any of these names.
+    /// Removes the stated facts from all rows that mention any of `names`, and returns the removed
+    /// facts.
     fn take_originals(&mut self, names: &BTreeSet<Symbol>) -> Vec<Fact> {
         let mut rows: Vec<Fact> = names.iter().flat_map(|&name| self.mentions(name)).collect();
         let pending_rows =
@@ -292,9 +300,9 @@ impl<'e> Update<'e> {
         facts
     }
 
-    /// Removes edges and splits their classes into the components that the remaining edges and stated pairs
-    /// connect. Ignores the stated pairs in `added`: [`Update::join_stated`] merges their classes and
-    /// restates the facts of both.
+    /// Removes the equality edges in `invalid` and splits their classes into the components that the
+    /// remaining edges and stated pairs connect. Ignores the stated pairs in `added`:
+    /// [`Update::join_stated`] merges the classes of these pairs later.
     fn split_classes(&mut self, invalid: &BTreeSet<EdgeId>, added: &[Fact]) {
         let added: FxHashSet<&Fact> = added.iter().collect();
         let classes = &self.equality.classes;
@@ -326,7 +334,7 @@ impl<'e> Update<'e> {
         }
     }
 
-    /// Marks the pair of a name with itself as changed.
+    /// Marks the `owl:sameAs` pair of a name with itself as changed.
     fn touch_reflexive(&mut self, name: Symbol) {
         let row = Fact::new(self.equality.same_as, [name, name]);
         self.originals(&row);
@@ -346,7 +354,8 @@ impl<'e> Update<'e> {
         );
     }
 
-    /// Merges the classes of pairs. `connect` adds the edges.
+    /// Merges the classes of the two names of each pair, and moves the stated facts to the rows of the
+    /// new representatives. `connect` adds the edges to the classes.
     fn join(&mut self, pairs: &[(Symbol, Symbol)], connect: impl FnOnce(&mut Classes)) {
         let classes = &self.equality.classes;
         let representatives = pairs.iter().map(|&(left, right)| (classes.find(left), classes.find(right)));
@@ -368,7 +377,8 @@ impl<'e> Update<'e> {
         }
     }
 
-    /// Merges the classes of derived pairs until the rules derive no further pair.
+    /// Merges the classes of derived `owl:sameAs` pairs and runs the rules again, until they derive no
+    /// further pair.
     fn join_concluded(&mut self) -> Result<(), Error> {
         loop {
             let mut connected = Forest::default();
@@ -399,7 +409,8 @@ impl<'e> Update<'e> {
         }
     }
 
-    /// Stores the original facts of a row. Returns `true` if the row is stated.
+    /// Stores the stated facts that a row represents. Returns `true` if the row has to be asserted in
+    /// the store.
     fn update_originals(&mut self, row: &Fact, facts: BTreeSet<Fact>) -> bool {
         let equality = &mut self.equality;
         if equality.is_reflexive(row) && equality.is_pair(row, &self.engine.symbols) {
@@ -418,7 +429,8 @@ impl<'e> Update<'e> {
         is_stated
     }
 
-    /// Updates the store and the rules to the stated facts and classes.
+    /// Applies the pending changes: states or withdraws rows, rewrites the rules with the current
+    /// representatives, and runs the rules.
     fn flush(&mut self) -> Result<(), Error> {
         let mut delta = Delta::default();
         for (row, facts) in std::mem::take(&mut self.pending_rows) {
@@ -448,7 +460,8 @@ impl<'e> Update<'e> {
         Ok(())
     }
 
-    /// Adds a change of rows to the net change, and queues the new pairs.
+    /// Adds a change of rows to the net change of this update, and queues the new `owl:sameAs` pairs for
+    /// merging.
     fn record_change(&mut self, change: Delta) {
         for (rows, sign) in [(change.insert, 1), (change.delete, -1)] {
             for row in rows {
@@ -461,7 +474,9 @@ impl<'e> Update<'e> {
         }
     }
 
-    /// Returns the change of the facts about names, sorted.
+    /// Returns the change of the facts since the start of the update, sorted. The facts are about all
+    /// names of a class, not only about its representative. `added` and `removed` are the changed stated
+    /// facts.
     fn report(&mut self, added: &[Fact], removed: &[Fact]) -> Delta {
         let mut after: FxHashSet<Fact> = FxHashSet::default();
         let representatives: BTreeSet<Symbol> =
@@ -481,7 +496,7 @@ impl<'e> Update<'e> {
         for row in rows {
             after.extend(self.equality.facts_of(&row, &|symbol| self.equality.names(symbol)));
         }
-        // Pairs of a name with itself hold exactly if they are stated, so their change is that of the
+        // A pair of a name with itself holds only if it is stated, so its change is taken from the
         // input.
         let reflexive = |facts: &[Fact]| -> Vec<Fact> {
             let is_reflexive = |fact: &&Fact| {

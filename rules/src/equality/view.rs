@@ -1,4 +1,4 @@
-//! Facts that hold about all names of each individual.
+//! Facts of an engine under equality, about all names of each individual.
 
 use smallvec::SmallVec;
 
@@ -32,7 +32,7 @@ impl Equality {
         }
     }
 
-    /// All stated facts.
+    /// Returns all stated facts.
     pub fn stated(&self, engine: &Engine) -> Vec<Fact> {
         // A pair is filed under both of its names; the filter takes it once.
         let pairs = self
@@ -50,7 +50,8 @@ impl Equality {
         facts
     }
 
-    /// Facts about names that a row represents. An equality row represents only pairs of different names.
+    /// Returns the facts about names that a row represents; `names` returns the names in the class of a
+    /// representative. An `owl:sameAs` row represents only pairs of different names.
     pub(super) fn facts_of<'n>(
         &'n self,
         row: &Fact,
@@ -62,8 +63,8 @@ impl Equality {
         rows.map(|arguments| Fact { predicate, arguments }).collect()
     }
 
-    /// All facts that hold, in no particular order. For a class of more than `max_names` names, only the
-    /// equalities with its first name.
+    /// Returns all facts that hold, in no particular order. For a class of more than `max_names` names,
+    /// the result contains only the equalities with its first name.
     pub fn facts(&self, engine: &Engine, max_names: usize) -> Vec<Fact> {
         let names = |symbol| self.names(symbol);
         let mut facts: Vec<Fact> = Vec::new();
@@ -84,14 +85,15 @@ impl Equality {
         facts
     }
 
-    /// Stated pairs of a name with itself.
+    /// Returns the arguments of the stated `owl:sameAs` pairs of a name with itself: of `name`, or of
+    /// all names if it is `None`.
     fn reflexive_pairs(&self, name: Option<Symbol>) -> impl Iterator<Item = Arguments> {
         let fits = move |at: Symbol| name.is_none_or(|name| name == at);
         let pairs = self.pairs.values().flatten().filter(|pair| pair.arguments[0] == pair.arguments[1]);
         pairs.map(|pair| pair.arguments.clone()).filter(move |pair| fits(pair[0]))
     }
 
-    /// Arguments of the facts of a predicate that agree with a pattern.
+    /// Returns the arguments of the facts of a predicate that agree with a pattern.
     pub fn matching(&self, engine: &Engine, predicate: Symbol, pattern: &[Option<Symbol>]) -> Vec<Arguments> {
         let normal: SmallVec<[Option<Symbol>; 4]> =
             pattern.iter().map(|wanted| wanted.map(|name| self.classes.find(name))).collect();
@@ -114,7 +116,7 @@ impl Equality {
         results
     }
 
-    /// Equality rows that relate a literal to a different symbol.
+    /// Returns the `owl:sameAs` rows that relate a literal to a different symbol.
     pub fn clashes(&self, engine: &Engine) -> Vec<Fact> {
         let rows = engine.matching_rows(self.same_as, &[None, None]);
         let clashes = rows.filter(|row| engine.symbols.differ(row[0], row[1]));

@@ -2,7 +2,7 @@
 
 use super::temporal::{split_zone, zone_text};
 
-/// Decodes pairs of hexadecimal digits.
+/// Decodes pairs of hexadecimal digits. Returns `None` for invalid text.
 pub(super) fn parse_hexadecimal(text: &str) -> Option<Box<[u8]>> {
     let digit = |byte: u8| char::from(byte).to_digit(16);
     let pairs = text.as_bytes().chunks(2);
@@ -21,7 +21,7 @@ pub(super) fn hexadecimal(bytes: &[u8]) -> String {
 
 const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
-/// Decodes groups of four base64 digits. White space is ignored.
+/// Decodes groups of four base64 digits. White space is ignored. Returns `None` for invalid text.
 pub(super) fn parse_base64(text: &str) -> Option<Box<[u8]>> {
     let digits: Vec<u8> = text.bytes().filter(|byte| !byte.is_ascii_whitespace()).collect();
     let padding = digits.iter().rev().take_while(|&&byte| byte == b'=').count();
@@ -93,7 +93,7 @@ pub(super) fn recurring(text: &str, local: &str) -> Option<(Box<str>, &'static s
     valid.then(|| (format!("{body}{zone}").into(), local))
 }
 
-/// IRI of a datatype of recurring dates.
+/// Returns the IRI of a datatype of recurring dates, given by its local name.
 pub(super) fn recurring_datatype(local: &str) -> &'static str {
     match local {
         "gYear" => "http://www.w3.org/2001/XMLSchema#gYear",

@@ -15,7 +15,8 @@ pub(crate) fn is_datatype(iri: &str) -> bool {
     iri.starts_with(XSD) || [RDFS_LITERAL, OWL_REAL, OWL_RATIONAL].contains(&iri) || rdf(iri)
 }
 
-/// Inclusive bounds of the integer types of XSD.
+/// Returns the inclusive bounds of an integer type of XSD, given by its local name; `None` for other
+/// types.
 pub(super) fn integer_range(local: &str) -> Option<(Option<i128>, Option<i128>)> {
     Some(match local {
         "integer" => (None, None),

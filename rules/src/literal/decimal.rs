@@ -30,7 +30,7 @@ enum Repr {
 }
 
 impl Decimal {
-    /// Number of bytes of the digits; 0 for the small representation.
+    /// Returns the number of bytes of the digits; 0 for the small representation.
     pub(super) fn size(&self) -> usize {
         match &self.0 {
             Repr::Small { .. } => 0,
@@ -38,7 +38,8 @@ impl Decimal {
         }
     }
 
-    /// Parses `-12.50`, or `1e-05` in the form of Python's decimals. Returns `None` for an invalid form.
+    /// Parses a decimal number such as `-12.50`, or `1e-05` in the form of Python's decimals. Returns
+    /// `None` for an invalid form.
     pub fn parse(lexical: &str) -> Option<Self> {
         let (mantissa, exponent) = match lexical.find(['e', 'E']) {
             Some(position) => (&lexical[..position], lexical[position + 1..].parse::<i64>().ok()?),
@@ -89,7 +90,7 @@ impl Decimal {
         }
     }
 
-    /// Returns unscaled value and scale.
+    /// Returns the unscaled value and the scale.
     pub fn parts(&self) -> (BigInt, u32) {
         match &self.0 {
             Repr::Small { unscaled, scale } => (BigInt::from(*unscaled), *scale),
@@ -118,8 +119,8 @@ impl Decimal {
         Self::new(scaled.round().to_integer(), DIVISION_DIGITS)
     }
 
-    /// Converts a rational number exactly if few digits suffice. This path avoids a long product with
-    /// trailing zeros.
+    /// Converts a rational number exactly if at most 18 fractional digits suffice, and otherwise returns
+    /// `None`. This path avoids a long product with trailing zeros.
     fn short(value: &BigRational) -> Option<Self> {
         let (numerator, denominator) = (value.numer().to_i64()?, value.denom().to_u64()?);
         let scale = (0..=SMALL_SCALE).find(|&scale| 10_u64.pow(scale).is_multiple_of(denominator))?;
@@ -198,7 +199,7 @@ impl PartialOrd for Decimal {
     }
 }
 
-/// Formats the shortest form: `-0.5`, `12`.
+/// Formats the shortest form, for example `-0.5` or `12`.
 impl fmt::Display for Decimal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (unscaled, scale) = self.parts();
@@ -227,7 +228,7 @@ pub(crate) fn ten_to(exponent: u32) -> BigInt {
 mod tests {
     use super::{BigInt, BigRational, DIVISION_DIGITS, Decimal, power_of_ten};
 
-    /// The fast path gives the same representation as the general path.
+    /// The fast conversion from rational numbers gives the same representation as the general conversion.
     #[test]
     fn short_conversion_equals_general_conversion() {
         let mut values = vec![(i64::MAX, 1), (i64::MIN, 1), (i64::MAX, 10), (1, i64::MAX), (0, 7), (100, 1)];

@@ -40,7 +40,7 @@ impl Literal {
 pub(super) enum Parsed {
     /// A valid form.
     Value(Literal),
-    /// A form outside its datatype.
+    /// A form that is invalid for its datatype.
     IllTyped,
     /// The datatype is unsupported.
     Unknown,
@@ -111,8 +111,8 @@ fn parse_float<F: std::str::FromStr>(lexical: &str) -> Option<F> {
     normal.parse().ok()
 }
 
-/// Parses `numerator / denominator` of `owl:rational`. The result is a decimal if the value has a finite
-/// decimal expansion of at most 34 digits.
+/// Parses an `owl:rational` of the form `numerator / denominator`. The result is a decimal if the value
+/// has a finite decimal expansion of at most 34 digits.
 fn parse_rational(lexical: &str) -> Parsed {
     let text = lexical.trim_matches([' ', '\t', '\n', '\r']);
     let (numerator, denominator) = text.split_once('/').unwrap_or((text, "1"));

@@ -7,10 +7,9 @@
 //! being identical ([3], sections 4.2 and 4.7): the two zeros of a floating-point type, or one instant in
 //! two time zones.
 //!
-//! Of an unsupported datatype, only one fact is known: equal forms denote the same value. It is undecided
+//! For an unsupported datatype, only equal forms are known to denote the same value. It is undecided
 //! whether two different forms denote one value, and whether a value lies in another datatype
-//! ([`Literal::differs`],
-//! [`Literal::membership`]).
+//! ([`Literal::differs`], [`Literal::membership`]).
 //!
 //! [1] W3C XML Schema Definition Language 1.1 Part 2: Datatypes, 2012.
 //! [2] W3C RDF 1.1 Concepts, section 5.

@@ -1,10 +1,10 @@
-//! Subsumption of datatypes: decides whether the intersection of several datatypes is contained in another
-//! one. Uses the type hierarchy of XML Schema ([1], section 3) and the bounds of its integer types.
+//! Subsumption of datatypes: decides if the intersection of several datatypes is contained in another
+//! datatype. Uses the type hierarchy of XML Schema ([1], section 3) and the bounds of its integer types.
 
 use super::datatype::{OWL_RATIONAL, OWL_REAL, RDF, RDFS_LITERAL, XSD, integer_range};
 
-/// Derived datatypes with their base types, by local name. Integer types are compared by their bounds
-/// instead.
+/// Pairs of a derived datatype and its base type, by local name. Integer types are compared by their
+/// bounds instead.
 const BELOW: [(&str, &str); 9] = [
     ("normalizedString", "string"),
     ("token", "normalizedString"),
@@ -39,8 +39,8 @@ const DISJOINT: [&str; 18] = [
     "integer",
 ];
 
-/// Local name of a supported datatype. The two OWL datatypes that contain all decimals have the names
-/// `real` and `rational`.
+/// Returns the local name of a datatype of XML Schema, `PlainLiteral`, or one of `owl:real` and
+/// `owl:rational`, which contain all decimals. Returns `None` for other datatypes.
 fn local(iri: &str) -> Option<&str> {
     match iri {
         OWL_REAL => Some("real"),
@@ -49,7 +49,7 @@ fn local(iri: &str) -> Option<&str> {
     }
 }
 
-/// A datatype with its ancestors.
+/// Returns a datatype and its ancestors in the type hierarchy, all by local name.
 fn upwards(local: &str) -> Vec<&str> {
     let mut ancestors = vec![local];
     while let Some((_, parent)) =
@@ -72,7 +72,7 @@ fn upwards(local: &str) -> Vec<&str> {
     ancestors
 }
 
-/// The primitive datatype that contains a datatype.
+/// Returns the primitive datatype that contains a datatype; `None` if there is none.
 fn primitive(local: &str) -> Option<&'static str> {
     let ancestors = upwards(local);
     let is_ancestor = |name: &&&str| ancestors.contains(name) && **name != "integer";

@@ -1,10 +1,10 @@
 //! `xsd:dateTime`, `xsd:date`, `xsd:time` and `xsd:duration` as numbers of seconds and months, partially
 //! ordered.
 //!
-//! A moment is a number of seconds since 1970-01-01T00:00:00 in the proleptic Gregorian calendar, converted
-//! to UTC if it has a time zone. A moment without a time zone is comparable with a moment with one only if
-//! every time zone gives the same order. One instant in two time zones is equal in this order, but is two
-//! values.
+//! A moment is a number of seconds since 1970-01-01T00:00:00 in the proleptic Gregorian calendar,
+//! converted to UTC if it has a time zone. A moment without a time zone is comparable with a moment that
+//! has a time zone only if every possible time zone gives the same order. The order treats one instant
+//! in two time zones as equal, but `==` distinguishes the two.
 
 use std::cmp::Ordering;
 use std::fmt;
@@ -48,7 +48,8 @@ pub struct Duration {
 }
 
 impl Moment {
-    /// Parses the lexical form of `dateTime`, `dateTimeStamp`, `date` or `time`.
+    /// Parses the lexical form of `dateTime`, `dateTimeStamp`, `date` or `time`; `local` is the name of
+    /// the datatype. Returns `None` if the form is invalid.
     pub(super) fn parse(lexical: &str, local: &str) -> Option<Self> {
         let (body, zone) = split_zone(lexical)?;
         let (kind, days, time) = match local {
@@ -78,10 +79,10 @@ impl Moment {
         &self.seconds
     }
 
-    /// Adds a duration. Months are added first; a day that does not exist in the new month becomes its last
-    /// day. Then seconds are added. A time of day wraps around at midnight. A date is rounded down to whole
-    /// days. Months cannot be added to a time (`None`). The calculation is in local time, and the result
-    /// has the same time zone.
+    /// Returns the moment plus a duration, with the same time zone; the calculation is in local time.
+    /// Months are added first; a day that does not exist in the new month becomes its last day. Then
+    /// seconds are added. A time of day wraps around at midnight. A date is rounded down to whole days.
+    /// Returns `None` if months are added to a time, or if the result is out of range.
     pub(crate) fn later(&self, duration: &Duration) -> Option<Self> {
         let local = self.local();
         let (day, _) = split_day(&local);
@@ -114,15 +115,15 @@ impl Moment {
         add_seconds(&self.seconds, self.zone.unwrap_or(0))
     }
 
-    /// Returns the duration from another moment of the same kind, in seconds. `None` if only one has a time
-    /// zone.
+    /// Returns the duration `self - other` in seconds. Returns `None` if the moments differ in kind, or
+    /// if only one of them has a time zone.
     pub(crate) fn since(&self, other: &Self) -> Option<Duration> {
         let comparable = self.kind == other.kind && self.zone.is_some() == other.zone.is_some();
         comparable.then(|| Duration { months: 0, seconds: add(&self.seconds, &negate(&other.seconds)) })
     }
 
-    /// Returns the duration from another moment in whole months, truncated. `None` under the conditions of
-    /// [`Moment::since`].
+    /// Returns the duration `self - other` in whole months, truncated toward zero. Returns `None` under
+    /// the conditions of [`Moment::since`].
     pub(crate) fn months_since(&self, other: &Self) -> Option<Duration> {
         let negative = self.since(other)?.seconds < Decimal::from(0);
         let (late, early) = if negative { (other, self) } else { (self, other) };
@@ -154,12 +155,12 @@ impl Moment {
         Self { zone: self.zone.map(|_| 0), ..self.clone() }
     }
 
-    /// Converts a date to its first instant.
+    /// Converts a date to the `dateTime` of its first instant.
     pub(crate) fn as_date_time(&self) -> Self {
         Self { kind: MomentKind::DateTime, ..self.clone() }
     }
 
-    /// Returns the time zone as text; empty without a time zone.
+    /// Returns the time zone as text, for example `+02:00`; empty without a time zone.
     pub(crate) fn zone_text(&self) -> String {
         self.zone.map(zone_text).unwrap_or_default()
     }
@@ -193,7 +194,7 @@ impl PartialOrd for Moment {
     }
 }
 
-/// Formats the canonical form.
+/// Formats the canonical lexical form.
 impl fmt::Display for Moment {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (day, clock) = split_day(&self.local());
@@ -210,7 +211,7 @@ impl fmt::Display for Moment {
 }
 
 impl Duration {
-    /// Parses `P1Y2M3DT4H5M6.7S`, with an optional minus sign.
+    /// Parses `P1Y2M3DT4H5M6.7S`, with an optional minus sign; `local` is the name of the datatype.
     pub(super) fn parse(lexical: &str, local: &str) -> Option<Self> {
         let (negative, body) = lexical.strip_prefix('-').map_or((false, lexical), |body| (true, body));
         let body = body.strip_prefix('P')?;
@@ -354,13 +355,14 @@ fn add_seconds(value: &Decimal, whole: i64) -> Decimal {
     Decimal::new(unscaled + BigInt::from(whole) * ten_to(scale), scale)
 }
 
-/// Formats a time zone, given in seconds east of UTC.
+/// Formats a time zone, given in seconds east of UTC, as `Z` or `+hh:mm`.
 pub(super) fn zone_text(zone: i64) -> String {
     let (sign, minutes) = (if zone < 0 { '-' } else { '+' }, zone.abs() / 60);
     if zone == 0 { "Z".into() } else { format!("{sign}{:02}:{:02}", minutes / 60, minutes % 60) }
 }
 
-/// Splits a lexical form into the text before the time zone, and the time zone in seconds east of UTC.
+/// Splits a lexical form into the text before the time zone, and the offset of the time zone in seconds
+/// east of UTC (`None` without a time zone). Returns `None` if the time zone is invalid.
 pub(super) fn split_zone(lexical: &str) -> Option<(&str, Option<i64>)> {
     if let Some(body) = lexical.strip_suffix('Z') {
         return Some((body, Some(0)));
@@ -386,7 +388,7 @@ fn number(text: &str, width: usize) -> Option<i64> {
     (text.len() == width && text.bytes().all(|b| b.is_ascii_digit())).then(|| text.parse().ok())?
 }
 
-/// Parses `hh:mm:ss.fff` to seconds. `24:00:00` is valid.
+/// Parses `hh:mm:ss.fff` to seconds since midnight. `24:00:00` is valid.
 fn parse_clock(text: &str) -> Option<Decimal> {
     let mut parts = text.splitn(3, ':');
     let (hours, minutes, seconds) = (number(parts.next()?, 2)?, number(parts.next()?, 2)?, parts.next()?);
@@ -421,7 +423,8 @@ fn days_from_civil(year: i64, month: i64, day: i64) -> i64 {
     era * 146_097 + year_of_era * 365 + year_of_era / 4 - year_of_era / 100 + day_of_year - 719_468
 }
 
-/// Converts days since 1970-01-01 to year, month and day (`civil_from_days`).
+/// Converts days since 1970-01-01 to year, month and day, by Howard Hinnant's algorithm
+/// `civil_from_days`.
 fn civil_from_days(days: i64) -> (i64, i64, i64) {
     let days = days + 719_468;
     let (era, day_of_era) = (days.div_euclid(146_097), days.rem_euclid(146_097));
@@ -433,7 +436,8 @@ fn civil_from_days(days: i64) -> (i64, i64, i64) {
     (year, month, day_of_year - (153 * shifted + 2) / 5 + 1)
 }
 
-/// Splits seconds into whole days and the clock time `hh:mm:ss.fff`.
+/// Splits a number of seconds into whole days (rounded down) and the remaining clock time
+/// `hh:mm:ss.fff`.
 fn split_day(seconds: &Decimal) -> (i64, String) {
     let (unscaled, scale) = seconds.parts();
     let unit = ten_to(scale);

@@ -50,7 +50,8 @@ pub enum Literal {
         /// IRI of the datatype.
         datatype: Box<str>,
     },
-    /// A lexical form outside its datatype. It makes a knowledge base inconsistent.
+    /// A literal whose lexical form is invalid for its datatype. Such a literal makes a knowledge base
+    /// inconsistent.
     IllTyped {
         /// Lexical form as written.
         lexical: Box<str>,
@@ -142,7 +143,7 @@ impl Literal {
         }
     }
 
-    /// Number of bytes of a value, up to a constant.
+    /// Returns the number of bytes that a value needs in addition to its fixed size.
     pub(crate) fn size(&self) -> u64 {
         let size = match self {
             Self::String(text) | Self::Uri(text) | Self::Language { text, .. } | Self::Recurring(text, _) => {
@@ -181,7 +182,7 @@ impl Literal {
         matches!(self, Self::Decimal(_) | Self::Float(_) | Self::Double(_))
     }
 
-    /// Returns the exact value of a finite number.
+    /// Returns the exact value of a finite number; `None` for other literals.
     pub fn as_rational(&self) -> Option<BigRational> {
         match self {
             Self::Decimal(value) => Some(value.to_rational()),
@@ -191,7 +192,7 @@ impl Literal {
         }
     }
 
-    /// Returns the nearest double of a number.
+    /// Returns the nearest double of a number; `None` for other literals.
     pub fn as_f64(&self) -> Option<f64> {
         match self {
             Self::Decimal(value) => Some(value.to_f64()),

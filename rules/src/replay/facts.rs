@@ -12,7 +12,8 @@ type Relation = (Symbol, usize);
 pub(super) struct Facts {
     members: FxHashSet<Fact>,
     by_relation: FxHashMap<Relation, Vec<Fact>>,
-    /// Positions in `by_relation`, by argument position and symbol.
+    /// Maps a relation, an argument position and a symbol to the positions in `by_relation` of the facts
+    /// with this symbol.
     by_place: FxHashMap<(Relation, usize, Symbol), Vec<usize>>,
 }
 
@@ -41,7 +42,8 @@ impl Facts {
         self.members.contains(fact)
     }
 
-    /// Facts of a relation with a symbol at an argument position, or all facts of the relation.
+    /// Returns the facts of a relation with a symbol at an argument position, or all facts of the
+    /// relation.
     pub fn rows(&self, relation: Relation, place: Option<(usize, Symbol)>) -> Vec<&Fact> {
         let Some(rows) = self.by_relation.get(&relation) else { return Vec::new() };
         match place {
@@ -53,7 +55,7 @@ impl Facts {
         }
     }
 
-    /// Number of these facts.
+    /// Returns the number of facts that [`Facts::rows`] returns.
     pub fn count(&self, relation: Relation, place: Option<(usize, Symbol)>) -> usize {
         match place {
             None => self.by_relation.get(&relation).map_or(0, Vec::len),

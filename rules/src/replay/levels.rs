@@ -10,8 +10,8 @@ use crate::symbol::Symbol;
 
 type Relation = (Symbol, usize);
 
-/// Head relations and body relations of a rule. A body relation has the number 1 if the heads have to be
-/// above it.
+/// Head relations and body relations of a rule. The number of a body relation is the minimum difference
+/// between its level and the levels of the heads: 1 if the atom is negated or aggregated, otherwise 0.
 struct Uses {
     heads: Vec<Relation>,
     body: Vec<(Relation, usize)>,

@@ -14,7 +14,7 @@ use crate::rule::{Aggregate, Atom, Rule, Term, Variable};
 use crate::source::Source;
 use crate::symbol::{Symbol, Symbols};
 
-/// Maximum number of matches of one body.
+/// Maximum number of matches that are enumerated for one body.
 const MATCH_LIMIT: usize = 1 << 21;
 
 /// Values of the variables of a rule; `None` for an unbound variable.
@@ -27,7 +27,7 @@ pub(super) fn value(term: Term, values: &Values) -> Option<Symbol> {
     }
 }
 
-/// Instance of a relation atom; `None` if a variable is unbound.
+/// Returns the instance of a relation atom under the values; `None` if a variable is unbound.
 pub(super) fn instance(predicate: Symbol, terms: &[Term], values: &Values) -> Option<Fact> {
     let arguments: Option<Vec<Symbol>> = terms.iter().map(|term| value(*term, values)).collect();
     Some(Fact::new(predicate, arguments?))
@@ -35,19 +35,19 @@ pub(super) fn instance(predicate: Symbol, terms: &[Term], values: &Values) -> Op
 
 pub(super) struct Matcher<'m> {
     pub symbols: &'m mut Symbols,
-    /// Facts about the first name of each individual.
+    /// Facts in which the first name of each individual replaces its other names.
     pub facts: &'m Facts,
     pub names: &'m Names,
-    /// `true` if names may be equal.
+    /// Whether the program has equality, so that different names may denote one individual.
     pub equality: bool,
-    /// `true` if a rule compared two names that may be equal. The given facts alone then do not determine
-    /// the result.
+    /// Whether a rule required two names to differ although names may be equal. The given facts alone
+    /// then do not determine the result.
     pub compares_names: bool,
-    /// `true` if an enumeration was stopped at [`MATCH_LIMIT`] matches.
+    /// Whether an enumeration was stopped at [`MATCH_LIMIT`] matches.
     pub too_many: bool,
 }
 
-/// Variables that an aggregate shares with the other atoms of the body.
+/// Returns the variables that the aggregate at `position` shares with the other atoms of the body.
 fn group(body: &[Atom], position: usize) -> Vec<Term> {
     let outer_atoms = body.iter().enumerate().filter(|(other, _)| *other != position);
     let outer_terms: BTreeSet<Term> = outer_atoms
@@ -61,7 +61,7 @@ fn group(body: &[Atom], position: usize) -> Vec<Term> {
 }
 
 impl Matcher<'_> {
-    /// All matches of a rule's body, with first names as values.
+    /// Returns all matches of a rule's body. The values are first names of individuals.
     pub fn matches_of(&mut self, rule: &Rule) -> Vec<Values> {
         let mut matches = Vec::new();
         let open: Vec<usize> = (0..rule.body.len()).collect();
@@ -69,7 +69,8 @@ impl Matcher<'_> {
         matches
     }
 
-    /// Extends values by all matches of the open atoms of a body, in depth-first order.
+    /// Extends `values` by the open atoms of a body, in depth-first order, and appends each complete
+    /// match to `matches`.
     fn extend(&mut self, body: &[Atom], open: &[usize], values: Values, matches: &mut Vec<Values>) {
         let mut states: Vec<(Rc<[usize]>, Values)> = vec![(open.into(), values)];
         while let Some((open, values)) = states.pop() {
@@ -88,7 +89,8 @@ impl Matcher<'_> {
         }
     }
 
-    /// Chooses the next open atom, and returns its position with the extended values.
+    /// Chooses the next open atom. Returns its position and all extensions of the values by the atom;
+    /// the position is `None` if no atom can be evaluated.
     fn step(&mut self, body: &[Atom], open: &[usize], values: Values) -> (Option<usize>, Vec<Values>) {
         if let Some(position) = open.iter().copied().find(|position| is_ready(body, *position, &values)) {
             let next = match &body[position] {
@@ -115,7 +117,8 @@ impl Matcher<'_> {
         (Some(position), rows.into_iter().filter_map(|row| self.agree(arguments, row, &values)).collect())
     }
 
-    /// Unifies the terms of a relation atom with a row.
+    /// Unifies the terms of a relation atom with a row. Returns the extended values, or `None` if a
+    /// bound term differs from the row.
     fn agree(&self, terms: &[Term], row: &Fact, values: &Values) -> Option<Values> {
         let mut extended = values.clone();
         for (term, symbol) in terms.iter().zip(&row.arguments) {
@@ -128,7 +131,8 @@ impl Matcher<'_> {
         Some(extended)
     }
 
-    /// Extends values by all values that a built-in admits for its unbound arguments.
+    /// Returns the extensions of `values` by all values that a built-in admits for its unbound
+    /// arguments.
     fn solve(&mut self, built_in: BuiltIn, arguments: &[Term], values: &Values) -> Vec<Values> {
         let literal = |term: &Term| match value(*term, values) {
             Some(symbol) => self.symbols.value(symbol).as_literal().map(Some),
@@ -151,7 +155,8 @@ impl Matcher<'_> {
         solutions
     }
 
-    /// Extends values by an atom that is not a relation atom. `None` if the atom does not hold.
+    /// Evaluates an atom that is not a relation atom. Returns the values, extended if the atom binds a
+    /// variable, or `None` if the atom does not hold.
     fn filter(&mut self, body: &[Atom], position: usize, mut values: Values) -> Option<Values> {
         let bound = match &body[position] {
             Atom::Same(left, right) => match (value(*left, &values), value(*right, &values)) {
@@ -215,7 +220,8 @@ impl Matcher<'_> {
         terms.iter().map(literal).collect()
     }
 
-    /// Value of an aggregate over the distinct matches of its atoms within the group.
+    /// Returns the value of the aggregate at `position` over the distinct matches of its atoms within
+    /// the group.
     fn aggregate(&mut self, body: &[Atom], position: usize, values: &Values) -> Option<Literal> {
         let Atom::Aggregate { aggregate, body: inner, .. } = &body[position] else { return None };
         // Only the group is shared with the rule, so all other variables start unbound.
@@ -237,7 +243,7 @@ impl Matcher<'_> {
     }
 }
 
-/// Aggregate of the single column of the rows.
+/// Returns the aggregate function, applied to the only column of the rows.
 fn column(aggregate: Aggregate) -> Aggregate {
     aggregate.map(&|_| Term::Variable(Variable(0)))
 }

@@ -173,7 +173,8 @@ impl Replayer<'_> {
         Ok(())
     }
 
-    /// Checks that a rule derives a step from earlier steps.
+    /// Checks that a rule derives the step at `position` from earlier steps. The error is the reason why
+    /// not.
     fn follows(
         &mut self,
         rule: &Rule,
@@ -222,7 +223,7 @@ impl Replayer<'_> {
         }
     }
 
-    /// Checks that all stated facts and all conclusions of rules are present. Returns the number of
+    /// Checks that all stated facts and all conclusions of rules are present. Returns the number of rule
     /// matches.
     fn closed(&mut self, stated: &[Fact]) -> Result<usize, Fault> {
         if let Some(fact) =
@@ -256,8 +257,8 @@ impl Replayer<'_> {
     }
 }
 
-/// Removes conditions that the two names in the head of an equality rule differ. Without the condition, the
-/// rule derives additional pairs only of names that are already equal.
+/// Removes the condition that the two names in the head of an equality rule differ. Without the
+/// condition, the rule additionally derives only pairs of names that are already equal.
 fn without_guards(program: &Program) -> Program {
     let mut program = program.clone();
     for rule in program.rules.iter_mut().filter(|_| program.equality) {

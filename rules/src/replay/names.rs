@@ -11,7 +11,7 @@ use crate::symbol::Symbol;
 pub(super) struct Names(FxHashMap<Symbol, Symbol>);
 
 impl Names {
-    /// First name of a class.
+    /// Returns the first name of the class of a name.
     pub fn find(&self, mut name: Symbol) -> Symbol {
         while let Some(smaller) = self.0.get(&name) {
             name = *smaller;
@@ -19,7 +19,7 @@ impl Names {
         name
     }
 
-    /// Merges two classes. Returns `false` if they were already equal.
+    /// Merges the classes of two names. Returns `false` if the names were already in one class.
     pub fn join(&mut self, left: Symbol, right: Symbol) -> bool {
         let (left, right) = (self.find(left), self.find(right));
         if left != right {
@@ -28,7 +28,7 @@ impl Names {
         left != right
     }
 
-    /// Replaces all names of a fact by first names.
+    /// Returns the fact with all names replaced by first names.
     pub fn normal(&self, fact: &Fact) -> Fact {
         if self.0.is_empty() {
             return fact.clone();

@@ -7,8 +7,8 @@ use crate::engine::Engine;
 use crate::fact::Fact;
 
 impl Engine {
-    /// Returns one derivation of all facts that hold, as input of [`crate::replay`]. It has a step for
-    /// each fact, and the supports of a fact come before it.
+    /// Returns one derivation of all facts that hold, as input of [`crate::replay`]. The derivation has
+    /// a step for each fact, after the steps of the supports of the fact.
     pub fn everything(&self) -> Derivation {
         let mut positions: FxHashMap<Fact, usize> = FxHashMap::default();
         let mut steps = Vec::new();
@@ -26,7 +26,7 @@ impl Engine {
     }
 }
 
-/// Positions of the supports of a step.
+/// Returns the positions of all supports of a step, including the matches of aggregates.
 fn supports(reason: &Reason) -> Vec<usize> {
     match reason {
         Reason::Asserted => Vec::new(),
@@ -38,7 +38,7 @@ fn supports(reason: &Reason) -> Vec<usize> {
     }
 }
 
-/// Appends the steps of a derivation that are not yet present, supports first.
+/// Appends the steps of a derivation that are not yet present to `steps`, supports first.
 fn append(derivation: &Derivation, positions: &mut FxHashMap<Fact, usize>, steps: &mut Vec<DerivationStep>) {
     let mut stack = vec![(0, 0)];
     while let Some((position, visited_count)) = stack.pop() {

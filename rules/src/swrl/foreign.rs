@@ -15,8 +15,8 @@ pub(super) struct ForeignAtom {
 }
 
 impl ForeignAtom {
-    /// Creates a foreign atom if the atom has not one or two arguments, or if its first argument is a
-    /// literal.
+    /// Creates a foreign atom if the number of arguments is neither one nor two, or if the first
+    /// argument is a literal. Returns `None` for other atoms.
     pub fn from_atom(name: &str, arguments: &[Term], place: (u32, u32), symbols: &Symbols) -> Option<Self> {
         let is_literal = |term: &Term| match term {
             Term::Constant(symbol) => symbols.as_literal(*symbol).is_some(),
@@ -26,14 +26,14 @@ impl ForeignAtom {
         is_foreign.then(|| Self { name: name.to_owned(), count: arguments.len(), place })
     }
 
-    /// Error R104 for this atom.
+    /// Converts the atom to error R104: a relation that is neither a class, a property, nor derived.
     pub fn error(self, file: &str) -> Error {
         let Self { name, count, place: (line, column) } = self;
         Error::UnknownRelation { file: file.to_owned(), line, column, name, count }
     }
 }
 
-/// Errors for the atoms that rule bodies use and no rule head derives.
+/// Returns an error for each atom that rule bodies use and no rule head derives.
 pub(super) fn unknown(atoms: Vec<(&str, ForeignAtom)>, program: &Program, symbols: &Symbols) -> Vec<Error> {
     let (queried, derived) = (program.queried(symbols), program.concluded(symbols));
     let is_unknown = |(_, atom): &(&str, ForeignAtom)| {

@@ -9,15 +9,15 @@ pub(super) enum Token {
     Iri(String),
     /// `prefix:local`, `:local` or `local`. The prefix is `None` without a colon.
     Name(Option<String>, String),
-    /// `?name`.
+    /// A variable `?name`, without the question mark.
     Variable(String),
     /// A quoted string, unescaped.
     Text(String),
-    /// `@en`.
+    /// A language tag `@en`, without the at-sign.
     Language(String),
     /// A number as written.
     Number(String),
-    /// `[label]`.
+    /// A rule label `[label]`, without the brackets.
     Label(String),
     Carets,
     Open,

@@ -1,5 +1,5 @@
-//! Recursive-descent parser of rule texts. After an error it continues with the next rule, so that all
-//! errors are reported.
+//! Recursive-descent parser of rule texts. After an error, the parser continues with the next rule, so
+//! that all errors are reported.
 
 use std::sync::Arc;
 
@@ -19,7 +19,7 @@ const LIBRARIES: [&str; 2] =
 /// Syntax options of rule texts.
 #[derive(Clone, PartialEq, Eq, Default, Debug)]
 pub struct Syntax {
-    /// Rejects extensions of SWRL: `not` and aggregates.
+    /// Whether the extensions of SWRL, `not` and aggregates, are rejected.
     pub swrl_only: bool,
     /// Built-ins in addition to those of SWRL, see [`BuiltIn::custom`].
     pub built_ins: Vec<BuiltIn>,
@@ -60,9 +60,10 @@ pub fn parse_rules_as(
     parse(text, source, symbols, prefixes, syntax).map(|(program, _)| program)
 }
 
-/// Parses several rule texts, each with its source, that refer to one ontology. A relation that occurs in
-/// bodies and is derived by none of the texts has to be a class or a property. An atom that can be neither
-/// (three arguments, or a literal as its individual) is an unknown built-in.
+/// Parses several rule texts about one ontology; `texts` contains pairs of source name and text. A
+/// relation in a body that no rule of any text derives has to be a class or a property. An atom of such
+/// a relation that can be neither (three arguments, or a literal as its individual) is an unknown
+/// built-in.
 ///
 /// # Errors
 /// Returns the errors of [`parse_rules_as`] for each text, and R104 for unknown built-ins of any namespace.
@@ -118,7 +119,7 @@ struct Parser<'a> {
     prefixes: Prefixes,
     syntax: &'a Syntax,
     variables: Vec<Box<str>>,
-    /// Relation atoms that cannot belong to an ontology.
+    /// Relation atoms that can be neither class nor property atoms, because of their arguments.
     foreign: Vec<ForeignAtom>,
     errors: Vec<Error>,
 }
@@ -163,7 +164,7 @@ impl Parser<'_> {
         is_match
     }
 
-    /// Line and column of the next token.
+    /// Returns line and column of the next token.
     fn position(&self) -> (u32, u32) {
         let spanned = &self.tokens[self.cursor.min(self.tokens.len() - 1)];
         (spanned.line, spanned.column)
@@ -179,7 +180,8 @@ impl Parser<'_> {
         if self.accept(token) { Ok(()) } else { Err(self.error(expected)) }
     }
 
-    /// Skips to the position after the next full stop, or before the next label or prefix.
+    /// Skips the rest of a faulty rule: past the next full stop, or up to the next label or prefix
+    /// declaration.
     fn recover(&mut self) {
         loop {
             match self.peek() {
@@ -298,8 +300,8 @@ impl Parser<'_> {
         })
     }
 
-    /// Adds the names of the variables to the expression of a mathematical built-in, which is its second
-    /// argument.
+    /// Inserts the names of the variables into the expression of a mathematical built-in, which is the
+    /// second argument.
     fn name_expression(&mut self, built_in: BuiltIn, arguments: &mut [Term]) {
         let [_, Term::Constant(text), values @ ..] = arguments else { return };
         let Some(Literal::String(expression)) = self.symbols.value(*text).as_literal() else { return };
@@ -341,7 +343,8 @@ impl Parser<'_> {
         Ok(Atom::Aggregate { aggregate, result, body })
     }
 
-    /// Creates a built-in atom for a datatype used as a predicate.
+    /// Creates the atom of a datatype used as a predicate: `built_in` tests membership of `value` in the
+    /// datatype.
     fn data_range(&mut self, built_in: BuiltIn, value: Term, datatype: String) -> Atom {
         let datatype = self.symbols.literal(Literal::Uri(datatype.into()));
         Atom::BuiltIn { built_in, arguments: vec![value, Term::Constant(datatype)] }
@@ -444,7 +447,7 @@ impl Parser<'_> {
     }
 }
 
-/// Name of a token for error messages.
+/// Returns the text of a token for error messages.
 fn describe(token: &Token) -> String {
     match token {
         Token::Prefix => "`@prefix`".into(),

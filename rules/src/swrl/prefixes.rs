@@ -5,10 +5,11 @@ use std::collections::BTreeMap;
 use crate::builtin::SWRLB;
 use crate::literal::XSD;
 
-/// Prefixes for IRIs. `swrlb`, `swrlm`, `temporal`, `xsd`, `rdf`, `rdfs` and `owl` are predefined and may
-/// be redeclared.
+/// Prefixes that abbreviate IRIs in rule texts. `swrlb`, `swrlm`, `temporal`, `xsd`, `rdf`, `rdfs` and
+/// `owl` are predefined and may be redeclared.
 ///
-/// A name without a colon has the empty prefix if that is declared. Otherwise the name is used unchanged.
+/// A name without a colon has the empty prefix if the empty prefix is declared. Otherwise the name is
+/// used unchanged.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Prefixes(BTreeMap<String, String>);
 
@@ -45,12 +46,12 @@ impl Prefixes {
         self
     }
 
-    /// Returns the IRI of a prefix.
+    /// Returns the IRI of a prefix, if the prefix is declared.
     pub fn get(&self, prefix: &str) -> Option<&str> {
         self.0.get(prefix).map(String::as_str)
     }
 
-    /// All prefixes with their IRIs, sorted.
+    /// Returns all prefixes with their IRIs, sorted.
     pub fn iter(&self) -> impl Iterator<Item = (&str, &str)> {
         self.0.iter().map(|(prefix, iri)| (prefix.as_str(), iri.as_str()))
     }

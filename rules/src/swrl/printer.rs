@@ -9,7 +9,8 @@ use crate::literal::Literal;
 use crate::rule::{Atom, Program, Rule, Term, Variable};
 use crate::symbol::{Symbol, Symbols, Value};
 
-/// Prints one rule per line, with labels. Names are abbreviated by the prefixes, which are declared first.
+/// Prints one rule per line, with labels. IRIs are abbreviated by the prefixes, which are declared
+/// first.
 pub fn print_rules(program: &Program, symbols: &Symbols, prefixes: &Prefixes) -> String {
     let mut text = String::new();
     for (prefix, iri) in prefixes.iter().filter(|&(prefix, iri)| Prefixes::default().get(prefix) != Some(iri))
@@ -109,8 +110,8 @@ impl Printer<'_> {
     }
 }
 
-/// Name of a variable if it can be parsed and is unique in the rule, and otherwise a name made of its
-/// number.
+/// Returns the name of a variable, if the name can be parsed and is unique in the rule, and otherwise a
+/// name made of the variable's number.
 fn variable_name(rule: &Rule, variable: Variable) -> String {
     let name = rule.variable_name(variable);
     let readable = !name.is_empty() && name.chars().all(|c| c.is_alphanumeric() || c == '_' || c == '-');

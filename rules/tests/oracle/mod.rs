@@ -204,7 +204,7 @@ fn extend(atom: &Atom, binding: &Binding, facts: &BTreeSet<Fact>) -> Vec<Binding
     .collect()
 }
 
-/// Terms of a body's atoms. Other aggregates contribute only their results.
+/// Returns the terms of `body` outside of `aggregate`. Other aggregates contribute only their results.
 fn outside(body: &[Atom], aggregate: &Atom) -> BTreeSet<Term> {
     let other_atoms = body.iter().filter(|&other| !std::ptr::eq(other, aggregate));
     let visible = other_atoms.flat_map(|other| match other {

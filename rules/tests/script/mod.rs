@@ -25,7 +25,8 @@ const DIFFERENCE: u8 = 4;
 const DIFFERENT_FROM: &str = "http://www.w3.org/2002/07/owl#differentFrom";
 const VARIABLES: u8 = 4;
 const CONSTANTS: u8 = 4;
-/// Predicates of changes and of heads. There are few, so that different conclusions interact.
+/// Predicates of changes and of heads. There are only few predicates, so that different conclusions
+/// interact.
 const CHANGED: [u8; 16] = [0, 0, 0, 0, 1, 1, 1, 1, 0, 1, 2, 3, 3, 4, 6, 7];
 const CONCLUDED: [u8; 9] = [0, 1, 2, 3, 3, 4, 4, 6, 7];
 
@@ -205,7 +206,7 @@ impl World {
 }
 
 /// Checks that the first step follows from its supports by its rule, and that no fact supports itself. The
-/// other steps are the first steps of their own derivations.
+/// other steps need no check here, because each of them is the first step of the derivation of its own fact.
 fn check_derivation(engine: &Engine, derivation: &Derivation, facts: &BTreeSet<Fact>) {
     let mut supported = vec![false; derivation.steps.len()];
     // The number of passes is at most the length of the longest chain. A circle is never resolved.
@@ -301,7 +302,7 @@ fn check_equality(engine: &Engine, fact: &Fact, supporting: &[&Fact]) {
     }
 }
 
-/// Violated constraints, with the number of matches of each.
+/// Returns the positions of the violated constraints, each with the number of its distinct matches.
 fn violations(program: &Program, symbols: &mut Symbols, facts: &BTreeSet<Fact>) -> BTreeMap<u32, usize> {
     let random = program.rules.iter().filter(|rule| is_random(rule));
     let constraints = random.filter(|rule| rule.head.is_empty());
@@ -448,7 +449,7 @@ fn assert_difference(change: &Delta, before: &BTreeSet<Fact>, after: &BTreeSet<F
     assert_eq!(change.delete, before.difference(after).cloned().collect::<Vec<_>>());
 }
 
-/// Removes an active rule, or adds an absent one, by one of several functions.
+/// Removes an active rule, or adds an absent rule, by one of several functions of the engine.
 fn switch(
     engine: &mut Engine,
     program: &Program,

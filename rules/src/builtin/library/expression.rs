@@ -3,10 +3,11 @@
 //! The syntax consists of the operators `+`, `-`, `*`, `/`, `%` and `^`, signs, brackets, the constants `pi` and `e`,
 //! functions of one or two numbers, and implicit multiplication (`2x`, `3(a + b)`).
 
-/// Maximum nesting depth of brackets, signs and powers. It protects the stack.
+/// Maximum nesting depth of brackets, signs and powers, which limits the recursion depth of the parser.
 const MAX_DEPTH: usize = 200;
 
-/// Value of an expression under an assignment of its variables; `None` if the expression is invalid.
+/// Returns the value of an expression under an assignment of its variables; `None` if the expression is
+/// invalid.
 pub(super) fn value(text: &str, variables: &[(&str, f64)]) -> Option<f64> {
     let mut parser = Parser { rest: text, variables, depth: 0 };
     let value = parser.sum()?;
@@ -33,7 +34,7 @@ impl<'a> Parser<'a> {
         is_next
     }
 
-    /// Consumes the longest prefix of characters with a property.
+    /// Consumes and returns the longest prefix of characters with a property.
     fn take(&mut self, belongs: impl Fn(char) -> bool) -> &'a str {
         let end = self.rest.find(|c| !belongs(c)).unwrap_or(self.rest.len());
         let (prefix, remainder) = self.rest.split_at(end);

@@ -13,7 +13,7 @@ const EVAL: &str = "http://swrl.stanford.edu/ontologies/built-ins/3.4/swrlm.owl#
 const SQRT: &str = "http://swrl.stanford.edu/ontologies/built-ins/3.4/swrlm.owl#sqrt";
 const LOG: &str = "http://swrl.stanford.edu/ontologies/built-ins/3.4/swrlm.owl#log";
 
-/// A function of one number.
+/// A function of one number, with its IRI.
 struct Unary(&'static str, fn(f64) -> f64);
 
 /// The function `eval`.
@@ -21,7 +21,7 @@ struct Eval;
 
 pub(super) const ALL: [&dyn Definition; 3] = [&Unary(SQRT, f64::sqrt), &Unary(LOG, f64::ln), &Eval];
 
-/// Result as a double; `None` if it is infinite or NaN.
+/// Returns the result as a double; `None` if it is infinite or NaN.
 fn number(value: f64) -> Option<Literal> {
     value.is_finite().then(|| Literal::double(value))
 }
@@ -72,8 +72,9 @@ impl Definition for Eval {
 }
 
 impl BuiltIn {
-    /// Returns the expression of a `swrlm:eval` atom with the names of its arguments. `None` if it already
-    /// has names, and for other built-ins. A constant has no name.
+    /// Returns the expression of a `swrlm:eval` atom, preceded by the names of the atom's arguments.
+    /// Returns `None` if the expression already has names, and for other built-ins. A constant has the
+    /// name `_`.
     pub fn with_names(self, expression: &str, names: &[Option<&str>]) -> Option<String> {
         let is_eval = self.name() == EVAL && !expression.contains(':') && !names.is_empty();
         let local = |name: &str| name.rsplit(['#', '/', ':']).next().map(str::to_owned);

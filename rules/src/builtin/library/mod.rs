@@ -19,25 +19,26 @@ use super::signature::BuiltIn;
 /// Common IRI prefix of the libraries of `SWRLTab`, before the version.
 const LIBRARY_ROOT: &str = "http://swrl.stanford.edu/ontologies/built-ins/";
 
-/// All built-ins of the libraries.
+/// All built-ins of both libraries.
 static ALL: LazyLock<Vec<&'static dyn Definition>> =
     LazyLock::new(|| math::ALL.iter().copied().chain(temporal::all()).collect());
 
-/// Built-in with this IRI, in any version of its library.
+/// Returns the built-in with this IRI, in any version of its library.
 pub(super) fn find(iri: &str) -> Option<BuiltIn> {
     let target = name(iri)?;
     let definition = ALL.iter().find(|definition| name(definition.iri()) == Some(target));
     definition.map(|definition| BuiltIn::custom(*definition))
 }
 
-/// IRIs of all built-ins in the library of an IRI, in any version.
+/// Returns the IRIs of all built-ins in the library of an IRI, in any version.
 pub(super) fn names_in_library(iri: &str) -> Vec<&'static str> {
     let library = |iri| name(iri).and_then(|name| name.split_once('#')).map(|(library, _)| library);
     let iris = ALL.iter().map(|definition| definition.iri());
     iris.filter(|known| library(iri).is_some() && library(known) == library(iri)).collect()
 }
 
-/// Library and local name of an IRI, without the version.
+/// Returns the library and the local name of an IRI, without the version; `None` for IRIs outside of the
+/// libraries.
 fn name(iri: &str) -> Option<&str> {
     iri.strip_prefix(LIBRARY_ROOT)?.split_once('/').map(|(_, name)| name)
 }

@@ -46,7 +46,7 @@ impl Granularity {
         })
     }
 
-    /// Number of the granule that contains a moment, relative to a fixed origin.
+    /// Returns the number of the granule that contains a moment, relative to a fixed origin.
     fn granule(self, moment: &Moment) -> Option<i64> {
         let ([year, month, _], _) = moment.in_utc().calendar();
         let per_second = match self {
@@ -63,7 +63,7 @@ impl Granularity {
         granules.floor().to_integer().to_i64()
     }
 
-    /// Duration of a number of granules.
+    /// Returns the duration of a number of granules.
     fn duration(self, count: i64) -> Option<Duration> {
         let seconds = |unit: i64| Some(Duration::new(0, Decimal::from(count.checked_mul(unit)?)));
         match self {
@@ -78,7 +78,8 @@ impl Granularity {
     }
 }
 
-/// Moment of an argument: a date, a date with time, or the text of either.
+/// Converts an argument to a moment: a date, a date with time, or the text of either. Returns `None` for
+/// other literals.
 fn moment(literal: &Literal) -> Option<Moment> {
     let text = match literal {
         Literal::Moment(moment) if moment.kind() != MomentKind::Time => return Some(moment.clone()),
@@ -105,12 +106,13 @@ fn moment(literal: &Literal) -> Option<Moment> {
     }
 }
 
-/// Returns `true` if all moments have a time zone, or none has.
+/// Returns `true` if the moments are comparable: all have a time zone, or none has.
 fn comparable(moments: &[Moment]) -> bool {
     moments.windows(2).all(|pair| pair[0].zone_text().is_empty() == pair[1].zone_text().is_empty())
 }
 
-/// Number of granules between two moments.
+/// Returns the absolute number of granules between two moments. The arguments are two moments and a
+/// granularity.
 fn difference(arguments: &[&Literal]) -> Option<i64> {
     let [from, to, granularity] = arguments else { return None };
     let (granularity, moments) = (Granularity::from_literal(granularity)?, [moment(from)?, moment(to)?]);
@@ -131,7 +133,7 @@ struct DurationComparison {
     negated: bool,
 }
 
-/// Allen's interval relations, between instants or periods.
+/// A test of one of Allen's interval relations, between instants or periods.
 struct AllenRelation {
     iri: &'static str,
     relation: fn(Period, Period) -> bool,
@@ -214,8 +216,8 @@ impl Definition for AllenRelation {
     }
 }
 
-/// Parses an instant, then an instant or the two bounds of a period, then an optional granularity (by
-/// default milliseconds).
+/// Parses the arguments of an Allen relation: an instant, then an instant or the two bounds of a period,
+/// then an optional granularity (by default milliseconds). Returns both as periods of granules.
 fn periods(arguments: &[&Literal]) -> Option<(Period, Period)> {
     let (granularity, moments) = match arguments.split_last()? {
         (last, others) if others.len() >= 2 => match Granularity::from_literal(last) {
@@ -299,7 +301,7 @@ static ALLEN_RELATIONS: &[AllenRelation] = table!(AllenRelation {
     "notIntersects" true => relation: |a, b| a.0 <= b.1 && b.0 <= a.1,
 });
 
-/// All built-ins of the library.
+/// Returns the definitions of all built-ins of the library.
 pub(super) fn all() -> Vec<&'static dyn Definition> {
     let mut definitions: Vec<&'static dyn Definition> = vec![&DurationFunction, &AddFunction];
     definitions.extend(DURATION_COMPARISONS.iter().map(|definition| definition as &dyn Definition));
