@@ -47,7 +47,7 @@ impl Clock for SystemClock {
     }
 }
 
-/// Runs a loop until the observer returns no observation.
+/// Runs a loop until the observer returns `None`: passes each observation to the loop, and its answers to the effector.
 ///
 /// # Errors
 /// Errors of the observer and of the effector.

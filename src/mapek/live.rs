@@ -1,8 +1,8 @@
-//! Translates the believed situation to a query of the incremental planner, and its answer to a plan.
+//! Translates the believed situation to a query of the incremental planner, and the planner's answer to a plan.
 //!
-//! The incremental planner is built for the domain of the mission. The remainder of an action under way is passed as a
-//! fixed first step: each of its configurations is simulated in the domain in which the action is shortened, see
-//! [`super::resume`].
+//! The incremental planner is built for the domain of the mission. If an action is under way, the query restricts the
+//! first step to the remainder of this action. The remainder is simulated for each of its configurations in the domain
+//! of [`super::resume`], in which the action is shortened.
 
 use num_rational::BigRational;
 use pddl::validate::advance_each;
@@ -14,23 +14,24 @@ use crate::mapek::step::PlannedStep;
 use crate::mapek::watch::Watch;
 use crate::mission::replanner;
 
-/// Upper limit on the simulated configurations of the action under way.
+/// Upper limit on the number of configurations for which the action under way is simulated.
 const MAX_CONFIGURATIONS: usize = 256;
 
-/// Incremental planner, kept between queries.
+/// State of the incremental planner, kept between queries.
 #[derive(Debug, Clone, Default)]
 pub(super) enum Live {
-    /// Before the first query.
+    /// Not built yet, because there was no query.
     #[default]
     Untried,
     /// The incremental planner does not support the mission.
     Unsuited,
-    /// Built for one problem. It also accepts problems that differ only in initial values and available designs.
+    /// Planner built for one problem. Also accepts problems that differ only in initial values and available designs.
     Ready(Replanner),
 }
 
 impl Live {
-    /// Returns a proved answer, or the incumbent at the time limit. `None` if planning from scratch is necessary.
+    /// Plans incrementally. Returns a proved outcome, or the best plan at the time limit. Returns `None` if planning
+    /// from scratch is necessary.
     pub(super) fn plan(
         &mut self,
         question: &Question<'_>,
@@ -103,7 +104,8 @@ impl Live {
     }
 }
 
-/// Proved absence of a plan.
+/// Returns the outcome that proves the absence of a plan. `blocking` is a set of unavailable designs that blocks every
+/// plan.
 fn none(blocking: Vec<String>) -> Outcome {
     Outcome {
         steps: None,
@@ -114,8 +116,8 @@ fn none(blocking: Vec<String>) -> Outcome {
     }
 }
 
-/// Remainders of the action under way, one per executable configuration. `None` if the configurations are too many or
-/// unknown.
+/// Returns the remainders of the action under way with their simulated effects, one per executable configuration.
+/// Returns `None` if no action is under way, or its configurations are too many or unknown.
 pub(super) fn first_steps(question: &Question<'_>) -> Option<Vec<(PlannedStep, FirstStep)>> {
     let running = question.running?;
     let mut steps = vec![running.step.clone()];

@@ -1,4 +1,4 @@
-//! Applies reports of sensors, components and functions to the beliefs, after their filters.
+//! Applies reports of sensors, components and functions to the beliefs. Noise filters can delay or reject a report.
 
 use num_rational::BigRational;
 use ontology::tomasys::change::Status;
@@ -70,7 +70,7 @@ impl BeliefUpdate<'_> {
         }
     }
 
-    /// Applies a sample unless its filter holds it back.
+    /// Applies a sample of a measured attribute, unless the attribute's filter holds the sample back.
     pub(super) fn sampled(&mut self, attribute: &str, value: &BigRational) -> Result<(), Refusal> {
         let is_known = self.monitor.attributes.contains(attribute);
         let (states, now, filtered) =
@@ -84,7 +84,7 @@ impl BeliefUpdate<'_> {
         }
     }
 
-    /// Applies the status of a component unless its filter holds it back.
+    /// Applies a reported status of a component, unless the component's filter holds the report back.
     pub(super) fn component(&mut self, component: &str, status: Status) -> Result<(), Refusal> {
         let name = match self.monitor.components.get(component) {
             Some(name) => Some(name.clone()),
