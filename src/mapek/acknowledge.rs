@@ -1,9 +1,9 @@
-//! Acknowledgements: determines the believed design of each function from acknowledgements of reconfigurations.
+//! Determines the believed design of each function from acknowledgements of reconfigurations.
 //!
-//! The believed design is the one that was acknowledged last. An event with the number of a reconfiguration
-//! acknowledges it. Messages can cross, be duplicated or arrive out of order: of two acknowledged reconfigurations of
-//! one function, the later one counts. A superseded reconfiguration without an answer can still be acknowledged. Until
-//! then its design is not believed, and the design of the function is uncertain.
+//! The believed design of a function is the design of its last acknowledged reconfiguration. An event with the number
+//! of a reconfiguration acknowledges it. Messages can cross, be duplicated or arrive out of order: of two acknowledged
+//! reconfigurations of one function, the later one counts. A superseded reconfiguration without an answer can still be
+//! acknowledged. Before this acknowledgement, its design is not believed, and the design of the function is uncertain.
 //!
 //! A report that an action has started, progressed or succeeded implies the arrival of its request, and nothing else.
 //! Under this rule alone, robots without acknowledgements would never have a believed design. Therefore, until a
@@ -21,14 +21,14 @@ pub(super) enum Receipt {
     Unknown,
     /// The effect is acknowledged.
     Recorded,
-    /// The design of this function is uncertain.
+    /// The effect is acknowledged, but the design of the given function is uncertain.
     Doubtful(String),
 }
 
 /// Outcome of a report that a reconfiguration has failed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Failure {
-    /// The design cannot be realised.
+    /// The given design could not be realised.
     Design(String),
     /// No consequence: the report is old or a duplicate.
     Stale,
@@ -136,8 +136,8 @@ impl Beliefs {
     }
 
     /// Records that a reconfiguration has arrived, unless a later one is acknowledged. If the function was observed
-    /// with another design while the reconfiguration was pending, the order of the two is unknown, and so is the
-    /// design.
+    /// with another design while the reconfiguration was pending, the order of observation and reconfiguration is
+    /// unknown, and so is the design.
     fn configured(&mut self, effect: u64, function: String, design: String) -> Receipt {
         let history = self.receipts.functions.entry(function.clone()).or_default();
         // A superseded reconfiguration without an answer may have been carried out in between.
