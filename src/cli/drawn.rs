@@ -68,7 +68,7 @@ impl Pages {
     }
 }
 
-/// Writes pictures into a directory.
+/// Writes pictures, given as file names and SVG texts, into a directory.
 pub(super) fn write_pictures(directory: &Path, pictures: &[(String, String)]) -> Result<(), Failure> {
     output::make_directory(directory)?;
     pictures.iter().try_for_each(|(name, text)| output::write_file(&directory.join(name), &visible(text)))
@@ -80,14 +80,14 @@ impl Drawing {
         self.svg.is_some()
     }
 
-    /// Writes the only picture of a front.
+    /// Writes the picture of a Pareto front to an SVG file, if requested.
     pub(super) fn draw_front(&self, sheet: &Sheet) -> Result<(), Failure> {
         let (Some(file), [(_, picture)]) = (&self.svg, &sheet.pictures()[..]) else { return Ok(()) };
         output::write_file(file, &visible(picture))
     }
 
-    /// Writes the file, and returns the picture for a terminal. Empty if it is not requested, or if
-    /// the terminal is too small.
+    /// Writes the timeline of a plan to an SVG file, if requested, and returns the timeline as text for a terminal. The
+    /// text is empty if it is not requested, or if the terminal is too small.
     pub(super) fn draw(
         &self,
         mission: &Mission,

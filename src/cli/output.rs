@@ -65,7 +65,7 @@ pub fn json_answer(answer: &impl Serialize) {
     document(&visible_json(&pretty(answer)));
 }
 
-/// Formats an answer for programs as one line.
+/// Formats an answer for programs as one line of JSON.
 pub fn line(answer: &impl Serialize) -> String {
     serde_json::to_string(answer).unwrap_or_default() + "\n"
 }
@@ -126,7 +126,7 @@ pub fn write_file(path: &Path, text: &str) -> Result<(), Failure> {
     file::write(path, text).map_err(Failure::from)
 }
 
-/// Returns the file that `--output` names. `None` for standard output, the meaning of `-`.
+/// Returns the file given by `--output`, or `None` for standard output (no option, or `-`).
 pub fn file_named(output: Option<&PathBuf>) -> Option<&Path> {
     output.map(PathBuf::as_path).filter(|path| !file::is_stdout(path))
 }

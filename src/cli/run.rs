@@ -66,7 +66,7 @@ enum Fsync {
     Never,
 }
 
-/// Runs the command.
+/// Runs `metaplan run` and returns the exit status of the program.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     if arguments.configure {
         return keep(arguments, common);
@@ -161,7 +161,7 @@ fn adaptation(file: Option<&Path>, knowledge: &Knowledge) -> Result<Settings, Fa
     Ok(Settings::read(file, Some(knowledge))?)
 }
 
-/// Runs the configuration loop as [`drive`] runs the planning loop.
+/// Runs the configuration loop from its first line to its last.
 fn keep_going(
     common: &Common,
     keeper: Keeper,
