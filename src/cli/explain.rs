@@ -92,7 +92,7 @@ fn explain_plan(mission: &Mission, limits: &Limits, common: &Common) -> Result<b
     Ok(changes.complete)
 }
 
-/// Runs planning queries and shows their progress.
+/// Runs `plan`, which computes plans, and shows its progress.
 fn planning<T>(
     common: &Common,
     limits: &Limits,
@@ -104,7 +104,7 @@ fn planning<T>(
     outcome.map_err(|messages| Failure::planning(messages, limits))
 }
 
-/// Explains a message code.
+/// Prints meaning, cause and remedy of a message code.
 fn code(name: &str, common: &Common) -> Result<Exit, Failure> {
     let Some(found) = codes::find(name) else {
         let catalogue = codes::all();

@@ -1,4 +1,4 @@
-//! The command `metaplan journal`, which shows or checks the journal of a loop.
+//! The command `metaplan journal`, which shows or checks the journal of an adaptation loop.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;

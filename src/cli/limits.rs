@@ -72,7 +72,7 @@ impl Guard {
             return Err(Failure::usage(Message::error("M115", text)));
         }
         if let Some(megabytes) = memory {
-            // Formulas and ground tasks take the other half.
+            // The search may use half of the memory limit; formulas and ground tasks take the other half.
             let half = usize::try_from(megabytes).unwrap_or(usize::MAX).saturating_mul(1 << 19);
             limits = limits.with_room(half);
         }

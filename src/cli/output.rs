@@ -60,7 +60,7 @@ pub fn has_begun() -> bool {
     HAS_BEGUN.load(Ordering::Relaxed)
 }
 
-/// Writes an answer for programs to standard output.
+/// Writes an answer for programs to standard output, as indented JSON.
 pub fn json_answer(answer: &impl Serialize) {
     document(&visible_json(&pretty(answer)));
 }
@@ -70,7 +70,7 @@ pub fn line(answer: &impl Serialize) -> String {
     serde_json::to_string(answer).unwrap_or_default() + "\n"
 }
 
-/// Writes a sentence for people to standard error.
+/// Writes a text for people to standard error.
 pub fn note(text: &str) {
     let _ = std::io::stderr().write_all(visible(text).as_bytes());
 }

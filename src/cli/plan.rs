@@ -282,7 +282,7 @@ fn two(pair: &str) -> Result<[&str; 2], Failure> {
     })
 }
 
-/// Shows the answer, or writes it to a file.
+/// Prints the answer, or writes it to a file, and draws the requested pictures.
 fn finish(
     planned: &Planned<'_>,
     mission: &Mission,

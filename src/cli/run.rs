@@ -1,4 +1,4 @@
-//! `metaplan run`: reads lines of events and writes lines of adaptations.
+//! The command `metaplan run`, which runs the adaptation loop: reads lines of events and writes lines of answers.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -112,7 +112,7 @@ fn journal(
     Ok(Some((journal, recovery)))
 }
 
-/// Closes the outputs after the loop, also after a failure.
+/// Closes the recording and the web page after the loop has ended with `result`, also after a failure.
 fn ended(result: Result<(), Failure>, outlet: &Outlet) -> Result<Exit, Failure> {
     let closed = outlet.close();
     result?;
@@ -180,7 +180,7 @@ fn keep_going(
 /// Time of planning before the first heartbeat, and between two heartbeats.
 const HEARTBEAT: Duration = Duration::from_secs(1);
 
-/// Reports the progress of planning every second until the program ends.
+/// Starts a thread that reports the progress of planning every second until the program ends.
 fn heartbeat(watch: Watch, line: Arc<AtomicU64>, outlet: Outlet) {
     std::thread::spawn(move || {
         let mut reported: Option<(u64, Instant, Instant)> = None;

@@ -12,7 +12,7 @@ use metaplan::recording::{FIRST_BYTE, Replay};
 use crate::cli::common::Common;
 use crate::cli::output;
 
-/// A line, and its time since the start of the mission, if the source has times.
+/// A line of input, with its time since the start of the mission if the source has times.
 pub(super) struct Line {
     pub(super) text: String,
     pub(super) now: Option<Duration>,

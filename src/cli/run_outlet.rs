@@ -80,8 +80,7 @@ impl Outlet {
         Ok(Self { recorder, is_told: Arc::default(), live })
     }
 
-    /// Publishes a line before it is handled, with its number and the time since the start of the
-    /// mission.
+    /// Publishes a line of input before it is handled, with its number and the time since the start of the mission.
     pub(super) fn heard(&self, line: u64, now: Duration, text: &str) {
         if let Some((recorder, _)) = &self.recorder {
             recorder.event(line, now, text);

@@ -53,7 +53,7 @@ pub(super) enum Flow {
     Over,
 }
 
-/// A loop with its inputs and outputs.
+/// An adaptation loop with its inputs and outputs.
 pub(super) struct Session<'a> {
     common: &'a Common,
     control: Loop,
@@ -359,7 +359,7 @@ impl<'a> Session<'a> {
         Ok(flow)
     }
 
-    /// Writes the last answers to a line, and its acknowledgement.
+    /// Writes the last answers to a line, and the acknowledgement of the line.
     fn answer(&self, number: u64, answers: &[Answer], read: Instant) -> Result<Flow, Failure> {
         warn_if_unrecorded(self.common, answers);
         let flow = flow(self.outlet.answer(number, answers, read))?;
@@ -367,7 +367,7 @@ impl<'a> Session<'a> {
         Ok(flow)
     }
 
-    /// Acknowledges the last line.
+    /// Writes the acknowledgement of the last line, unless it was written before.
     fn close(&mut self) -> Result<Flow, Failure> {
         match self.open.take() {
             None => Ok(Flow::GoesOn),
@@ -381,7 +381,7 @@ pub(super) fn flow(written: std::io::Result<()>) -> Result<Flow, Failure> {
     Ok(if is_over(written)? { Flow::Over } else { Flow::GoesOn })
 }
 
-/// Receives all waiting inputs.
+/// Moves all received inputs to the queue `waiting`, up to [`MAX_WAITING`].
 fn gather(inputs: &Receiver<Input>, waiting: &mut VecDeque<Input>) {
     while waiting.len() < MAX_WAITING {
         match inputs.try_recv() {

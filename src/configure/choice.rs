@@ -45,8 +45,8 @@ pub struct Configuration {
     pub choices: Vec<Choice>,
     /// Sum of the utilities of the chosen designs.
     pub utility: BigRational,
-    /// `true` if it is proved that no choice serves more functions, or equally many with more
-    /// utility. Otherwise a limit was reached.
+    /// `true` if it is proved that no choice is better: serves more functions, else misses fewer requirements, else has
+    /// more utility. Otherwise a limit was reached.
     pub optimal: bool,
 }
 
@@ -102,7 +102,7 @@ struct Group {
     candidates: Vec<Offer>,
 }
 
-/// A candidate design with its demands, utility and rejections.
+/// A candidate design for an objective, with its demands on budgets, its utility, and the reasons that exclude it.
 struct Offer {
     design: String,
     utility: BigRational,

@@ -91,12 +91,12 @@ impl Configurator {
         &self.knowledge
     }
 
-    /// Returns the knowledge base for assertions of reports.
+    /// Returns the knowledge base, for the assertion of the robot's reports.
     pub fn knowledge_mut(&mut self) -> &mut Knowledge {
         &mut self.knowledge
     }
 
-    /// Returns the requirements on the configuration as a whole.
+    /// Returns the definition of utility and the joint constraints on the chosen designs.
     pub fn wishes(&self) -> &Wishes {
         &self.wishes
     }

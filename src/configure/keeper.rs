@@ -74,7 +74,7 @@ impl From<Answer> for KeeperAnswer {
 }
 
 impl Service {
-    /// Marks a request as repeated.
+    /// Marks a request as a repetition.
     #[must_use]
     pub(super) fn repeated(mut self) -> Self {
         if let Self::Reconfigure { repeated, .. } = &mut self {
@@ -280,7 +280,7 @@ impl Keeper {
         Ok(())
     }
 
-    /// Asserts the status of a component, unless its filter holds it back.
+    /// Asserts the reported status of a component, unless the component's filter holds the report back.
     fn component(
         &mut self,
         component: &str,

@@ -14,7 +14,7 @@ use crate::mapek::answer::Command;
 use crate::mapek::beliefs::Beliefs;
 use crate::mapek::receipts::{Acknowledged, Before};
 
-/// Outcome of an acknowledgement.
+/// Outcome of recording the acknowledgement of an effect.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Receipt {
     /// No effect has this number.
@@ -37,7 +37,8 @@ pub(super) enum Failure {
 }
 
 impl Beliefs {
-    /// Records an acknowledgement. The effect is then no longer outstanding.
+    /// Records that the managed system has acknowledged the effect with this number. The effect is then no longer
+    /// outstanding.
     pub(super) fn acknowledge(&mut self, effect: u64) -> Receipt {
         if effect == 0 || effect > self.effects {
             return Receipt::Unknown;
@@ -101,7 +102,7 @@ impl Beliefs {
                 return self.unanswered_failed(&function, design);
             }
             let Some(last) = history.last.as_mut() else { continue };
-            // If the previous reconfiguration failed too, the design after a failure of the last one is unknown.
+            // If both the last and the previous reconfiguration have failed, the design of the function is unknown.
             if let Some(before) = last.before.take_if(|before| before.effect == Some(effect))
                 && last.failed
                 && self.configuration.get(function) == Some(&before.design)
@@ -125,9 +126,9 @@ impl Beliefs {
         Failure::Stale
     }
 
-    /// Records the failure of an unanswered reconfiguration. The function keeps its previous design. If the function
-    /// was observed with the new design meanwhile, the reconfiguration has failed after it was carried out, and the
-    /// design becomes unknown.
+    /// Records the failure of a reconfiguration to `design` that was not acknowledged. The function keeps its previous
+    /// design. If the function was observed with the new design in the meantime, the reconfiguration has failed after
+    /// it was carried out, and the design becomes unknown.
     fn unanswered_failed(&mut self, function: &str, design: String) -> Failure {
         if self.configuration.get(function) == Some(&design) {
             self.configuration.remove(function);

@@ -27,10 +27,11 @@ use crate::number;
 /// Number of consecutive failures of one step after which planning pauses until something else changes.
 const MAX_FAILURES: u32 = 3;
 
-/// Lower limit on the base of the pause after an unfinished search. The base is the time limit of a plan, if greater.
+/// Minimum base of the pause before a search that hit its time limit is repeated. A greater time limit is used as the
+/// base instead.
 const MIN_RETRY: Duration = Duration::from_secs(10);
 
-/// Upper limit on the pause after an unfinished search.
+/// Upper limit on the pause before a search that hit its time limit is repeated.
 const MAX_RETRY: Duration = Duration::from_secs(3600);
 
 /// Entry of `Beliefs::improvement_causes`, among the names of designs, that represents changed facts.
@@ -56,7 +57,8 @@ pub(super) struct Adaptation<'a> {
 }
 
 impl Adaptation<'_> {
-    /// Handles changes and findings, and replans if necessary.
+    /// Decides from changes and findings of the analysis whether a plan is needed. If so, searches for a plan and
+    /// adopts it.
     pub(super) fn adapt(&mut self, changes: Changes, findings: Findings, answers: &mut Vec<Answer>) {
         let is_observed = changes.observed;
         self.decide(changes, findings, answers);
@@ -172,8 +174,8 @@ impl Adaptation<'_> {
         self.beliefs.running = Some(running);
     }
 
-    /// Searches for a better plan if reasons for one have been known for the settle time, or an unfinished search is
-    /// due again.
+    /// Searches for a better plan if the reasons why one may exist have lasted for the settle time, or if the
+    /// repetition of an unfinished search is due.
     fn improve(&mut self, answers: &mut Vec<Answer>) {
         let has_plan = self.beliefs.plan.is_some() && !self.beliefs.reached;
         if !has_plan {
@@ -189,7 +191,7 @@ impl Adaptation<'_> {
         }
     }
 
-    /// Returns `true` if an unfinished search is due again.
+    /// Returns `true` if the scheduled repetition of an unfinished search is due.
     fn is_retry_due(&self) -> bool {
         self.beliefs.retry.is_some_and(|scheduled| scheduled.at <= self.beliefs.now)
     }
@@ -206,7 +208,8 @@ impl Adaptation<'_> {
         self.beliefs.retry = Some(Retry { at, attempt: attempt + 1 });
     }
 
-    /// Plans, and adopts the result. With [`Need::Better`], the plan is adopted only if its benefit is sufficient.
+    /// Searches for a plan for the reasons `because`, and adopts it. With [`Need::Better`], the plan is adopted only if
+    /// its benefit is sufficient.
     pub(super) fn replan(&mut self, because: Vec<String>, need: Need, answers: &mut Vec<Answer>) {
         let is_necessary = need != Need::Better;
         let reason = because.first().cloned().unwrap_or_default();
@@ -283,7 +286,7 @@ impl Adaptation<'_> {
         }
     }
 
-    /// Returns `true` if all designs of an action are available and its remainder satisfies its conditions.
+    /// Returns `true` if all designs of an action under way are available, and its remainder is executable.
     fn can_go_on(&self, running: &Running) -> bool {
         let designs = running.step.configuration.iter();
         designs.into_iter().all(|(_, design)| self.beliefs.is_available(design))
@@ -378,14 +381,15 @@ impl Adaptation<'_> {
     }
 }
 
-/// Improvement of the metric from `metric` to `other`; negative if `other` is worse.
+/// Returns the improvement from the metric value `metric` to the value `other`; negative if `other` is worse.
 fn gain(beliefs: &Beliefs, metric: &BigRational, other: &BigRational) -> BigRational {
     let declared = beliefs.mission.problem().metric.as_ref();
     let maximize = declared.is_some_and(|metric| metric.direction == Direction::Maximize);
     if maximize { other - metric } else { metric - other }
 }
 
-/// Returns the [`gain`] if it is positive and at least the minimum benefit.
+/// Returns the [`gain`] from `metric` to `other` if it is positive and at least the minimum benefit, and `None`
+/// otherwise.
 fn benefit(
     beliefs: &Beliefs,
     settings: &Settings,

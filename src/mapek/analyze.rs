@@ -10,7 +10,7 @@ use crate::mapek::answer::{Answer, DesignChange, ObjectiveChange};
 use crate::mapek::beliefs::Beliefs;
 use crate::mapek::monitor::Base;
 
-/// Changes found by the analysis.
+/// Changes of available designs and of objectives in error, found by the analysis.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Findings {
     /// Designs that are no longer available.
@@ -139,7 +139,7 @@ pub(crate) fn changes(
     (changed_designs, changed_objectives)
 }
 
-/// Availability of a design, with the reasons if it is unavailable.
+/// Returns the availability of a design, with the reasons if it is unavailable.
 pub(super) fn availability(knowledge: &Knowledge, design: &str, available: bool) -> DesignChange {
     let because = match knowledge.fault() {
         _ if available => Vec::new(),

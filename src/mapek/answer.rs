@@ -53,7 +53,8 @@ pub enum Answer {
     },
     /// Planning has found no plan.
     PlanNone {
-        /// `unsolvable`, `unknown` or `failed`.
+        /// `unsolvable` if the absence of a plan is proved, `failed` if an action has failed repeatedly, and `unknown`
+        /// otherwise.
         status: &'static str,
         /// Reason, as a sentence.
         because: String,
@@ -214,7 +215,7 @@ pub enum Command {
 }
 
 impl Command {
-    /// Value of the field `answer`.
+    /// Returns the value of the JSON field `answer`, such as `request_action`.
     fn kind(&self) -> &'static str {
         match self {
             Self::Reconfigure { .. } => "reconfigure",
@@ -259,13 +260,13 @@ impl Serialize for Answer {
 }
 
 impl Answer {
-    /// Converts the answer to a JSON object of the format.
+    /// Converts the answer to a JSON object of the output format.
     pub fn to_json(&self) -> Value {
         // The serialization cannot fail: all map keys are strings.
         serde_json::to_value(self).unwrap_or_default()
     }
 
-    /// Value of the field `answer`.
+    /// Returns the value of the JSON field `answer`, such as `plan_found`.
     fn kind(&self) -> &'static str {
         match self {
             Self::Inferred { .. } => "inferred",
@@ -348,7 +349,7 @@ impl Answer {
         }
     }
 
-    /// Returns the effect, if the answer is one.
+    /// Returns the effect if the answer requests one, and `None` otherwise.
     pub fn effect(&self) -> Option<&Effect> {
         match self {
             Self::Effect(effect) => Some(effect),

@@ -31,7 +31,7 @@ pub(crate) struct Question<'a> {
     pub problem: &'a Problem,
     /// The action under way. Its remainder is the first step of every plan.
     pub running: Option<&'a Running>,
-    /// The current plan, if planning starts before the first of its steps.
+    /// Remaining steps of the current plan; `None` without a plan, or if the action under way is treated as cancelled.
     pub old: Option<&'a [PlannedStep]>,
     /// Whether to prefer, among optimal plans of equal length, one that shares most steps with `old`.
     pub stay_close: bool,

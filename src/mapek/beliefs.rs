@@ -1,8 +1,8 @@
 //! Shared state of the loop: the believed situation and outstanding effects. Loops of one mission with equal beliefs
 //! behave equally.
 //!
-//! While an action is under way, values that it increases or decreases change with its progress. Its other effects take
-//! place when it succeeds.
+//! While an action is under way, numeric values that the action increases or decreases change with its progress. The
+//! other effects of the action take place when it succeeds.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -35,7 +35,8 @@ pub struct Beliefs {
     pub(super) statuses: BTreeMap<String, Vec<String>>,
     /// Axioms and rules that the known facts violate.
     pub(super) violated: BTreeSet<String>,
-    /// Fault that stopped the reasoning, as last reported. The conclusions are then incomplete.
+    /// Fault that stopped the reasoning, as last reported; the conclusions are then incomplete. `None` if they are
+    /// complete.
     pub(super) fault: Option<Fault>,
     /// Believed design of each function: the design that was acknowledged or observed last.
     pub(super) configuration: BTreeMap<String, String>,
@@ -43,7 +44,7 @@ pub struct Beliefs {
     pub(super) plan: Option<VecDeque<PlannedStep>>,
     /// The action under way: requested and not ended.
     pub(super) running: Option<Running>,
-    /// Whether the goal held when it was last checked.
+    /// Whether the goal was reached, and no later change required a new plan.
     pub(super) reached: bool,
     /// Whether planning has failed and pauses until something changes.
     pub(super) stuck: bool,
@@ -57,9 +58,9 @@ pub struct Beliefs {
     pub(super) improvement_causes: BTreeSet<String>,
     /// Time at which the last entry of `improvement_causes` was added, since the start of the mission.
     pub(super) improvement_since: Duration,
-    /// Number of actions requested so far.
+    /// Number of actions requested since the start.
     pub(super) actions: u64,
-    /// Number of effects requested so far.
+    /// Number of effects requested since the start.
     pub(super) effects: u64,
     /// Unacknowledged effects by number.
     pub(super) outstanding: BTreeMap<u64, Effect>,
@@ -290,7 +291,7 @@ impl Beliefs {
         self.now
     }
 
-    /// Returns `true` if the goal was reached and nothing has changed since.
+    /// Returns `true` if the goal was reached, and no later change required a new plan.
     pub fn reached(&self) -> bool {
         self.reached
     }

@@ -40,8 +40,7 @@ pub(super) enum Base {
 }
 
 impl Changes {
-    /// Returns `true` if facts have changed, or if there is a reason to plan. Ignores the end of actions and filtered
-    /// reports.
+    /// Returns `true` if the knowledge base or facts of the problem have changed, or if there is a reason to plan.
     pub(super) fn any(&self) -> bool {
         self.base > Base::Nothing || self.facts || self.predicates || !self.reasons.is_empty()
     }

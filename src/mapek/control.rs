@@ -69,7 +69,7 @@ pub struct Loop {
     pub(super) planner: Planner,
     /// Changes since the last deliberation, if any.
     agenda: Option<Agenda>,
-    /// Number of changes of the planning problem.
+    /// Number of changes of the planning problem since the start, which identifies the current problem.
     pub(super) question: u64,
     digest: String,
 }

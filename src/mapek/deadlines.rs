@@ -61,9 +61,9 @@ fn is_request(effect: &Effect) -> bool {
 }
 
 /// Returns the effect number of the request of the action under way, if the action is suspended and the suspension is
-/// acknowledged. A suspended action has no deadline, so its request is repeated like any other effect; it then starts
-/// the action in the suspended state. Before the acknowledgement of the suspension, a repeated request might start the
-/// action moving.
+/// acknowledged. A suspended action has no deadline, so its request is repeated like any other effect. Such a request
+/// starts the action in the suspended state. Before the acknowledgement of the suspension, a repeated request might
+/// start the action moving.
 fn suspended_request(beliefs: &Beliefs) -> Option<u64> {
     let running = beliefs.running.as_ref().filter(|action| action.suspended && !action.cancelling)?;
     let is_about = |effect: &Effect| effect.action == running.action && effect.command.controls_execution();
@@ -138,7 +138,7 @@ fn check_action(beliefs: &mut Beliefs, settings: &Settings, answers: &mut Vec<An
     let (action, request) = (running.action, running.request);
     let is_unacknowledged = beliefs.outstanding.contains_key(&request);
     let is_first = running.overdue == 1;
-    // A report is expected if the robot has sent one of this kind before.
+    // A report is expected if the robot has sent a report of this kind before.
     let is_expected = match (running.started, is_unacknowledged) {
         (true, _) => running.progressed,
         (false, true) => beliefs.reports_actions || beliefs.receipts.are_sent(),

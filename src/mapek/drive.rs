@@ -31,7 +31,7 @@ pub trait Clock {
     fn now(&mut self) -> Duration;
 }
 
-/// Time since creation of the value, from the monotonic system clock.
+/// Clock that returns the time since its creation, from the monotonic system clock.
 #[derive(Debug, Clone, Copy)]
 pub struct SystemClock(Instant);
 

@@ -23,7 +23,7 @@ pub(super) enum Interruption {
     },
     /// The action is suspended, because no plan exists.
     Suspend {
-        /// `unsolvable` or `unknown`.
+        /// `unsolvable` if the absence of a plan is proved, and `unknown` otherwise.
         status: &'static str,
         /// Reason for the absence of a plan.
         because: String,

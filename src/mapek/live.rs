@@ -64,7 +64,7 @@ impl Live {
             watch.improve(cost, progress.bound - &metric);
         };
         let mut answer = self.query_planner(question, &query, false, &mut report)?;
-        // The planner does not fit the problem, for example after a change of the goal. It is rebuilt once.
+        // The planner does not fit the problem, for example after a change of the goal. The planner is rebuilt once.
         if answer == ReplanOutcome::Misfit {
             answer = self.query_planner(question, &query, true, &mut report)?;
         }
@@ -137,7 +137,7 @@ pub(super) fn first_steps(question: &Question<'_>) -> Option<Vec<(PlannedStep, F
     let mut first = Vec::new();
     for (mut step, change) in steps.into_iter().zip(advances) {
         let Ok(mut change) = change else { continue };
-        // The gate exists only in the shortened domain, not in the one of the planner.
+        // The gate exists only in the shortened domain, and not in the planner's domain.
         change.added.retain(|atom| atom.predicate.name.as_str() != GATE);
         // Without a metric, plans are measured by their number of steps.
         let one_step = BigRational::from_integer(1.into());

@@ -60,7 +60,7 @@ impl StoredQuestion {
         Self { problem: question.problem.clone(), running: question.running.cloned(), old }
     }
 
-    /// Returns `true` if both questions have the same action under way, or none.
+    /// Returns `true` if both planning problems have the same action under way, or no action.
     pub(super) fn has_same_action(&self, question: &Question<'_>) -> bool {
         self.running.as_ref().map(|running| running.action) == question.running.map(|running| running.action)
     }
@@ -83,7 +83,7 @@ impl StoredQuestion {
     }
 }
 
-/// Part of the action under way that plans depend on. The numbers of action and request are irrelevant.
+/// Returns the parts of the action under way on which plans depend. The numbers of action and request are irrelevant.
 fn relevant_part(running: &Running) -> (&PlannedStep, &num_rational::BigRational) {
     (&running.step, &running.progress)
 }

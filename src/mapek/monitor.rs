@@ -144,7 +144,7 @@ impl BeliefUpdate<'_> {
         }
     }
 
-    /// Updates the knowledge base with a report about one of its individuals.
+    /// Updates the knowledge base with a report about the individual `name`. `kind` is the noun for error messages.
     pub(super) fn report(&mut self, kind: &str, name: &str, report: RobotReport) -> Result<(), Refusal> {
         let Some(knowledge) = self.beliefs.mission.knowledge_mut() else {
             let text = format!("there is no knowledge base that has a {kind} `{name}`");
@@ -156,7 +156,7 @@ impl BeliefUpdate<'_> {
         Ok(())
     }
 
-    /// Records the acknowledgement of an effect.
+    /// Records the acknowledgement of an effect by the managed system.
     fn acknowledged(&mut self, effect: u64) -> Result<(), Refusal> {
         match self.beliefs.acknowledge(effect) {
             Receipt::Unknown => Err(Refusal::new("M305", format!("there was no effect {effect}"))),
@@ -251,7 +251,7 @@ impl BeliefUpdate<'_> {
         self.changes.facts |= delta.insert.iter().any(is_concluded) || delta.delete.iter().any(is_lost);
     }
 
-    /// Returns the action under way, or a refusal unless it has the number `action`.
+    /// Returns the action under way, or a refusal if no action with the number `action` is under way.
     fn running(&mut self, action: u64) -> Result<&mut Running, Refusal> {
         let running = self.beliefs.running.as_mut().filter(|running| running.action == action);
         running.ok_or_else(|| Refusal::new("M305", format!("no action {action} is under way")))

@@ -1,4 +1,4 @@
-//! Plan (of MAPE-K): computes an optimal plan of actions and designs, or the reason why there is none.
+//! Plan (of MAPE-K): computes an optimal plan of actions and designs, or the reason for its absence.
 //!
 //! During replay, plans are read from the journal and not computed again, because a search that ends at a time limit is
 //! not reproducible.
@@ -24,11 +24,11 @@ const MAX_DOUBLINGS: u32 = 3;
 /// Planner of the adaptation loop, with its caches.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Planner {
-    /// Time limit of one plan.
+    /// Time limit of one search for a plan; `None` for no limit.
     pub time_limit: Option<Duration>,
     /// Number of consecutive searches that reached their time limit. Each of them doubles the next time limit.
     pub attempt: u32,
-    /// Limits in addition to the time limit of one plan.
+    /// Limits in addition to the time limit of one search.
     pub limits: Limits,
     /// Recorded plans for replay, in order.
     pub recorded: VecDeque<Outcome>,
@@ -54,7 +54,7 @@ impl Planner {
     /// Returns a recorded, prepared or cached outcome, or searches for a plan. If searches are forbidden, sets
     /// `is_missing` and returns an outcome without a plan.
     pub fn plan(&mut self, question: &Question<'_>) -> Outcome {
-        // Recorded and prepared outcomes have an order, so that they are consumed even if the memo has the answer.
+        // Recorded and prepared outcomes have an order. Therefore, they are consumed even if the memo has the answer.
         let recorded = self.recorded.pop_front().or_else(|| self.prepared(question));
         let stored_outcome = recorded.or_else(|| self.memo.recall(question));
         if stored_outcome.is_none() && self.forbids_search {

@@ -1,8 +1,9 @@
 //! React: requests a safe effect for the action under way after changes, before planning.
 //!
 //! If an action has lost a design, or its remainder is not executable, the action is reconfigured to available designs
-//! for which the validator accepts the remainder. Otherwise it is suspended. This needs no search: each configuration
-//! of this one action is simulated once. Planning decides later about the whole mission.
+//! for which the validator accepts the remainder. If no such designs exist, the action is suspended. This decision
+//! needs no search: each configuration of this one action is simulated once. Planning decides later about the whole
+//! mission.
 
 use num_rational::BigRational;
 use pddl::ast::Direction;
@@ -59,8 +60,8 @@ pub(super) fn trouble(beliefs: &Beliefs, running: &Running, facts: bool) -> Opti
     beliefs.obstacle(running).map(|obstacle| format!("action {}: {obstacle}", running.action))
 }
 
-/// Returns the action under way with the available designs that make its remainder executable with the best metric, or
-/// `None` if there are none. Ties are broken by the order of designs.
+/// Returns the action under way with the available designs that make its remainder executable with the best metric.
+/// Ties are broken by the order of designs. Returns `None` if no designs make the remainder executable.
 fn other_designs(beliefs: &Beliefs, running: &Running) -> Option<PlannedStep> {
     let problem = beliefs.filled();
     let question = Question {

@@ -62,7 +62,7 @@ impl Receipts {
         self.functions.get(function).is_some_and(|history| !history.superseded.is_empty())
     }
 
-    /// Records a reconfiguration that was superseded before it was answered.
+    /// Records that the reconfiguration `effect` of `function` to `design` was superseded before it was answered.
     pub(super) fn supersede(&mut self, effect: u64, function: String, design: String) {
         let superseded = &mut self.functions.entry(function).or_default().superseded;
         superseded.insert(effect, design);
@@ -111,7 +111,7 @@ impl Receipts {
         json!([self.by_number, self.functions.iter().map(function).collect::<Vec<_>>()])
     }
 
-    /// Inverse of [`Receipts::to_record`].
+    /// Inverse of [`Receipts::to_record`]. Returns `None` if the record is malformed.
     pub(super) fn from_record(record: &Value) -> Option<Self> {
         let text = |value: &Value| value.as_str().map(ToOwned::to_owned);
         let superseded = |pair: &Value| Some((pair.get(0)?.as_u64()?, text(pair.get(1)?)?));

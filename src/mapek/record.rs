@@ -61,7 +61,7 @@ fn essence(mut answer: Value) -> Value {
     answer
 }
 
-/// Beliefs of a loop as JSON.
+/// State of a loop as JSON, from which the loop can be restored.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Snapshot(pub Value);
 
@@ -135,7 +135,7 @@ pub(super) fn restore(beliefs: &mut Beliefs, snapshot: &Snapshot) -> Result<(), 
     Ok(())
 }
 
-/// Restores the mission: statements, facts and goal.
+/// Restores statements, facts and goal of the mission. Returns `None` if they are malformed or do not fit the mission.
 fn restore_mission(beliefs: &mut Beliefs, data: &Value) -> Option<()> {
     let records = |name: &str| data.get(name).and_then(Value::as_array);
     let statements =
@@ -158,7 +158,7 @@ fn restore_mission(beliefs: &mut Beliefs, data: &Value) -> Option<()> {
     Some(())
 }
 
-/// Restores plan, effects, receipts and filters.
+/// Restores the other beliefs, such as plan, effects, receipts and filters. Returns `None` if they are malformed.
 fn restore_work(beliefs: &mut Beliefs, data: &Value) -> Option<()> {
     let number = |name: &str| data.get(name).and_then(Value::as_u64);
     let truth = |name: &str| data.get(name).and_then(Value::as_bool);

@@ -1,4 +1,4 @@
-//! Interface between a loop and its journal: the recorded data, and the restoration from them.
+//! Interface between a loop and its journal: recorded decisions, and the restoration of the loop from the journal.
 
 use std::time::Duration;
 
@@ -17,7 +17,7 @@ pub trait Recoverable {
     /// An answer of the loop.
     type Answer: From<Answer>;
 
-    /// Returns a checksum of all inputs of decisions, before the loop begins.
+    /// Returns the checksum of the initial knowledge, mission and settings, which identifies the loop in a journal.
     fn digest(&self) -> String;
 
     /// Returns the reaction to a journal that cannot be written.
@@ -54,8 +54,8 @@ pub trait Recoverable {
     /// Returns the number of the effect that an answer requests, or `None` if the answer requests no effect.
     fn effect(answer: &Self::Answer) -> Option<u64>;
 
-    /// Returns the state as data. Afterwards the loop makes the same decisions as a loop that is restored
-    /// from the data.
+    /// Returns a snapshot of the state. Afterwards, this loop makes the same decisions as a loop restored from the
+    /// snapshot.
     fn checkpoint(&mut self) -> Snapshot;
 
     /// Restores the state from a snapshot of a loop with the same checksum.

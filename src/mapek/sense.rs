@@ -10,8 +10,9 @@ use crate::mapek::monitor::BeliefUpdate;
 use crate::message::did_you_mean;
 
 impl BeliefUpdate<'_> {
-    /// Applies an observed design of a function that was not requested. The function and the action under way have this
-    /// design from now on. A change back is considered in the same way as for a design that is available again.
+    /// Applies a report that a function has a design without a request of the loop; `None` if it has no design. The
+    /// function has this design from now on, and so has the action under way, unless a reconfiguration is pending. The
+    /// loop later considers another design in the same way as after a design has become available.
     pub(super) fn observed(&mut self, function: &str, design: Option<&str>) -> Result<(), Refusal> {
         let designs = self.beliefs.mission.designs_of(function);
         if designs.is_empty() {

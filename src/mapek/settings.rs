@@ -156,11 +156,12 @@ impl AdaptationSection {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Settings {
-    /// Minimum benefit of a new plan over a valid current plan, in the metric's unit. 0 is any benefit.
+    /// Minimum benefit of a new plan over a valid current plan, in the metric's unit. With 0, any benefit is
+    /// sufficient.
     pub minimum_benefit: BigRational,
     /// Time for which a design must be available again before a better plan is sought. Default: 5 s.
     pub settle: Duration,
-    /// Time limit of one search for a plan. At the limit, the best plan found so far is used. Default: 10 s.
+    /// Time limit of one search for a plan. At the limit, the incumbent is used. Default: 10 s.
     pub time_limit: Option<Duration>,
     /// Whether to prefer, among optimal plans of equal length, one that shares most steps with the current plan. The
     /// choice then depends on the history, and not only on the situation.
@@ -295,12 +296,12 @@ impl Default for Settings {
     }
 }
 
-/// Default settle time. A better plan is not urgent, and a driver that its supervisor restarts fails and recovers
-/// within seconds.
+/// Default of [`Settings::settle`]. A better plan is not urgent, and a driver that its supervisor restarts fails and
+/// recovers within seconds.
 const SETTLE: Duration = Duration::from_secs(5);
 
-/// Default deadline.
+/// Default of [`Settings::deadline`].
 const DEADLINE: Duration = Duration::from_secs(10);
 
-/// Default time limit of one plan. The robot waits during planning.
+/// Default time limit of one search for a plan. The robot waits during planning.
 const TIME_LIMIT: Duration = Duration::from_secs(10);

@@ -81,15 +81,15 @@ impl PlannedStep {
         }
     }
 
-    /// The action with all arguments in PDDL syntax: `(move a b)`.
+    /// Returns the action with all arguments in PDDL syntax: `(move a b)`.
     pub fn call(&self) -> String {
         let words: Vec<&str> =
             std::iter::once(&self.action).chain(&self.arguments).map(String::as_str).collect();
         format!("({})", words.join(" "))
     }
 
-    /// Short text in which functions and designs are not repeated as arguments: `move wp1 wp2 (f_localization =
-    /// fd_amcl_kinect)`.
+    /// Returns a short text in which functions and designs are not repeated as arguments: `move wp1 wp2 (f_localization
+    /// = fd_amcl_kinect)`.
     pub fn summary(&self) -> String {
         let configured = |word: &str| self.configuration.iter().any(|(f, d)| f == word || d == word);
         let mut text = self.action.clone();
@@ -101,7 +101,7 @@ impl PlannedStep {
         if pairs.is_empty() { text } else { format!("{text} ({})", pairs.join(", ")) }
     }
 
-    /// The arguments, with `None` in place of designs.
+    /// Returns the arguments, with `None` in place of designs.
     pub fn context(&self) -> Vec<Option<&str>> {
         let is_design = |word: &str| self.configuration.iter().any(|(_, design)| design == word);
         self.arguments.iter().map(|word| (!is_design(word)).then_some(word.as_str())).collect()

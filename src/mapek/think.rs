@@ -62,7 +62,8 @@ impl Loop {
         !thoughts.is_stopped && thoughts.question == self.question
     }
 
-    /// Returns `true` if an observation mentions an action or an effect that has not been requested yet.
+    /// Returns `true` if an observation mentions an action or an effect whose number has not been used in a request
+    /// yet.
     pub fn is_ahead(&self, observation: &Observation) -> bool {
         let beliefs = self.beliefs();
         observation.events.iter().flatten().any(|event| match event {
@@ -78,7 +79,7 @@ impl Loop {
         })
     }
 
-    /// Number of the current planning problem. Plans for another number are obsolete.
+    /// Returns the number of the current planning problem. Plans for another number are obsolete.
     pub fn question(&self) -> u64 {
         self.question
     }

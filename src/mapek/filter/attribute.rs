@@ -36,8 +36,8 @@ pub(crate) struct Bound {
     pub value: BigRational,
     /// Side on which the design can be used.
     pub side: Side,
-    /// Hysteresis: distance by which a sample must satisfy a violated bound before it counts as satisfied again, in the
-    /// attribute's unit.
+    /// Hysteresis: distance by which a sample must satisfy a violated bound before the bound counts as satisfied again,
+    /// in the attribute's unit.
     pub band: BigRational,
 }
 
@@ -65,7 +65,7 @@ impl Stale {
     }
 }
 
-/// Filter of one attribute. Any values are valid; the default accepts every sample at once.
+/// Filter of one attribute. Any field values are valid; the default accepts every sample at once.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct AttributeFilter {
     /// Bounds of designs, in any order.
@@ -222,7 +222,7 @@ impl AttributeFilter {
         lasted && agreeing >= self.agree
     }
 
-    /// Believes a sample that has crossed bounds.
+    /// Believes a sample whose crossing of bounds is confirmed, and ends the crossing.
     fn accept(&self, state: &mut AttributeState, value: &BigRational) -> Verdict {
         let target =
             state.believed.as_ref().map_or_else(|| value.clone(), |current| self.target(current, value));

@@ -27,7 +27,7 @@ pub struct FilterSettings {
     pub heal_time: Duration,
     /// Hysteresis as a share of the bound, for attributes without their own hysteresis. Default: 0.02.
     pub band: BigRational,
-    /// Times of single components, by local name.
+    /// Confirmation times of single components, by local name.
     pub components: BTreeMap<String, ComponentTimes>,
     /// Filters of single attributes, by local name.
     pub measured: BTreeMap<String, MeasuredSettings>,
