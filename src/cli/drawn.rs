@@ -51,12 +51,12 @@ pub(super) struct Pages {
 }
 
 impl Pages {
-    /// Returns `true` if a picture is requested.
+    /// Returns `true` if an HTML page or SVG files are requested.
     pub(super) fn are_wanted(&self) -> bool {
         self.report.is_some() || self.svg.is_some()
     }
 
-    /// Writes the requested files.
+    /// Writes the requested HTML page and SVG files of a sheet of pictures.
     pub(super) fn write(&self, sheet: &Sheet) -> Result<(), Failure> {
         if let Some(directory) = &self.svg {
             write_pictures(directory, &sheet.pictures())?;
@@ -75,7 +75,7 @@ pub(super) fn write_pictures(directory: &Path, pictures: &[(String, String)]) ->
 }
 
 impl Drawing {
-    /// Returns `true` if a file is requested.
+    /// Returns `true` if an SVG file is requested.
     pub(super) fn is_file_wanted(&self) -> bool {
         self.svg.is_some()
     }

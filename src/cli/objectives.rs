@@ -1,4 +1,4 @@
-//! Formats the values of plans by the objectives of `--minimize` and `--pareto`.
+//! Formats the values of plans for the objectives of `--minimize` and `--pareto`.
 
 use std::fmt::Write as _;
 

@@ -75,7 +75,7 @@ pub fn note(text: &str) {
     let _ = std::io::stderr().write_all(visible(text).as_bytes());
 }
 
-/// Formats a message for a terminal.
+/// Formats a message, either with colours, or without colours and with control characters made visible.
 pub fn shown(message: &Message, colors: bool) -> Cow<'_, str> {
     if colors { message.colored().into() } else { visible(message.text()) }
 }

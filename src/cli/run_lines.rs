@@ -18,8 +18,8 @@ pub(super) struct Line {
     pub(super) now: Option<Duration>,
 }
 
-/// Reader of non-blank lines. A line that is far too long is truncated, so that it is not a valid
-/// event.
+/// Reader of non-blank lines. A line longer than [`LONGEST_LINE`] is truncated just above this length, and is therefore
+/// refused as an event.
 pub(super) struct Lines {
     name: String,
     source: Source,

@@ -62,7 +62,7 @@ pub(super) struct Session<'a> {
     clock: SystemClock,
     /// Time of the last line of the resumed journal, since the start of the mission; 0 without such a line.
     begun: Duration,
-    /// Number of the current line, for heartbeats.
+    /// Number of the current line, shared with the thread that reports the progress of planning.
     line: Arc<AtomicU64>,
     /// Number of the last line and the time at which it was read, while further answers to the line are possible.
     open: Option<(u64, Instant)>,

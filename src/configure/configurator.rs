@@ -101,7 +101,7 @@ impl Configurator {
         &self.wishes
     }
 
-    /// Returns the objectives.
+    /// Returns all objectives of the knowledge base.
     pub fn objectives(&self) -> Vec<Objective> {
         self.knowledge.runtime().objectives()
     }
@@ -133,7 +133,7 @@ impl Configurator {
         self.change(|runtime| runtime.add_objective(&new))
     }
 
-    /// Removes an objective.
+    /// Removes an objective, given by IRI or local name.
     ///
     /// # Errors
     /// The objective does not exist.

@@ -368,7 +368,7 @@ impl Loop {
         answers
     }
 
-    /// Copies the state of the loop. Call only after deliberation.
+    /// Returns a snapshot of the beliefs. Must be called only after deliberation.
     pub fn snapshot(&self) -> Snapshot {
         record::snapshot(&self.beliefs)
     }

@@ -42,7 +42,7 @@ const PLANNED: [&str; 9] = [
 /// value is a stated fact.
 const VALUES: [&str; 2] = ["hasValue", "qa_has_value"];
 
-/// Constant data for the interpretation of events, with caches.
+/// Data for the interpretation of events: attributes, filters and caches. Not a part of the beliefs.
 #[derive(Debug, Clone)]
 pub(super) struct Monitor {
     /// IRIs and local names of the quality attributes of the knowledge base.

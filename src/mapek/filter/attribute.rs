@@ -137,7 +137,7 @@ impl Hold {
     }
 }
 
-/// Verdict on a sample.
+/// Result of filtering a sample.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Verdict {
     /// Newly believed value. The value differs from the sample if the sample satisfies some violated bounds by less

@@ -12,7 +12,7 @@ use crate::mapek::{Loop, Observation, PlannedStep, Settings, Watch};
 use crate::mission::Mission;
 use crate::setup::Setup;
 
-/// A mission with its possible events.
+/// A mission with the event lines from which the test draws at random.
 struct World {
     name: String,
     mission: Mission,
