@@ -20,7 +20,7 @@ const MAX_CONFIGURATIONS: usize = 256;
 /// State of the incremental planner, kept between queries.
 #[derive(Debug, Clone, Default)]
 pub(super) enum Live {
-    /// Not built yet, because there was no query.
+    /// State before the first query: no planner has been built.
     #[default]
     Untried,
     /// The incremental planner does not support the mission.

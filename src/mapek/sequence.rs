@@ -23,13 +23,13 @@ const MAX_FIRST: u64 = 1 << 62;
 /// Classification of a sequence number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Classification {
-    /// Not seen before, and within the upper limit.
+    /// The number is within the upper limit and was not seen before.
     New,
-    /// Already seen.
+    /// The number was seen before.
     Seen,
-    /// At most the given mark, the end of the dropped ranges: it is unknown whether the number was seen.
+    /// The number is at most the given mark, the end of the dropped ranges: it is unknown whether the number was seen.
     Stale(u64),
-    /// Above the given upper limit.
+    /// The number is above the given upper limit.
     Ahead(u64),
 }
 
