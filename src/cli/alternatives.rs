@@ -7,8 +7,8 @@ use planner::Alternatives;
 
 use crate::cli::plan_text::steps_text;
 
-/// Formats the further plans as tables, and lists for each step of the first plan the choices that
-/// all plans share.
+/// Formats further optimal plans as tables, and lists for each step of the first plan the choices that all optimal
+/// plans share.
 pub(super) fn text(found: Option<&Alternatives>, planned: &Planned<'_>, columns: Option<u16>) -> String {
     let Some(found) = found else {
         return "\nothers that are as good were not looked for: it is not proved that none is better\n"

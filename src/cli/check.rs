@@ -1,4 +1,4 @@
-//! `metaplan check`.
+//! The command `metaplan check`, which checks properties of a PRISM model.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -94,13 +94,13 @@ struct Queries {
     text: String,
 }
 
-/// Results for one combination of values.
+/// Results of all properties for one combination of constant values.
 struct CombinationResult<'a> {
     combination: &'a Combination,
     reports: Vec<Result<Report, Error>>,
 }
 
-/// Runs the command.
+/// Runs `metaplan check` and returns the exit status of the program.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let _guard = arguments.time.guard(common)?;
     let file = source(&arguments.model)?;
@@ -153,7 +153,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     Ok(Exit::BadInput)
 }
 
-/// Returns the property of the command line, or the selected properties of a file.
+/// Parses the property of the command line, or the selected properties of a file.
 fn asked(arguments: &Arguments) -> Result<Queries, Failure> {
     let Some(path) = &arguments.props else {
         let text = arguments.property.clone().unwrap_or_default();
@@ -233,7 +233,7 @@ fn precision(arguments: &Arguments) -> Option<Precision> {
     precision.map(if absolute { Precision::Absolute } else { Precision::Relative })
 }
 
-/// Returns `true` if the answer has the requested certainty and precision.
+/// Returns `true` if the result is decided and has the requested precision.
 fn is_proved(arguments: &Arguments, report: &Report) -> bool {
     let fits = precision(arguments).is_none_or(|precision| report.outcome.is_within(precision));
     fits && !matches!(report.outcome, Outcome::Undecided(_))
@@ -254,8 +254,8 @@ fn single(arguments: &Arguments, common: &Common, property: &str, report: &Repor
     Ok(if is_proved(arguments, report) { Exit::Done } else { Exit::NotProved })
 }
 
-/// Writes several answers: a line for each property, or a table with a line for each combination of
-/// values.
+/// Writes several answers: a line for each property, or a table with a line for each combination of values. Also writes
+/// the CSV file, if requested.
 fn write_all(
     arguments: &Arguments,
     common: &Common,
@@ -302,7 +302,7 @@ fn write_all(
     Ok(())
 }
 
-/// Formats an error.
+/// Returns the messages of an error.
 fn said(error: &Error) -> Vec<String> {
     match error.diagnostics() {
         [] => vec![error.to_string()],

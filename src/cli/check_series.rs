@@ -1,4 +1,4 @@
-//! Series of constant values, and tables of their results.
+//! Series of values of model constants for `metaplan check`, and tables of the results.
 
 use metaplan::message::Message;
 use num_bigint::BigInt;
@@ -13,17 +13,17 @@ use crate::cli::check_text::{number, shown};
 use crate::cli::common::Failure;
 use crate::cli::output;
 
-/// Maximum number of values in a series, and of combinations.
+/// Upper limit on the number of values in a series, and on the number of combinations.
 const MOST: usize = 100_000;
 
-/// Values of all given constants.
+/// One combination of values of the given constants.
 pub struct Combination {
     pub settings: Settings,
-    /// The constants with several values, in the order of the command line.
+    /// Values in this combination of the constants that have several values, in the order of the command line.
     pub varied: Vec<(String, String)>,
 }
 
-/// A combination of values with the result of each property.
+/// A combination of constant values with the result of each property.
 pub type Row<'a> = (&'a Combination, &'a [Result<Report, Error>]);
 
 /// Returns all combinations of the constants' values. The value of the last constant changes first.
@@ -90,7 +90,7 @@ fn values(name: &str, text: &str) -> Result<Vec<String>, String> {
     Ok(values)
 }
 
-/// Formats a decimal. All values of a series are sums of decimals.
+/// Formats a number that has a finite decimal expansion. All values of a series are such numbers.
 fn decimal(value: &BigRational) -> String {
     let (mut scaled, mut places) = (value.clone(), 0_usize);
     while !scaled.denom().is_one() {
@@ -103,7 +103,7 @@ fn decimal(value: &BigRational) -> String {
     if fraction.is_empty() { format!("{sign}{whole}") } else { format!("{sign}{whole}.{fraction}") }
 }
 
-/// Formats a result for a cell.
+/// Formats the result of a property for a table cell.
 fn cell(report: &Result<Report, Error>, text: impl Fn(&Answer) -> String) -> String {
     match report {
         Err(_) => "no answer".to_owned(),
@@ -122,7 +122,7 @@ fn cell(report: &Result<Report, Error>, text: impl Fn(&Answer) -> String) -> Str
     }
 }
 
-/// Formats the results as a text table.
+/// Formats the results as a text table. `heads` are the column titles of the properties.
 pub fn table(heads: &[&str], rows: &[Row<'_>]) -> String {
     let header = header(heads, rows);
     let lines = rows.iter().map(|(combination, reports)| {
@@ -137,8 +137,7 @@ fn header<'a>(heads: &[&'a str], rows: &[Row<'a>]) -> Vec<&'a str> {
     varied.iter().map(|(name, _)| &name[..]).chain(heads.iter().copied()).collect()
 }
 
-/// Formats the results as CSV. A value is exact if its exact form is known and short, and otherwise
-/// the nearest double.
+/// Formats the results as CSV. Finite values are written as doubles.
 pub fn csv(heads: &[&str], rows: &[Row<'_>]) -> String {
     let plain = |answer: &Answer| match answer {
         Answer::Finite(quantity) => number(quantity.value),

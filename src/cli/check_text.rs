@@ -42,7 +42,7 @@ pub fn as_text(report: &Report, verbose: bool) -> String {
     text
 }
 
-/// A line for each state, with the values of its variables.
+/// Formats a table with a line for each state: the values of the variables, and the result in this state.
 fn states_text(variables: &[(String, bool)], states: &[Listed]) -> String {
     if states.is_empty() {
         return "no state\n".to_owned();

@@ -1,4 +1,4 @@
-//! Shared parts of all commands: exit status, failures, and the output of answers.
+//! Shared parts of all commands: exit status, failures, and common options.
 
 use std::io::IsTerminal;
 use std::path::PathBuf;
@@ -23,7 +23,7 @@ pub(super) enum Exit {
     Fault = 70,
 }
 
-/// Reason for a command without answer.
+/// Exit status and messages of a command that ends without an answer.
 pub(super) struct Failure {
     pub(super) exit: Exit,
     pub(super) messages: Errors,
@@ -34,7 +34,8 @@ impl Failure {
         Self { exit: Exit::Usage, messages: message.into() }
     }
 
-    /// Failure of the planner.
+    /// Converts errors of the planner to a failure. The exit status depends on the message codes, and on a reached
+    /// limit.
     pub(super) fn planning(messages: Errors, limits: &Limits) -> Self {
         let is = |code: &str| messages.iter().any(|message| message.code == code);
         let exit = if is("M170") {
@@ -114,7 +115,7 @@ pub(super) enum Format {
     Turtle,
 }
 
-/// Converts an error about a model and a property, each given by its name and its text.
+/// Converts an error about a model and a property to a failure. Both are given by name and text, for the messages.
 pub(super) fn process_failure(error: Error, model: (&str, &str), property: (&str, &str)) -> Failure {
     match error {
         Error::Model(problems) => in_file(&problems, model),

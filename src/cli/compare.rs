@@ -1,4 +1,4 @@
-//! `metaplan compare`.
+//! The command `metaplan compare`, which compares Metaplan with probabilistic model checking on a mission.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -91,7 +91,7 @@ fn penalty(text: &str) -> Result<f64, String> {
     value.ok_or_else(|| format!("`{text}` is not a time that is at least 0"))
 }
 
-/// Runs the command.
+/// Runs `metaplan compare` and returns the exit status of the program.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let so_far = Shared::new();
     so_far.show_after(arguments.time_limit, common);
@@ -153,7 +153,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     so_far.end(common)
 }
 
-/// Returns the mission itself, or variants of it with other starts and goals.
+/// Returns the missions to compare, with their processes: the mission itself, or variants with other starts and goals.
 fn missions(
     arguments: &Arguments,
     mission: &Mission,

@@ -1,4 +1,4 @@
-//! Results of a comparison: all of them, or those that are available at the time limit.
+//! Results of `metaplan compare`: all of them, or those that are available at the time limit.
 //!
 //! The comparison does not check the clock. So a separate thread waits for the time limit or for
 //! Ctrl-C, shows the results that are available then, and ends the program.
@@ -23,16 +23,16 @@ use crate::cli::output;
 /// Polling interval of the clock.
 const INTERVAL: Duration = Duration::from_millis(10);
 
-/// The finished comparisons, and the current one.
+/// Intermediate results: the finished comparisons, and the current one.
 #[derive(Debug, Clone, Default)]
 pub(super) struct SoFar {
     /// Total number of comparisons. `None` while files are read.
     pub of: Option<usize>,
     pub done: Vec<(Option<Pair>, Comparison)>,
     pub begun: Option<Begun>,
-    /// Rows that the user adds.
+    /// Rows that the user adds to the table with `--published`.
     pub added: Vec<Row>,
-    /// File for the table in CSV.
+    /// File for the table in CSV, if requested.
     pub csv: Option<PathBuf>,
     /// The mission's name.
     pub mission: String,
@@ -48,7 +48,7 @@ pub(super) struct Begun {
     pub costs: Costs,
 }
 
-/// Results shared with the waiting thread. `None` once they are being shown.
+/// Results shared with the thread that waits for the time limit. `None` once the results are being shown.
 #[derive(Debug, Clone)]
 pub(super) struct Shared(Arc<Mutex<Option<SoFar>>>);
 
@@ -57,7 +57,7 @@ impl Shared {
         Self(Arc::new(Mutex::new(Some(SoFar::default()))))
     }
 
-    /// Changes the results. Does nothing once the time is over, since the program ends.
+    /// Applies `change` to the results. Does nothing once the time is over, because the program ends.
     pub fn change(&self, change: impl FnOnce(&mut SoFar)) {
         if let Some(so_far) = &mut *self.0.lock().unwrap_or_else(PoisonError::into_inner) {
             change(so_far);
@@ -95,7 +95,7 @@ impl Shared {
         });
     }
 
-    /// Shows all results.
+    /// Shows all results, and returns the exit status.
     ///
     /// # Errors
     /// The table cannot be written.
@@ -112,7 +112,7 @@ impl Shared {
 }
 
 impl SoFar {
-    /// Message about the reached time limit and the number of available results.
+    /// Returns the message about the reached time limit and the number of available results.
     fn message(&self) -> Message {
         let Some(of) = self.of else {
             return Message::error(

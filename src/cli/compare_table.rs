@@ -1,4 +1,4 @@
-//! Formats a comparison as text, JSON and CSV, and reads additional rows of users.
+//! Formats a comparison as text and CSV, reads additional rows from a file, and measures peak memory.
 
 use std::fmt::Write as _;
 

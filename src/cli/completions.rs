@@ -1,4 +1,5 @@
-//! `metaplan completions` and `metaplan man`, generated from the description of the command line.
+//! The commands `metaplan completions` and `metaplan man`. Their output is generated from the description of the
+//! command line.
 
 use std::path::PathBuf;
 
@@ -25,7 +26,7 @@ pub struct ManArguments {
     output: PathBuf,
 }
 
-/// Writes the completions of a shell.
+/// Writes the completion script of a shell to standard output.
 pub fn run(arguments: &Arguments, mut command: Command) -> Exit {
     let name = command.get_name().to_owned();
     let mut script = Vec::new();
@@ -34,7 +35,7 @@ pub fn run(arguments: &Arguments, mut command: Command) -> Exit {
     Exit::Done
 }
 
-/// Writes all pages.
+/// Writes the manual pages of all commands to a directory.
 pub fn man(arguments: &ManArguments, command: Command) -> Result<Exit, Failure> {
     let directory = &arguments.output;
     output::make_directory(directory)?;

@@ -1,4 +1,5 @@
-//! `metaplan configure`, and the arguments that it shares with `metaplan run --configure`.
+//! The command `metaplan configure`, which chooses designs without a task plan, and the arguments that it shares with
+//! `metaplan run --configure`.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -82,10 +83,11 @@ impl Wanted {
             && self.least.is_none()
     }
 
-    /// Creates the configurator for a knowledge base.
+    /// Creates the configurator for a knowledge base, with the required functions as objectives.
     ///
     /// # Errors
-    /// All names that are not in the knowledge base.
+    /// All names in the options that are not in the knowledge base, and requirements for functions without an
+    /// objective.
     pub(super) fn configurator(&self, knowledge: Knowledge) -> Result<Configurator, Failure> {
         let worth = match (&self.most, &self.least) {
             (Some(attribute), _) => Worth::Most(attribute.clone()),
@@ -127,7 +129,7 @@ impl Wanted {
     }
 }
 
-/// Runs the command.
+/// Runs `metaplan configure` and returns the exit status of the program.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let Arguments { documents, rules, imports, set, fail, time, wanted } = arguments;
     let guard = time.guard(common)?;
@@ -183,8 +185,8 @@ fn text(configuration: &Configuration, wishes: &Wishes) -> String {
     text
 }
 
-/// Reasons why better designs were not chosen or cannot be used, and the requirements that the
-/// chosen design misses.
+/// Formats the reasons why better designs were not chosen or cannot be used, and the requirements that the chosen
+/// design misses.
 fn reasons(choice: &Choice) -> String {
     let mut text = String::new();
     for considered in &choice.considered {

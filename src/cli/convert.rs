@@ -1,4 +1,4 @@
-//! `metaplan convert`.
+//! The command `metaplan convert`, which merges knowledge bases and writes them in another syntax.
 
 use std::path::PathBuf;
 
@@ -44,7 +44,7 @@ enum Syntax {
     Functional,
 }
 
-/// Runs the command.
+/// Runs `metaplan convert` and returns the exit status of the program.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let _guard = arguments.time.guard(common)?;
     let syntax = match arguments.syntax {

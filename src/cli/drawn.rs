@@ -51,12 +51,12 @@ pub(super) struct Pages {
 }
 
 impl Pages {
-    /// Returns `true` if a picture is requested.
+    /// Returns `true` if an HTML page or SVG files are requested.
     pub(super) fn are_wanted(&self) -> bool {
         self.report.is_some() || self.svg.is_some()
     }
 
-    /// Writes the requested files.
+    /// Writes the requested HTML page and SVG files of a sheet of pictures.
     pub(super) fn write(&self, sheet: &Sheet) -> Result<(), Failure> {
         if let Some(directory) = &self.svg {
             write_pictures(directory, &sheet.pictures())?;
@@ -68,26 +68,26 @@ impl Pages {
     }
 }
 
-/// Writes pictures into a directory.
+/// Writes pictures, given as file names and SVG texts, into a directory.
 pub(super) fn write_pictures(directory: &Path, pictures: &[(String, String)]) -> Result<(), Failure> {
     output::make_directory(directory)?;
     pictures.iter().try_for_each(|(name, text)| output::write_file(&directory.join(name), &visible(text)))
 }
 
 impl Drawing {
-    /// Returns `true` if a file is requested.
+    /// Returns `true` if an SVG file is requested.
     pub(super) fn is_file_wanted(&self) -> bool {
         self.svg.is_some()
     }
 
-    /// Writes the only picture of a front.
+    /// Writes the picture of a Pareto front to an SVG file, if requested.
     pub(super) fn draw_front(&self, sheet: &Sheet) -> Result<(), Failure> {
         let (Some(file), [(_, picture)]) = (&self.svg, &sheet.pictures()[..]) else { return Ok(()) };
         output::write_file(file, &visible(picture))
     }
 
-    /// Writes the file, and returns the picture for a terminal. Empty if it is not requested, or if
-    /// the terminal is too small.
+    /// Writes the timeline of a plan to an SVG file, if requested, and returns the timeline as text for a terminal. The
+    /// text is empty if it is not requested, or if the terminal is too small.
     pub(super) fn draw(
         &self,
         mission: &Mission,

@@ -1,4 +1,4 @@
-//! `metaplan explain`.
+//! The command `metaplan explain`, which explains a design, a plan or a message code.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -36,7 +36,7 @@ pub struct Arguments {
     time: TimeLimit,
 }
 
-/// Runs the command.
+/// Runs `metaplan explain` and returns the exit status of the program.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     if let Some(name) = arguments.mission.to_str().filter(|name| codes::is_code(name))
         && !arguments.mission.exists()
@@ -92,7 +92,7 @@ fn explain_plan(mission: &Mission, limits: &Limits, common: &Common) -> Result<b
     Ok(changes.complete)
 }
 
-/// Runs planning queries and shows their progress.
+/// Runs `plan`, which computes plans, and shows its progress.
 fn planning<T>(
     common: &Common,
     limits: &Limits,
@@ -104,7 +104,7 @@ fn planning<T>(
     outcome.map_err(|messages| Failure::planning(messages, limits))
 }
 
-/// Explains a message code.
+/// Prints meaning, cause and remedy of a message code.
 fn code(name: &str, common: &Common) -> Result<Exit, Failure> {
     let Some(found) = codes::find(name) else {
         let catalogue = codes::all();
@@ -126,7 +126,7 @@ fn plan_text(answer: &BestPlan) -> String {
     answer.steps.iter().fold(String::new(), |text, step| text + "    " + &step.summary() + "\n")
 }
 
-/// Formats a metric, with its difference from that of the best plan.
+/// Formats the cost of the plan `answer`, with the difference from the cost of the plan `best`.
 fn cost_text(answer: &BestPlan, best: &BestPlan) -> String {
     let cost = match (&answer.cost, answer.proved) {
         (None, true) => return "there is no plan".to_owned(),
@@ -157,7 +157,7 @@ fn cost_text(answer: &BestPlan, best: &BestPlan) -> String {
     }
 }
 
-/// Formats an alteration; `about` marks an inexact bound.
+/// Formats a change of a measurement or of a component's status. `about` marks the bound as approximate.
 fn alteration_text(alteration: &Alteration, about: bool) -> String {
     let Alteration { name, from, to } = alteration;
     let now = from.as_ref().map(|from| format!(" (now {})", decimal(from))).unwrap_or_default();
@@ -172,7 +172,7 @@ fn alteration_text(alteration: &Alteration, about: bool) -> String {
     }
 }
 
-/// Text of the reasons for a design's availability. They need no planning.
+/// Formats the reasons why a design is available or unavailable. The reasons need no planning.
 fn why_text(why: &Availability) -> String {
     let functions = why.functions.join(", ");
     let state = if why.available { "is available" } else { "is not available" };
@@ -190,8 +190,8 @@ fn why_text(why: &Availability) -> String {
     text
 }
 
-/// Text of the plans about a design: the best plan, the best plan with this design as the only one
-/// of its functions, and the best plan without the design. Repairs follow.
+/// Formats the plans that explain a design: the best plan, the best plan with this design as the only one of its
+/// functions, and the best plan without the design. Changes of the design's availability follow.
 fn design_text(found: &DesignExplanation) -> String {
     let DesignExplanation { availability, best, .. } = found;
     let mut text = String::new();
@@ -223,7 +223,7 @@ fn design_text(found: &DesignExplanation) -> String {
     text + &repairs_text(found)
 }
 
-/// Text of the alterations that make a design available, or unavailable.
+/// Formats the changes that make an unavailable design available, or an available design unavailable.
 fn repairs_text(found: &DesignExplanation) -> String {
     let DesignExplanation { availability, best, repairs, .. } = found;
     let mut text = String::new();
@@ -256,7 +256,7 @@ fn repairs_text(found: &DesignExplanation) -> String {
     text
 }
 
-/// Text of the changes that lead to another plan.
+/// Formats the smallest changes of the situation that lead to another plan.
 fn changes_text(found: &SmallestChanges) -> String {
     let SmallestChanges { best, changes, complete, .. } = found;
     let mut text = match (&best.cost, best.proved) {

@@ -1,4 +1,4 @@
-//! `metaplan export`.
+//! The command `metaplan export`, which writes a mission in PDDL, PRISM or JANI for other tools.
 
 use std::path::PathBuf;
 
@@ -60,7 +60,7 @@ enum Setting {
     Published,
 }
 
-/// Runs the command.
+/// Runs `metaplan export` and returns the exit status of the program.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let _guard = arguments.time.guard(common)?;
     let Setup { mission, roles, .. } = arguments.situation.setup(&arguments.inputs, common)?;
@@ -85,7 +85,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
-/// Returns the co-adaptation process with all its uncertain parts.
+/// Writes the co-adaptation process of a mission, with all its uncertain parts, as a PRISM or JANI model.
 fn process(
     arguments: &Arguments,
     common: &Common,

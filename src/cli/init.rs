@@ -1,4 +1,4 @@
-//! `metaplan init`.
+//! The command `metaplan init`, which creates a directory with a small mission.
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -44,7 +44,7 @@ impl From<Start> for Template {
     }
 }
 
-/// Runs the command.
+/// Runs `metaplan init` and returns the exit status of the program.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let (directory, template) = (arguments.directory.as_path(), Template::from(arguments.from));
     let path = directory.display().to_string();

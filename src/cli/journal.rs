@@ -1,4 +1,4 @@
-//! `metaplan journal`: the contents of a loop's journal.
+//! The command `metaplan journal`, which shows or checks the journal of an adaptation loop.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -43,7 +43,7 @@ enum Operation {
     },
 }
 
-/// Runs the command.
+/// Runs `metaplan journal` and returns the exit status of the program.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let _guard = arguments.time.guard(common)?;
     let (Operation::Check { directory, .. } | Operation::Show { directory }) = &arguments.what;

@@ -1,14 +1,12 @@
 //! Time limits and signals, from the first file read to the last proof.
 //!
-//! While a mission is read and reasoned about, there is no answer to save. So a signal ends the
-//! program at once, and a separate thread ends it at the time limit, unless an answer is being
-//! written. Commands that do not plan need nothing else. In commands that plan, the planner handles
-//! the first signal from then on, and returns the best plan found. A second signal ends the
-//! program at once.
+//! While a mission is read and reasoned about, there is no answer to save. So a signal ends the program at once, and a
+//! separate thread ends it at the time limit, unless an answer is being written. Commands that do not plan need nothing
+//! else. In commands that plan, the planner handles the first signal after the mission has been read, and returns the
+//! best plan found. A second signal ends the program at once.
 //!
-//! The loops of the planner, of the validator and of the later stages poll the limits. If one of
-//! them does not, the separate thread ends the program a tenth of the limit later, unless an answer
-//! is being shown.
+//! The loops of the planner, of the validator and of the later stages poll the limits. If a loop does not, the separate
+//! thread ends the program a tenth of the limit later, unless an answer is being shown.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -26,7 +24,7 @@ use crate::cli::values::seconds;
 /// Polling interval of the clock.
 const INTERVAL: Duration = Duration::from_millis(10);
 
-/// Processor time in addition to a tenth of the limit after which a command without an answer is ended.
+/// Time after 1.1 times the time limit at which a command without an answer is ended.
 const GRACE: Duration = Duration::from_millis(150);
 
 /// The option `--time-limit` of commands that have nothing to show before their end, and of those that show what they have.
@@ -74,7 +72,7 @@ impl Guard {
             return Err(Failure::usage(Message::error("M115", text)));
         }
         if let Some(megabytes) = memory {
-            // Formulas and ground tasks take the other half.
+            // The search may use half of the memory limit; formulas and ground tasks take the other half.
             let half = usize::try_from(megabytes).unwrap_or(usize::MAX).saturating_mul(1 << 19);
             limits = limits.with_room(half);
         }
@@ -90,7 +88,8 @@ impl Guard {
         Ok(Self { limits, has_read })
     }
 
-    /// Ends the reading stage. From now on the planner handles signals, time and memory.
+    /// Ends the reading stage, and returns the limits for the planner. From now on, the planner handles signals, time
+    /// and memory.
     pub(super) fn plan(self) -> Limits {
         if self.has_read.swap(true, Ordering::Relaxed) {
             // The other thread is reporting the time limit and will end the program.
@@ -167,7 +166,7 @@ fn give_up_late(limits: Limits, has_read: Arc<AtomicBool>, late: Deadline, commo
     });
 }
 
-/// Ends the program, unless an answer is being shown, or `condition` holds.
+/// Ends the program, unless an answer is being shown, or `condition` returns `true`.
 fn end_unless(common: &Common, condition: impl FnOnce() -> bool) {
     // A thread that writes an answer holds this lock until the answer is complete.
     let _stdout = std::io::stdout().lock();

@@ -1,4 +1,4 @@
-//! `metaplan lint`.
+//! The command `metaplan lint`, which checks a mission for errors and warnings.
 
 use std::path::PathBuf;
 
@@ -24,7 +24,7 @@ pub struct Arguments {
     time: TimeLimit,
 }
 
-/// Runs the command.
+/// Runs `metaplan lint` and returns the exit status of the program.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let _guard = arguments.time.guard(common)?;
     let messages = match arguments.situation.setup(&arguments.inputs, common) {

@@ -131,7 +131,7 @@ const HELP_COLUMNS: usize = 80;
 /// Maximum width of help texts; longer lines are hard to read.
 const MAX_HELP_COLUMNS: usize = 100;
 
-/// Runs the program.
+/// Parses the command line, runs the command, and reports failures and panics.
 pub fn main() -> ExitCode {
     let cli = parse();
     // The default hook would print a stack trace to users; a short message is printed below.
@@ -175,7 +175,7 @@ fn parse() -> Cli {
     Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
 }
 
-/// Parses another command line. Returns the arguments of `simulate`, and `None` for other commands.
+/// Parses a command line of a study. Returns the arguments of `simulate`, and `None` for other commands.
 fn read(words: Vec<String>) -> Result<Option<simulate::Arguments>, clap::Error> {
     let cli = Cli::try_parse_from(std::iter::once("metaplan".to_owned()).chain(words))?;
     Ok(match cli.command {

@@ -1,4 +1,4 @@
-//! Formats the values of plans by the objectives of `--minimize` and `--pareto`.
+//! Formats the values of plans for the objectives of `--minimize` and `--pareto`.
 
 use std::fmt::Write as _;
 
@@ -7,7 +7,7 @@ use planner::{Exact, Front, Status};
 use crate::cli::plan_answer::answer_text;
 use crate::cli::plan_text::steps_text;
 
-/// Formats the values of several objectives in a line.
+/// Formats the values of several objectives in one line. Returns an empty text for fewer than two objectives.
 pub(super) fn values_text(objectives: &[String], values: &[Exact]) -> String {
     if objectives.len() < 2 || values.is_empty() {
         return String::new();
@@ -15,7 +15,7 @@ pub(super) fn values_text(objectives: &[String], values: &[Exact]) -> String {
     format!("in order: {}\n", pairs(objectives, values))
 }
 
-/// Formats a front as tables.
+/// Formats a Pareto front: the values of the objectives and the steps of the plan for each point.
 pub(super) fn front_text(name: &str, objectives: &[String], front: &Front, columns: Option<u16>) -> String {
     let solved: Vec<_> = front.points.iter().filter(|point| point.solution.plan.is_some()).collect();
     let mut text = String::new();

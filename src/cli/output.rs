@@ -60,22 +60,22 @@ pub fn has_begun() -> bool {
     HAS_BEGUN.load(Ordering::Relaxed)
 }
 
-/// Writes an answer for programs to standard output.
+/// Writes an answer for programs to standard output, as indented JSON.
 pub fn json_answer(answer: &impl Serialize) {
     document(&visible_json(&pretty(answer)));
 }
 
-/// Formats an answer for programs as one line.
+/// Formats an answer for programs as one line of JSON.
 pub fn line(answer: &impl Serialize) -> String {
     serde_json::to_string(answer).unwrap_or_default() + "\n"
 }
 
-/// Writes a sentence for people to standard error.
+/// Writes a text for people to standard error.
 pub fn note(text: &str) {
     let _ = std::io::stderr().write_all(visible(text).as_bytes());
 }
 
-/// Formats a message for a terminal.
+/// Formats a message, either with colours, or without colours and with control characters made visible.
 pub fn shown(message: &Message, colors: bool) -> Cow<'_, str> {
     if colors { message.colored().into() } else { visible(message.text()) }
 }
@@ -126,7 +126,7 @@ pub fn write_file(path: &Path, text: &str) -> Result<(), Failure> {
     file::write(path, text).map_err(Failure::from)
 }
 
-/// Returns the file that `--output` names. `None` for standard output, the meaning of `-`.
+/// Returns the file given by `--output`, or `None` for standard output (no option, or `-`).
 pub fn file_named(output: Option<&PathBuf>) -> Option<&Path> {
     output.map(PathBuf::as_path).filter(|path| !file::is_stdout(path))
 }

@@ -1,4 +1,4 @@
-//! `metaplan plan`.
+//! The command `metaplan plan`, which computes an optimal plan, a Pareto front or alternative plans of a mission.
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -152,7 +152,7 @@ impl From<Encoding> for StepSemantics {
     }
 }
 
-/// Returns the optimizer's configuration by the options.
+/// Returns the optimizer's configuration for the options of the command line.
 fn configuration(arguments: &Arguments, limits: Limits) -> Config {
     Config::default()
         .with_horizon(arguments.horizon)
@@ -208,7 +208,7 @@ impl Arguments {
     }
 }
 
-/// Runs the command.
+/// Runs `metaplan plan` and returns the exit status of the program.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let started = Instant::now();
     let guard = Guard::new(arguments.time_limit, arguments.memory_limit, common)?;
@@ -272,7 +272,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     })
 }
 
-/// Splits the two objectives of a front.
+/// Splits the value of `--pareto` at the comma into two objectives.
 fn two(pair: &str) -> Result<[&str; 2], Failure> {
     let parts: Vec<_> = pair.split(',').map(str::trim).collect();
     <[&str; 2]>::try_from(parts).map_err(|parts| {
@@ -282,7 +282,7 @@ fn two(pair: &str) -> Result<[&str; 2], Failure> {
     })
 }
 
-/// Shows the answer, or writes it to a file.
+/// Prints the answer, or writes it to a file, and draws the requested pictures.
 fn finish(
     planned: &Planned<'_>,
     mission: &Mission,
@@ -302,8 +302,8 @@ fn finish(
     Ok(())
 }
 
-/// Text that is printed if the plan goes to a file: the verdict, and the parts of the answer that
-/// the file's format lacks.
+/// Returns the text for standard error if the plan goes to a file: the verdict, and the parts of the answer that the
+/// file's format lacks.
 fn beside(planned: &Planned<'_>, arguments: &Arguments, common: &Common) -> String {
     let verdict = format!("{}\n", planned.solution.verdict());
     match arguments.form(common) {
@@ -314,7 +314,8 @@ fn beside(planned: &Planned<'_>, arguments: &Arguments, common: &Common) -> Stri
     }
 }
 
-/// Returns the text below the verdict.
+/// Returns the text below the verdict: statistics, values of objectives, makespan, and alternatives or blocking
+/// designs.
 fn further(planned: &Planned<'_>, solution: &Solution, (arguments, common): (&Arguments, &Common)) -> String {
     let statistics =
         if common.verbose { statistics_text(solution, &planned.preparation) } else { String::new() };
@@ -355,7 +356,7 @@ fn show(
 /// Maximum number of listed missing values; further ones are only counted.
 const MISSING_SHOWN: usize = 10;
 
-/// Lists the missing numbers, one per line.
+/// Lists values of numeric functions that are missing in the mission, one per line.
 fn missing_text(missing: &[MissingValue]) -> String {
     let line = |value: &MissingValue| {
         let (function, actions, file) = (&value.function, value.needed_by.join(", "), &value.file);
@@ -380,7 +381,7 @@ fn missing_text(missing: &[MissingValue]) -> String {
     }
 }
 
-/// Shows a Pareto front.
+/// Shows a Pareto front or writes it to files, and returns the exit status.
 fn show_front(
     front: &PlannedFront<'_>,
     name: &str,

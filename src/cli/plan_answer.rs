@@ -1,4 +1,4 @@
-//! Formats a solution as text.
+//! Formats the answer of `metaplan plan` as text.
 
 use std::fmt::Write as _;
 

@@ -1,4 +1,4 @@
-//! Formats a plan for other programs.
+//! Formats in which a plan can be written, and the table of a plan's steps.
 
 use clap::ValueEnum;
 

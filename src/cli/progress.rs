@@ -15,7 +15,7 @@ use crate::cli::output;
 /// Delay before the first progress line, so that short commands show none.
 const INITIAL_DELAY: Duration = Duration::from_secs(3);
 
-/// Time between two lines.
+/// Time between two progress lines.
 const INTERVAL: Duration = Duration::from_secs(5);
 
 /// A progress display that ends when it is finished or dropped.
@@ -26,7 +26,7 @@ pub(super) struct Progress {
 }
 
 impl Progress {
-    /// Starts the display for an activity.
+    /// Starts the progress display for the activity `what`.
     pub(super) fn new(what: &'static str, common: &Common) -> Self {
         let is_terminal = std::io::stderr().is_terminal();
         let is_shown = is_terminal && !common.quiet;
@@ -56,7 +56,7 @@ impl Progress {
     }
 }
 
-/// Runs `work` and shows the activity while it runs.
+/// Runs `work`, and shows the progress of the activity `what` until `work` returns.
 pub(super) fn during<T>(what: &'static str, common: &Common, work: impl FnOnce() -> T) -> T {
     let _progress = Progress::new(what, common);
     work()
@@ -73,7 +73,7 @@ impl Drop for Progress {
     }
 }
 
-/// Writes a line every few seconds until the sender is dropped.
+/// Writes a progress line every few seconds until the returned sender is dropped.
 fn tell(what: &'static str, message: Arc<Mutex<String>>) -> (Sender<()>, JoinHandle<()>) {
     let (sender, receiver) = channel();
     let started = Instant::now();

@@ -1,4 +1,4 @@
-//! `metaplan reason`.
+//! The command `metaplan reason`, which prints the conclusions of knowledge bases and answers queries about them.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -53,7 +53,7 @@ pub struct Arguments {
     time: TimeLimit,
 }
 
-/// Runs the command.
+/// Runs `metaplan reason` and returns the exit status of the program.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let _guard = arguments.time.guard(common)?;
     let mut knowledge = during("reasoning", common, || read(arguments))?;

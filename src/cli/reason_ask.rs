@@ -37,7 +37,7 @@ pub struct Questions {
 }
 
 impl Questions {
-    /// Answers the query of the arguments, if there is one.
+    /// Answers the query of the arguments and returns the exit status. Returns `None` if there is no query.
     pub fn answer(
         &self,
         knowledge: &mut Knowledge,
@@ -97,7 +97,8 @@ impl Questions {
     }
 }
 
-/// Answers a query about each assertion. `answer` returns `true` if the query has an answer.
+/// Answers a query about each assertion. Returns the answers as text and as JSON, and the exit status. `answer` returns
+/// the reason, and `true` if the query has an answer.
 fn reasons(
     knowledge: &mut Knowledge,
     assertions: &[String],
@@ -163,7 +164,7 @@ fn words(text: &str) -> Vec<&str> {
     words
 }
 
-/// Parses the fact of an assertion.
+/// Parses an assertion `SUBJECT PROPERTY VALUE` or `SUBJECT a CLASS` as a fact.
 fn read(knowledge: &mut Knowledge, assertion: &str) -> Result<Fact, Message> {
     let words = words(assertion.trim().trim_end_matches(" ."));
     let [subject, predicate, object] = words[..] else {
@@ -187,7 +188,7 @@ fn read(knowledge: &mut Knowledge, assertion: &str) -> Result<Fact, Message> {
     Ok(Fact::new(symbols.name(&predicate), [symbols.name(&subject), object]))
 }
 
-/// Returns all names that facts and rules mention.
+/// Returns the names, usually IRIs, of all predicates and constants in facts and rules.
 fn names(engine: &Engine) -> BTreeSet<String> {
     let mut symbols: BTreeSet<Symbol> = BTreeSet::new();
     for fact in engine.facts() {
@@ -234,7 +235,7 @@ fn name(word: &str, names: &BTreeSet<String>) -> Result<String, Message> {
     }
 }
 
-/// Parses `"text"`, `"text"@en`, `"5"^^xsd:int`, a number, `true` or `false`.
+/// Parses `"text"`, `"text"@en`, `"5"^^xsd:int`, a number, `true` or `false`. Returns `None` for other words.
 fn literal(word: &str) -> Option<Literal> {
     const XSD: &str = ontology::vocab::xsd::NS;
     if let Some(rest) = word.strip_prefix('"') {

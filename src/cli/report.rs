@@ -1,4 +1,4 @@
-//! `metaplan report`: an answer as an HTML page.
+//! The command `metaplan report`, which writes a plan or a journal as an HTML page.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -56,7 +56,7 @@ pub struct Arguments {
     output: Option<PathBuf>,
 }
 
-/// Runs the command.
+/// Runs `metaplan report` and returns the exit status of the program.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     if common.format != Format::Text {
         let text = "`report` writes HTML; the same data come as JSON from `plan --format json`";
@@ -98,7 +98,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     Ok(exit(status))
 }
 
-/// Writes the page of a journal.
+/// Writes the report of a journal as an HTML page.
 fn journal(arguments: &Arguments, directory: &Path, report: &JournalReport) -> Result<Exit, Failure> {
     let log = log_picture(&directory.display().to_string(), report);
     if let Some(directory) = &arguments.svg {
@@ -108,7 +108,7 @@ fn journal(arguments: &Arguments, directory: &Path, report: &JournalReport) -> R
     Ok(if report.is_sound() { Exit::Done } else { Exit::BadInput })
 }
 
-/// Writes a page to its destination. The note is printed if the destination is a file.
+/// Writes a page to the output file and prints the note `said`. Without a file, writes the page to standard output.
 fn write(arguments: &Arguments, page: &str, said: &str) -> Result<(), Failure> {
     let page = &*visible(page);
     match output::file_named(arguments.output.as_ref()) {
@@ -121,15 +121,15 @@ fn write(arguments: &Arguments, page: &str, said: &str) -> Result<(), Failure> {
     Ok(())
 }
 
-/// A plan, and its pictures.
+/// The solution of a mission, and its plan in the form for pictures.
 struct Answer {
     solution: Solution,
     plan: Plan,
 }
 
 impl Answer {
-    /// Plans a mission, with a separation if actions may overlap. The validator has executed the
-    /// plan.
+    /// Plans a mission. Actions may overlap if `separation`, the minimum time between interfering happenings, is given.
+    /// The validator has executed the plan.
     fn of(
         mission: &Mission,
         positions: &Positions,

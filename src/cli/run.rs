@@ -1,4 +1,4 @@
-//! `metaplan run`: reads lines of events and writes lines of adaptations.
+//! The command `metaplan run`, which runs the adaptation loop: reads lines of events and writes lines of answers.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -66,7 +66,7 @@ enum Fsync {
     Never,
 }
 
-/// Runs the command.
+/// Runs `metaplan run` and returns the exit status of the program.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     if arguments.configure {
         return keep(arguments, common);
@@ -112,7 +112,7 @@ fn journal(
     Ok(Some((journal, recovery)))
 }
 
-/// Closes the outputs after the loop, also after a failure.
+/// Closes the recording and the web page after the loop has ended with `result`, also after a failure.
 fn ended(result: Result<(), Failure>, outlet: &Outlet) -> Result<Exit, Failure> {
     let closed = outlet.close();
     result?;
@@ -161,7 +161,7 @@ fn adaptation(file: Option<&Path>, knowledge: &Knowledge) -> Result<Settings, Fa
     Ok(Settings::read(file, Some(knowledge))?)
 }
 
-/// Runs the configuration loop as [`drive`] runs the planning loop.
+/// Runs the configuration loop from its first line to its last.
 fn keep_going(
     common: &Common,
     keeper: Keeper,
@@ -180,7 +180,7 @@ fn keep_going(
 /// Time of planning before the first heartbeat, and between two heartbeats.
 const HEARTBEAT: Duration = Duration::from_secs(1);
 
-/// Reports the progress of planning every second until the program ends.
+/// Starts a thread that reports the progress of planning every second until the program ends.
 fn heartbeat(watch: Watch, line: Arc<AtomicU64>, outlet: Outlet) {
     std::thread::spawn(move || {
         let mut reported: Option<(u64, Instant, Instant)> = None;

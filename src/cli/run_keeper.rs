@@ -20,7 +20,7 @@ pub(super) struct KeeperSession<'a> {
     journal: Option<Journal>,
     outlet: &'a Outlet,
     clock: SystemClock,
-    /// Time of the last line of the journal, before this program started.
+    /// Time of the last line of the resumed journal, since the start; 0 without such a line.
     begun: Duration,
     /// `true` if a line had a time. Time then advances with lines only.
     has_times: bool,
@@ -47,7 +47,7 @@ impl<'a> KeeperSession<'a> {
         Ok(())
     }
 
-    /// Answers lines as they come, and reacts when something becomes due.
+    /// Answers lines as they arrive, and reacts when the due time of a filter passes.
     pub(super) fn live(mut self, events: Lines) -> Result<(), Failure> {
         let (sender, inputs) = sync_channel(MAX_WAITING);
         read(events, self.common.clone(), sender);
@@ -67,7 +67,8 @@ impl<'a> KeeperSession<'a> {
         Ok(())
     }
 
-    /// Makes the first choice, or repeats the answers that may not have left the program.
+    /// Makes the first choice of designs. After a restart, repeats the answers that may not have left the program
+    /// before.
     fn begin(&mut self) -> Result<Flow, Failure> {
         let read = Instant::now();
         let answers = match &mut self.journal {
@@ -114,7 +115,7 @@ impl<'a> KeeperSession<'a> {
         warn_if_unrecorded(self.common, of_loop);
     }
 
-    /// Handles a line or a timer, and writes it to the journal first if there is one.
+    /// Handles a line or a timer. With a journal, records the line before it is handled.
     fn handle(
         &mut self,
         text: &str,

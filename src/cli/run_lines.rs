@@ -12,14 +12,14 @@ use metaplan::recording::{FIRST_BYTE, Replay};
 use crate::cli::common::Common;
 use crate::cli::output;
 
-/// A line, and its time since the start of the mission, if the source has times.
+/// A line of input, with its time since the start of the mission if the source has times.
 pub(super) struct Line {
     pub(super) text: String,
     pub(super) now: Option<Duration>,
 }
 
-/// Reader of non-blank lines. A line that is far too long is truncated, so that it is not a valid
-/// event.
+/// Reader of non-blank lines. A line longer than [`LONGEST_LINE`] is truncated just above this length, and is therefore
+/// refused as an event.
 pub(super) struct Lines {
     name: String,
     source: Source,
@@ -61,8 +61,8 @@ impl Lines {
         Ok(Self { name, source: Source::Fresh(Some(reader)), is_file })
     }
 
-    /// Returns `true` if all lines are available: each line is then answered before the next one is
-    /// read.
+    /// Returns `true` if the input is a file on disk, so that all lines are available. Each line is then answered
+    /// before the next one is read.
     pub(super) fn is_file(&self) -> bool {
         self.is_file
     }
@@ -89,7 +89,8 @@ impl Lines {
         Ok(line)
     }
 
-    /// Determines the format by the first byte, with which every MCAP file and no text begins.
+    /// Determines the format, MCAP or text, from the first byte of the input. Every MCAP file and no text begins with
+    /// [`FIRST_BYTE`].
     fn look(&mut self) -> io::Result<()> {
         let Source::Fresh(reader) = &mut self.source else { return Ok(()) };
         let Some(mut reader) = reader.take() else { return Ok(()) };

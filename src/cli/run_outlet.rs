@@ -47,7 +47,7 @@ enum Recorded {
 }
 
 impl Outlets {
-    /// Returns the painter of plan pictures, if a page is requested.
+    /// Returns the painter of plan pictures for the web page, or `None` if no page is requested.
     pub(super) fn painter(&self, setup: &Setup) -> Result<Option<Painter>, Errors> {
         let positions = self.serve.as_ref().map(|_| setup.positions()).transpose()?;
         Ok(positions.map(|positions| Painter::new(&setup.mission, positions)))
@@ -80,8 +80,7 @@ impl Outlet {
         Ok(Self { recorder, is_told: Arc::default(), live })
     }
 
-    /// Publishes a line before it is handled, with its number and the time since the start of the
-    /// mission.
+    /// Publishes a line of input before it is handled, with its number and the time since the start of the mission.
     pub(super) fn heard(&self, line: u64, now: Duration, text: &str) {
         if let Some((recorder, _)) = &self.recorder {
             recorder.event(line, now, text);
@@ -101,7 +100,7 @@ impl Outlet {
         }
     }
 
-    /// Shows the plan if the answers have changed or removed it.
+    /// Shows the plan on the web page if the answers have changed or removed the plan.
     pub(super) fn plan(&self, beliefs: &Beliefs, answers: &[Answer]) {
         let is_about_plans =
             |answer: &Answer| matches!(answer, Answer::PlanFound { .. } | Answer::PlanNone { .. });
@@ -178,7 +177,7 @@ pub(super) fn unwritten(error: &io::Error) -> Message {
     Message::error("M321", format!("the journal cannot be written: {error}"))
 }
 
-/// Prints a warning if an answer says that the loop continues without its journal.
+/// Prints a warning if an answer reports that the loop continues without its journal.
 pub(super) fn warn_if_unrecorded<'a>(common: &Common, answers: impl IntoIterator<Item = &'a Answer>) {
     for answer in answers {
         if let Answer::Unrecorded { message } = answer {
@@ -187,7 +186,8 @@ pub(super) fn warn_if_unrecorded<'a>(common: &Common, answers: impl IntoIterator
     }
 }
 
-/// Starts a recording, which is completed also when a signal ends the program.
+/// Starts a recording, which is also completed if a signal ends the program. Returns the recorder and the name of its
+/// file.
 fn record(path: &Path, events: Recorded, mission: &str) -> Result<(Recorder, String), Message> {
     let form = match events {
         Recorded::Json => Form::Json,

@@ -1,4 +1,4 @@
-//! The session of the loop between input and output, in two modes.
+//! Session of `metaplan run`: connects the adaptation loop with its input and output, in two modes.
 //!
 //! If all input is available, as in a file, each line is answered completely before the next one is
 //! read, so the same lines give the same answers. If lines arrive as they happen, from a pipe or a
@@ -27,10 +27,10 @@ pub(super) const MAX_WAITING: usize = 1024;
 /// input that changes all the time would prevent every plan.
 const MAX_STOPPED: u32 = 3;
 
-/// Minimum time between two timers.
+/// Minimum pause before the loop reacts to the passing of time.
 pub(super) const MIN_PAUSE: Duration = Duration::from_millis(1);
 
-/// Inputs of the loop.
+/// Input of a session: a line with the time at which it was read, plans from another thread, or the end of the lines.
 pub(super) enum Input {
     Line(Line, Instant),
     Thoughts(Thoughts),
@@ -53,18 +53,18 @@ pub(super) enum Flow {
     Over,
 }
 
-/// A loop with its inputs and outputs.
+/// An adaptation loop with its inputs and outputs.
 pub(super) struct Session<'a> {
     common: &'a Common,
     control: Loop,
     journal: Option<Journal>,
     outlet: &'a Outlet,
     clock: SystemClock,
-    /// Time of the last line of the journal, before this program started.
+    /// Time of the last line of the resumed journal, since the start of the mission; 0 without such a line.
     begun: Duration,
-    /// Number of the current line, for heartbeats.
+    /// Number of the current line, shared with the thread that reports the progress of planning.
     line: Arc<AtomicU64>,
-    /// The last line and the time of reading it, while further answers to it are possible.
+    /// Number of the last line and the time at which it was read, while further answers to the line are possible.
     open: Option<(u64, Instant)>,
     thinking: Option<PlanSearch>,
     stopped: u32,
@@ -110,7 +110,7 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// Reacts to lines as they come.
+    /// Reacts to lines as they arrive, and searches for plans on another thread.
     pub(super) fn live(mut self, events: Lines) -> Result<(), Failure> {
         let (sender, inputs) = sync_channel(MAX_WAITING);
         read(events, self.common.clone(), sender.clone());
@@ -170,7 +170,7 @@ impl<'a> Session<'a> {
         self.answer(number, &answers, read)
     }
 
-    /// Handles a line completely.
+    /// Handles a line completely: reacts, deliberates, and writes all answers.
     fn answer_line(&mut self, line: &Line, read: Instant) -> Result<Flow, Failure> {
         let now = self.heard(line);
         let answers = match &mut self.journal {
@@ -183,8 +183,7 @@ impl<'a> Session<'a> {
         self.answer(number, &answers, read)
     }
 
-    /// Forwards a line to the recording and the page. Returns its time since the start of the
-    /// mission.
+    /// Forwards a line to the recording and the web page. Returns the time of the line since the start of the mission.
     fn heard(&mut self, line: &Line) -> Duration {
         let now = self.begun + line.now.unwrap_or_else(|| self.clock.now());
         let number = self.control.beliefs().lines() + 1;
@@ -193,7 +192,8 @@ impl<'a> Session<'a> {
         now
     }
 
-    /// Reacts to a line. `is_last` is `true` if no further line is waiting.
+    /// Reacts to a line, and deliberates if `is_last` is `true` and no search is necessary. `is_last` says that no
+    /// further line is waiting.
     fn line(&mut self, line: &Line, read: Instant, is_last: bool) -> Result<Flow, Failure> {
         if self.close()? == Flow::Over {
             return Ok(Flow::Over);
@@ -229,14 +229,14 @@ impl<'a> Session<'a> {
         self.say(&answers)
     }
 
-    /// Returns the time until the next deadline. `None` without a deadline, or if lines have times of
-    /// their own.
+    /// Returns the time until the loop must act without a line. Returns `None` if nothing is due, or if lines have
+    /// times of their own.
     fn pause(&mut self) -> Option<Duration> {
         let due = self.control.due().filter(|_| !self.has_times)?;
         Some(due.saturating_sub(self.begun + self.clock.now()).max(MIN_PAUSE))
     }
 
-    /// Reacts to the passing of time.
+    /// Reacts to the passing of time if something has become due.
     fn elapse(&mut self) -> Result<Flow, Failure> {
         let now = self.begun + self.clock.now();
         if self.control.due().is_none_or(|due| due > now) {
@@ -255,15 +255,15 @@ impl<'a> Session<'a> {
         self.say(&answers)
     }
 
-    /// Returns `true` if a line is about an action or effect that does not exist yet, and no action
-    /// is running that might require a reaction. The writer of such a line knows the loop's answers
-    /// in advance, as in a file that is piped.
+    /// Returns `true` if deliberation is pending, no action under way might need a reaction, and the line is about an
+    /// action or effect that was not requested yet. The writer of such a line knows the loop's answers in advance, as
+    /// in a file that is piped.
     fn is_early(&self, line: &Line) -> bool {
         let is_idle = self.control.has_agenda() && self.control.beliefs().running().is_none();
         is_idle && self.control.is_ahead(&Observation::parse(&line.text))
     }
 
-    /// Deliberates before the next line.
+    /// Advances the pending deliberation before the next line is handled: starts a search, or waits for its result.
     fn catch_up(
         &mut self,
         sender: &SyncSender<Input>,
@@ -359,7 +359,7 @@ impl<'a> Session<'a> {
         Ok(flow)
     }
 
-    /// Writes the last answers to a line, and its acknowledgement.
+    /// Writes the last answers to a line, and the acknowledgement of the line.
     fn answer(&self, number: u64, answers: &[Answer], read: Instant) -> Result<Flow, Failure> {
         warn_if_unrecorded(self.common, answers);
         let flow = flow(self.outlet.answer(number, answers, read))?;
@@ -367,7 +367,7 @@ impl<'a> Session<'a> {
         Ok(flow)
     }
 
-    /// Acknowledges the last line.
+    /// Writes the acknowledgement of the last line, unless it was written before.
     fn close(&mut self) -> Result<Flow, Failure> {
         match self.open.take() {
             None => Ok(Flow::GoesOn),
@@ -376,12 +376,12 @@ impl<'a> Session<'a> {
     }
 }
 
-/// Ends the run if the reader of the answers has closed the pipe.
+/// Converts the result of writing answers. Returns [`Flow::Over`] if the reader of the answers has closed the pipe.
 pub(super) fn flow(written: std::io::Result<()>) -> Result<Flow, Failure> {
     Ok(if is_over(written)? { Flow::Over } else { Flow::GoesOn })
 }
 
-/// Receives all waiting inputs.
+/// Moves all received inputs to the queue `waiting`, up to [`MAX_WAITING`].
 fn gather(inputs: &Receiver<Input>, waiting: &mut VecDeque<Input>) {
     while waiting.len() < MAX_WAITING {
         match inputs.try_recv() {
@@ -391,7 +391,7 @@ fn gather(inputs: &Receiver<Input>, waiting: &mut VecDeque<Input>) {
     }
 }
 
-/// Reads lines on a separate thread.
+/// Reads lines on a separate thread and sends them to the session, up to the end or the first error.
 pub(super) fn read(mut events: Lines, common: Common, sender: SyncSender<Input>) {
     std::thread::spawn(move || {
         loop {

@@ -1,4 +1,4 @@
-//! `metaplan schema`.
+//! The command `metaplan schema`, which prints the JSON Schema of a format.
 
 use clap::Args;
 use metaplan::message::{Message, did_you_mean};
@@ -16,7 +16,7 @@ pub struct Arguments {
     name: Option<String>,
 }
 
-/// Runs the command.
+/// Runs `metaplan schema` and returns the exit status of the program.
 pub fn run(arguments: &Arguments) -> Result<Exit, Failure> {
     let Some(name) = &arguments.name else {
         let rows = FORMATS.iter().map(|(format, about, _)| vec![(*format).to_owned(), (*about).to_owned()]);

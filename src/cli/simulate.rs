@@ -1,4 +1,4 @@
-//! `metaplan simulate`.
+//! The command `metaplan simulate`, which simulates missions with different strategies.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -80,7 +80,7 @@ impl Who {
     }
 }
 
-/// Runs the command.
+/// Runs `metaplan simulate` and returns the exit status of the program.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let guard = Guard::new(arguments.time_limit, None, common)?;
     let mut experiment = experiment(&arguments.mission, &arguments.scenario, common)?;
@@ -132,7 +132,7 @@ fn experiment(mission: &Path, scenario: &str, common: &Common) -> Result<Experim
     during("reading", common, read).map_err(scenario_failure)
 }
 
-/// Text that identifies the mission and the scenario of a command line.
+/// Returns a text that identifies the mission and the scenario of a command line.
 pub fn subject(arguments: &Arguments) -> String {
     format!("{} {}", arguments.mission.display(), arguments.scenario)
 }

@@ -1,4 +1,4 @@
-//! The mission of a command, and the changes of its situation by options.
+//! Options that select the mission of a command and change its initial situation.
 
 use std::path::PathBuf;
 
@@ -69,7 +69,7 @@ impl Imports {
 }
 
 impl Situation {
-    /// Situation of a mission that has a manifest.
+    /// Returns the options for a mission with a manifest: a scenario, values to set, and failed components.
     pub(super) fn of_mission(
         scenario: Option<String>,
         set: Vec<(String, String)>,
@@ -80,7 +80,8 @@ impl Situation {
         Self { knowledge, rules, imports, names, scenario, set, fail }
     }
 
-    /// Returns the mission as its files define it. `None` if no option changes it.
+    /// Returns the options without scenario, set values and failed components, which select the mission as its files
+    /// define it. Returns `None` if there are no such changes.
     pub(super) fn before(&self) -> Option<Self> {
         let (scenario, set, fail) = (None, Vec::new(), Vec::new());
         let differs = self.scenario.is_some() || !self.set.is_empty() || !self.fail.is_empty();
@@ -95,7 +96,7 @@ impl Situation {
         scenario.chain(fail).chain(set).collect()
     }
 
-    /// Returns the knowledge of documents in this situation, without a mission.
+    /// Reads a knowledge base from documents, without a mission, and applies the options `--set` and `--fail`.
     pub(super) fn knowledge(&self, documents: &[PathBuf], common: &Common) -> Result<Knowledge, Failure> {
         if !self.knowledge.is_empty() || !self.names.is_empty() || self.scenario.is_some() {
             let text = "with `--configure` the knowledge bases are the arguments, and there is no `--kb`, `--name` or `--scenario`";
@@ -110,7 +111,7 @@ impl Situation {
         self.setup(inputs, common).map(|setup| setup.mission)
     }
 
-    /// Returns the mission, as [`Situation::mission`], with the settings of the manifest.
+    /// Reads the mission as [`Situation::mission`] does. Returns it with the settings of the manifest.
     pub(super) fn setup(&self, inputs: &[PathBuf], common: &Common) -> Result<Setup, Failure> {
         during("reading", common, || self.read(inputs))
     }
@@ -179,13 +180,14 @@ impl Situation {
     }
 }
 
-/// An unknown scenario is a usage error; a scenario that does not fit the mission is bad input.
+/// Converts errors of a scenario to a failure. An unknown scenario is a usage error; a scenario that does not fit the
+/// mission is bad input.
 pub(super) fn scenario_failure(messages: Errors) -> Failure {
     let is_usage = messages.iter().any(|message| message.code == "M108");
     Failure { exit: if is_usage { Exit::Usage } else { Exit::BadInput }, messages }
 }
 
-/// Reads a knowledge base and asserts the observations of the options.
+/// Reads a knowledge base, marks the components in `fail` as failed, and sets the measured attributes in `set`.
 pub(super) fn knowledge(
     documents: &[PathBuf],
     rules: &[String],

@@ -1,4 +1,4 @@
-//! `metaplan sweep`.
+//! The command `metaplan sweep`, which executes the runs of a parameter study.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -45,10 +45,10 @@ pub struct Arguments {
     measured: bool,
 }
 
-/// Parses a command line; returns the arguments of `simulate`.
+/// Parser of a command line. Returns the arguments if the command is `simulate`, and `None` for other commands.
 pub type Read<'a> = dyn Fn(Vec<String>) -> Result<Option<simulate::Arguments>, clap::Error> + 'a;
 
-/// Runs the command. `read` parses the command lines of the study.
+/// Runs `metaplan sweep` and returns the exit status of the program. `read` parses the command lines of the study.
 pub fn run(arguments: &Arguments, common: &Common, read: &Read<'_>) -> Result<Exit, Failure> {
     output::require_directory(&arguments.output)?;
     let guard = Guard::new(arguments.time_limit, None, common)?;
@@ -97,7 +97,7 @@ fn sweep(arguments: &Arguments, study: &Study, guard: Guard, common: &Common) ->
 /// simulate.
 ///
 /// # Errors
-/// All mistakes in them, without duplicates.
+/// All mistakes in the commands, without duplicates.
 fn check(study: &Study, common: &Common, read: &Read<'_>) -> Result<(), Failure> {
     let (mut mistakes, mut simulated): (Vec<Message>, BTreeSet<String>) = (Vec::new(), BTreeSet::new());
     for (path, run) in study.samples() {
@@ -126,7 +126,7 @@ fn check(study: &Study, common: &Common, read: &Read<'_>) -> Result<(), Failure>
     Ok(Errors::unless_empty(mistakes)?)
 }
 
-/// Message of the command-line parser, in one line.
+/// Returns the error message of the command-line parser in one line, without the usage.
 fn refusal(error: &clap::Error) -> String {
     let text = error.to_string();
     let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
@@ -160,7 +160,7 @@ fn merge(arguments: &Arguments, study: &Study, common: &Common) -> Result<Exit, 
     Ok(say(&SweepAnswer::new(&lines, 0..study.len(), &groups), &groups, common))
 }
 
-/// Writes the answer. The exit status reports missing runs.
+/// Writes the answer. Returns [`Exit::NotProved`] if runs are missing, and [`Exit::Done`] otherwise.
 fn say(answer: &SweepAnswer, groups: &[Group], common: &Common) -> Exit {
     if common.format == Format::Json {
         output::json_answer(answer);
@@ -170,7 +170,7 @@ fn say(answer: &SweepAnswer, groups: &[Group], common: &Common) -> Exit {
     if answer.is_complete() { Exit::Done } else { Exit::NotProved }
 }
 
-/// Formats the means, one per line.
+/// Formats the mean of each group and column as a table, one row per mean.
 fn text(groups: &[Group]) -> String {
     if groups.is_empty() {
         return String::new();

@@ -8,7 +8,7 @@ use metaplan::message::Message;
 use tracing_chrome::{ChromeLayerBuilder, FlushGuard};
 use tracing_subscriber::layer::SubscriberExt as _;
 
-/// A running trace.
+/// A profile that is being recorded to a file.
 pub(super) struct Trace {
     flush: FlushGuard,
     pending: Pending,
@@ -29,7 +29,7 @@ impl Trace {
         Ok(Self { flush, pending, file: file.to_owned() })
     }
 
-    /// Completes the file.
+    /// Stops the recording and completes the file.
     ///
     /// # Errors
     /// The file cannot be written.

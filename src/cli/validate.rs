@@ -1,4 +1,4 @@
-//! `metaplan validate`.
+//! The command `metaplan validate`, which checks a plan by executing it step by step.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -38,7 +38,7 @@ pub struct Arguments {
     time: TimeLimit,
 }
 
-/// Runs the command.
+/// Runs `metaplan validate` and returns the exit status of the program.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let (plan, mission) = match arguments.inputs.split_last() {
         Some((plan, mission)) if !mission.is_empty() => (plan, mission),

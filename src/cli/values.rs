@@ -19,7 +19,7 @@ pub(super) fn setting(text: &str) -> Result<(String, String), String> {
     Ok((name.trim().to_owned(), value.trim().to_owned()))
 }
 
-/// Parses a name with an exact decimal number.
+/// Parses `NAME=NUMBER`. Returns the name and the exact decimal number.
 pub(super) fn amount(text: &str) -> Result<(String, BigRational), String> {
     let (name, value) = setting(text)?;
     let wrong = || format!("`{value}` is not a decimal number");
@@ -34,7 +34,7 @@ pub(super) fn time(text: &str) -> Result<BigRational, String> {
         .ok_or_else(|| format!("`{text}` is not a time such as 0.001"))
 }
 
-/// Converts a JSON decimal to an exact number.
+/// Converts a JSON number to an exact rational number. Returns `None` for other JSON values.
 pub(super) fn decimal(value: &Value) -> Option<BigRational> {
     let text = value.as_number()?.to_string();
     let (whole, fraction) = text.split_once('.').unwrap_or((&text, ""));

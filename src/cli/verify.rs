@@ -1,4 +1,4 @@
-//! `metaplan verify`.
+//! The command `metaplan verify`, which checks a certificate.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -39,7 +39,7 @@ pub struct Arguments {
     fail: Vec<String>,
 }
 
-/// Runs the command.
+/// Runs `metaplan verify` and returns the exit status of the program.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let format = common.format;
     let watch =

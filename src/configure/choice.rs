@@ -12,23 +12,23 @@ use crate::mapek::ruled_out;
 use crate::message::Message;
 use crate::number::decimal;
 
-/// Utility of a design.
+/// Definition of a design's utility.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub enum Worth {
     /// Utility as in MROS: the value that the knowledge base infers, otherwise the estimated
     /// `performance`, otherwise 0.001.
     #[default]
     Mros,
-    /// The estimation of an attribute type, by local name; larger is better.
+    /// The design's estimation of the given attribute type (local name); larger is better.
     Most(String),
-    /// The estimation of an attribute type, by local name; smaller is better.
+    /// The design's estimation of the given attribute type (local name); smaller is better.
     Least(String),
 }
 
-/// Requirements on a configuration as a whole.
+/// Utility and joint constraints for the choice of all designs of a configuration.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Wishes {
-    /// Utility of a design.
+    /// Definition of a design's utility.
     pub worth: Worth,
     /// Budgets: attribute types by local name, with the limit on the sum of the chosen designs'
     /// estimations, in the type's unit.
@@ -45,12 +45,12 @@ pub struct Configuration {
     pub choices: Vec<Choice>,
     /// Sum of the utilities of the chosen designs.
     pub utility: BigRational,
-    /// `true` if it is proved that no choice serves more functions, or equally many with more
-    /// utility. Otherwise a limit was reached.
+    /// `true` if it is proved that no choice is better: serves more functions, else misses fewer requirements, else has
+    /// more utility. Otherwise a limit was reached.
     pub optimal: bool,
 }
 
-/// Choice for an objective.
+/// Choice of a design for one objective, with the alternatives.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Choice {
@@ -90,7 +90,7 @@ pub enum Verdict {
     Chosen,
     /// The design is unusable for the objective now; the reasons are sentences.
     RuledOut(Vec<String>),
-    /// The design misses more requirements, or equally many without more utility.
+    /// The design is not better than the chosen one: it misses more requirements, or equally many without more utility.
     Less,
     /// The design would be better, but conflicts with other choices; the reason is a sentence.
     Together(String),
@@ -102,7 +102,7 @@ struct Group {
     candidates: Vec<Offer>,
 }
 
-/// A candidate design with its demands, utility and rejections.
+/// A candidate design for an objective, with its demands on budgets, its utility, and the reasons that exclude it.
 struct Offer {
     design: String,
     utility: BigRational,
@@ -118,7 +118,7 @@ impl Group {
     }
 }
 
-/// Returns the design that currently provides an objective's function.
+/// Returns the design that currently provides an objective's function, or `None` if the objective has none.
 pub(super) fn current(objective: &Objective) -> Option<&str> {
     let designs = objective.groundings.iter().filter_map(|grounding| grounding.design.as_ref());
     designs.map(|design| design.name.as_str()).next()
@@ -190,7 +190,7 @@ pub(super) fn choose(
     Ok(Configuration { choices, utility: chosen.utility, optimal: chosen.optimal })
 }
 
-/// Computes demands and utilities of the designs in the knowledge base.
+/// Computes demands and utilities of the candidate designs of objectives.
 struct Offers<'a> {
     knowledge: &'a Knowledge,
     wishes: &'a Wishes,
@@ -248,16 +248,16 @@ impl<'a> Offers<'a> {
     }
 }
 
-/// The joint decision, for the reasons of each choice.
+/// The joint choice for all objectives in need, from which the verdict on each design is derived.
 struct Whole<'a> {
     knowledge: &'a Knowledge,
     wishes: &'a Wishes,
     needing: &'a [Group],
-    /// For each group, the position of its chosen design.
+    /// For each group, the index of the chosen design among the candidates; `None` if no design was chosen.
     designs: &'a [Option<usize>],
-    /// Offers in use that stay.
+    /// Designs in use of objectives that are not in need. They are kept.
     kept: &'a [&'a Offer],
-    /// Remaining budgets after the fixed offers.
+    /// Remaining budgets after the demands of the kept designs.
     left: &'a [BigRational],
 }
 
@@ -296,7 +296,8 @@ impl Whole<'_> {
         Verdict::Together(self.conflict(at, offer))
     }
 
-    /// Reason why a usable design with more utility conflicts with the other choices.
+    /// Returns the reason, as a sentence, why a usable and preferred design was not chosen: its conflict with other
+    /// choices.
     fn conflict(&self, at: usize, offer: &Offer) -> String {
         let chosen_elsewhere =
             self.needing.iter().zip(self.designs).enumerate().filter(|(other, _)| *other != at);

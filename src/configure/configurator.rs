@@ -16,21 +16,21 @@ use crate::number::decimal;
 /// Limit on inference steps after a report; see [`rules::Limits`].
 const STEPS: u64 = 100_000_000;
 
-/// An objective.
+/// An objective to pursue: a function to provide, with requirements.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Goal {
     /// Name of the objective.
     pub name: String,
     /// The function to provide, by IRI or local name.
     pub function: String,
-    /// Attribute types, by IRI or local name, and bounds in their units.
+    /// Bounds on quality attributes: the attribute type by IRI or local name, and the bound in the type's unit.
     pub requirements: Vec<(String, BigRational)>,
     /// `true` if a better design is also searched for while the objective is fulfilled.
     pub always_improve: bool,
 }
 
 impl Goal {
-    /// Objective named after its function, without requirements.
+    /// Returns an objective for a function, named `o_` followed by the function's local name, without requirements.
     pub fn of(function: &str) -> Self {
         let name = format!("o_{}", ontology::vocab::local_name(function));
         Self { name, function: function.to_owned(), requirements: Vec::new(), always_improve: false }
@@ -42,8 +42,8 @@ impl Goal {
 pub struct Configurator {
     knowledge: Knowledge,
     wishes: Wishes,
-    /// Objectives in need that no design could serve, or for which the robot could not change
-    /// designs; they stay in need.
+    /// Local names of objectives that stay in need, because no design could serve them or the robot could not change
+    /// the design.
     pub(super) pending: BTreeSet<String>,
 }
 
@@ -91,23 +91,23 @@ impl Configurator {
         &self.knowledge
     }
 
-    /// Returns the knowledge base for assertions of reports.
+    /// Returns the knowledge base, for the assertion of the robot's reports.
     pub fn knowledge_mut(&mut self) -> &mut Knowledge {
         &mut self.knowledge
     }
 
-    /// Returns the requirements on the configuration as a whole.
+    /// Returns the definition of utility and the joint constraints on the chosen designs.
     pub fn wishes(&self) -> &Wishes {
         &self.wishes
     }
 
-    /// Returns the objectives.
+    /// Returns all objectives of the knowledge base.
     pub fn objectives(&self) -> Vec<Objective> {
         self.knowledge.runtime().objectives()
     }
 
-    /// Returns the functions that some design solves, by local name, except PLANTA's `fd_unground`,
-    /// which solves each function.
+    /// Returns the sorted local names of the functions that some design solves. PLANTA's design `fd_unground`, which
+    /// solves every function, is ignored.
     pub fn functions(&self) -> Vec<String> {
         let view = self.knowledge.view();
         let designs =
@@ -133,7 +133,7 @@ impl Configurator {
         self.change(|runtime| runtime.add_objective(&new))
     }
 
-    /// Removes an objective.
+    /// Removes an objective, given by IRI or local name.
     ///
     /// # Errors
     /// The objective does not exist.

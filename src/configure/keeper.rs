@@ -1,5 +1,5 @@
-//! The configuration loop: asserts the robot's reports in the knowledge base, and chooses and
-//! requests designs for objectives in need.
+//! The configuration loop: asserts the robot's reports in the knowledge base, and chooses and requests designs for
+//! objectives that need one.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
@@ -22,13 +22,13 @@ use crate::message::Message;
 #[serde(untagged)]
 #[non_exhaustive]
 pub enum KeeperAnswer {
-    /// An answer in the form of the planning loop.
+    /// An answer that the planning loop of [`crate::mapek`] gives, too.
     Loop(Answer),
-    /// A change in the service of an objective.
+    /// A new design for an objective, or the report that no design can serve it.
     Service(Service),
 }
 
-/// A change in the service of an objective.
+/// A new design for an objective, or the report that no design can serve it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "answer")]
 #[non_exhaustive]
@@ -74,7 +74,7 @@ impl From<Answer> for KeeperAnswer {
 }
 
 impl Service {
-    /// Marks a request as repeated.
+    /// Marks a request as a repetition.
     #[must_use]
     pub(super) fn repeated(mut self) -> Self {
         if let Self::Reconfigure { repeated, .. } = &mut self {
@@ -87,7 +87,7 @@ impl Service {
 /// Maximum number of changes of design that can be undone.
 const MAX_CHANGES: usize = 256;
 
-/// A requested change of design. It is undone if it fails, even after its acknowledgement.
+/// A requested change of an objective's design. A failed change is undone, even after its acknowledgement.
 #[derive(Debug, Clone)]
 pub(super) struct PendingChange {
     pub(super) objective: String,
@@ -104,18 +104,18 @@ pub struct Keeper {
     pub(super) numbers: Numbers,
     pub(super) effects: u64,
     pub(super) pending_changes: BTreeMap<u64, PendingChange>,
-    /// Latest requested change of each objective, unless it was acknowledged or has failed.
+    /// Latest requested change of each objective, by effect number. Acknowledged and failed changes are removed.
     pub(super) outstanding: BTreeMap<u64, Service>,
     pub(super) available: BTreeSet<String>,
     pub(super) statuses: BTreeMap<String, Vec<String>>,
     pub(super) violated: BTreeSet<String>,
     pub(super) fault: Option<Fault>,
-    /// Last reported reasons for each objective that no design can serve.
+    /// Objectives that no design can serve, each with the reasons reported last.
     pub(super) unserved: BTreeMap<String, Vec<String>>,
     pub(super) filters: Filters,
     pub(super) unrecorded: Unrecorded,
     pub(super) states: FilterStates,
-    /// `true` once the first choice was made.
+    /// `true` once the first choice of designs was made.
     pub(super) has_begun: bool,
     /// Number of received lines.
     pub(super) lines: u64,
@@ -164,8 +164,8 @@ impl Keeper {
         Self { unrecorded, ..self }
     }
 
-    /// Returns the time since the start at which a filter needs a tick, if nothing else is
-    /// reported.
+    /// Returns the next time, since the start, at which a filter changes a belief without a further report; `None` if
+    /// no filter does. The caller should handle a tick at this time.
     pub fn due(&self) -> Option<Duration> {
         self.filters.due(&self.states)
     }
@@ -185,8 +185,7 @@ impl Keeper {
         self.numbers.greatest()
     }
 
-    /// Returns the ranges of sequence numbers below the greatest one that were never received, with
-    /// both ends.
+    /// Returns the gaps between received sequence numbers, as inclusive ranges `[first, last]`.
     pub fn missing(&self) -> Vec<[u64; 2]> {
         self.numbers.missing()
     }
@@ -196,7 +195,7 @@ impl Keeper {
         &self.configurator
     }
 
-    /// Makes the first choice.
+    /// Makes the first choice of designs, and returns the answers.
     pub fn start(&mut self) -> Vec<KeeperAnswer> {
         let mut answers = Vec::new();
         self.has_begun = true;
@@ -281,7 +280,7 @@ impl Keeper {
         Ok(())
     }
 
-    /// Asserts the status of a component, unless its filter holds it back.
+    /// Asserts the reported status of a component, unless the component's filter holds the report back.
     fn component(
         &mut self,
         component: &str,
@@ -301,20 +300,21 @@ impl Keeper {
         Ok(())
     }
 
-    /// Rejects the number of an unknown effect.
+    /// Returns a refusal if no effect with this number was requested.
     fn check_effect(&self, effect: u64) -> Result<(), Refusal> {
         let is_known = (1..=self.effects).contains(&effect);
         is_known.then_some(()).ok_or_else(|| Refusal::new("M305", format!("there was no effect {effect}")))
     }
 
-    /// Undoes a change of design: the design counts as not realisable, so that the next best is
-    /// chosen. Does nothing if the change is unknown or was undone before.
+    /// Undoes a failed change of design: marks the new design as not realisable, so that the next best design is
+    /// chosen, and restores the previous design unless a later change replaced it. Does nothing if the change is
+    /// unknown or was undone before.
     fn undo(&mut self, effect: u64) -> Result<(), Message> {
         let Some(PendingChange { objective, from, to }) = self.pending_changes.remove(&effect) else {
             return Ok(());
         };
         self.configurator.knowledge_mut().take(&to, RobotReport::Design(false))?;
-        // A later change of the same objective has replaced it.
+        // A later change of the same objective has replaced this change.
         if self.pending_changes.range(effect..).any(|(_, later)| later.objective == objective) {
             return Ok(());
         }
@@ -363,7 +363,7 @@ impl Keeper {
         Ok(())
     }
 
-    /// Reports new conclusions, and chooses designs for the objectives in need.
+    /// Reports new conclusions, then chooses and requests designs for the objectives in need.
     fn adapt(&mut self, answers: &mut Vec<KeeperAnswer>) {
         self.infer(answers);
         let knowledge = self.configurator.knowledge();
@@ -441,7 +441,7 @@ impl Keeper {
         KeeperAnswer::Service(reconfigure)
     }
 
-    /// Reports the designs and objectives whose conclusions have changed.
+    /// Reports designs whose availability has changed, and objectives whose status has changed.
     fn infer(&mut self, answers: &mut Vec<KeeperAnswer>) {
         let knowledge = self.configurator.knowledge();
         let (designs, objectives) = changes(knowledge, &mut self.available, &mut self.statuses);
@@ -453,7 +453,7 @@ fn wrong(message: &Message) -> KeeperAnswer {
     KeeperAnswer::Loop(Answer::Error { code: message.code.clone(), message: message.message.clone() })
 }
 
-/// Reasons why an objective is in need, and why better designs than the chosen one are not used.
+/// Returns the reasons why an objective needs a design, and why designs preferred to the chosen one are not used.
 fn reasons_of(choice: &Choice) -> Vec<String> {
     let mut because: Vec<String> =
         choice.need.iter().map(|need| format!("{} is {need}", choice.objective)).collect();

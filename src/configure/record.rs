@@ -1,4 +1,4 @@
-//! The configuration loop as data, for its journal: decisions, and snapshots of its state.
+//! Serialization of the configuration loop ([`Keeper`]) for its journal: decisions, and snapshots of the state.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -72,8 +72,9 @@ impl Recoverable for Keeper {
 
     fn checkpoint(&mut self) -> Snapshot {
         let snapshot = snapshot(self);
-        // The explanation that is found depends on the order of past assertions. A restored loop and
-        // this loop must find the same explanation. This also frees the names of former values.
+        // The explanation that is found depends on the order of past assertions. A restored loop and this loop must
+        // find the same explanation. Therefore, the statements are asserted again. This also frees the names of former
+        // values.
         if let Some(statements) = statements(&snapshot.0) {
             // Cannot fail: these statements were evaluated before, within the budget and without a fault.
             let _ = self.configurator.knowledge_mut().restore(&statements);
@@ -113,7 +114,7 @@ fn snapshot(keeper: &Keeper) -> Snapshot {
     }))
 }
 
-/// Parses the differences between the assertions and those of the documents.
+/// Parses the assertions that were added to, and removed from, those of the OWL documents.
 fn statements(data: &Value) -> Option<Statements> {
     let list = |name: &str| {
         data.get(name)?.as_array()?.iter().map(statement_from_record).collect::<Option<Vec<_>>>()
@@ -121,7 +122,7 @@ fn statements(data: &Value) -> Option<Statements> {
     Some(Statements { added: list("added")?, removed: list("removed")? })
 }
 
-/// Restores a snapshot. Returns `None` if it is not of this knowledge base.
+/// Restores the state from a snapshot. Returns `None` if the snapshot is damaged or belongs to another knowledge base.
 fn restore(keeper: &mut Keeper, data: &Value) -> Option<()> {
     let number = |name: &str| data.get(name).and_then(Value::as_u64);
     let knowledge = keeper.configurator.knowledge_mut();
@@ -162,7 +163,7 @@ fn change(record: &Value) -> Option<(u64, PendingChange)> {
     Some((record.get(0)?.as_u64()?, PendingChange { objective, from, to: text(record.get(3)?)? }))
 }
 
-/// Parses a requested change in the form of its answer.
+/// Parses a requested change of design and its effect number. The record has the form of the answer `reconfigure`.
 fn service(record: &Value) -> Option<(u64, Service)> {
     let field = |name: &str| record.get(name).and_then(text);
     let effect = record.get("effect")?.as_u64()?;

@@ -1,9 +1,9 @@
-//! Acknowledgements: determines the believed design of each function from acknowledgements of reconfigurations.
+//! Determines the believed design of each function from acknowledgements of reconfigurations.
 //!
-//! The believed design is the one that was acknowledged last. An event with the number of a reconfiguration
-//! acknowledges it. Messages can cross, be duplicated or arrive out of order: of two acknowledged reconfigurations of
-//! one function, the later one counts. A superseded reconfiguration without an answer can still be acknowledged. Until
-//! then its design is not believed, and the design of the function is uncertain.
+//! The believed design of a function is the design of its last acknowledged reconfiguration. An event with the number
+//! of a reconfiguration acknowledges it. Messages can cross, be duplicated or arrive out of order: of two acknowledged
+//! reconfigurations of one function, the later one counts. A superseded reconfiguration without an answer can still be
+//! acknowledged. Before this acknowledgement, its design is not believed, and the design of the function is uncertain.
 //!
 //! A report that an action has started, progressed or succeeded implies the arrival of its request, and nothing else.
 //! Under this rule alone, robots without acknowledgements would never have a believed design. Therefore, until a
@@ -14,21 +14,21 @@ use crate::mapek::answer::Command;
 use crate::mapek::beliefs::Beliefs;
 use crate::mapek::receipts::{Acknowledged, Before};
 
-/// Outcome of an acknowledgement.
+/// Outcome of recording the acknowledgement of an effect.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Receipt {
     /// No effect has this number.
     Unknown,
     /// The effect is acknowledged.
     Recorded,
-    /// The design of this function is uncertain.
+    /// The effect is acknowledged, but the design of the given function is uncertain.
     Doubtful(String),
 }
 
 /// Outcome of a report that a reconfiguration has failed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Failure {
-    /// The design cannot be realised.
+    /// The given design could not be realised.
     Design(String),
     /// No consequence: the report is old or a duplicate.
     Stale,
@@ -37,7 +37,8 @@ pub(super) enum Failure {
 }
 
 impl Beliefs {
-    /// Records an acknowledgement. The effect is then no longer outstanding.
+    /// Records that the managed system has acknowledged the effect with this number. The effect is then no longer
+    /// outstanding.
     pub(super) fn acknowledge(&mut self, effect: u64) -> Receipt {
         if effect == 0 || effect > self.effects {
             return Receipt::Unknown;
@@ -101,7 +102,7 @@ impl Beliefs {
                 return self.unanswered_failed(&function, design);
             }
             let Some(last) = history.last.as_mut() else { continue };
-            // If the previous reconfiguration failed too, the design after a failure of the last one is unknown.
+            // If both the last and the previous reconfiguration have failed, the design of the function is unknown.
             if let Some(before) = last.before.take_if(|before| before.effect == Some(effect))
                 && last.failed
                 && self.configuration.get(function) == Some(&before.design)
@@ -125,9 +126,9 @@ impl Beliefs {
         Failure::Stale
     }
 
-    /// Records the failure of an unanswered reconfiguration. The function keeps its previous design. If the function
-    /// was observed with the new design meanwhile, the reconfiguration has failed after it was carried out, and the
-    /// design becomes unknown.
+    /// Records the failure of a reconfiguration to `design` that was not acknowledged. The function keeps its previous
+    /// design. If the function was observed with the new design in the meantime, the reconfiguration has failed after
+    /// it was carried out, and the design becomes unknown.
     fn unanswered_failed(&mut self, function: &str, design: String) -> Failure {
         if self.configuration.get(function) == Some(&design) {
             self.configuration.remove(function);
@@ -136,8 +137,8 @@ impl Beliefs {
     }
 
     /// Records that a reconfiguration has arrived, unless a later one is acknowledged. If the function was observed
-    /// with another design while the reconfiguration was pending, the order of the two is unknown, and so is the
-    /// design.
+    /// with another design while the reconfiguration was pending, the order of observation and reconfiguration is
+    /// unknown, and so is the design.
     fn configured(&mut self, effect: u64, function: String, design: String) -> Receipt {
         let history = self.receipts.functions.entry(function.clone()).or_default();
         // A superseded reconfiguration without an answer may have been carried out in between.

@@ -1,10 +1,10 @@
-//! Decides whether a new plan is needed after changes, and adopts it: Algorithm 1 of the paper (see [`crate::mapek`]).
+//! Decides after changes whether a new plan is needed, and adopts it (Algorithm 1 of the paper, see [`crate::mapek`]).
 //!
 //! The paper plans whenever the available designs have changed or an objective is in error. Here, a plan that is still
-//! valid and uses none of the lost designs is kept. It is still optimal, because losing alternatives cannot improve the
-//! optimum. If the action under way loses a design, the designs of this action and the rest of the plan are chosen
-//! again together, see [`crate::mapek::resume`]. If no such plan exists or another one is better, the action is
-//! suspended or cancelled, see [`crate::mapek::interrupt`].
+//! valid and uses none of the lost designs is kept. Such a plan is still optimal, because losing alternatives cannot
+//! improve the optimum. If the action under way loses a design, the designs of this action and of the remaining steps
+//! are chosen again together, see [`crate::mapek::resume`]. If no plan continues the action, or another plan is better,
+//! the action is suspended or cancelled, see [`crate::mapek::interrupt`].
 
 use std::time::Duration;
 
@@ -27,25 +27,28 @@ use crate::number;
 /// Number of consecutive failures of one step after which planning pauses until something else changes.
 const MAX_FAILURES: u32 = 3;
 
-/// Lower limit on the time limit from which the pause after an unfinished search is computed; upper limit on the pause.
+/// Minimum base of the pause before a search that hit its time limit is repeated. A greater time limit is used as the
+/// base instead.
 const MIN_RETRY: Duration = Duration::from_secs(10);
+
+/// Upper limit on the pause before a search that hit its time limit is repeated.
 const MAX_RETRY: Duration = Duration::from_secs(3600);
 
-/// Entry among the designs of `improvement_causes` for changed facts.
+/// Entry of `Beliefs::improvement_causes`, among the names of designs, that represents changed facts.
 const FACTS: &str = "facts";
 
-/// Reason for planning, which determines when the plan is adopted.
+/// Reason for planning, which determines the condition under which the new plan is adopted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Need {
-    /// The action under way could not go on unchanged, and a safe effect was requested.
+    /// The action under way could not continue unchanged, and a safe effect was requested.
     Interrupted,
-    /// The plan at hand cannot be kept.
+    /// The current plan cannot be kept.
     Must,
     /// A better plan may exist.
     Better,
 }
 
-/// The stage that decides whether to plan, and adopts plans. The planner computes them.
+/// Stage that decides whether to search for a plan, and adopts plans. [`Planner`] computes the plans.
 #[derive(Debug)]
 pub(super) struct Adaptation<'a> {
     pub(super) beliefs: &'a mut Beliefs,
@@ -54,12 +57,13 @@ pub(super) struct Adaptation<'a> {
 }
 
 impl Adaptation<'_> {
-    /// Handles changes and findings, and replans if necessary.
+    /// Decides from changes and findings of the analysis whether a plan is needed. If so, searches for a plan and
+    /// adopts it.
     pub(super) fn adapt(&mut self, changes: Changes, findings: Findings, answers: &mut Vec<Answer>) {
         let is_observed = changes.observed;
         self.decide(changes, findings, answers);
-        // The action continues with the observed design, although it may be waiting for the previous one. An unfinished
-        // deliberation must not change it.
+        // The action continues with the observed design, but may be waiting for the previous one. Therefore, the
+        // observed design is requested. An unfinished deliberation must not change the beliefs.
         if is_observed && !self.planner.is_missing {
             self.configure_again(answers);
         }
@@ -74,7 +78,7 @@ impl Adaptation<'_> {
         }
         let interruptions = std::mem::take(&mut changes.interruptions);
         if let Some(running) = self.beliefs.running.clone() {
-            // The report of its end leads to the next plan.
+            // The report of the action's end leads to the next plan.
             if running.cancelling {
                 return;
             }
@@ -89,7 +93,7 @@ impl Adaptation<'_> {
                 return;
             }
         }
-        // The domain need not mention availability, so that the plan is compared with it here.
+        // The domain need not mention availability. Therefore, the designs of the plan are checked here.
         let lost: Vec<&String> =
             self.beliefs.planned_designs().filter(|design| !self.beliefs.is_available(design)).collect();
         if let Some(design) = lost.first() {
@@ -97,7 +101,7 @@ impl Adaptation<'_> {
         }
         changes.reasons.extend(interruptions);
         changes.reasons.extend(findings.errors);
-        // After the goal there is no plan. The validator then checks the goal alone.
+        // After the goal is reached, there is no plan, and the validator checks the goal alone.
         if self.beliefs.reached && changes.reasons.is_empty() && changes.facts {
             let is_undone = self.beliefs.violation().is_some();
             changes.reasons.extend(is_undone.then(|| "the goal does not hold any more".to_owned()));
@@ -139,14 +143,14 @@ impl Adaptation<'_> {
         }
     }
 
-    /// Records the causes for which a better plan may exist.
+    /// Updates the reasons why a better plan may exist: designs that have become available, and changed facts.
     fn record_improvement_causes(&mut self, findings: &Findings, changes: &Changes) {
         let improvement_causes = &mut self.beliefs.improvement_causes;
         improvement_causes.retain(|design| !findings.lost.contains(design));
         let before = improvement_causes.len();
         improvement_causes.extend(findings.gained.iter().cloned());
         improvement_causes.extend((changes.predicates || changes.values).then(|| FACTS.to_owned()));
-        // The plan at hand is not proved optimal. A changed situation may be easier to search.
+        // A plan that is not proved optimal may be improved: a changed situation may be easier to search.
         let is_news = changes.facts || !findings.gained.is_empty() || !findings.lost.is_empty();
         improvement_causes.extend((is_news && self.beliefs.unproved).then(|| FACTS.to_owned()));
         if improvement_causes.len() > before {
@@ -154,7 +158,8 @@ impl Adaptation<'_> {
         }
     }
 
-    /// Resumes an action that was suspended only until planning has finished, if it can go on.
+    /// Resumes the action under way if it was suspended only until planning has finished, and its remainder is
+    /// executable.
     pub(super) fn release(&mut self, answers: &mut Vec<Answer>) {
         let Some(mut running) =
             self.beliefs.running.clone().filter(|running_action| running_action.provisional)
@@ -169,7 +174,8 @@ impl Adaptation<'_> {
         self.beliefs.running = Some(running);
     }
 
-    /// Searches for a better plan if a cause has lasted for the settle time, or an unfinished search is due again.
+    /// Searches for a better plan if the reasons why one may exist have lasted for the settle time, or if the
+    /// repetition of an unfinished search is due.
     fn improve(&mut self, answers: &mut Vec<Answer>) {
         let has_plan = self.beliefs.plan.is_some() && !self.beliefs.reached;
         if !has_plan {
@@ -185,13 +191,13 @@ impl Adaptation<'_> {
         }
     }
 
-    /// Returns `true` if an unfinished search is due again.
+    /// Returns `true` if the scheduled repetition of an unfinished search is due.
     fn is_retry_due(&self) -> bool {
         self.beliefs.retry.is_some_and(|scheduled| scheduled.at <= self.beliefs.now)
     }
 
-    /// Schedules another search after one that hit its time limit. The pause doubles with each attempt. Nothing is
-    /// scheduled while conclusions are missing.
+    /// Schedules another search after a search without a proved outcome. The pause doubles with each attempt. Nothing
+    /// is scheduled while conclusions are missing.
     fn schedule_retry(&mut self, attempt: u32, outcome: &Outcome) {
         if outcome.proved || self.beliefs.fault.is_some() {
             return;
@@ -202,7 +208,8 @@ impl Adaptation<'_> {
         self.beliefs.retry = Some(Retry { at, attempt: attempt + 1 });
     }
 
-    /// Plans, and adopts the result. With [`Need::Better`], the plan is adopted only if its benefit is sufficient.
+    /// Searches for a plan for the reasons `because`, and adopts it. With [`Need::Better`], the plan is adopted only if
+    /// its benefit is sufficient.
     pub(super) fn replan(&mut self, because: Vec<String>, need: Need, answers: &mut Vec<Answer>) {
         let is_necessary = need != Need::Better;
         let reason = because.first().cloned().unwrap_or_default();
@@ -238,7 +245,7 @@ impl Adaptation<'_> {
         }
     }
 
-    /// Requests the designs of the action under way again for functions that have lost them.
+    /// Requests designs of the action under way again if their functions are expected to have other designs.
     fn configure_again(&mut self, answers: &mut Vec<Answer>) {
         let Some(mut running) = self.beliefs.running.take() else { return };
         let is_active = !running.suspended && !running.cancelling;
@@ -251,8 +258,9 @@ impl Adaptation<'_> {
         self.beliefs.running = Some(running);
     }
 
-    /// Cancels or suspends the action under way if that is better than `going_on`, the plan that starts with the
-    /// remainder of the action. Returns `true` if it did.
+    /// Cancels or suspends the action under way if this is better than `going_on`, the plan that starts with the
+    /// remainder of the action. Returns `true` if the action was interrupted, or if the decision needs a search that is
+    /// forbidden.
     fn interrupt(&mut self, reason: &str, need: Need, going_on: &Outcome, answers: &mut Vec<Answer>) -> bool {
         let Some(running) = self.beliefs.running.clone() else { return false };
         let can_go_on = self.can_go_on(&running);
@@ -278,7 +286,7 @@ impl Adaptation<'_> {
         }
     }
 
-    /// Returns `true` if all designs of an action are available and its remainder satisfies its conditions.
+    /// Returns `true` if all designs of an action under way are available, and its remainder is executable.
     fn can_go_on(&self, running: &Running) -> bool {
         let designs = running.step.configuration.iter();
         designs.into_iter().all(|(_, design)| self.beliefs.is_available(design))
@@ -312,7 +320,7 @@ impl Adaptation<'_> {
                 .map(|(_, d)| d.clone())
         };
         match outcome.steps.iter().flatten().find_map(unavailable) {
-            // The domain does not require `available` of its designs, so that the planner may choose an unavailable
+            // The domain need not require that designs are available. Therefore, the planner may choose an unavailable
             // one.
             Some(design) => Outcome {
                 steps: None,
@@ -332,7 +340,7 @@ impl Adaptation<'_> {
         running.chain(plan).map(key).eq(steps.iter().map(key))
     }
 
-    /// Returns the reason to keep the current plan, if the benefit of `outcome` is too small.
+    /// Returns the reason to keep the current plan if the benefit of `outcome` is too small, and `None` otherwise.
     fn insufficient_benefit(&self, outcome: &Outcome) -> Option<String> {
         let current_metric = self.beliefs.verdict().metric?;
         if benefit(self.beliefs, self.settings, &current_metric, &outcome.cost).is_some() {
@@ -343,7 +351,7 @@ impl Adaptation<'_> {
         Some(format!("the benefit of another plan is {benefit}, the minimum is {minimum}"))
     }
 
-    /// Adopts a plan. The action under way is reconfigured to the designs of its first step.
+    /// Adopts a plan. The action under way is reconfigured to the designs of the plan's first step.
     fn adopt(&mut self, outcome: Outcome, answers: &mut Vec<Answer>) {
         let Outcome { steps, proved, .. } = outcome;
         self.beliefs.unproved = !proved;
@@ -362,7 +370,7 @@ impl Adaptation<'_> {
         self.beliefs.plan = Some(steps);
     }
 
-    /// Reports that no plan exists. If the current plan cannot be kept, it is dropped.
+    /// Reports that no plan was found. If a new plan `is_necessary`, drops the current plan.
     fn report_no_plan(&mut self, is_necessary: bool, outcome: Outcome, answers: &mut Vec<Answer>) {
         let status = if outcome.proved { "unsolvable" } else { "unknown" };
         answers.push(Answer::PlanNone { status, because: outcome.because, blocking: outcome.blocking });
@@ -373,14 +381,15 @@ impl Adaptation<'_> {
     }
 }
 
-/// Improvement of the metric from `metric` to `other`; negative if `other` is worse.
+/// Returns the improvement from the metric value `metric` to the value `other`; negative if `other` is worse.
 fn gain(beliefs: &Beliefs, metric: &BigRational, other: &BigRational) -> BigRational {
     let declared = beliefs.mission.problem().metric.as_ref();
     let maximize = declared.is_some_and(|metric| metric.direction == Direction::Maximize);
     if maximize { other - metric } else { metric - other }
 }
 
-/// Returns the [`gain`] if it is positive and at least the minimum benefit.
+/// Returns the [`gain`] from `metric` to `other` if it is positive and at least the minimum benefit, and `None`
+/// otherwise.
 fn benefit(
     beliefs: &Beliefs,
     settings: &Settings,

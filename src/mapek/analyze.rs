@@ -1,5 +1,5 @@
-//! Analyze: computes available designs and objectives in error from the knowledge base, and compares them with the
-//! previous ones.
+//! Analyze (of MAPE-K): computes the available designs and the objectives in error from the knowledge base, and
+//! compares them with the previous results.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,7 +10,7 @@ use crate::mapek::answer::{Answer, DesignChange, ObjectiveChange};
 use crate::mapek::beliefs::Beliefs;
 use crate::mapek::monitor::Base;
 
-/// Changes found by the analysis.
+/// Changes of available designs and of objectives in error, found by the analysis.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Findings {
     /// Designs that are no longer available.
@@ -44,7 +44,7 @@ impl Findings {
     }
 }
 
-/// Returns the local names of available designs. Without conclusions, no design counts as available.
+/// Returns the local names of available designs. If the conclusions are incomplete, no design counts as available.
 pub(crate) fn available(knowledge: &Knowledge) -> BTreeSet<String> {
     if knowledge.fault().is_some() {
         return BTreeSet::new();
@@ -53,13 +53,14 @@ pub(crate) fn available(knowledge: &Knowledge) -> BTreeSet<String> {
     designs.map(|design| design.individual.name.clone()).collect()
 }
 
-/// Reports changes of contradictions and of the availability of conclusions. Observed statements are kept.
+/// Reports new or resolved contradictions, and whether the conclusions have become incomplete or complete.
 pub(super) fn report_contradictions(beliefs: &mut Beliefs, answers: &mut Vec<Answer>) {
     let Some(knowledge) = beliefs.mission.knowledge() else { return };
     answers.extend(doubts(knowledge, &mut beliefs.fault, &mut beliefs.violated));
 }
 
-/// Returns answers for a changed fault and for changed contradictions, and updates `fault` and `violated`.
+/// Returns answers if the reasoning fault or the violated constraints of the knowledge base differ from `fault` and
+/// `violated`. Updates `fault` and `violated`.
 pub(crate) fn doubts(
     knowledge: &Knowledge,
     fault: &mut Option<Fault>,
@@ -107,14 +108,14 @@ pub(super) fn analyze(beliefs: &mut Beliefs, answers: &mut Vec<Answer>) -> Findi
     findings
 }
 
-/// Returns an answer with the changes, or `None` without changes.
+/// Returns an answer with the changes, or `None` if both lists are empty.
 pub(crate) fn inferred(designs: Vec<DesignChange>, objectives: Vec<ObjectiveChange>) -> Option<Answer> {
     let is_something = !designs.is_empty() || !objectives.is_empty();
     is_something.then_some(Answer::Inferred { designs, objectives })
 }
 
-/// Returns the designs whose availability has changed and the objectives whose statuses have changed, with reasons.
-/// Updates both arguments.
+/// Compares the available designs and the statuses of objectives in error with `designs` and `objectives`. Returns the
+/// differences with reasons, and updates both arguments.
 pub(crate) fn changes(
     knowledge: &Knowledge,
     designs: &mut BTreeSet<String>,
@@ -138,7 +139,7 @@ pub(crate) fn changes(
     (changed_designs, changed_objectives)
 }
 
-/// Availability of a design, with the reasons if it is unavailable.
+/// Returns the availability of a design, with the reasons if it is unavailable.
 pub(super) fn availability(knowledge: &Knowledge, design: &str, available: bool) -> DesignChange {
     let because = match knowledge.fault() {
         _ if available => Vec::new(),
@@ -148,7 +149,8 @@ pub(super) fn availability(knowledge: &Knowledge, design: &str, available: bool)
     DesignChange { design: design.to_owned(), available, because }
 }
 
-/// Explains that conclusions are missing, so that no design counts as available and planning is impossible.
+/// Returns the message that conclusions are missing. Without conclusions, no design counts as available, and planning
+/// is impossible.
 pub(super) fn missing_conclusions(fault: &Fault) -> String {
     format!("it is not known what follows: {}", fault.message)
 }

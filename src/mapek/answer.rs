@@ -10,7 +10,7 @@ use crate::knowledge::{Contradiction, Fault};
 use crate::mapek::step::{PlannedStep, configuration_to_json};
 use crate::number;
 
-/// One line of output.
+/// One line of the loop's output.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Answer {
@@ -26,8 +26,8 @@ pub enum Answer {
         /// All current contradictions; empty if the knowledge is consistent again.
         contradictions: Vec<Contradiction>,
     },
-    /// A rule has exceeded its budget, so that the conclusions are incomplete; or they are complete again. Observed
-    /// statements are kept. Without conclusions, no design counts as available, and no action is requested.
+    /// The conclusions are incomplete because a rule has exceeded its budget, or they are complete again. Observed
+    /// statements are kept. With incomplete conclusions, no design counts as available, and no action is requested.
     Unconcluded {
         /// Fault that stopped the reasoning; `None` once the conclusions are complete.
         fault: Option<Fault>,
@@ -39,7 +39,7 @@ pub enum Answer {
     },
     /// A plan is adopted.
     PlanFound {
-        /// Sum of the costs of its steps, in the metric's unit.
+        /// Sum of the costs of the plan's steps, in the metric's unit.
         cost: BigRational,
         /// Whether the plan is proved optimal.
         optimal: bool,
@@ -53,7 +53,8 @@ pub enum Answer {
     },
     /// Planning has found no plan.
     PlanNone {
-        /// `unsolvable`, `unknown` or `failed`.
+        /// `unsolvable` if the absence of a plan is proved, `failed` if an action has failed repeatedly, and `unknown`
+        /// otherwise.
         status: &'static str,
         /// Reason, as a sentence.
         because: String,
@@ -83,19 +84,19 @@ pub enum Answer {
         name: String,
         /// Reported value or status.
         value: Value,
-        /// `range`, `jump`, `hysteresis`, `debounce`, `confirm` or `heal`.
+        /// Reason for holding the report: `range`, `jump`, `hysteresis`, `debounce`, `confirm` or `heal`.
         because: &'static str,
         /// Number of held reports since the last change.
         held: u64,
-        /// Time at which the report will be believed unless another one arrives; `None` if time alone does not confirm
-        /// it.
+        /// Time at which the report will be believed unless another report arrives; `None` if the passage of time does
+        /// not confirm the report.
         due: Option<Duration>,
     },
     /// A sensor has been silent for longer than its period.
     Silent {
         /// The attribute, by local name.
         name: String,
-        /// `keep`, `unknown` or `worst`.
+        /// Setting that determines the believed value from now on: `keep`, `unknown` or `worst`.
         outcome: &'static str,
         /// Believed value from now on; only with `worst`.
         value: Option<Value>,
@@ -109,7 +110,7 @@ pub enum Answer {
     Stale {
         /// Sequence number of the line.
         sequence: u64,
-        /// Greatest number that is too old.
+        /// Greatest sequence number that is too old.
         mark: u64,
     },
     /// The journal cannot be written and is now incomplete. The loop continues without it.
@@ -119,9 +120,9 @@ pub enum Answer {
     },
     /// The line, or a part of it, was refused and has changed nothing.
     Error {
-        /// A stable code.
+        /// Stable code of the error, such as `M305`.
         code: String,
-        /// One sentence.
+        /// Message, one sentence.
         message: String,
     },
 }
@@ -146,9 +147,9 @@ pub enum OverdueOutcome {
 pub struct DesignChange {
     /// Local name of the design.
     pub design: String,
-    /// Whether it is available from now on.
+    /// Whether the design is available from now on.
     pub available: bool,
-    /// Rules and facts that make it unavailable.
+    /// Rules and facts that make the design unavailable; empty if the design is available.
     pub because: Vec<String>,
 }
 
@@ -174,7 +175,7 @@ pub struct Effect {
     pub command: Command,
     /// Whether the effect is a repetition, so that the robot may have received it before.
     pub repeated: bool,
-    /// Numbers of unacknowledged effects that this one replaces. They need not be carried out.
+    /// Numbers of unacknowledged effects that this effect replaces. The replaced effects need not be carried out.
     pub supersedes: Vec<u64>,
 }
 
@@ -206,7 +207,7 @@ pub enum Command {
         /// Reason, as a sentence.
         because: String,
     },
-    /// Resumes a suspended action once its functions have these designs.
+    /// Resumes a suspended action once its functions have the given designs.
     Resume {
         /// Functions with their designs, in the order of the step's parameters.
         configuration: Vec<(String, String)>,
@@ -214,7 +215,7 @@ pub enum Command {
 }
 
 impl Command {
-    /// Value of the field `answer`.
+    /// Returns the value of the JSON field `answer`, such as `request_action`.
     fn kind(&self) -> &'static str {
         match self {
             Self::Reconfigure { .. } => "reconfigure",
@@ -225,8 +226,8 @@ impl Command {
         }
     }
 
-    /// Returns `true` if this command makes an earlier one pointless. `same_action` says whether both belong to one
-    /// action.
+    /// Returns `true` if this command makes the command `earlier` obsolete. `same_action` says whether both commands
+    /// belong to the same action.
     pub(super) fn replaces(&self, earlier: &Self, same_action: bool) -> bool {
         match (self, earlier) {
             (
@@ -237,14 +238,14 @@ impl Command {
         }
     }
 
-    /// Returns `true` for commands that end, suspend or resume an action. A report of that action may have been sent
-    /// before the command arrived, so that it does not acknowledge the command.
+    /// Returns `true` if the command ends, suspends or resumes an action. A report of that action may have been sent
+    /// before the command arrived. Therefore, such a report does not acknowledge the command.
     pub(super) fn controls_execution(&self) -> bool {
         matches!(self, Self::Cancel { .. } | Self::Suspend { .. } | Self::Resume { .. })
     }
 }
 
-/// JSON object of the format.
+/// Serializes the answer as a JSON object of the output format.
 impl Serialize for Answer {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut object = serializer.serialize_map(None)?;
@@ -259,13 +260,13 @@ impl Serialize for Answer {
 }
 
 impl Answer {
-    /// Converts the answer to a JSON object of the format.
+    /// Converts the answer to a JSON object of the output format.
     pub fn to_json(&self) -> Value {
         // The serialization cannot fail: all map keys are strings.
         serde_json::to_value(self).unwrap_or_default()
     }
 
-    /// Value of the field `answer`.
+    /// Returns the value of the JSON field `answer`, such as `plan_found`.
     fn kind(&self) -> &'static str {
         match self {
             Self::Inferred { .. } => "inferred",
@@ -348,7 +349,7 @@ impl Answer {
         }
     }
 
-    /// Returns the effect, if the answer is one.
+    /// Returns the effect if the answer requests one, and `None` otherwise.
     pub fn effect(&self) -> Option<&Effect> {
         match self {
             Self::Effect(effect) => Some(effect),
@@ -358,7 +359,7 @@ impl Answer {
 }
 
 impl Effect {
-    /// Writes the effect as an object of the format.
+    /// Writes the JSON fields of the effect, including `answer`.
     fn fields<M: SerializeMap>(&self, object: &mut M) -> Result<(), M::Error> {
         object.serialize_entry("answer", self.command.kind())?;
         if let Command::Request { step } = &self.command {

@@ -1,4 +1,4 @@
-//! Question to the planner, and outcome of planning.
+//! Planning problem of the loop (*question*), and outcome of planning.
 
 use num_rational::BigRational;
 use pddl::ast::Problem;
@@ -8,7 +8,7 @@ use crate::mapek::beliefs::Running;
 use crate::mapek::step::PlannedStep;
 use crate::mission::Mission;
 
-/// Outcome of planning.
+/// Outcome of planning: a plan, or the reason for its absence.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Outcome {
     /// Steps of the plan, if there is one.
@@ -31,14 +31,14 @@ pub(crate) struct Question<'a> {
     pub problem: &'a Problem,
     /// The action under way. Its remainder is the first step of every plan.
     pub running: Option<&'a Running>,
-    /// The current plan, if the question continues from its first step.
+    /// Remaining steps of the current plan; `None` without a plan, or if the action under way is treated as cancelled.
     pub old: Option<&'a [PlannedStep]>,
     /// Whether to prefer, among optimal plans of equal length, one that shares most steps with `old`.
     pub stay_close: bool,
 }
 
 impl Question<'_> {
-    /// Metric of the current state, as if the plan were empty; 0 without a metric.
+    /// Returns the value of the metric for the empty plan; 0 without a metric, and `None` if the value is undefined.
     pub(super) fn metric(&self) -> Option<BigRational> {
         let zero = BigRational::default();
         if self.problem.metric.is_none() {
@@ -49,7 +49,7 @@ impl Question<'_> {
 }
 
 impl Outcome {
-    /// An outcome without a plan.
+    /// Returns an outcome without a plan.
     pub(super) fn no_plan(proved: bool, because: String) -> Self {
         Self { steps: None, cost: BigRational::default(), proved, because, blocking: Vec::new() }
     }
@@ -61,7 +61,7 @@ impl Outcome {
         json!([steps, self.cost.to_string(), self.proved, self.because, self.blocking])
     }
 
-    /// Inverse of [`Outcome::to_record`].
+    /// Inverse of [`Outcome::to_record`]. Returns `None` if the record is malformed.
     pub fn from_record(record: &Value) -> Option<Self> {
         let [steps, cost, proved, because, blocking] = record.as_array()?.as_slice() else { return None };
         let text = |value: &Value| value.as_str().map(ToOwned::to_owned);

@@ -1,8 +1,8 @@
 //! Shared state of the loop: the believed situation and outstanding effects. Loops of one mission with equal beliefs
 //! behave equally.
 //!
-//! While an action is under way, values that it increases or decreases change with its progress. Its other effects take
-//! place when it succeeds.
+//! While an action is under way, numeric values that the action increases or decreases change with its progress. The
+//! other effects of the action take place when it succeeds.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -21,7 +21,7 @@ use crate::mapek::sequence::Numbers;
 use crate::mapek::step::{PlannedStep, plan_text};
 use crate::mission::Mission;
 
-/// State of the loop.
+/// State of the adaptation loop: the believed situation, the current plan, and outstanding effects.
 #[derive(Debug, Clone)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own")]
 pub struct Beliefs {
@@ -33,39 +33,40 @@ pub struct Beliefs {
     pub(super) available: BTreeSet<String>,
     /// Objectives in error, with their statuses.
     pub(super) statuses: BTreeMap<String, Vec<String>>,
-    /// Violated axioms and rules.
+    /// Axioms and rules that the known facts violate.
     pub(super) violated: BTreeSet<String>,
-    /// Fault that stopped the reasoning, as last reported. The conclusions are then incomplete.
+    /// Fault that stopped the reasoning, as last reported; the conclusions are then incomplete. `None` if they are
+    /// complete.
     pub(super) fault: Option<Fault>,
-    /// Believed design of each function: the one that was acknowledged last.
+    /// Believed design of each function: the design that was acknowledged or observed last.
     pub(super) configuration: BTreeMap<String, String>,
     /// Remaining steps of the plan, without the action under way.
     pub(super) plan: Option<VecDeque<PlannedStep>>,
     /// The action under way: requested and not ended.
     pub(super) running: Option<Running>,
-    /// Whether the goal held when it was last checked.
+    /// Whether the goal was reached, and no later change required a new plan.
     pub(super) reached: bool,
     /// Whether planning has failed and pauses until something changes.
     pub(super) stuck: bool,
     /// Whether the plan is not proved optimal, because its search hit a limit.
     pub(super) unproved: bool,
-    /// The next search after one that hit its time limit.
+    /// Scheduled repetition of a search that hit its time limit.
     pub(super) retry: Option<Retry>,
     /// The step that failed last, with its number of consecutive failures.
     pub(super) failures: Option<(PlannedStep, u32)>,
-    /// Causes for which a better plan may exist: designs that are available again, and an entry for changed facts.
+    /// Reasons why a better plan may exist: names of designs that are available again, and an entry for changed facts.
     pub(super) improvement_causes: BTreeSet<String>,
-    /// Time at which the last cause was added, since the start of the mission.
+    /// Time at which the last entry of `improvement_causes` was added, since the start of the mission.
     pub(super) improvement_since: Duration,
-    /// Number of requested actions.
+    /// Number of actions requested since the start.
     pub(super) actions: u64,
-    /// Number of effects.
+    /// Number of effects requested since the start.
     pub(super) effects: u64,
     /// Unacknowledged effects by number.
     pub(super) outstanding: BTreeMap<u64, Effect>,
-    /// History of acknowledgements by function.
+    /// History of acknowledged and superseded reconfigurations, by function.
     pub(super) receipts: Receipts,
-    /// Time of the last request and number of repetitions, by outstanding effect.
+    /// Time of the last request and number of repetitions, by number of the outstanding effect.
     pub(super) waits: BTreeMap<u64, Wait>,
     /// Whether the robot has ever reported the start or the progress of an action.
     pub(super) reports_actions: bool,
@@ -77,7 +78,7 @@ pub struct Beliefs {
     pub(super) now: Duration,
     /// Time of the last line that was not refused, since the start of the mission.
     pub(super) considered: Duration,
-    /// Memory of the filters for measurements and component reports.
+    /// States of the filters for measurements and component reports.
     pub(super) filters: FilterStates,
 }
 
@@ -91,25 +92,25 @@ pub(super) struct Running {
     pub(super) step: PlannedStep,
     /// Completed share of the action, from 0 to 1.
     pub(super) progress: BigRational,
-    /// Whether the loop has requested its end.
+    /// Whether the loop has requested the cancellation of the action.
     pub(super) cancelling: bool,
-    /// Whether the loop has suspended it.
+    /// Whether the loop has suspended the action.
     pub(super) suspended: bool,
-    /// Whether it is suspended only until planning has finished.
+    /// Whether the action is suspended only until planning has finished.
     pub(super) provisional: bool,
-    /// Number of the effect that requested it.
+    /// Number of the effect that requested the action.
     pub(super) request: u64,
     /// Time of the request or of the last report, since the start of the mission.
     pub(super) last_report: Duration,
-    /// Backoff since the last report: 0, then doubled from 1 by each missed deadline.
+    /// Backoff factor: 0 after a report, 1 after the first missed deadline, then doubled by each further one.
     pub(super) overdue: u32,
-    /// Whether its start or progress was reported.
+    /// Whether the start or progress of the action was reported.
     pub(super) started: bool,
-    /// Whether its progress was reported.
+    /// Whether progress of the action was reported.
     pub(super) progressed: bool,
-    /// Whether it was suspended and resumed.
+    /// Whether the action was suspended and resumed.
     pub(super) resumed: bool,
-    /// Functions with the designs that were last sent to the action.
+    /// Functions with the designs that were last requested for the action.
     pub(super) sent_configuration: Vec<(String, String)>,
 }
 
@@ -122,7 +123,7 @@ pub(super) struct Retry {
     pub(super) attempt: u32,
 }
 
-/// Time and repetitions of an outstanding effect.
+/// Time of the last request of an outstanding effect, and number of its repetitions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Wait {
     /// Time of the last request, since the start of the mission.
@@ -134,13 +135,13 @@ pub(super) struct Wait {
 /// The remaining mission as a planning task with its plan.
 #[derive(Debug, Clone)]
 pub struct Outlook {
-    /// The domain. If an action is under way, its remainder must come first.
+    /// Domain of the mission. If an action is under way, the domain forces plans to begin with its remainder.
     pub domain: Domain,
     /// The believed problem, filled from the knowledge base, with the goal.
     pub problem: Problem,
     /// The action under way, if any, followed by the remaining steps of the plan.
     pub steps: Vec<PlannedStep>,
-    /// Number of the first of these steps as an action.
+    /// Action number of the first step in `steps`.
     pub first: u64,
     /// Whether the first step is under way.
     pub is_under_way: bool,
@@ -184,7 +185,7 @@ impl Beliefs {
         &self.mission
     }
 
-    /// Text of the current goal; `None` for the goal of the problem file.
+    /// Returns the text of the current goal; `None` for the goal of the problem file.
     pub fn goal(&self) -> Option<&str> {
         self.goal.as_deref()
     }
@@ -199,13 +200,13 @@ impl Beliefs {
         &self.statuses
     }
 
-    /// Believed design of each function: the one that was acknowledged last. Later requests are
-    /// [pending](Self::pending).
+    /// Returns the believed design of each function: the design that was acknowledged or observed last. Later requests
+    /// are [pending](Self::pending).
     pub fn configuration(&self) -> &BTreeMap<String, String> {
         &self.configuration
     }
 
-    /// Functions with requested designs that are not acknowledged.
+    /// Returns a pair of function and requested design for each reconfiguration that is not acknowledged.
     pub fn pending(&self) -> impl Iterator<Item = (&str, &str)> {
         self.outstanding.values().filter_map(|effect| match &effect.command {
             Command::Reconfigure { function, to, .. } => Some((function.as_str(), to.as_str())),
@@ -214,12 +215,13 @@ impl Beliefs {
     }
 
     /// Returns `true` if a reconfiguration of the function is outstanding, or was superseded without an answer. The
-    /// function may then have another design than the one that was acknowledged last.
+    /// function's actual design may then differ from the believed one.
     pub fn is_unsettled(&self, function: &str) -> bool {
         self.pending().any(|(name, _)| name == function) || self.receipts.has_superseded(function)
     }
 
-    /// Design that a function has or is about to get; `None` if uncertain.
+    /// Returns the requested design of a function if a reconfiguration is pending, and the believed design otherwise;
+    /// `None` if the design is uncertain.
     pub(super) fn expected(&self, function: &str) -> Option<&str> {
         if let Some((_, design)) = self.pending().find(|(name, _)| *name == function) {
             return Some(design);
@@ -228,7 +230,7 @@ impl Beliefs {
         design.filter(|_| !self.receipts.has_superseded(function))
     }
 
-    /// Number and current designs of the action under way.
+    /// Returns the number of the action under way, and the action with its current designs.
     pub fn running(&self) -> Option<(u64, &PlannedStep)> {
         self.running.as_ref().map(|running| (running.action, &running.step))
     }
@@ -253,7 +255,7 @@ impl Beliefs {
         self.plan.as_ref().map(VecDeque::iter)
     }
 
-    /// The remaining mission with its plan, if there is one.
+    /// Returns the remaining mission with its plan, or `None` without a plan.
     pub fn outlook(&self) -> Option<Outlook> {
         let plan = self.plan.as_ref()?;
         let (domain, problem) = self.remaining_mission();
@@ -278,8 +280,8 @@ impl Beliefs {
         self.numbers.greatest()
     }
 
-    /// Gaps among the sequence numbers of accepted lines, as inclusive ranges. These lines have not arrived yet, or
-    /// were refused.
+    /// Returns the gaps between sequence numbers of accepted lines, as inclusive ranges. The missing lines have not
+    /// arrived yet, or were refused.
     pub fn missing(&self) -> Vec<[u64; 2]> {
         self.numbers.missing()
     }
@@ -289,7 +291,7 @@ impl Beliefs {
         self.now
     }
 
-    /// Returns `true` if the goal was reached and nothing has changed since.
+    /// Returns `true` if the goal was reached, and no later change required a new plan.
     pub fn reached(&self) -> bool {
         self.reached
     }
@@ -299,20 +301,21 @@ impl Beliefs {
         self.mission.knowledge().is_none() || self.available.contains(design) || self.mission.provides(design)
     }
 
-    /// Designs of the remaining steps of the plan.
+    /// Returns the designs of the remaining steps of the plan, with repetitions.
     pub(super) fn planned_designs(&self) -> impl Iterator<Item = &String> {
         let steps = self.plan.iter().flatten();
         steps.flat_map(|step| step.configuration.iter().map(|(_, design)| design))
     }
 
-    /// The believed problem, filled from the knowledge base.
+    /// Returns the problem in its believed state, with the facts of the knowledge base added.
     pub(super) fn filled(&self) -> Problem {
         let mut problem = self.mission.problem().clone();
         self.mission.fill(&mut problem);
         problem
     }
 
-    /// Domain and filled problem of the remaining mission. The remainder of the action under way must come first.
+    /// Returns the domain and the filled problem of the remaining mission. If an action is under way, plans must begin
+    /// with its remainder.
     fn remaining_mission(&self) -> (Cow<'_, Domain>, Problem) {
         let (domain, mut problem) = (self.mission.domain(), self.filled());
         match &self.running {
@@ -332,14 +335,15 @@ impl Beliefs {
         validate(&domain, &problem, &plan_text(steps), &Options::default())
     }
 
-    /// Reason why the remainder of the action under way cannot be executed, if it cannot.
+    /// Returns the reason why the remainder of the action under way cannot be executed, or `None` if it can.
     pub(super) fn obstacle(&self, running: &Running) -> Option<String> {
         let (domain, problem) = self.remaining_mission();
         let violation = advance(&domain, &problem, &running.step.to_plan_step(), false).err()?;
         Some(violation.message.clone())
     }
 
-    /// Reason why the action under way and the remaining plan do not fit the believed situation, if they do not.
+    /// Returns the reason why the action under way and the remaining plan are not executable in the believed situation,
+    /// or do not reach the goal. Returns `None` if they are valid.
     pub fn violation(&self) -> Option<String> {
         self.verdict().violation.map(|violation| self.mission.spoken(&sentence(&violation)))
     }

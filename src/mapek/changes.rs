@@ -1,14 +1,14 @@
-//! Changes by observations, passed from the monitor to analysis and planning.
+//! Record of the changes caused by observations, passed from the monitor to analysis and planning.
 
 use crate::mapek::answer::Answer;
 
-/// Changes by the observations since the last deliberation.
+/// Changes caused by the observations since the last deliberation.
 #[derive(Debug, Clone, Default)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own")]
 pub(super) struct Changes {
-    /// Change of the knowledge base.
+    /// Extent of the change of the knowledge base.
     pub(super) base: Base,
-    /// Whether facts or values of the problem have changed.
+    /// Whether inputs of planning have changed: facts or values of the problem, or facts of the knowledge base.
     pub(super) facts: bool,
     /// Whether facts of the problem have changed, and not only values.
     pub(super) predicates: bool,
@@ -18,9 +18,9 @@ pub(super) struct Changes {
     pub(super) values: bool,
     /// Whether an action has ended.
     pub(super) ended: bool,
-    /// Whether the action under way was observed with a design that the loop has not requested.
+    /// Whether a function of the action under way was reported with a design that the loop has not requested.
     pub(super) observed: bool,
-    /// Reasons why the action under way could not go on unchanged. A safe effect was requested for each.
+    /// Reasons why the action under way could not continue unchanged. A safe effect was requested for each reason.
     pub(super) interruptions: Vec<String>,
     /// Reasons to plan, as sentences, that apply even if the current plan is valid.
     pub(super) reasons: Vec<String>,
@@ -40,7 +40,7 @@ pub(super) enum Base {
 }
 
 impl Changes {
-    /// Returns `true` if anything has changed, for lines of which only a part was accepted.
+    /// Returns `true` if the knowledge base or facts of the problem have changed, or if there is a reason to plan.
     pub(super) fn any(&self) -> bool {
         self.base > Base::Nothing || self.facts || self.predicates || !self.reasons.is_empty()
     }

@@ -1,4 +1,5 @@
-//! The loop: passes each observation through its stages and returns answers.
+//! The adaptation loop: passes each observation through the stages Monitor, Analyze, Plan and Execute, and returns
+//! answers.
 
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
@@ -35,20 +36,20 @@ const MAX_REASONING_STEPS: u64 = 100_000_000;
 /// Number of unused interned names and values above which the knowledge base is rebuilt without them.
 const MAX_GROWTH: usize = 1024;
 
-/// Upper limit on the time between two lines; a larger step is an error. It matches the limit on gaps of sequence
-/// numbers.
+/// Upper limit on the time between two lines; a line with a later time is refused. The number of seconds equals the
+/// limit on gaps between sequence numbers.
 const MAX_TIME_STEP: Duration = Duration::from_secs(1_000_000);
 
-/// Input of the next deliberation.
+/// Changes and findings since the last deliberation, which the next deliberation considers.
 #[derive(Debug, Clone, Default)]
 struct Agenda {
     changes: Changes,
     findings: Findings,
-    /// Whether the loop has just started, so that nothing has changed.
+    /// Whether the loop has just started. The first action is then requested even without changes.
     is_start: bool,
 }
 
-/// State that deliberation can change before its first search.
+/// Copy of the state that deliberation can change before its first search.
 #[derive(Debug)]
 pub(super) struct Checkpoint {
     agenda: Option<Agenda>,
@@ -68,7 +69,7 @@ pub struct Loop {
     pub(super) planner: Planner,
     /// Changes since the last deliberation, if any.
     agenda: Option<Agenda>,
-    /// Number of changes of the planning problem.
+    /// Number of changes of the planning problem since the start, which identifies the current problem.
     pub(super) question: u64,
     digest: String,
 }
@@ -106,12 +107,12 @@ impl Loop {
         &self.settings
     }
 
-    /// State of the loop.
+    /// Returns the state of the loop.
     pub fn beliefs(&self) -> &Beliefs {
         &self.beliefs
     }
 
-    /// Availability of all designs of the knowledge base, with the reasons for unavailability.
+    /// Returns the availability of all designs of the knowledge base, with the reasons for unavailability.
     pub fn designs(&self) -> Vec<DesignChange> {
         let Some(knowledge) = self.beliefs.mission.knowledge() else { return Vec::new() };
         let designs = knowledge.catalogue().designs().iter().map(|design| design.individual.name.as_str());
@@ -120,7 +121,7 @@ impl Loop {
             .collect()
     }
 
-    /// Handle to observe the progress of planning from another thread.
+    /// Returns a handle by which another thread reads the progress of planning.
     pub fn watch(&self) -> Watch {
         self.planner.watch.clone()
     }
@@ -130,8 +131,8 @@ impl Loop {
         self.deliberate()
     }
 
-    /// Takes an observation over, at a time since the start of the mission that never goes back, and says what follows:
-    /// [`react`](Self::react) and [`deliberate`](Self::deliberate) at once.
+    /// Handles an observation: runs [`react`](Self::react) and [`deliberate`](Self::deliberate). `now` is the time
+    /// since the start of the mission and must not decrease.
     ///
     /// ```
     /// use std::{path::Path, time::Duration};
@@ -154,15 +155,15 @@ impl Loop {
         answers
     }
 
-    /// Applies an observation to the beliefs. If the action under way cannot go on unchanged, requests a safe effect:
-    /// other designs for its remainder, or suspension. Does not plan, so that the time limit of plans does not delay
-    /// it.
+    /// Applies an observation to the beliefs. If the action under way cannot continue unchanged, requests a safe
+    /// effect: other designs for its remainder, or suspension. Does not search for a plan, so that the reaction is not
+    /// delayed.
     ///
     /// Call [`deliberate`](Self::deliberate) after one or several observations.
     pub fn react(&mut self, observation: &Observation, now: Duration) -> Vec<Answer> {
         let _span = info_span!("react", line = self.beliefs.lines + 1).entered();
         let mut answers = Vec::new();
-        // Plans that no decision has taken are obsolete.
+        // Computed plans that no decision has recorded are obsolete.
         self.planner.computed.clear();
         self.beliefs.lines += u64::from(!observation.is_timer);
         let latest = self.beliefs.now.max(now).saturating_add(MAX_TIME_STEP);
@@ -207,7 +208,7 @@ impl Loop {
             if let Some(sequence) = observation.sequence {
                 self.beliefs.numbers.insert(sequence);
             }
-            // The observed design becomes a grounding before the analysis.
+            // The observed design becomes a function grounding before the analysis.
             if let Some(running) = self.beliefs.running.as_ref().filter(|_| changes.observed) {
                 let step = running.step.clone();
                 objectives(&mut self.beliefs, Some(&step), &mut answers);
@@ -223,8 +224,8 @@ impl Loop {
         answers
     }
 
-    /// Plans if the changes since the last call require it, adopts the plan, and requests the next action. Can take
-    /// several times the time limit of plans. Without changes, this does nothing.
+    /// Searches for a plan if the changes since the last call require one, adopts the plan, and requests the next
+    /// action. Can take several times the time limit of plans. Without changes, this does nothing.
     pub fn deliberate(&mut self) -> Vec<Answer> {
         let _span = info_span!("deliberate", line = self.beliefs.lines).entered();
         let mut answers = Vec::new();
@@ -242,7 +243,8 @@ impl Loop {
         answers
     }
 
-    /// Returns `true` if observations were applied since the last deliberation.
+    /// Returns `true` if deliberation is pending: observations were applied since the last deliberation, or the loop
+    /// has not started.
     pub fn has_agenda(&self) -> bool {
         self.agenda.is_some()
     }
@@ -261,7 +263,7 @@ impl Loop {
         self.beliefs.outstanding.remove(&effect);
         self.beliefs.waits.remove(&effect);
         self.beliefs.configuration.remove(&function);
-        // It may still arrive, and be acknowledged.
+        // The request may still arrive and be acknowledged.
         self.beliefs.receipts.supersede(effect, function, to);
     }
 
@@ -278,7 +280,8 @@ impl Loop {
         }
     }
 
-    /// Restores the state before deliberation. Deliberation must not have searched since the checkpoint.
+    /// Restores the checkpointed state from before deliberation. Deliberation must not have searched since the
+    /// checkpoint.
     pub(super) fn roll_back(&mut self, to: Checkpoint) {
         let beliefs = &mut self.beliefs;
         self.agenda = to.agenda;
@@ -289,14 +292,14 @@ impl Loop {
         self.planner.computed.clear();
     }
 
-    /// The deciding stage.
+    /// Returns the planning stage, which borrows the beliefs, the planner and the settings of the loop.
     fn adaptation(&mut self) -> Adaptation<'_> {
         Adaptation { beliefs: &mut self.beliefs, planner: &mut self.planner, settings: &self.settings }
     }
 
-    /// Time since the start of the mission at which something becomes due without an event: a report held by a filter,
-    /// a silent sensor, a search for a better plan, a repeated search, or a deadline. Handle a tick or a
-    /// [timer](Observation::timer) at that time.
+    /// Returns the next time, since the start of the mission, at which the loop must act without an event: a filter
+    /// releases a report, a sensor becomes silent, a search is due, or a deadline passes. The caller should handle a
+    /// tick or a [timer](Observation::timer) at that time. Returns `None` if nothing is scheduled.
     pub fn due(&self) -> Option<Duration> {
         // A refused line advances the time, but decides nothing that has become due.
         let improvement = self.beliefs.improvement_since.saturating_add(self.settings.settle);
@@ -309,13 +312,13 @@ impl Loop {
         filters.into_iter().chain(improvement).chain(retry).chain(deadline).min()
     }
 
-    /// Unacknowledged effects as answers, to be requested again after a restart.
+    /// Returns unacknowledged effects as answers, to be requested again after a restart.
     pub fn repeat(&self) -> Vec<Answer> {
         let again = |effect: &Effect| Answer::Effect(Effect { repeated: true, ..effect.clone() });
         self.beliefs.outstanding().map(again).collect()
     }
 
-    /// Checksum of the initial mission and settings, which identifies them in a journal.
+    /// Returns the checksum of the initial mission and settings, which identifies them in a journal.
     pub fn digest(&self) -> String {
         self.digest.clone()
     }
@@ -339,7 +342,8 @@ fn refused(Refusal { code, message }: Refusal) -> Answer {
 
 /// Recording and replay of decisions, for the journal.
 impl Loop {
-    /// Returns the decision with these answers and the plans computed for them. Call once after each step.
+    /// Returns the journal's record of a step: the answers, and the plans computed for them. Must be called once after
+    /// each step.
     pub fn decision(&mut self, answers: &[Answer]) -> Decision {
         let plans = std::mem::take(&mut self.planner.computed);
         Decision {
@@ -348,7 +352,7 @@ impl Loop {
         }
     }
 
-    /// Repeats [`Loop::handle`] with recorded plans.
+    /// Replays [`Loop::handle`] with recorded plans in place of searches.
     pub fn handle_again(&mut self, observation: &Observation, now: Duration, plans: &[Value]) -> Vec<Answer> {
         self.planner.recorded = plans.iter().filter_map(Outcome::from_record).collect();
         let answers = self.handle(observation, now);
@@ -356,7 +360,7 @@ impl Loop {
         answers
     }
 
-    /// Repeats [`Loop::start`] or [`Loop::deliberate`] with recorded plans.
+    /// Replays [`Loop::start`] or [`Loop::deliberate`] with recorded plans in place of searches.
     pub fn deliberate_again(&mut self, plans: &[Value]) -> Vec<Answer> {
         self.planner.recorded = plans.iter().filter_map(Outcome::from_record).collect();
         let answers = self.deliberate();
@@ -364,7 +368,7 @@ impl Loop {
         answers
     }
 
-    /// Copies the state of the loop. Call only after deliberation.
+    /// Returns a snapshot of the beliefs. Must be called only after deliberation.
     pub fn snapshot(&self) -> Snapshot {
         record::snapshot(&self.beliefs)
     }
@@ -380,7 +384,7 @@ impl Loop {
     }
 }
 
-/// Single stages, for strategies of a simulation that decide otherwise: they observe, plan and request separately.
+/// Single stages, for strategies of a simulation that observe, plan and request actions separately.
 impl Loop {
     /// Applies an observation to the beliefs without a reaction.
     pub(crate) fn observe(&mut self, observation: &Observation, now: Duration) {
@@ -406,7 +410,7 @@ impl Loop {
         self.planner.limits = limits;
     }
 
-    /// Plans from the believed situation.
+    /// Searches for a plan from the believed situation. Returns its steps, or `None` if no plan is found.
     pub(crate) fn plan_anew(&mut self) -> Option<Vec<PlannedStep>> {
         let outcome = self.adaptation().plan(true);
         self.planner.computed.clear();
@@ -418,7 +422,7 @@ impl Loop {
         request(&mut self.beliefs, step, answers);
     }
 
-    /// Changes the designs of the action under way.
+    /// Requests the designs of `step` for the action under way. Does nothing without an action under way.
     pub(crate) fn reconfigure_now(&mut self, step: PlannedStep, answers: &mut Vec<Answer>) {
         if let Some(mut running) = self.beliefs.running.take() {
             running.step = step;
@@ -432,7 +436,7 @@ impl Loop {
         self.beliefs.plan.is_none() && self.beliefs.running.is_none() && self.beliefs.violation().is_none()
     }
 
-    /// Available designs of a function, in the order of the knowledge base.
+    /// Returns the available designs of a function, in the order of the knowledge base.
     pub(crate) fn designs_for(&self, function: &str) -> Vec<String> {
         let mut designs = self.beliefs.mission.designs_of(function);
         designs.retain(|design| self.beliefs.is_available(design));

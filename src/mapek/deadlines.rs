@@ -2,8 +2,8 @@
 //!
 //! Deadlines are checked at each line, including ticks. Messages that a robot never sends have no deadline:
 //! acknowledgements are expected only after the first acknowledgement of a reconfiguration by its number. An action is
-//! cancelled only if its reports have stopped, or if the robot has reported the start of other actions. The end of a
-//! cancelled action is expected from every robot.
+//! cancelled only if a message about it is overdue that this robot has sent before in similar cases: progress, the
+//! start of an action, or an acknowledgement. The end of a cancelled action is expected from every robot.
 
 use std::time::Duration;
 
@@ -13,10 +13,12 @@ use crate::mapek::effects::cancel;
 use crate::mapek::settings::Settings;
 use crate::number;
 
-/// Reconfigurations that count as failed: a repetition was not acknowledged either.
+/// Effect numbers of reconfigurations that count as failed, because neither the request nor its repetition was
+/// acknowledged in time.
 pub(super) type Expired = Vec<u64>;
 
-/// Repeats or abandons overdue effects and actions. Returns abandoned reconfigurations.
+/// Repeats overdue effects, and cancels an overdue action if a report was to be expected. Returns the reconfigurations
+/// that count as failed.
 pub(super) fn handle_overdue(
     beliefs: &mut Beliefs,
     settings: &Settings,
@@ -30,7 +32,7 @@ pub(super) fn handle_overdue(
     expired
 }
 
-/// Time of the next deadline, since the start of the mission.
+/// Returns the time of the next deadline, since the start of the mission; `None` if there is no deadline.
 pub(super) fn due(beliefs: &Beliefs, settings: &Settings) -> Option<Duration> {
     if settings.deadline.is_zero() {
         return None;
@@ -53,14 +55,15 @@ pub(super) fn due(beliefs: &Beliefs, settings: &Settings) -> Option<Duration> {
     effects.chain(action).min()
 }
 
-/// Returns `true` for the request of an action, whose deadline is the one of the action.
+/// Returns `true` if the effect requests an action. The deadline of the action then applies to the effect.
 fn is_request(effect: &Effect) -> bool {
     matches!(effect.command, Command::Request { .. })
 }
 
-/// Number of the request of the action under way, if the action is suspended and the suspension is acknowledged. The
-/// request is then repeated like any other effect: a suspended action has no deadline of its own, and the request
-/// starts it suspended. Before that acknowledgement, a repeated request might start the action moving.
+/// Returns the effect number of the request of the action under way, if the action is suspended and the suspension is
+/// acknowledged. A suspended action has no deadline, so its request is repeated like any other effect. Such a request
+/// starts the action in the suspended state. Before the acknowledgement of the suspension, a repeated request might
+/// start the action moving.
 fn suspended_request(beliefs: &Beliefs) -> Option<u64> {
     let running = beliefs.running.as_ref().filter(|action| action.suspended && !action.cancelling)?;
     let is_about = |effect: &Effect| effect.action == running.action && effect.command.controls_execution();
@@ -68,7 +71,8 @@ fn suspended_request(beliefs: &Beliefs) -> Option<u64> {
     (!is_open).then_some(running.request)
 }
 
-/// Checks the deadlines of effects, except for requests, whose deadline is the one of the action.
+/// Repeats effects that were not acknowledged in time. Returns the reconfigurations that count as failed. Requests of
+/// actions are skipped, because the deadline of the action applies, unless the action is suspended.
 fn check_effects(beliefs: &mut Beliefs, deadline: Duration, answers: &mut Vec<Answer>) -> Expired {
     let mut expired = Expired::new();
     // This robot may never acknowledge effects.
@@ -83,7 +87,7 @@ fn check_effects(beliefs: &mut Beliefs, deadline: Duration, answers: &mut Vec<An
         if waited < deadline || is_request(effect) && request_of_suspended != Some(*number) {
             continue;
         }
-        // Cancellations and suspensions are repeated without end: otherwise the action might go on.
+        // Cancellations and suspensions are repeated without end. Otherwise, the action might go on.
         let is_expired = wait.repeats > 0 && matches!(effect.command, Command::Reconfigure { .. });
         let outcome = if is_expired { OverdueOutcome::Failed } else { OverdueOutcome::Repeated };
         answers.push(Answer::Overdue {
@@ -102,8 +106,9 @@ fn check_effects(beliefs: &mut Beliefs, deadline: Duration, answers: &mut Vec<An
     expired
 }
 
-/// The cancellation of the action under way, if the robot has never acknowledged anything. It is then repeated without
-/// acknowledgements, because the end of the action is expected from every robot.
+/// Returns the outstanding cancellation of the action under way, if the robot has never acknowledged a reconfiguration
+/// by its number. For this robot, the cancellation is repeated until the action ends, because every robot must report
+/// the end of an action.
 fn open_cancel(beliefs: &Beliefs) -> Option<&Effect> {
     let running = beliefs.running.as_ref().filter(|action| action.cancelling)?;
     let is_cancel = |effect: &&Effect| {
@@ -112,7 +117,8 @@ fn open_cancel(beliefs: &Beliefs) -> Option<&Effect> {
     beliefs.outstanding.values().find(is_cancel).filter(|_| !beliefs.receipts.are_sent())
 }
 
-/// Checks the deadline of the action under way.
+/// Checks the deadline of the action under way. After the deadline, repeats its request or its cancellation, cancels
+/// the action, or reports that the loop keeps waiting.
 fn check_action(beliefs: &mut Beliefs, settings: &Settings, answers: &mut Vec<Answer>) {
     if let Some(cancel) = open_cancel(beliefs).cloned()
         && let Some(running) = &mut beliefs.running
@@ -132,7 +138,7 @@ fn check_action(beliefs: &mut Beliefs, settings: &Settings, answers: &mut Vec<An
     let (action, request) = (running.action, running.request);
     let is_unacknowledged = beliefs.outstanding.contains_key(&request);
     let is_first = running.overdue == 1;
-    // A report is expected if the robot has sent one of this kind before.
+    // A report is expected if the robot has sent a report of this kind before.
     let is_expected = match (running.started, is_unacknowledged) {
         (true, _) => running.progressed,
         (false, true) => beliefs.reports_actions || beliefs.receipts.are_sent(),
@@ -146,8 +152,8 @@ fn check_action(beliefs: &mut Beliefs, settings: &Settings, answers: &mut Vec<An
     answers.push(Answer::Overdue { effect: is_unacknowledged.then_some(request), action, seconds, outcome });
     match outcome {
         OverdueOutcome::Repeated => {
-            // A robot that has never acknowledged anything gets no other repetitions, so that the designs before the
-            // request are repeated here.
+            // A robot that has never acknowledged anything gets no other repetitions. Therefore, reconfigurations
+            // before the request are repeated here.
             let from = if beliefs.receipts.are_sent() { request } else { 0 };
             let effects = beliefs.outstanding.range(from..=request).map(|(_, effect)| effect.clone());
             answers.extend(effects.map(|effect| Answer::Effect(Effect { repeated: true, ..effect })));
@@ -168,8 +174,8 @@ fn check_action(beliefs: &mut Beliefs, settings: &Settings, answers: &mut Vec<An
     }
 }
 
-/// Returns the seconds since the last report of an action if its deadline has passed, and sets the next deadline. Deadlines double, so
-/// that a robot that never reports causes few messages.
+/// Returns the seconds since the last report of an action if its deadline has passed, and sets the next deadline;
+/// `None` otherwise. The intervals grow exponentially, so that a robot that never reports causes few messages.
 fn passed_deadline(running: &mut Running, now: Duration, settings: &Settings) -> Option<u64> {
     let time_since_report = now.saturating_sub(running.last_report);
     if time_since_report < next_deadline_after(running, settings) {
@@ -179,13 +185,13 @@ fn passed_deadline(running: &mut Running, now: Duration, settings: &Settings) ->
     Some(time_since_report.as_secs())
 }
 
-/// Time after the last report at which the next deadline of an action passes.
+/// Returns the time from the last report of an action to the next deadline of the action.
 fn next_deadline_after(running: &Running, settings: &Settings) -> Duration {
     allowed_silence(running, settings).saturating_mul(running.overdue.saturating_add(1))
 }
 
-/// Time without reports that is allowed for an action: a multiple of its expected duration, and at least the deadline
-/// of effects.
+/// Returns the time without reports after which an action is first overdue: a multiple of its expected duration, and at
+/// least the deadline of effects.
 fn allowed_silence(running: &Running, settings: &Settings) -> Duration {
     let expected = number::to_f64(&running.step.duration) * settings.time_unit.seconds();
     let allowed_silence =

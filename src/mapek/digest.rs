@@ -10,7 +10,7 @@ use crate::mission::Mission;
 /// Hashes everything that initial decisions depend on: facts, rules, domain, filled problem, bindings, settings, and
 /// the versions of program and format.
 pub(super) fn digest(mission: &Mission, settings: &Settings) -> String {
-    // A journal that can be resumed is complete, so the reaction to a failed write does not matter.
+    // A journal that can be resumed is complete. Therefore, the reaction to a failed write does not matter.
     let settings = settings.clone().with_unrecorded(Unrecorded::default());
     let mut problem = mission.problem().clone();
     mission.fill(&mut problem);
@@ -29,7 +29,7 @@ pub(super) fn digest(mission: &Mission, settings: &Settings) -> String {
     checksum(&parts)
 }
 
-/// The facts and the rules of a knowledge base as text.
+/// Returns the facts, as N-Triples, and the rules of a knowledge base as text.
 pub(crate) fn knowledge_parts(knowledge: &Knowledge) -> [String; 2] {
     let engine = knowledge.engine();
     let facts: Vec<rules::Fact> = engine.facts().collect();
@@ -39,7 +39,7 @@ pub(crate) fn knowledge_parts(knowledge: &Knowledge) -> [String; 2] {
     ]
 }
 
-/// Returns the first half of the SHA-256 of texts with their lengths, in hexadecimal digits.
+/// Returns the first half of the SHA-256 of the texts, as 32 hexadecimal digits. Each text is preceded by its length.
 pub(crate) fn checksum(parts: &[String]) -> String {
     let mut hash = Sha256::new();
     for part in parts {

@@ -31,7 +31,7 @@ pub trait Clock {
     fn now(&mut self) -> Duration;
 }
 
-/// Time since creation of the value, from the monotonic system clock.
+/// Clock that returns the time since its creation, from the monotonic system clock.
 #[derive(Debug, Clone, Copy)]
 pub struct SystemClock(Instant);
 
@@ -47,7 +47,7 @@ impl Clock for SystemClock {
     }
 }
 
-/// Runs a loop until the observer returns no observation.
+/// Runs a loop until the observer returns `None`: passes each observation to the loop, and its answers to the effector.
 ///
 /// # Errors
 /// Errors of the observer and of the effector.

@@ -7,10 +7,10 @@ use crate::mapek::answer::{Answer, Command, Effect};
 use crate::mapek::beliefs::{Beliefs, Running, Wait};
 use crate::mapek::step::PlannedStep;
 
-/// Upper limit on the superseded effects that one effect lists.
+/// Upper limit on the number of superseded effects listed in one effect.
 const MAX_SUPERSEDED: usize = 64;
 
-/// Finishes the mission: the goal holds, and no objective remains.
+/// Ends the mission, whose goal holds: drops the plan, and removes all objectives from the knowledge base.
 pub(super) fn finish(beliefs: &mut Beliefs, answers: &mut Vec<Answer>) {
     beliefs.reached = true;
     beliefs.plan = None;
@@ -18,7 +18,7 @@ pub(super) fn finish(beliefs: &mut Beliefs, answers: &mut Vec<Answer>) {
     answers.push(Answer::GoalReached);
 }
 
-/// Requests an action, after reconfigurations for its designs.
+/// Requests the action of a step, preceded by the reconfigurations for its designs.
 pub(super) fn request(beliefs: &mut Beliefs, step: PlannedStep, answers: &mut Vec<Answer>) {
     beliefs.actions += 1;
     let action = beliefs.actions;
@@ -43,10 +43,11 @@ pub(super) fn request(beliefs: &mut Beliefs, step: PlannedStep, answers: &mut Ve
     beliefs.running = Some(running);
 }
 
-/// Requests the designs of an action where functions have others, and updates the objectives of the knowledge base.
+/// Requests each design of an action whose function has another design. Then makes the action's functions the
+/// objectives of the knowledge base.
 ///
-/// A requested action can still be waiting for designs that were sent before. Therefore, changed designs of the action
-/// are sent even if the functions already have them.
+/// A requested action can still be waiting for designs that were requested before. Therefore, changed designs of the
+/// action are requested even if the functions already have them.
 pub(super) fn reconfigure(beliefs: &mut Beliefs, running: &mut Running, answers: &mut Vec<Answer>) {
     for pair in &running.step.configuration {
         if must_be_sent(beliefs, running, pair) {
@@ -60,15 +61,16 @@ pub(super) fn reconfigure(beliefs: &mut Beliefs, running: &mut Running, answers:
     objectives(beliefs, Some(&running.step), answers);
 }
 
-/// Returns `true` if a function has to be asked for a design of an action: it has another one, or the action may be waiting for the one
-/// that was sent before.
+/// Returns `true` if the design in `pair` (function, design) must be requested for the action under way. This is the
+/// case if the function is expected to have another design, or if the action may be waiting for a design requested
+/// before.
 pub(super) fn must_be_sent(beliefs: &Beliefs, running: &Running, pair: &(String, String)) -> bool {
     let may_wait = !running.suspended && (!running.started || running.resumed);
     let (function, design) = pair;
     beliefs.expected(function) != Some(design) || may_wait && !running.sent_configuration.contains(pair)
 }
 
-/// Creates an effect, and removes the effects that it supersedes.
+/// Creates the effect with `command`, and removes the outstanding effects that the new effect supersedes.
 pub(super) fn effect(beliefs: &mut Beliefs, action: u64, command: Command, answers: &mut Vec<Answer>) {
     beliefs.effects += 1;
     let number = beliefs.effects;
@@ -112,6 +114,7 @@ pub(super) fn effect(beliefs: &mut Beliefs, action: u64, command: Command, answe
 }
 
 /// Makes the functions of a step, and no others, the objectives of the knowledge base, grounded by the step's designs.
+/// Without a step, removes all objectives.
 pub(super) fn objectives(beliefs: &mut Beliefs, step: Option<&PlannedStep>, answers: &mut Vec<Answer>) {
     let mission = &beliefs.mission;
     let mut objectives_with_designs = step.map_or_else(Vec::new, |step| step.configuration.clone());
@@ -124,14 +127,14 @@ pub(super) fn objectives(beliefs: &mut Beliefs, step: Option<&PlannedStep>, answ
     analyze(beliefs, answers);
 }
 
-/// Cancels the action under way and drops the plan.
+/// Requests the cancellation of the action under way, and drops the plan.
 pub(super) fn cancel(beliefs: &mut Beliefs, running: Running, because: String, answers: &mut Vec<Answer>) {
     beliefs.plan = None;
     effect(beliefs, running.action, Command::Cancel { because }, answers);
     beliefs.running = Some(Running { cancelling: true, ..running });
 }
 
-/// Suspends the action under way and drops the plan.
+/// Suspends the action under way, drops the plan, and stops planning until the situation changes.
 pub(super) fn suspend(beliefs: &mut Beliefs, running: Running, reason: &str, answers: &mut Vec<Answer>) {
     beliefs.plan = None;
     beliefs.stuck = true;
@@ -142,7 +145,7 @@ pub(super) fn suspend(beliefs: &mut Beliefs, running: Running, reason: &str, ans
     beliefs.running = Some(Running { suspended: true, provisional: false, ..running });
 }
 
-/// Resumes an action if it is suspended.
+/// Requests that the action under way is resumed, if it is suspended.
 pub(super) fn resume_suspended(beliefs: &mut Beliefs, running: &mut Running, answers: &mut Vec<Answer>) {
     running.provisional = false;
     if std::mem::take(&mut running.suspended) {

@@ -184,7 +184,8 @@ fn word_schema(_: &mut SchemaGenerator) -> Schema {
     json_schema!({ "type": ["string", "number", "boolean"] })
 }
 
-/// JSON Schema of an event with the fields common to all lines. Diagnostic arrays are specified by ROS.
+/// JSON Schema of an event, with the optional fields `seq` and `time` of all lines. Diagnostic arrays are not included,
+/// because ROS specifies them.
 pub fn event_schema() -> Schema {
     let mut schema = schema_for!(Event);
     let kinds = schema.get_mut("oneOf").and_then(Value::as_array_mut);
@@ -206,7 +207,8 @@ pub struct Observation {
     pub time: Option<Duration>,
     /// Events of the line. A diagnostic array can contain several.
     pub events: Vec<Result<Event, Refusal>>,
-    /// Whether this is not a line but the passing of time. It is not counted as a line.
+    /// Whether the observation is the passing of time and not an input line. Such an observation is not counted as a
+    /// line.
     pub is_timer: bool,
 }
 
@@ -217,20 +219,21 @@ impl From<Event> for Observation {
 }
 
 impl Observation {
-    /// Text of a [timer](Self::timer) in a journal. Blank lines of input are skipped, so that no line has this text.
+    /// Text that represents a [timer](Self::timer) in a journal. Blank lines of input are skipped, so no input line has
+    /// this text.
     pub const TIMER: &str = "";
 
-    /// The passing of time, as requested by [`Loop::due`](crate::mapek::Loop::due).
+    /// Creates the observation that time has passed, for the time requested by [`Loop::due`](crate::mapek::Loop::due).
     pub fn timer() -> Self {
         Self { is_timer: true, ..Self::from(Event::Tick) }
     }
 
-    /// Reads a line of a journal: a [timer](Self::TIMER), or a line of input.
+    /// Parses a line of a journal: a [timer](Self::TIMER), or a line of input.
     pub fn recorded(text: &str) -> Self {
         if text == Self::TIMER { Self::timer() } else { Self::parse(text) }
     }
 
-    /// Reads a line of input.
+    /// Parses a line of input. A line that cannot be parsed becomes a [`Refusal`] in `events`.
     pub fn parse(text: &str) -> Self {
         let mut observation = Self { sequence: None, time: None, events: Vec::new(), is_timer: false };
         match observation.read(text) {
@@ -436,7 +439,7 @@ fn as_numbers<S: Serializer>(values: &[(String, BigRational)], serializer: S) ->
     serializer.collect_map(values.iter().map(|(name, value)| (name, number::to_json(value))))
 }
 
-/// A status in the spelling of MROS.
+/// Serializes a status in the spelling of MROS.
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
 fn as_word<S: Serializer>(status: &Status, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(match status {
@@ -453,13 +456,13 @@ impl Event {
         serde_json::to_value(self).unwrap_or_default()
     }
 
-    /// Name of the event in the format.
+    /// Returns the name of the event in the format, such as `component_status`.
     pub(crate) fn kind(&self) -> String {
         self.to_json().get("event").and_then(Value::as_str).unwrap_or_default().to_owned()
     }
 }
 
-/// An event with the common fields of its line.
+/// An event with the optional fields of its line, for serialization.
 #[derive(Serialize)]
 struct Line<'a> {
     #[serde(flatten)]

@@ -1,5 +1,5 @@
-//! Execute: requests the actions of a plan one by one, each with its configuration: Algorithm 2 of the paper (see
-//! [`crate::mapek`]).
+//! Execute (of MAPE-K): requests the actions of a plan one by one, each with its configuration (Algorithm 2 of the
+//! paper, see [`crate::mapek`]).
 //!
 //! Before each request, the remaining plan is validated against the believed situation.
 
@@ -9,8 +9,8 @@ use crate::mapek::adapt::{Adaptation, Need};
 use crate::mapek::answer::Answer;
 use crate::mapek::effects::{finish, request};
 
-/// Requests the next action if none is under way. A plan that does not fit is replaced once. If the second plan does
-/// not fit either, planning pauses until something changes.
+/// Requests the next action if none is under way. A plan that is not executable in the believed situation is replaced
+/// once. If the second plan is not executable either, planning pauses until the situation changes.
 pub(super) fn execute(adaptation: &mut Adaptation<'_>, answers: &mut Vec<Answer>) {
     for attempt in 0..2 {
         let beliefs = &mut *adaptation.beliefs;

@@ -1,4 +1,4 @@
-//! Readers for the fields of a line, with messages for missing, wrong and repeated fields.
+//! Parsers for the fields of a JSON line, with messages for missing, wrong and repeated fields.
 
 use std::time::Duration;
 
@@ -7,7 +7,7 @@ use serde_json::{Map, Value};
 
 use crate::number;
 
-/// Reason why a line, or a part of it, is not an event.
+/// Reason why an input line, or a part of the line, is rejected. Rejected input changes nothing.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Refusal {
     /// Stable code of the message.
@@ -58,7 +58,8 @@ pub(super) fn seconds(value: &Value) -> Option<Duration> {
     number::from_json(value).and_then(|value| Duration::try_from_secs_f64(number::to_f64(&value)).ok())
 }
 
-/// Removes an optional field and parses it.
+/// Removes a field and parses its value with `read`. Returns `None` if the field is missing. The error message says
+/// that the value should be `wanted`.
 pub(super) fn take<T>(
     fields: &mut Map<String, Value>,
     name: &str,
@@ -95,7 +96,7 @@ pub(super) fn fraction(value: &Value) -> Option<BigRational> {
     Some((fraction * &percent).round() / percent)
 }
 
-/// Parses an object of names and numbers, without rounding.
+/// Parses a JSON object whose values are numbers, without rounding. Returns `None` for other JSON values.
 pub(super) fn numbers(value: &Value) -> Option<Vec<(String, BigRational)>> {
     let fields = value.as_object()?.iter();
     fields.map(|(name, value)| Some((name.clone(), number::from_json(value)?))).collect()

@@ -1,4 +1,4 @@
-//! Decides whether the action under way continues, is suspended, or is cancelled, when it cannot go on unchanged.
+//! Decides whether the action under way continues, is suspended, or is cancelled, if it cannot continue unchanged.
 //!
 //! Cancelling an action loses its progress. Therefore, the remaining mission is planned twice: with the remainder of
 //! the action as the first step, and as if the action were cancelled. The action is cancelled if only the second plan
@@ -16,14 +16,14 @@ use crate::number;
 pub(super) enum Interruption {
     /// The action continues.
     None,
-    /// The action is ended safely.
+    /// The action is cancelled.
     Cancel {
         /// Reason, as a sentence.
         because: String,
     },
     /// The action is suspended, because no plan exists.
     Suspend {
-        /// `unsolvable` or `unknown`.
+        /// `unsolvable` if the absence of a plan is proved, and `unknown` otherwise.
         status: &'static str,
         /// Reason for the absence of a plan.
         because: String,
@@ -32,9 +32,10 @@ pub(super) enum Interruption {
     },
 }
 
-/// Compares the plan that continues with the action (`going_on`) and the plan after its cancellation (`without`).
-/// `reason` says why the action cannot go on unchanged. `can_go_on` says whether its current designs are available and
-/// its remainder is executable. `gained` is the benefit of cancelling, if it is sufficient.
+/// Decides about the action under way, given the `reason` why it may have to be interrupted. `going_on` is the plan
+/// that continues the action, and `without` the plan after its cancellation. `can_go_on` says whether the current
+/// designs of the action are available and its remainder is executable. `gained` is the benefit of cancelling, if it is
+/// sufficient.
 pub(super) fn weigh(
     reason: &str,
     can_go_on: bool,

@@ -1,8 +1,8 @@
-//! Translates the believed situation to a query of the incremental planner, and its answer to a plan.
+//! Translates the believed situation to a query of the incremental planner, and the planner's answer to a plan.
 //!
-//! The incremental planner is built for the domain of the mission. The remainder of an action under way is passed as a
-//! fixed first step: each of its configurations is simulated in the domain in which the action is shortened, see
-//! [`super::resume`].
+//! The incremental planner is built for the domain of the mission. If an action is under way, the query restricts the
+//! first step to the remainder of this action. The remainder is simulated for each of its configurations in the domain
+//! of [`super::resume`], in which the action is shortened.
 
 use num_rational::BigRational;
 use pddl::validate::advance_each;
@@ -14,23 +14,24 @@ use crate::mapek::step::PlannedStep;
 use crate::mapek::watch::Watch;
 use crate::mission::replanner;
 
-/// Upper limit on the simulated configurations of the action under way.
+/// Upper limit on the number of configurations for which the action under way is simulated.
 const MAX_CONFIGURATIONS: usize = 256;
 
-/// Incremental planner, kept between queries.
+/// State of the incremental planner, kept between queries.
 #[derive(Debug, Clone, Default)]
 pub(super) enum Live {
-    /// Before the first query.
+    /// State before the first query: no planner has been built.
     #[default]
     Untried,
     /// The incremental planner does not support the mission.
     Unsuited,
-    /// Built for one problem. It also accepts problems that differ only in initial values and available designs.
+    /// Planner built for one problem. Also accepts problems that differ only in initial values and available designs.
     Ready(Replanner),
 }
 
 impl Live {
-    /// Returns a proved answer, or the incumbent at the time limit. `None` if planning from scratch is necessary.
+    /// Plans incrementally. Returns a proved outcome, or the best plan at the time limit. Returns `None` if planning
+    /// from scratch is necessary.
     pub(super) fn plan(
         &mut self,
         question: &Question<'_>,
@@ -63,7 +64,7 @@ impl Live {
             watch.improve(cost, progress.bound - &metric);
         };
         let mut answer = self.query_planner(question, &query, false, &mut report)?;
-        // The planner does not fit the problem, for example after a change of the goal. It is rebuilt once.
+        // The planner does not fit the problem, for example after a change of the goal. The planner is rebuilt once.
         if answer == ReplanOutcome::Misfit {
             answer = self.query_planner(question, &query, true, &mut report)?;
         }
@@ -103,7 +104,8 @@ impl Live {
     }
 }
 
-/// Proved absence of a plan.
+/// Returns the outcome that proves the absence of a plan. `blocking` is a set of unavailable designs that blocks every
+/// plan.
 fn none(blocking: Vec<String>) -> Outcome {
     Outcome {
         steps: None,
@@ -114,8 +116,8 @@ fn none(blocking: Vec<String>) -> Outcome {
     }
 }
 
-/// Remainders of the action under way, one per executable configuration. `None` if the configurations are too many or
-/// unknown.
+/// Returns the remainders of the action under way with their simulated effects, one per executable configuration.
+/// Returns `None` if no action is under way, or its configurations are too many or unknown.
 pub(super) fn first_steps(question: &Question<'_>) -> Option<Vec<(PlannedStep, FirstStep)>> {
     let running = question.running?;
     let mut steps = vec![running.step.clone()];
@@ -135,7 +137,7 @@ pub(super) fn first_steps(question: &Question<'_>) -> Option<Vec<(PlannedStep, F
     let mut first = Vec::new();
     for (mut step, change) in steps.into_iter().zip(advances) {
         let Ok(mut change) = change else { continue };
-        // The gate exists only in the shortened domain, not in the one of the planner.
+        // The gate exists only in the shortened domain, and not in the planner's domain.
         change.added.retain(|atom| atom.predicate.name.as_str() != GATE);
         // Without a metric, plans are measured by their number of steps.
         let one_step = BigRational::from_integer(1.into());

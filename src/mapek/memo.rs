@@ -1,7 +1,8 @@
 //! Cache of optimal plans for recurring situations: components that fail and recover, and measurements that oscillate
 //! around a bound.
 //!
-//! A proved plan depends only on the situation, so that a cached plan equals the plan of a new search.
+//! A plan that is proved optimal depends only on the situation. Therefore, the cached plan equals the plan of a new
+//! search.
 
 use std::collections::VecDeque;
 
@@ -11,15 +12,15 @@ use crate::mapek::ask::{Outcome, Question};
 use crate::mapek::beliefs::Running;
 use crate::mapek::step::PlannedStep;
 
-/// Capacity of the cache.
+/// Upper limit on the number of cached plans.
 const CAPACITY: usize = 16;
 
-/// Situations with their plans, most recently used first.
+/// Planning problems with their outcomes, most recently used first.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Memo(VecDeque<(StoredQuestion, Outcome)>);
 
-/// Everything that a plan depends on, apart from the domain and the metric, which are constant. A new goal clears the
-/// cache.
+/// Copy of a planning problem: all inputs of a search except the domain and the metric, which are constant. The goal is
+/// not compared, because a new goal clears the cache.
 #[derive(Debug, Clone)]
 pub(crate) struct StoredQuestion {
     problem: Problem,
@@ -29,7 +30,7 @@ pub(crate) struct StoredQuestion {
 }
 
 impl Memo {
-    /// Returns the plan of a cached situation.
+    /// Returns the cached outcome of an equal planning problem, if any, and moves it to the front.
     pub(super) fn recall(&mut self, question: &Question<'_>) -> Option<Outcome> {
         let position = self.0.iter().position(|(situation, _)| situation.equals(question))?;
         let entry = self.0.remove(position)?;
@@ -38,7 +39,7 @@ impl Memo {
         Some(outcome)
     }
 
-    /// Caches an outcome if it is proved.
+    /// Caches an outcome if it is proved: an optimal plan, or the absence of any plan.
     pub(super) fn store(&mut self, question: &Question<'_>, outcome: &Outcome) {
         if outcome.proved {
             self.0.push_front((StoredQuestion::new(question), outcome.clone()));
@@ -53,18 +54,19 @@ impl Memo {
 }
 
 impl StoredQuestion {
-    /// Copies the situation of a question.
+    /// Copies a planning problem. The current plan is copied only if the choice between optimal plans depends on it.
     pub(super) fn new(question: &Question<'_>) -> Self {
         let old = question.old.filter(|_| question.stay_close).map(<[_]>::to_vec);
         Self { problem: question.problem.clone(), running: question.running.cloned(), old }
     }
 
-    /// Returns `true` if both questions have the same action under way, or none.
+    /// Returns `true` if both planning problems have the same action under way, or no action.
     pub(super) fn has_same_action(&self, question: &Question<'_>) -> bool {
         self.running.as_ref().map(|running| running.action) == question.running.map(|running| running.action)
     }
 
-    /// Returns `true` if the questions are equal.
+    /// Returns `true` if both planning problems have the same initial state, objects and action under way and, if
+    /// relevant, the same current plan.
     pub(super) fn equals(&self, question: &Question<'_>) -> bool {
         let (left, right) = (&self.problem, question.problem);
         let objects = |problem: &Problem| problem.objects.len();
@@ -81,7 +83,7 @@ impl StoredQuestion {
     }
 }
 
-/// Part of the action under way that plans depend on. The numbers of action and request are irrelevant.
+/// Returns the parts of the action under way on which plans depend. The numbers of action and request are irrelevant.
 fn relevant_part(running: &Running) -> (&PlannedStep, &num_rational::BigRational) {
     (&running.step, &running.progress)
 }

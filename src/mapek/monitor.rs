@@ -1,4 +1,4 @@
-//! Monitor: applies events to the beliefs.
+//! Monitor (of MAPE-K): applies events reported by the managed system to the beliefs.
 
 use std::collections::{BTreeSet, HashMap, HashSet};
 
@@ -22,10 +22,10 @@ use crate::message::{Message, did_you_mean};
 use crate::mission::Mission;
 use crate::number;
 
-/// Local names of properties that determine availability and statuses.
+/// Local names of the TOMASys properties that determine the availability of designs and the statuses of objectives.
 const WATCHED: [&str; 5] = ["fd_realisability", "fd_available", "o_status", "o_updatable", "fg_status"];
 
-/// Local names of other properties and classes that plans depend on.
+/// Local names of further TOMASys properties and classes on which plans depend.
 const PLANNED: [&str; 9] = [
     "solvesF",
     "requiresF",
@@ -38,15 +38,16 @@ const PLANNED: [&str; 9] = [
     "FunctionDesign",
 ];
 
-/// Local names of properties with values. Derived values are estimations; reported values are stated.
+/// Local names of the properties that hold values of quality attributes. A derived value is an estimation; a reported
+/// value is a stated fact.
 const VALUES: [&str; 2] = ["hasValue", "qa_has_value"];
 
-/// Constant data for the interpretation of events, with caches.
+/// Data for the interpretation of events: attributes, filters and caches. Not a part of the beliefs.
 #[derive(Debug, Clone)]
 pub(super) struct Monitor {
-    /// Attributes of the knowledge base, by local name and by IRI.
+    /// IRIs and local names of the quality attributes of the knowledge base.
     pub(super) attributes: BTreeSet<String>,
-    /// Facts and functions that are known to fit the domain, as text.
+    /// Cache of facts and functions, as text, that are known to fit the domain.
     checked: HashSet<String>,
     pub(super) filters: Filters,
     /// Cache of local names of components, by the reported name.
@@ -68,7 +69,8 @@ impl Monitor {
         &self.filters
     }
 
-    /// Applies reports that were held by filters and have become due.
+    /// Applies reports that filters have held back and that are due now. Returns refusals of reports that do not fit
+    /// the mission.
     pub(super) fn elapse(&mut self, beliefs: &mut Beliefs, changes: &mut Changes) -> Vec<Refusal> {
         let due = self.filters.elapse(&mut beliefs.filters, beliefs.now, &mut changes.filtered);
         let mut update = BeliefUpdate { monitor: self, beliefs, changes };
@@ -78,7 +80,7 @@ impl Monitor {
     /// Applies an event to the beliefs, and records the changes.
     ///
     /// # Errors
-    /// The event does not fit the mission or the state of the loop. Nothing has changed.
+    /// The event does not fit the mission or the state of the loop.
     pub(super) fn apply(
         &mut self,
         beliefs: &mut Beliefs,
@@ -89,7 +91,7 @@ impl Monitor {
     }
 }
 
-/// Application of one event to the beliefs.
+/// Context for applying one event to the beliefs, with a record of the changes.
 pub(super) struct BeliefUpdate<'a> {
     pub(super) monitor: &'a mut Monitor,
     pub(super) beliefs: &'a mut Beliefs,
@@ -142,7 +144,7 @@ impl BeliefUpdate<'_> {
         }
     }
 
-    /// Updates the knowledge base with a report about one of its individuals.
+    /// Updates the knowledge base with a report about the individual `name`. `kind` is the noun for error messages.
     pub(super) fn report(&mut self, kind: &str, name: &str, report: RobotReport) -> Result<(), Refusal> {
         let Some(knowledge) = self.beliefs.mission.knowledge_mut() else {
             let text = format!("there is no knowledge base that has a {kind} `{name}`");
@@ -154,7 +156,7 @@ impl BeliefUpdate<'_> {
         Ok(())
     }
 
-    /// Records the acknowledgement of an effect.
+    /// Records the acknowledgement of an effect by the managed system.
     fn acknowledged(&mut self, effect: u64) -> Result<(), Refusal> {
         match self.beliefs.acknowledge(effect) {
             Receipt::Unknown => Err(Refusal::new("M305", format!("there was no effect {effect}"))),
@@ -170,7 +172,7 @@ impl BeliefUpdate<'_> {
     }
 
     /// Records that a reconfiguration has failed: the function has the previously acknowledged design, and the
-    /// requested one is marked as unrealisable until a report says otherwise.
+    /// requested design is marked as unrealisable until the next report about the design.
     fn failed_reconfiguration(&mut self, effect: u64) -> Result<(), Refusal> {
         if self.beliefs.mission.knowledge().is_none() {
             return Err(Refusal::new("M306", "there is no knowledge base that has designs"));
@@ -221,8 +223,8 @@ impl BeliefUpdate<'_> {
         Err(Refusal::new("M306", text))
     }
 
-    /// Records the consequences of a change of the knowledge base. `was_known` says whether the conclusions were
-    /// complete before.
+    /// Records in `changes` which conclusions and plan inputs are affected by a delta of the knowledge base.
+    /// `was_known` says whether the conclusions were complete before.
     fn record_delta(&mut self, delta: &Delta, was_known: bool) {
         let Some(knowledge) = self.beliefs.mission.knowledge() else { return };
         let is_known = knowledge.fault().is_none();
@@ -249,13 +251,14 @@ impl BeliefUpdate<'_> {
         self.changes.facts |= delta.insert.iter().any(is_concluded) || delta.delete.iter().any(is_lost);
     }
 
-    /// Returns the action under way, which must have this number.
+    /// Returns the action under way, or a refusal if no action with the number `action` is under way.
     fn running(&mut self, action: u64) -> Result<&mut Running, Refusal> {
         let running = self.beliefs.running.as_mut().filter(|running| running.action == action);
         running.ok_or_else(|| Refusal::new("M305", format!("no action {action} is under way")))
     }
 
-    /// Returns the action under way after a report that it has started, which also confirms its request.
+    /// Records that the action under way has started, which also confirms the arrival of its request. Returns the
+    /// action.
     fn confirm_started(&mut self, action: u64) -> Result<&mut Running, Refusal> {
         let request = self.running(action)?.request;
         self.beliefs.confirm_request(request);
@@ -266,7 +269,8 @@ impl BeliefUpdate<'_> {
         Ok(running)
     }
 
-    /// Ends an action. Its effects are no longer outstanding, except reconfigurations, which belong to functions.
+    /// Removes and returns the action under way. Its effects are no longer outstanding, except reconfigurations, which
+    /// belong to functions.
     fn end(&mut self, action: u64) -> Result<Running, Refusal> {
         self.running(action)?;
         let is_moot = |effect: &Effect| {
@@ -311,14 +315,16 @@ impl BeliefUpdate<'_> {
         Ok(())
     }
 
-    /// Ends an action without success: its progress has consumed resources, and its other effects do not take place.
+    /// Ends an action without success. Resources consumed by its progress remain consumed, and its other effects do not
+    /// take place.
     fn ended_early(&mut self, action: u64) -> Result<Running, Refusal> {
         let running = self.end(action)?;
         self.changes.facts = true;
         Ok(running)
     }
 
-    /// Sets the progress of the action under way, and changes numeric values in proportion.
+    /// Sets the progress of the action under way, and applies the share of its increases and decreases since the
+    /// previous progress.
     fn progress(&mut self, fraction: &BigRational) -> Result<(), Refusal> {
         let Some(running) = &mut self.beliefs.running else { return Ok(()) };
         let increment = fraction - &running.progress;
@@ -335,13 +341,14 @@ impl BeliefUpdate<'_> {
         Ok(())
     }
 
-    /// Effects of a whole action, regardless of its conditions.
+    /// Returns the effects of a complete execution of `step`, regardless of its conditions. Returns `None` if the step
+    /// does not fit the domain.
     fn advance(&self, step: &PlannedStep) -> Option<Advance> {
         let mission = &self.beliefs.mission;
         advance(mission.domain(), &self.beliefs.filled(), &step.to_plan_step(), true).ok()
     }
 
-    /// Applies a report of a fact or a value of the problem.
+    /// Applies a reported fact, or a reported value of a numeric function.
     fn fact(&mut self, name: &str, value: &str) -> Result<(), Refusal> {
         let mut words = name.split_whitespace();
         let name = words.by_ref().collect::<Vec<_>>().join(" ");
@@ -366,7 +373,7 @@ impl BeliefUpdate<'_> {
         Ok(())
     }
 
-    /// Facts of a predicate, as sequences of words.
+    /// Returns the argument lists of the facts of a predicate in the believed state.
     fn facts(&self, predicate: &str) -> BTreeSet<Vec<String>> {
         let predicate = Name::new(predicate);
         let word = |term: &Term| match term {

@@ -1,6 +1,7 @@
-//! Plan: computes a jointly optimal plan with a proof of its status, or the reason for its absence.
+//! Plan (of MAPE-K): computes an optimal plan of actions and designs, or the reason for its absence.
 //!
-//! Plans recorded in the journal are replayed: a plan cut short by a time limit is not reproducible.
+//! During replay, plans are read from the journal and not computed again, because a search that ends at a time limit is
+//! not reproducible.
 
 use std::borrow::Cow;
 use std::collections::VecDeque;
@@ -20,14 +21,14 @@ use crate::number;
 /// Upper limit on the number of doublings of the time limit.
 const MAX_DOUBLINGS: u32 = 3;
 
-/// Planner of the loop, with its caches.
+/// Planner of the adaptation loop, with its caches.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Planner {
-    /// Time limit of one plan.
+    /// Time limit of one search for a plan; `None` for no limit.
     pub time_limit: Option<Duration>,
-    /// Number of consecutive searches that hit their time limit. Each doubles the next time limit.
+    /// Number of consecutive searches that reached their time limit. Each of them doubles the next time limit.
     pub attempt: u32,
-    /// Limits in addition to the time limit of one plan.
+    /// Limits in addition to the time limit of one search.
     pub limits: Limits,
     /// Recorded plans for replay, in order.
     pub recorded: VecDeque<Outcome>,
@@ -37,22 +38,23 @@ pub(crate) struct Planner {
     pub forbids_search: bool,
     /// Whether a plan was missing because searches are forbidden.
     pub is_missing: bool,
-    /// Questions of the current deliberation with their answers, recorded if present.
+    /// Planning problems of the current deliberation with their outcomes; `None` if they are not logged.
     pub question_log: Option<Vec<(StoredQuestion, Outcome)>>,
-    /// Questions with answers that another thread has computed, in order.
+    /// Planning problems with outcomes that another thread has computed, in order.
     pub prepared: VecDeque<(StoredQuestion, Outcome)>,
-    /// Incremental planner, kept between plans.
+    /// Incremental planner, whose state is kept between searches.
     pub live: Live,
     /// Cache of plans for recurring situations.
     pub memo: Memo,
-    /// Handle for observers of the progress.
+    /// Handle by which other threads read the progress of planning.
     pub watch: Watch,
 }
 
 impl Planner {
-    /// Returns a recorded, prepared or cached plan, or computes one.
+    /// Returns a recorded, prepared or cached outcome, or searches for a plan. If searches are forbidden, sets
+    /// `is_missing` and returns an outcome without a plan.
     pub fn plan(&mut self, question: &Question<'_>) -> Outcome {
-        // Recorded and prepared outcomes have an order, so that they are consumed even if the memo has the answer.
+        // Recorded and prepared outcomes have an order. Therefore, they are consumed even if the memo has the answer.
         let recorded = self.recorded.pop_front().or_else(|| self.prepared(question));
         let stored_outcome = recorded.or_else(|| self.memo.recall(question));
         if stored_outcome.is_none() && self.forbids_search {
@@ -67,8 +69,9 @@ impl Planner {
         outcome
     }
 
-    /// Returns the next answer of another thread, if it is about the same action under way. If the situation has
-    /// changed since, for example by progress of the action, the plan is not proved optimal.
+    /// Removes the next outcome computed by another thread. Returns `None` if the outcome is about a different action
+    /// under way. If the situation has changed, for example by progress of the action, the plan is not reported as
+    /// optimal.
     fn prepared(&mut self, question: &Question<'_>) -> Option<Outcome> {
         let (answered, mut outcome) = self.prepared.pop_front()?;
         if !answered.has_same_action(question) {
@@ -97,7 +100,7 @@ impl Planner {
     }
 }
 
-/// Plans in a task that is ground for this question.
+/// Grounds the planning problem and searches for an optimal plan, without data from earlier searches.
 pub(super) fn from_scratch(question: &Question<'_>, limits: Limits, watch: &Watch) -> Outcome {
     let no_plan = Outcome::no_plan;
     let (mut domain, mut problem) =

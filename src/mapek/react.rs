@@ -1,8 +1,9 @@
 //! React: requests a safe effect for the action under way after changes, before planning.
 //!
 //! If an action has lost a design, or its remainder is not executable, the action is reconfigured to available designs
-//! for which the validator accepts the remainder. Otherwise it is suspended. This needs no search: each configuration
-//! of this one action is simulated once. Planning decides later about the whole mission.
+//! for which the validator accepts the remainder. If no such designs exist, the action is suspended. This decision
+//! needs no search: each configuration of this one action is simulated once. Planning decides later about the whole
+//! mission.
 
 use num_rational::BigRational;
 use pddl::ast::Direction;
@@ -17,7 +18,7 @@ use crate::mapek::monitor::Changes;
 use crate::mapek::settings::{SafeReaction, Settings};
 use crate::mapek::step::PlannedStep;
 
-/// Requests a safe effect if the action under way cannot go on unchanged.
+/// Reconfigures or suspends the action under way if the action cannot continue unchanged.
 pub(super) fn react(
     beliefs: &mut Beliefs,
     settings: &Settings,
@@ -46,7 +47,8 @@ pub(super) fn react(
     changes.interruptions.push(reason);
 }
 
-/// Reason why an action cannot go on unchanged, if it cannot. `facts` says whether its conditions may have changed.
+/// Returns the reason why the action under way cannot continue unchanged, or `None` if it can. `facts` says whether
+/// facts in its conditions may have changed.
 pub(super) fn trouble(beliefs: &Beliefs, running: &Running, facts: bool) -> Option<String> {
     let lost = running.step.configuration.iter().find(|(_, design)| !beliefs.is_available(design));
     if let Some((_, design)) = lost {
@@ -58,8 +60,8 @@ pub(super) fn trouble(beliefs: &Beliefs, running: &Running, facts: bool) -> Opti
     beliefs.obstacle(running).map(|obstacle| format!("action {}: {obstacle}", running.action))
 }
 
-/// The action with available designs for which its remainder is executable at least cost. Ties are broken by the order
-/// of designs.
+/// Returns the action under way with the available designs that make its remainder executable with the best metric.
+/// Ties are broken by the order of designs. Returns `None` if no designs make the remainder executable.
 fn other_designs(beliefs: &Beliefs, running: &Running) -> Option<PlannedStep> {
     let problem = beliefs.filled();
     let question = Question {

@@ -1,17 +1,17 @@
-//! History of reconfigurations per function: the last acknowledged one, and the superseded ones without an answer.
-//! [`super::acknowledge`] derives the believed design from it.
+//! History of reconfiguration requests per function: the last acknowledged request, and superseded requests that the
+//! robot has not answered. [`super::acknowledge`] derives the believed design from this history.
 
 use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 
-/// Upper limit on the recorded superseded reconfigurations per function.
+/// Upper limit on the number of superseded reconfigurations recorded per function.
 const MAX_SUPERSEDED: usize = 16;
 
-/// History of acknowledgements.
+/// History of acknowledged and superseded reconfigurations, by function.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(super) struct Receipts {
-    /// Whether any reconfiguration was acknowledged by its number.
+    /// Whether any reconfiguration was acknowledged explicitly, by its effect number.
     pub(super) by_number: bool,
     pub(super) functions: BTreeMap<String, Received>,
 }
@@ -20,14 +20,13 @@ pub(super) struct Receipts {
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(super) struct Received {
     pub(super) last: Option<Acknowledged>,
-    /// Designs of superseded reconfigurations without an answer, by number.
+    /// Superseded reconfigurations that the robot has not answered: maps the effect number to the requested design.
     pub(super) superseded: BTreeMap<u64, String>,
-    /// Greatest number of an effect at the time when the function was observed with a design that was neither believed
-    /// nor pending; 0 if it never was. It is unknown whether reconfigurations up to this number were carried out before
-    /// or after the observation.
+    /// Greatest effect number of an uncertain reconfiguration, or 0. After a report of an unexpected design, it is
+    /// unknown whether the robot carried out the reconfigurations up to this number before or after the report.
     pub(super) doubted: u64,
-    /// Last reconfiguration whose arrival was implied by a report of an action, unless a later one was acknowledged.
-    /// Copies of it may still arrive.
+    /// Effect number of the last reconfiguration whose arrival was only implied by a report of an action. `None` if a
+    /// later reconfiguration was acknowledged. Copies of the request may still arrive.
     pub(super) implied: Option<u64>,
 }
 
@@ -36,9 +35,9 @@ pub(super) struct Received {
 pub(super) struct Acknowledged {
     pub(super) effect: u64,
     pub(super) design: String,
-    /// Previous design, if known.
+    /// Design before the reconfiguration, if known.
     pub(super) before: Option<Before>,
-    /// Whether it was reported as failed after its acknowledgement.
+    /// Whether the reconfiguration was reported as failed after its acknowledgement.
     pub(super) failed: bool,
 }
 
@@ -46,12 +45,13 @@ pub(super) struct Acknowledged {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Before {
     pub(super) design: String,
-    /// Number of the reconfiguration that had set this design; `None` if it was observed.
+    /// Effect number of the reconfiguration that had set this design; `None` if the design was observed without a
+    /// request.
     pub(super) effect: Option<u64>,
 }
 
 impl Receipts {
-    /// Returns `true` if the robot acknowledges reconfigurations by their number.
+    /// Returns `true` if the robot has acknowledged any reconfiguration explicitly, by its effect number.
     pub(super) fn are_sent(&self) -> bool {
         self.by_number
     }
@@ -62,7 +62,7 @@ impl Receipts {
         self.functions.get(function).is_some_and(|history| !history.superseded.is_empty())
     }
 
-    /// Records a reconfiguration that was superseded before it was answered.
+    /// Records that the reconfiguration `effect` of `function` to `design` was superseded before it was answered.
     pub(super) fn supersede(&mut self, effect: u64, function: String, design: String) {
         let superseded = &mut self.functions.entry(function).or_default().superseded;
         superseded.insert(effect, design);
@@ -71,8 +71,9 @@ impl Receipts {
         }
     }
 
-    /// Records an observation of a function, which may cross messages: acknowledgements up to number `doubted` are then
-    /// uncertain, and so are those of superseded reconfigurations if none is pending.
+    /// Records a report of a function's design, which can cross messages to the robot. Reconfigurations up to effect
+    /// number `doubted` become uncertain, and so do all superseded ones if no reconfiguration of the function is
+    /// pending.
     pub(super) fn observe(&mut self, function: &str, doubted: Option<u64>, is_pending: bool) {
         if !is_pending && let Some(history) = self.functions.get_mut(function) {
             let last = history.superseded.last_key_value().map_or(0, |(number, _)| *number);
@@ -83,18 +84,20 @@ impl Receipts {
         }
     }
 
-    /// Numbers of superseded reconfigurations of a function without an answer.
+    /// Returns the effect numbers of a function's reconfigurations that were superseded before they were acknowledged.
     pub(super) fn unanswered_superseded(&self, function: &str) -> impl Iterator<Item = &u64> {
         self.functions.get(function).into_iter().flat_map(|history| history.superseded.keys())
     }
 
-    /// Numbers of earlier reconfigurations of a function of which a copy may still be on its way.
+    /// Returns the effect numbers of a function's reconfigurations of which a copy may still be on its way: they were
+    /// superseded, or their arrival was only implied, without an acknowledgement.
     pub(super) fn unanswered(&self, function: &str) -> impl Iterator<Item = &u64> {
         let implied = self.functions.get(function).and_then(|history| history.implied.as_ref());
         self.unanswered_superseded(function).chain(implied)
     }
 
-    /// Returns function and design of a superseded reconfiguration.
+    /// Returns the function and the requested design of the superseded reconfiguration with number `effect`, if
+    /// recorded.
     pub(super) fn superseded(&self, effect: u64) -> Option<(&String, &String)> {
         let design = |(function, history)| Some((function, Received::superseded(history, effect)?));
         self.functions.iter().find_map(design)
@@ -113,7 +116,7 @@ impl Receipts {
         json!([self.by_number, self.functions.iter().map(function).collect::<Vec<_>>()])
     }
 
-    /// Inverse of [`Receipts::to_record`].
+    /// Inverse of [`Receipts::to_record`]. Returns `None` if the record is malformed.
     pub(super) fn from_record(record: &Value) -> Option<Self> {
         let text = |value: &Value| value.as_str().map(ToOwned::to_owned);
         let superseded = |pair: &Value| Some((pair.get(0)?.as_u64()?, text(pair.get(1)?)?));

@@ -16,18 +16,19 @@ use crate::mapek::sequence::Numbers;
 use crate::mapek::step::{PlannedStep, configuration_from_record};
 use crate::message::Message;
 
-/// Result of one observation.
+/// Answers to one observation, with the plans computed for them, as stored in the journal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Decision {
-    /// Answers, as JSON objects of the format.
+    /// Answers, as JSON objects of the loop's output.
     pub answers: Vec<Value>,
-    /// Plans computed for the answers.
+    /// Plans computed for the answers, in a form for replay.
     pub plans: Vec<Value>,
 }
 
 impl Decision {
-    /// Returns `true` if the answers equal earlier answers to the same observation, apart from explanations. Of several
-    /// correct explanations, the chosen one depends on events before the snapshot.
+    /// Returns `true` if the answers equal `written`, the recorded answers to the same observation, apart from
+    /// explanations. Explanations are not compared because the choice among several correct ones depends on events
+    /// before the snapshot.
     pub fn agrees(&self, written: &[Value]) -> bool {
         let essence = |answers: &[Value]| answers.iter().cloned().map(essence).collect::<Vec<_>>();
         essence(&self.answers) == essence(written)
@@ -60,7 +61,7 @@ fn essence(mut answer: Value) -> Value {
     answer
 }
 
-/// Beliefs of a loop as JSON.
+/// State of a loop as JSON, from which the loop can be restored.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Snapshot(pub Value);
 
@@ -134,7 +135,7 @@ pub(super) fn restore(beliefs: &mut Beliefs, snapshot: &Snapshot) -> Result<(), 
     Ok(())
 }
 
-/// Restores the mission: statements, facts and goal.
+/// Restores statements, facts and goal of the mission. Returns `None` if they are malformed or do not fit the mission.
 fn restore_mission(beliefs: &mut Beliefs, data: &Value) -> Option<()> {
     let records = |name: &str| data.get(name).and_then(Value::as_array);
     let statements =
@@ -157,7 +158,7 @@ fn restore_mission(beliefs: &mut Beliefs, data: &Value) -> Option<()> {
     Some(())
 }
 
-/// Restores plan, effects, receipts and filters.
+/// Restores the other beliefs, such as plan, effects, receipts and filters. Returns `None` if they are malformed.
 fn restore_work(beliefs: &mut Beliefs, data: &Value) -> Option<()> {
     let number = |name: &str| data.get(name).and_then(Value::as_u64);
     let truth = |name: &str| data.get(name).and_then(Value::as_bool);
@@ -284,7 +285,7 @@ pub(crate) fn statement_from_record(record: &Value) -> Option<Statement> {
     Some(Statement { predicate: text(record.get(0)?)?, arguments })
 }
 
-/// Serializes an element of `:init`. Timed initial literals never change, so that they are not recorded.
+/// Serializes an element of `:init`. Returns `None` for timed initial literals, which never change.
 fn element_to_record(element: &InitialElement) -> Option<Value> {
     let words = |atom: &Atom| -> Vec<String> {
         let arguments = atom.arguments.iter().map(|term| match term {

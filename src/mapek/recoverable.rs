@@ -1,4 +1,4 @@
-//! Interface between a loop and its journal: the recorded data, and the restoration from them.
+//! Interface between a loop and its journal: recorded decisions, and the restoration of the loop from the journal.
 
 use std::time::Duration;
 
@@ -11,28 +11,29 @@ use crate::mapek::record::{Decision, Snapshot};
 use crate::mapek::settings::Unrecorded;
 use crate::message::Message;
 
-/// A loop whose state can be restored from a journal. Equal observations at equal times, with the recorded plans, must give equal
-/// decisions.
+/// A loop whose state can be restored from a journal. Equal observations at equal times, with the recorded plans, must
+/// give equal decisions.
 pub trait Recoverable {
     /// An answer of the loop.
     type Answer: From<Answer>;
 
-    /// Returns a checksum of all inputs of decisions, before the loop begins.
+    /// Returns the checksum of the initial knowledge, mission and settings, which identifies the loop in a journal.
     fn digest(&self) -> String;
 
     /// Returns the reaction to a journal that cannot be written.
     fn unrecorded(&self) -> Unrecorded;
 
-    /// Returns `true` if the loop has not begun, or has reacted to an observation and has not deliberated.
+    /// Returns `true` if a decision is pending: the loop has not begun, or has not deliberated since its last reaction.
     fn has_agenda(&self) -> bool;
 
     /// Reacts to an observation; `now` is the time since the start.
     fn react(&mut self, observation: &Observation, now: Duration) -> Vec<Self::Answer>;
 
-    /// Decides the pending questions of the reactions. Makes the first decision if the loop has not begun.
+    /// Makes the decisions left open by [`Recoverable::react`], or the first decision if the loop has not begun. May
+    /// search for a plan.
     fn deliberate(&mut self) -> Vec<Self::Answer>;
 
-    /// Reacts and deliberates with recorded plans.
+    /// Reacts to an observation, and deliberates with the recorded `plans` instead of a search.
     fn handle_again(
         &mut self,
         observation: &Observation,
@@ -40,23 +41,24 @@ pub trait Recoverable {
         plans: &[Value],
     ) -> Vec<Self::Answer>;
 
-    /// Deliberates with recorded plans.
+    /// Deliberates with the recorded `plans` instead of a search.
     fn deliberate_again(&mut self, plans: &[Value]) -> Vec<Self::Answer>;
 
-    /// Returns the decision with these answers. The journal calls this once after each step.
+    /// Returns the journal's record of a step: the answers, and the plans computed for them. The journal calls this
+    /// once after each step.
     fn decision(&mut self, answers: &[Self::Answer]) -> Decision;
 
     /// Returns the effects that were not acknowledged, for repetition after a restart.
     fn repeat(&self) -> Vec<Self::Answer>;
 
-    /// Returns the number of the effect that an answer requests.
+    /// Returns the number of the effect that an answer requests, or `None` if the answer requests no effect.
     fn effect(answer: &Self::Answer) -> Option<u64>;
 
-    /// Returns the state as data. Afterwards the loop makes the same decisions as a loop that is restored
-    /// from the data.
+    /// Returns a snapshot of the state. Afterwards, this loop makes the same decisions as a loop restored from the
+    /// snapshot.
     fn checkpoint(&mut self) -> Snapshot;
 
-    /// Restores the state of a loop with the same checksum.
+    /// Restores the state from a snapshot of a loop with the same checksum.
     ///
     /// # Errors
     /// The snapshot is damaged, or belongs to another loop.

@@ -1,11 +1,12 @@
-//! Domain of the remaining mission while an action is under way. The action must come first, with any designs.
+//! Compiles the action under way into the PDDL domain, so that each plan of the remaining mission begins with the
+//! remainder of this action, under any designs.
 //!
-//! The paper plans from the state in which the action has ended. Here, planning starts in the current state, with the
-//! remainder of the action as the first step, so that its designs and all later ones are chosen together. A copy of the
-//! action's schema has the other arguments fixed. Its duration, increases and decreases are scaled to the remainder. It
-//! adds a gate fact that all other actions require. A condition at the start of the action may mention a value that the
-//! action changes. In such conditions, the changes already made are subtracted: the condition asks whether the remainder
-//! can be executed.
+//! The paper (see [`crate::mapek`]) plans from the state in which the action has ended. Here, planning starts in the
+//! current state, with the remainder of the action as the first step, so that the designs of all remaining steps are
+//! chosen together. A copy of the action's schema fixes all arguments except designs. Its duration, increases and
+//! decreases are scaled to the remainder. The copy adds a gate fact that all other actions require. A condition of the
+//! action may mention a value that the action changes. In such conditions, the past changes are subtracted from the
+//! value, which restores the value before the action.
 
 use num_rational::BigRational;
 use pddl::ast::{
@@ -15,14 +16,15 @@ use pddl::ast::{
 
 use crate::mapek::step::PlannedStep;
 
-/// Divisor for the least remaining duration: an action with full progress that has not ended has 1/`LEAST_LEFT` of its
-/// duration left. Progress has a resolution of 1/100.
+/// Denominator of the least remaining share of a duration: an unfinished action with full progress still has
+/// 1/`LEAST_LEFT` of its duration to go. The share is below the resolution of progress, 1/100.
 const LEAST_LEFT: u32 = 1000;
 
 /// Predicate that holds once the action under way has ended. No input file declares it.
 pub(super) const GATE: &str = "metaplan_resumed";
 
-/// Returns the domain of the remaining mission. `done` is the completed share of `running`, from 0 to 1.
+/// Returns `domain` with the gate and, as the first action, a copy of the schema of `running` that is shortened to the
+/// remainder. `done` is the completed share of `running`, from 0 to 1.
 pub(crate) fn resume(domain: &Domain, running: &PlannedStep, done: &BigRational) -> Domain {
     let mut gated = domain.clone();
     gated.predicates.push(Declaration { identifier: identifier(GATE), parameters: Vec::new() });
@@ -45,18 +47,19 @@ pub(crate) fn resume(domain: &Domain, running: &PlannedStep, done: &BigRational)
         // The gate opens only once, so that the remainder occurs exactly once.
         require(&mut copy, Condition::Not(Box::new(Condition::Atom(gate()))));
         open(&mut copy);
-        // Of schemas with one name the first that is possible is taken.
+        // Among schemas with the same name, the first applicable one is used.
         gated.actions.insert(0, copy);
     }
     gated
 }
 
-/// Extends a goal by the end of the action under way.
+/// Returns the conjunction of `goal` and the gate fact, which holds once the action under way has ended.
 pub(crate) fn resumed_goal(goal: &Condition) -> Condition {
     Condition::And(vec![goal.clone(), Condition::Atom(gate())])
 }
 
-/// Scales an action to its remainder.
+/// Scales the duration, increases and decreases of a durative action to the share that is not yet `done`. Restores the
+/// values before the action in its conditions, except conditions at the end.
 fn shorten(action: &mut Action, done: &BigRational) {
     let ActionBody::Durative { duration, conditions, effects } = &mut action.body else { return };
     let remaining_share = BigRational::from_integer(1.into()) - done;
@@ -78,7 +81,8 @@ fn shorten(action: &mut Action, done: &BigRational) {
     }
 }
 
-/// Scales increases and decreases to `remaining_share`, and appends the change of each whole effect to `changes`.
+/// Multiplies increases and decreases by `remaining_share`. Appends the unscaled change of each fluent to `changes`.
+/// `whole` is the full duration, which replaces `?duration`.
 fn shorten_effect(
     effect: &mut Effect,
     remaining_share: &BigRational,
@@ -106,7 +110,8 @@ fn shorten_effect(
     }
 }
 
-/// Subtracts the changes that were already made from the values in a condition.
+/// Replaces each fluent in a condition by its value before the action: the fluent minus the share `done` of its
+/// `changes`.
 fn restore_condition(condition: &mut Condition, done: &BigRational, changes: &[(Atom, Expression)]) {
     match condition {
         Condition::And(parts) | Condition::Or(parts) => {
@@ -138,7 +143,7 @@ fn restore_condition(condition: &mut Condition, done: &BigRational, changes: &[(
     }
 }
 
-/// Replaces parts of an expression. Replacements are not visited.
+/// Replaces each subexpression for which `replace` returns an expression. Replacements are not visited.
 fn substitute(expression: &mut Expression, replace: &dyn Fn(&Expression) -> Option<Expression>) {
     if let Some(replacement) = replace(expression) {
         *expression = replacement;

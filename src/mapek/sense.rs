@@ -1,4 +1,4 @@
-//! Applies reports of sensors, components and functions to the beliefs, after their filters.
+//! Applies reports of sensors, components and functions to the beliefs. Noise filters can delay or reject a report.
 
 use num_rational::BigRational;
 use ontology::tomasys::change::Status;
@@ -10,8 +10,9 @@ use crate::mapek::monitor::BeliefUpdate;
 use crate::message::did_you_mean;
 
 impl BeliefUpdate<'_> {
-    /// Applies an observed design of a function that was not requested. The function and the action under way have this
-    /// design from now on. A change back is considered in the same way as for a design that is available again.
+    /// Applies a report that a function has a design without a request of the loop; `None` if it has no design. The
+    /// function has this design from now on, and so has the action under way, unless a reconfiguration is pending. The
+    /// loop later considers another design in the same way as after a design has become available.
     pub(super) fn observed(&mut self, function: &str, design: Option<&str>) -> Result<(), Refusal> {
         let designs = self.beliefs.mission.designs_of(function);
         if designs.is_empty() {
@@ -70,7 +71,7 @@ impl BeliefUpdate<'_> {
         }
     }
 
-    /// Applies a sample unless its filter holds it back.
+    /// Applies a sample of a measured attribute, unless the attribute's filter holds the sample back.
     pub(super) fn sampled(&mut self, attribute: &str, value: &BigRational) -> Result<(), Refusal> {
         let is_known = self.monitor.attributes.contains(attribute);
         let (states, now, filtered) =
@@ -84,7 +85,7 @@ impl BeliefUpdate<'_> {
         }
     }
 
-    /// Applies the status of a component unless its filter holds it back.
+    /// Applies a reported status of a component, unless the component's filter holds the report back.
     pub(super) fn component(&mut self, component: &str, status: Status) -> Result<(), Refusal> {
         let name = match self.monitor.components.get(component) {
             Some(name) => Some(name.clone()),

@@ -1,8 +1,8 @@
-//! Duplicate detection by sequence numbers.
+//! Duplicate detection by the sequence numbers of input lines.
 //!
-//! Lines of several senders with one counter can arrive out of order. Therefore, the seen numbers are stored as ranges
-//! without gaps; without missing lines, there is one range. If there are too many gaps, the oldest range is dropped.
-//! Numbers up to its end are then *stale*: it is unknown whether they were seen.
+//! Lines of several senders that share a counter can arrive out of order. Therefore, the seen numbers are stored as
+//! ranges without gaps; if no line is missing, there is one range. Above [`MAX_RANGES`] ranges, the lowest range is
+//! dropped. Numbers up to the end of a dropped range are *stale*: it is unknown whether they were seen.
 
 use std::collections::BTreeMap;
 
@@ -10,40 +10,39 @@ use serde_json::{Value, json};
 
 use crate::mapek::answer::Answer;
 
-/// Upper limit on the number of ranges.
+/// Upper limit on the number of stored ranges of seen sequence numbers.
 const MAX_RANGES: usize = 256;
 
-/// Upper limit on the distance to the greatest seen number. Without a limit, all numbers after an erroneous huge one
-/// would be refused.
+/// Upper limit on the distance from the greatest seen number to a new number. Numbers further ahead are refused as
+/// erroneous.
 const MAX_AHEAD: u64 = 1_000_000;
 
-/// Upper limit on the first number.
+/// Upper limit on the first sequence number.
 const MAX_FIRST: u64 = 1 << 62;
 
-/// Classification of a number.
+/// Classification of a sequence number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Classification {
-    /// It was not seen.
+    /// The number is within the upper limit and was not seen before.
     New,
-    /// It was seen.
+    /// The number was seen before.
     Seen,
-    /// At most this mark: it is unknown whether it was seen.
+    /// The number is at most the given mark, the end of the dropped ranges: it is unknown whether the number was seen.
     Stale(u64),
-    /// Above this upper limit.
+    /// The number is above the given upper limit.
     Ahead(u64),
 }
 
-/// Set of seen numbers.
+/// Set of seen sequence numbers, stored as ranges.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct Numbers {
-    /// Last number of each range, by its first number.
+    /// Ranges of seen numbers: maps the first number of each range to the last.
     ranges: BTreeMap<u64, u64>,
-    /// Last number of the dropped ranges.
+    /// Greatest number in the dropped ranges; `None` if no range was dropped.
     mark: Option<u64>,
 }
 
 impl Numbers {
-    /// Classifies a number.
     fn classify(&self, number: u64) -> Classification {
         let range = self.ranges.range(..=number).next_back();
         if range.is_some_and(|(_, &last)| number <= last) {
@@ -57,7 +56,8 @@ impl Numbers {
         }
     }
 
-    /// Returns the answer to a line with this number if the line must be ignored.
+    /// Returns the answer to a line with this sequence number if the line must be ignored, or `None` if the number is
+    /// new.
     pub(crate) fn refused(&self, sequence: u64) -> Option<Answer> {
         match self.classify(sequence) {
             Classification::New => None,
@@ -72,7 +72,7 @@ impl Numbers {
         }
     }
 
-    /// Adds a new number.
+    /// Adds a number that was not seen before.
     pub(crate) fn insert(&mut self, number: u64) {
         // The number may close the gap to the next range, to the previous range, or both.
         let last = number.checked_add(1).and_then(|next| self.ranges.remove(&next)).unwrap_or(number);
@@ -95,7 +95,7 @@ impl Numbers {
         self.ranges.last_key_value().map(|(_, last)| *last)
     }
 
-    /// Gaps between the ranges, as inclusive ranges.
+    /// Returns the gaps between seen numbers, as inclusive ranges `[first, last]`.
     pub(crate) fn missing(&self) -> Vec<[u64; 2]> {
         let ends = self.ranges.values().map(|last| last + 1);
         let starts = self.ranges.keys().skip(1).map(|first| first - 1);
@@ -107,7 +107,7 @@ impl Numbers {
         json!([self.mark, self.ranges.iter().collect::<Vec<_>>()])
     }
 
-    /// Inverse of [`Numbers::to_record`].
+    /// Inverse of [`Numbers::to_record`]. Returns `None` if the record is malformed.
     pub(crate) fn from_record(record: &Value) -> Option<Self> {
         let range = |pair: &Value| Some((pair.get(0)?.as_u64()?, pair.get(1)?.as_u64()?));
         let ranges = record.get(1)?.as_array()?.iter().map(range).collect::<Option<_>>()?;

@@ -112,7 +112,7 @@ impl AdaptationSection {
     /// Returns the settings, with defaults for missing keys.
     ///
     /// # Errors
-    /// A value is not a number, or negative.
+    /// A value is not a number, is negative, or is too long for a duration.
     pub fn settings(&self, origin: &ManifestPath) -> Result<Settings, Message> {
         let filters = filters(&self.confirm_time, &self.heal_time, &self.components, &self.measured, origin)?;
         let (stay_close, safe_reaction, unrecorded) = (self.stay_close, self.safe_reaction, self.unrecorded);
@@ -156,23 +156,24 @@ impl AdaptationSection {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Settings {
-    /// Minimum benefit of a new plan over a valid current plan, in the metric's unit. 0 is any benefit.
+    /// Minimum benefit of a new plan over a valid current plan, in the metric's unit. With 0, any benefit is
+    /// sufficient.
     pub minimum_benefit: BigRational,
     /// Time for which a design must be available again before a better plan is sought. Default: 5 s.
     pub settle: Duration,
-    /// Time limit of one plan, after which the incumbent is used. Default: 10 s.
+    /// Time limit of one search for a plan. At the limit, the incumbent is used. Default: 10 s.
     pub time_limit: Option<Duration>,
     /// Whether to prefer, among optimal plans of equal length, one that shares most steps with the current plan. The
     /// choice then depends on the history, and not only on the situation.
     pub stay_close: bool,
     /// Filters for measurements and component reports.
     pub filters: FilterSettings,
-    /// Immediate reaction if the action under way cannot go on unchanged.
+    /// Effect requested before planning if the action under way cannot continue unchanged: other designs or suspension.
     pub safe_reaction: SafeReaction,
     /// Minimum time after which an unacknowledged effect, or an action without reports, is overdue. 0 disables
     /// deadlines. Default: 10 s.
     pub deadline: Duration,
-    /// Factor of an action's expected duration after which an action without reports is overdue.
+    /// Multiple of an action's expected duration after which the action is overdue if no report arrives. Default: 3.
     pub deadline_factor: f64,
     /// Unit of the domain's times.
     pub time_unit: TimeUnit,
@@ -186,7 +187,8 @@ impl Settings {
         Self { settle: Duration::ZERO, filters: FilterSettings::none(), ..Self::default() }
     }
 
-    /// Reads a file that contains only the section `adaptation`. Its names refer to a knowledge base.
+    /// Reads the settings from a file that contains only the section `adaptation`. Names of components and attributes
+    /// in the file must occur in `knowledge`.
     ///
     /// # Errors
     /// The file cannot be read, or contains errors; all of them are returned.
@@ -210,7 +212,7 @@ impl Settings {
         Errors::unless_empty(origin.quote(mistakes))
     }
 
-    /// Warnings for settings with which noise changes designs, for `lint`.
+    /// Returns warnings, for `lint`, about settings with which sensor noise causes reconfigurations.
     pub(crate) fn doubts(&self, knowledge: Option<&Knowledge>) -> Vec<Message> {
         let mut doubts = self.filters.doubts(knowledge);
         if self.settle.is_zero() && knowledge.is_some() {
@@ -294,12 +296,12 @@ impl Default for Settings {
     }
 }
 
-/// Default settle time. A better plan is not urgent, and a driver that its supervisor restarts fails and recovers
-/// within seconds.
+/// Default of [`Settings::settle`]. A better plan is not urgent, and a driver that its supervisor restarts fails and
+/// recovers within seconds.
 const SETTLE: Duration = Duration::from_secs(5);
 
-/// Default deadline.
+/// Default of [`Settings::deadline`].
 const DEADLINE: Duration = Duration::from_secs(10);
 
-/// Default time limit of one plan. The robot waits during planning.
+/// Default time limit of one search for a plan. The robot waits during planning.
 const TIME_LIMIT: Duration = Duration::from_secs(10);

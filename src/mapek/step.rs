@@ -1,4 +1,4 @@
-//! Steps of a plan with exact numbers, and their serialization for the journal.
+//! Plan steps with rational durations and costs, and their serialization as JSON and for the journal.
 
 use std::borrow::Cow;
 
@@ -12,14 +12,15 @@ use serde_json::{Map, Value, json};
 use crate::mission::Mission;
 use crate::number;
 
-/// An action with its configuration.
+/// A step of a plan: a ground action with the design chosen for each function.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlannedStep {
     /// Name of the action schema.
     pub action: String,
-    /// All arguments in the order of the schema's parameters, designs among them.
+    /// All arguments, including designs, in the order of the schema's parameters.
     pub arguments: Vec<String>,
-    /// Number of arguments in the domain file. The knowledge base adds the others to a plain domain.
+    /// Number of leading arguments whose parameters the domain file declares. The knowledge base adds parameters for
+    /// designs to a plain domain.
     pub written: usize,
     /// Functions with their chosen designs, in the order of the parameters.
     pub configuration: Vec<(String, String)>,
@@ -29,7 +30,7 @@ pub struct PlannedStep {
     pub cost: BigRational,
 }
 
-/// JSON object of the format.
+/// Serializes the step as an object of the JSON output.
 impl Serialize for PlannedStep {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut object = serializer.serialize_map(None)?;
@@ -80,15 +81,15 @@ impl PlannedStep {
         }
     }
 
-    /// The action with all arguments in PDDL syntax: `(move a b)`.
+    /// Returns the action with all arguments in PDDL syntax: `(move a b)`.
     pub fn call(&self) -> String {
         let words: Vec<&str> =
             std::iter::once(&self.action).chain(&self.arguments).map(String::as_str).collect();
         format!("({})", words.join(" "))
     }
 
-    /// Short text in which functions and designs are not repeated as arguments: `move wp1 wp2 (f_localization =
-    /// fd_amcl_kinect)`.
+    /// Returns a short text in which functions and designs are not repeated as arguments: `move wp1 wp2 (f_localization
+    /// = fd_amcl_kinect)`.
     pub fn summary(&self) -> String {
         let configured = |word: &str| self.configuration.iter().any(|(f, d)| f == word || d == word);
         let mut text = self.action.clone();
@@ -100,7 +101,7 @@ impl PlannedStep {
         if pairs.is_empty() { text } else { format!("{text} ({})", pairs.join(", ")) }
     }
 
-    /// The arguments, with `None` in place of designs.
+    /// Returns the arguments, with `None` in place of designs.
     pub fn context(&self) -> Vec<Option<&str>> {
         let is_design = |word: &str| self.configuration.iter().any(|(_, design)| design == word);
         self.arguments.iter().map(|word| (!is_design(word)).then_some(word.as_str())).collect()
@@ -111,12 +112,13 @@ impl PlannedStep {
         number::to_f64(&self.duration)
     }
 
-    /// Design chosen for a function.
+    /// Returns the design chosen for `function`, or `None` if the step does not use the function.
     pub fn design(&self, function: &str) -> Option<&str> {
         self.configuration.iter().find(|(name, _)| name == function).map(|(_, design)| design.as_str())
     }
 
-    /// Returns the action with another design for a function.
+    /// Returns the step with `design` in place of the current design of `function`. A step without this function is
+    /// returned unchanged.
     #[must_use]
     pub fn with_design(&self, function: &str, design: &str) -> Self {
         let Some(old) = self.design(function).map(ToOwned::to_owned) else { return self.clone() };
@@ -142,7 +144,7 @@ impl PlannedStep {
         }
     }
 
-    /// Writes the fields after the name of the step.
+    /// Writes all JSON fields except the action's name: arguments, configuration, duration and cost.
     pub(crate) fn fields<M: SerializeMap>(&self, object: &mut M) -> Result<(), M::Error> {
         let written = self.arguments.get(..self.written).unwrap_or(&self.arguments);
         object.serialize_entry("arguments", written)?;
@@ -163,7 +165,7 @@ impl PlannedStep {
         ])
     }
 
-    /// Inverse of [`PlannedStep::to_record`].
+    /// Inverse of [`PlannedStep::to_record`]. Returns `None` if the record is malformed.
     pub(crate) fn from_record(record: &Value) -> Option<Self> {
         let text = |value: &Value| value.as_str().map(ToOwned::to_owned);
         let [action, arguments, written, configuration, duration, cost] = record.as_array()?.as_slice()
@@ -181,12 +183,12 @@ impl PlannedStep {
     }
 }
 
-/// Converts functions with designs to an object of the format.
+/// Converts pairs of function and design to a JSON object with the functions as keys.
 pub(super) fn configuration_to_json(configuration: &[(String, String)]) -> Map<String, Value> {
     configuration.iter().map(|(function, design)| (function.clone(), json!(design))).collect()
 }
 
-/// Parses functions with designs from the journal's array of pairs.
+/// Parses the journal's array of pairs of function and design. Returns `None` if the array is malformed.
 pub(super) fn configuration_from_record(record: &Value) -> Option<Vec<(String, String)>> {
     let text = |value: &Value| value.as_str().map(ToOwned::to_owned);
     let pair = |value: &Value| Some((text(value.get(0)?)?, text(value.get(1)?)?));

@@ -1,8 +1,9 @@
 //! Planning in parallel to the loop: a copy of the loop plans on another thread while the loop reacts to observations.
 //!
-//! The copy deliberates, and records its questions with the answers. The loop then deliberates with these answers,
-//! without a search, if no observation has changed the question meanwhile. Progress of the action under way, ticks, and
-//! repeated reports do not change the question, but after progress the plan is no longer proved optimal.
+//! The copy records each planning problem (*question*) with its outcome. The loop then uses the recorded outcomes
+//! without a search, provided that no observation has changed the question in the meantime. Progress of the action
+//! under way, ticks, and repeated reports do not change the question. After such progress, however, the plan is no
+//! longer reported as optimal.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -15,7 +16,7 @@ use crate::mapek::control::Loop;
 use crate::mapek::event::{Event, Observation};
 use crate::mapek::memo::StoredQuestion;
 
-/// A copy of a loop that deliberates on another thread.
+/// A copy of an adaptation loop that computes plans on another thread.
 #[derive(Debug)]
 pub struct Thinker {
     control: Loop,
@@ -32,12 +33,13 @@ pub struct Thoughts {
 }
 
 impl Thinker {
-    /// Flag that interrupts planning when set.
+    /// Returns the flag that interrupts planning once it is set to `true`.
     pub fn stop(&self) -> Arc<AtomicBool> {
         self.limits.interrupt()
     }
 
-    /// Computes the plans that the next deliberation of the loop needs.
+    /// Computes the plans for the pending decisions of the copied loop. [`Loop::deliberate_with`] applies them to the
+    /// loop.
     pub fn think(mut self) -> Thoughts {
         self.control.planner.question_log = Some(Vec::new());
         self.control.deliberate();
@@ -54,13 +56,14 @@ impl Loop {
         Thinker { control, limits }
     }
 
-    /// Returns `true` if the planning problem has not changed since the copy was made, and planning was not
+    /// Returns `true` if `thoughts` are plans for the loop's current planning problem, and planning was not
     /// interrupted.
     pub fn is_answered_by(&self, thoughts: &Thoughts) -> bool {
         !thoughts.is_stopped && thoughts.question == self.question
     }
 
-    /// Returns `true` if an observation mentions an action or an effect that has not been requested yet.
+    /// Returns `true` if an observation mentions an action or an effect whose number has not been used in a request
+    /// yet.
     pub fn is_ahead(&self, observation: &Observation) -> bool {
         let beliefs = self.beliefs();
         observation.events.iter().flatten().any(|event| match event {
@@ -76,7 +79,7 @@ impl Loop {
         })
     }
 
-    /// Number of the current planning problem. Plans for another number are obsolete.
+    /// Returns the number of the current planning problem. Plans for another number are obsolete.
     pub fn question(&self) -> u64 {
         self.question
     }
@@ -97,13 +100,14 @@ impl Loop {
         Some(answers)
     }
 
-    /// Runs [`Loop::deliberate`] with computed plans. Returns `None` if they are incomplete or do not fit the
-    /// situation; the loop is then unchanged. With `is_late`, the planning problem may have changed since.
+    /// Runs [`Loop::deliberate`] with the plans in `thoughts`. Returns `None` and leaves the loop unchanged if a plan
+    /// is missing or does not fit the situation. With `is_late`, plans for an earlier planning problem are accepted,
+    /// too.
     pub fn deliberate_with(&mut self, thoughts: Thoughts, is_late: bool) -> Option<Vec<Answer>> {
         if thoughts.is_stopped || !self.is_answered_by(&thoughts) && !is_late {
             return None;
         }
-        // A checkpoint covers only changes before the first plan, so that the whole loop is copied.
+        // A checkpoint covers only changes before the first plan. Therefore, the whole loop is copied.
         let before = self.clone();
         self.planner.prepared = thoughts.answers.into();
         self.planner.forbids_search = true;

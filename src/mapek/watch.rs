@@ -1,10 +1,11 @@
-//! Observation of planning from another thread. Has no clock and no thread.
+//! Shared handle by which another thread reads the progress of a planning run. This module starts no thread and reads
+//! no clock.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
 use num_rational::BigRational;
 
-/// Shared handle to the progress of a loop's planner. Clones share the progress.
+/// Handle to the progress of the adaptation loop's planner. Clones refer to the same progress.
 #[derive(Debug, Clone, Default)]
 pub struct Watch(Arc<Mutex<WatchState>>);
 
@@ -17,7 +18,7 @@ struct WatchState {
 /// Progress of a planning run.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Planning {
-    /// Number of the planning run, from 1.
+    /// Serial number of the planning run; the first run has number 1.
     pub number: u64,
     /// Cost of the incumbent, if reported.
     pub cost: Option<BigRational>,

@@ -1,10 +1,11 @@
 //! Filter for the samples of one attribute: plausibility, hysteresis, debounce and staleness.
 //!
-//! Bounds of designs divide the values of an attribute into *cells*: within a cell each bound is either kept or missed.
-//! A value of the believed cell is accepted at once. A bound is missed as soon as a sample misses it. It is kept again
-//! only after a sample that keeps it by at least its band (a Schmitt trigger whose lower threshold is the bound \[1\]).
-//! If a lower bound of one design and an upper bound of another are within one band, each crossing makes a design
-//! unavailable. Either cell is then left only by a sample beyond the band. Crossings are debounced.
+//! Bounds of designs divide the values of an attribute into *cells*: within a cell, each bound is either satisfied
+//! (kept) or violated (missed). A sample in the cell of the believed value is accepted at once. A bound counts as
+//! violated as soon as a sample violates it. It counts as satisfied again only after a sample that satisfies it by at
+//! least its band (a Schmitt trigger whose lower threshold is the bound \[1\]). If a lower bound of one design and an
+//! upper bound of another are within one band, each crossing makes a design unavailable. In this case, only a sample
+//! beyond the band leaves either cell. Crossings are debounced.
 //!
 //! Times are in microseconds and monotonic. Additional calls of [`AttributeFilter::elapse`] do not change the accepted
 //! values.
@@ -22,9 +23,9 @@ pub(crate) type Micros = u64;
 /// Side of a bound on which a design can be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Side {
-    /// At least the bound.
+    /// Values that are at least the bound, i.e. a lower bound.
     Least,
-    /// At most the bound.
+    /// Values that are at most the bound, i.e. an upper bound.
     Most,
 }
 
@@ -35,7 +36,8 @@ pub(crate) struct Bound {
     pub value: BigRational,
     /// Side on which the design can be used.
     pub side: Side,
-    /// Distance by which a sample must keep a missed bound, in the attribute's unit.
+    /// Hysteresis: distance by which a sample must satisfy a violated bound before the bound counts as satisfied again,
+    /// in the attribute's unit.
     pub band: BigRational,
 }
 
@@ -63,61 +65,63 @@ impl Stale {
     }
 }
 
-/// Filter of one attribute. Any values are valid; the default accepts every sample at once.
+/// Filter of one attribute. Any field values are valid; the default accepts every sample at once.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct AttributeFilter {
     /// Bounds of designs, in any order.
     pub bounds: Vec<Bound>,
-    /// Number of the last `of` samples that must lie in another cell than the believed value; 0 and 1 disable the
-    /// condition.
+    /// Number of the last `of` samples that must have crossed a bound before the crossing is believed; 0 and 1 disable
+    /// the condition.
     pub agree: usize,
-    /// Number of considered samples; at least `agree`.
+    /// Number of latest samples that `agree` considers; values below `agree` have the effect of `agree`.
     pub of: usize,
-    /// Time for which all samples must lie in another cell than the believed value.
+    /// Time for which all samples must have crossed a bound before the crossing is believed.
     pub debounce: Micros,
     /// Least plausible value.
     pub minimum: Option<BigRational>,
     /// Greatest plausible value.
     pub maximum: Option<BigRational>,
-    /// Greatest plausible distance between two samples; a second sample within this distance confirms a jump.
+    /// Greatest plausible distance between consecutive samples. A sample at a greater distance is rejected, unless the
+    /// previous sample was rejected, too, and lies within this distance.
     pub jump: Option<BigRational>,
-    /// Time after a plausible sample at which the sensor counts as silent.
+    /// Time without a plausible sample after which the sensor counts as silent; `None` for never.
     pub period: Option<Micros>,
-    /// Outcome for a silent sensor.
+    /// Value that is believed while the sensor is silent.
     pub stale: Stale,
 }
 
-/// Memory of the filter of one attribute.
+/// State of the filter of one attribute.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct AttributeState {
     /// Value that was accepted last.
     believed: Option<BigRational>,
-    /// Last plausible sample.
+    /// Last plausible sample; `None` after silence.
     plausible: Option<BigRational>,
     /// Last sample rejected as a jump.
     suspect: Option<BigRational>,
-    /// For each of the last samples, oldest first: whether it lies in another cell than the believed value.
+    /// For each of the last samples, oldest first, whether the sample has crossed a bound relative to the believed
+    /// value.
     recent: VecDeque<bool>,
-    /// Time since which all samples lie in another cell, and the last of these samples.
+    /// Time since which all samples have crossed a bound, and the last of these samples; `None` without a crossing.
     crossing: Option<(Micros, BigRational)>,
     /// Time of the last plausible sample.
     last_sample_time: Option<Micros>,
     /// Whether the sensor counts as silent.
     silent: bool,
-    /// Number of held samples since the last change of cell.
+    /// Number of samples held back since a crossing of a bound was last believed.
     pub held: u64,
 }
 
-/// Reason for holding a sample.
+/// Reason why a sample is held back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Hold {
-    /// It is outside the plausible range.
+    /// The sample is outside the plausible range.
     Range,
-    /// It is farther from the sample before than is plausible.
+    /// The sample is implausibly far from the previous sample.
     Jump,
-    /// It is within the band of a bound that was missed.
+    /// The sample satisfies a violated bound, but by less than the hysteresis.
     Hysteresis,
-    /// It has crossed a bound for too short a time, or with too few samples.
+    /// Samples have crossed a bound for too short a time, or too few of them agree.
     Debounce,
 }
 
@@ -133,11 +137,11 @@ impl Hold {
     }
 }
 
-/// Verdict on a sample.
+/// Result of filtering a sample.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Verdict {
-    /// Newly believed value. It differs from the sample if the sample crosses some of the bounds by less than their
-    /// bands.
+    /// Newly believed value. The value differs from the sample if the sample satisfies some violated bounds by less
+    /// than their hysteresis.
     Accepted(BigRational),
     /// The sample is held, and the believed value is unchanged.
     Held(Hold),
@@ -146,14 +150,15 @@ pub(crate) enum Verdict {
 /// Change of a filter's state by the passage of time, without a sample.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Elapsed {
-    /// A crossing has lasted for the debounce time. Newly believed value.
+    /// A crossing of a bound has lasted for the debounce time. Contains the newly believed value.
     Accepted(BigRational),
-    /// The sensor counts as silent since its last plausible sample. Newly believed value with the outcome `worst`.
+    /// The sensor counts as silent from now on. Contains the newly believed value if the filter uses [`Stale::Worst`]
+    /// and has bounds.
     Silent(Option<BigRational>),
 }
 
 impl AttributeFilter {
-    /// Filters a sample. Call [`AttributeFilter::elapse`] for earlier due times first.
+    /// Filters a sample. Call [`AttributeFilter::elapse`] first, so that changes with earlier due times are applied.
     pub(crate) fn sample(&self, state: &mut AttributeState, now: Micros, value: &BigRational) -> Verdict {
         let verdict = self.judge(state, now, value);
         if matches!(verdict, Verdict::Held(_)) {
@@ -198,8 +203,8 @@ impl AttributeFilter {
         if self.is_confirmed(state, now) { self.accept(state, value) } else { Verdict::Held(Hold::Debounce) }
     }
 
-    /// Returns `true` if a sample is implausibly far from the previous one, and the last rejected sample does not
-    /// confirm it.
+    /// Returns `true` if a sample is implausibly far from the last plausible sample, and also from the last sample that
+    /// was rejected as a jump.
     fn is_jump(&self, state: &AttributeState, value: &BigRational) -> bool {
         let Some(jump) = &self.jump else { return false };
         let is_near = |sample: &BigRational| {
@@ -217,7 +222,7 @@ impl AttributeFilter {
         lasted && agreeing >= self.agree
     }
 
-    /// Believes a sample that has crossed bounds.
+    /// Believes a sample whose crossing of bounds is confirmed, and ends the crossing.
     fn accept(&self, state: &mut AttributeState, value: &BigRational) -> Verdict {
         let target =
             state.believed.as_ref().map_or_else(|| value.clone(), |current| self.target(current, value));
@@ -228,32 +233,35 @@ impl AttributeFilter {
         Verdict::Accepted(target)
     }
 
-    /// Time at which something becomes due without a sample.
+    /// Returns the earliest time at which a crossing is confirmed or the sensor becomes silent without a further
+    /// sample.
     pub(crate) fn due(&self, state: &AttributeState) -> Option<Micros> {
         let silent = self.silent_at(state);
         let confirmed = self.confirmed_from(state);
         [silent, confirmed].into_iter().flatten().min()
     }
 
-    /// Time at which the sensor will count as silent; `None` if it already does.
+    /// Returns the time at which the sensor will count as silent; `None` if the sensor is silent already or has no
+    /// period.
     fn silent_at(&self, state: &AttributeState) -> Option<Micros> {
         let period = self.period.filter(|_| !state.silent)?;
         Some(state.last_sample_time.unwrap_or(0).saturating_add(period).saturating_add(1))
     }
 
-    /// Time at which a crossing will have lasted for the debounce time; `None` if too few samples agree.
+    /// Returns the time at which a crossing has lasted for the debounce time; `None` without a crossing or if too few
+    /// samples agree.
     fn confirmed_from(&self, state: &AttributeState) -> Option<Micros> {
         let (since, _) = state.crossing.as_ref()?;
         let confirmed = since.saturating_add(self.debounce);
         self.is_confirmed(state, confirmed).then_some(confirmed)
     }
 
-    /// Starts the period of silence, unless a sample has arrived.
+    /// Starts the period of silence at `now`, unless it was started before or a sample has arrived.
     pub(crate) fn begin(state: &mut AttributeState, now: Micros) {
         state.last_sample_time.get_or_insert(now);
     }
 
-    /// Returns the first change that is due at a time. Call until it returns `None`.
+    /// Applies and returns the first change that is due at `now`. Must be called until the result is `None`.
     pub(crate) fn elapse(&self, state: &mut AttributeState, now: Micros) -> Option<Elapsed> {
         let due = self.due(state).filter(|due| *due <= now)?;
         if self.confirmed_from(state) == Some(due) {
@@ -275,13 +283,13 @@ impl AttributeFilter {
         Some(Elapsed::Silent(worst))
     }
 
-    /// Whether a value keeps each bound, in the order of the bounds.
+    /// Returns the cell of a value: for each bound, whether the value satisfies the bound.
     fn cell(&self, value: &BigRational) -> Vec<bool> {
         self.bounds.iter().map(|bound| bound.keeps(value)).collect()
     }
 
-    /// Value to be believed after a sample, without debouncing: the sample, or a value that still misses those bounds
-    /// that the sample keeps by less than their bands.
+    /// Returns the value to be believed after a sample, without debouncing. This is the sample, unless the sample
+    /// satisfies violated bounds by less than their bands. Then a value is returned that still violates these bounds.
     fn target(&self, believed: &BigRational, sample: &BigRational) -> BigRational {
         let is_missed =
             |bound: &&Bound| !bound.keeps(believed) && bound.keeps(sample) && !bound.keeps_clearly(sample);
@@ -294,7 +302,7 @@ impl AttributeFilter {
         if self.cell(&target) == self.cell(believed) { believed.clone() } else { target }
     }
 
-    /// A value that misses a bound, between this bound and the next one.
+    /// Returns a value that violates `bound`, between the bound and the next bound on the violated side.
     fn beyond(&self, bound: &Bound) -> BigRational {
         let two = BigRational::from_integer(2.into());
         let values = self.bounds.iter().map(|neighbour| &neighbour.value);
@@ -311,7 +319,7 @@ impl AttributeFilter {
         }
     }
 
-    /// The value that keeps the fewest bounds; the least of several. `None` without bounds.
+    /// Returns a value that satisfies the fewest bounds, the lowest one if several do. Returns `None` without bounds.
     pub(crate) fn worst(&self) -> Option<BigRational> {
         let unit = BigRational::from_integer(1.into());
         let two = BigRational::from_integer(2.into());
@@ -351,12 +359,12 @@ impl Bound {
 }
 
 impl AttributeState {
-    /// Initial memory of a filter with a believed value.
+    /// Returns the initial state of a filter with a believed value.
     pub(crate) fn believing(value: Option<BigRational>) -> Self {
         Self { believed: value, ..Self::default() }
     }
 
-    /// Serializes the memory for a snapshot.
+    /// Serializes the state for a snapshot.
     pub(crate) fn to_record(&self) -> Value {
         let text = |value: &Option<BigRational>| value.as_ref().map(ToString::to_string);
         json!([
@@ -371,7 +379,7 @@ impl AttributeState {
         ])
     }
 
-    /// Inverse of [`AttributeState::to_record`].
+    /// Inverse of [`AttributeState::to_record`]. Returns `None` if the record is malformed.
     pub(crate) fn from_record(record: &Value) -> Option<Self> {
         let [believed, plausible, suspect, recent, crossing, last_sample_time, silent, held] =
             record.as_array()?.as_slice()

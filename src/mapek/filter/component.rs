@@ -14,19 +14,20 @@ pub(crate) struct ComponentFilter {
     pub heal: Micros,
 }
 
-/// Memory of the filter of one component.
+/// State of the filter of one component.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct ComponentState {
     /// Whether the component is believed to have failed; `None` if unknown.
     has_failed: Option<bool>,
-    /// Time since which all reports differ from the belief, and the last of these reports.
+    /// Time since which all reports differ from the believed status, and the last reported status; `None` if the last
+    /// report agrees.
     change: Option<(Micros, Status)>,
-    /// Number of held reports since the last change.
+    /// Number of reports held back since the last change of the believed status.
     pub held: u64,
 }
 
 impl ComponentFilter {
-    /// Filters a report. Returns `true` if it is believed.
+    /// Filters a reported status. Returns `true` if the status is believed from now on.
     pub(crate) fn report(&self, state: &mut ComponentState, now: Micros, status: Status) -> bool {
         let fails = status == Status::Failed;
         if state.has_failed.unwrap_or(false) == fails {
@@ -44,13 +45,14 @@ impl ComponentFilter {
         false
     }
 
-    /// Time at which a change is confirmed without a further report.
+    /// Returns the time at which a reported change will be believed without a further report; `None` without such a
+    /// change.
     pub(crate) fn due(&self, state: &ComponentState) -> Option<Micros> {
         let (since, status) = state.change.as_ref()?;
         Some(since.saturating_add(self.time(*status)))
     }
 
-    /// Returns the newly believed status if a change is confirmed at a time.
+    /// Applies a change of status that is due at `now`, and returns the newly believed status.
     pub(crate) fn elapse(&self, state: &mut ComponentState, now: Micros) -> Option<Status> {
         self.due(state).filter(|due| *due <= now)?;
         let (_, status) = state.change?;
@@ -69,17 +71,17 @@ impl ComponentFilter {
 }
 
 impl ComponentState {
-    /// Initial memory of a filter with a belief.
+    /// Returns the initial state of a filter, with the belief whether the component has failed.
     pub(crate) fn believing(has_failed: Option<bool>) -> Self {
         Self { has_failed, ..Self::default() }
     }
 
-    /// Serializes the memory for a snapshot.
+    /// Serializes the state for a snapshot.
     pub(crate) fn to_record(&self) -> Value {
         json!([self.has_failed, self.change.map(|(since, status)| json!([since, word(status)])), self.held])
     }
 
-    /// Inverse of [`ComponentState::to_record`].
+    /// Inverse of [`ComponentState::to_record`]. Returns `None` if the record is malformed.
     pub(crate) fn from_record(record: &Value) -> Option<Self> {
         let [has_failed, change, held] = record.as_array()?.as_slice() else { return None };
         Some(Self {

@@ -1,8 +1,8 @@
-//! Filters between sensor reports and beliefs: a pure function of samples, reports and their times.
+//! Noise filters between the robot's reports and the beliefs. The output depends only on the reports and their times.
 //!
 //! [`Filters`] is the configuration, from the section `adaptation` of a manifest and the bounds of the knowledge base.
-//! [`FilterStates`] is the memory, a part of the beliefs and of snapshots. Filters have no clock: times are given by
-//! observations.
+//! [`FilterStates`] is the state, a part of the beliefs and of snapshots. Filters have no clock: observations provide
+//! the times.
 
 mod attribute;
 mod component;
@@ -31,7 +31,8 @@ use crate::message::Message;
 use crate::number;
 
 impl FilterSettings {
-    /// Warnings for attributes whose noise changes designs, for `lint`.
+    /// Returns warnings, for `lint`, about attributes and components whose noise causes reconfigurations: attributes
+    /// without hysteresis and debounce, and components without `heal_time`.
     pub(crate) fn doubts(&self, knowledge: Option<&Knowledge>) -> Vec<Message> {
         let filters = Filters::new(self, knowledge);
         let is_noisy = |(_, filter): &(&String, &AttributeFilter)| {
@@ -56,7 +57,7 @@ impl FilterSettings {
     }
 }
 
-/// Filters by local name.
+/// Configured filters of measured attributes and components, by local name.
 #[derive(Debug, Clone)]
 pub(crate) struct Filters {
     measured: BTreeMap<String, AttributeFilter>,
@@ -65,7 +66,7 @@ pub(crate) struct Filters {
     has_components: bool,
 }
 
-/// Memory of all filters.
+/// States of all filters, by local name of the attribute or component.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct FilterStates {
     measured: BTreeMap<String, AttributeState>,
@@ -84,7 +85,7 @@ pub(crate) enum Accepted {
 }
 
 impl Filters {
-    /// Filters from the settings and the bounds of a knowledge base.
+    /// Creates the filters from the settings and the bounds stated by the designs of `knowledge`.
     pub(crate) fn new(settings: &FilterSettings, knowledge: Option<&Knowledge>) -> Self {
         let mut bounds = knowledge.map(stated_bounds).unwrap_or_default();
         for name in settings.measured.keys() {
@@ -124,7 +125,8 @@ impl Filters {
         }
     }
 
-    /// Initial memory with the values and statuses that the knowledge base states.
+    /// Returns the initial states. The values stated by the knowledge base are believed, and so are the stated statuses
+    /// of components that have not failed.
     pub(crate) fn states(&self, knowledge: Option<&Knowledge>) -> FilterStates {
         let Some(knowledge) = knowledge else { return FilterStates::default() };
         let view = knowledge.view();
@@ -142,7 +144,8 @@ impl Filters {
         }
     }
 
-    /// Filters a sample of an attribute. Returns the newly believed value, or `None` if the sample is held.
+    /// Filters a sample of an attribute. Returns the newly believed value, or `None` if the sample is held back. Some
+    /// of the held samples are reported in `answers`.
     pub(crate) fn sample(
         &self,
         states: &mut FilterStates,
@@ -174,7 +177,8 @@ impl Filters {
         }
     }
 
-    /// Filters a report of a component. Returns `true` if it is believed.
+    /// Filters a status reported for a component. Returns `true` if the status is believed from now on. Some of the
+    /// held reports are mentioned in `answers`.
     pub(crate) fn report(
         &self,
         states: &mut FilterStates,
@@ -199,7 +203,8 @@ impl Filters {
         is_believed
     }
 
-    /// Time at which something becomes due without a report.
+    /// Returns the earliest time at which a filter changes a belief, or reports a silent sensor, without a further
+    /// report.
     pub(crate) fn due(&self, states: &FilterStates) -> Option<Duration> {
         let measured =
             self.measured.iter().filter_map(|(name, filter)| filter.due(states.measured.get(name)?));
@@ -209,7 +214,8 @@ impl Filters {
         measured.chain(components).min().map(Duration::from_micros)
     }
 
-    /// Returns the changes that are due at a time: first those of attributes, then those of components.
+    /// Applies and returns the changes of belief that are due at `now` without a further report: first changes of
+    /// attributes, then changes of components.
     pub(crate) fn elapse(
         &self,
         states: &mut FilterStates,
@@ -246,7 +252,7 @@ impl Filters {
 }
 
 impl Accepted {
-    /// Converts the report for the knowledge base.
+    /// Returns the name of the attribute or component, and the report in the form for the knowledge base.
     pub(crate) fn report(&self) -> (&str, RobotReport) {
         match self {
             Self::Value(name, value) => (name, RobotReport::measured(value)),
@@ -257,14 +263,14 @@ impl Accepted {
 }
 
 impl FilterStates {
-    /// Serializes the memory for a snapshot.
+    /// Serializes the states for a snapshot.
     pub(crate) fn to_record(&self) -> Value {
         let measured = self.measured.iter().map(|(name, state)| (name.clone(), state.to_record()));
         let components = self.components.iter().map(|(name, state)| (name.clone(), state.to_record()));
         json!([Value::Object(measured.collect()), Value::Object(components.collect())])
     }
 
-    /// Inverse of [`FilterStates::to_record`].
+    /// Inverse of [`FilterStates::to_record`]. Returns `None` if the record is malformed.
     pub(crate) fn from_record(record: &Value) -> Option<Self> {
         let [measured, components] = record.as_array()?.as_slice() else { return None };
         let measured = measured.as_object()?.iter();
@@ -280,7 +286,8 @@ impl FilterStates {
     }
 }
 
-/// Bounds on measured attributes from the designs of a knowledge base, by local name of the attribute.
+/// Returns the bounds that the designs of a knowledge base state for measured attributes. The key is the local name of
+/// the attribute; the side is the one on which the design can be used.
 fn stated_bounds(knowledge: &Knowledge) -> BTreeMap<String, Vec<(BigRational, Side)>> {
     let view = knowledge.view();
     let operator = |iri: &str| {

@@ -14,13 +14,13 @@ use crate::mapek::filter::settings::{ComponentTimes, FilterSettings, MeasuredSet
 use crate::message::Message;
 use crate::number;
 
-/// A number of a manifest that has not been read yet.
+/// An optional, unparsed number of a manifest, with its position in the file.
 type Number = Option<Spanned<toml::Value>>;
 
-/// Sections of components, by name.
+/// Sections `adaptation.components.NAME` of a manifest, by component.
 pub(crate) type ComponentsSection = BTreeMap<String, ComponentSection>;
 
-/// Sections of attributes, by name.
+/// Sections `adaptation.measured.NAME` of a manifest, by attribute.
 pub(crate) type MeasuredsSection = BTreeMap<String, MeasuredSection>;
 
 /// The section `adaptation.components.NAME` of a manifest.
@@ -84,7 +84,7 @@ pub struct MeasuredSection {
     stale: Stale,
 }
 
-/// Reads the settings of all filters.
+/// Parses the settings of all filters, with defaults for missing keys.
 ///
 /// # Errors
 /// The first value that is not a number, or out of range.

@@ -1,4 +1,4 @@
-//! Settings of all filters of a mission.
+//! Settings of a mission's noise filters for measurements and component reports.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -9,13 +9,15 @@ use crate::knowledge::Knowledge;
 use crate::mapek::filter::attribute::{AttributeFilter, Bound, Micros, Stale};
 use crate::message::{Message, did_you_mean};
 
-/// Default band as a share of the bound: the repeatability of ordinary sensors is 1 to 2 % of the reading.
+/// Default hysteresis as a share of the bound (numerator, denominator). The repeatability of ordinary sensors is 1 to 2
+/// % of the reading.
 const BAND: (i64, i64) = (1, 50);
 
-/// Default time to confirm a recovery: two reports of a driver that publishes diagnostics once a second.
+/// Default time for which a recovery must be reported. A driver that publishes diagnostics once a second sends two
+/// reports in this time.
 const HEAL: Duration = Duration::from_secs(2);
 
-/// Settings of all filters.
+/// Settings of the filters for measurements and component reports.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct FilterSettings {
@@ -23,15 +25,15 @@ pub struct FilterSettings {
     pub confirm_time: Duration,
     /// Time for which a recovery of a component must be reported before it is believed. Default: 2 s.
     pub heal_time: Duration,
-    /// Band as a share of the bound, for attributes without a hysteresis. Default: 0.02.
+    /// Hysteresis as a share of the bound, for attributes without their own hysteresis. Default: 0.02.
     pub band: BigRational,
-    /// Times of single components, by local name.
+    /// Confirmation times of single components, by local name.
     pub components: BTreeMap<String, ComponentTimes>,
     /// Filters of single attributes, by local name.
     pub measured: BTreeMap<String, MeasuredSettings>,
 }
 
-/// Times of a component. Missing ones default to the times of all components.
+/// Confirmation times of one component. Missing times default to the times in [`FilterSettings`].
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct ComponentTimes {
     /// Time for which a failure must be reported before it is believed.
@@ -40,18 +42,21 @@ pub struct ComponentTimes {
     pub heal_time: Option<Duration>,
 }
 
-/// Filter of a measured attribute. The default uses bands at the bounds of the knowledge base, and nothing else.
+/// Filter of one measured attribute. By default, the filter only applies a hysteresis at the bounds of the knowledge
+/// base.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct MeasuredSettings {
-    /// Band at each bound, in the attribute's unit. Default: a share of the bound.
+    /// Hysteresis: distance from a violated bound at which the bound counts as satisfied again, in the attribute's
+    /// unit. Default: a share of the bound.
     pub hysteresis: Option<BigRational>,
-    /// Bounds that the designs of the knowledge base do not state, such as those in rules.
+    /// Additional bounds at which designs change, such as bounds in rules. The bounds of designs in the knowledge base
+    /// are included automatically.
     pub bounds: Vec<BigRational>,
     /// Number of the last `of` samples that must have crossed a bound; 0 disables the condition.
     pub agree: usize,
-    /// Number of considered samples.
+    /// Number of latest samples that `agree` considers.
     pub of: usize,
-    /// Time for which all samples must have crossed a bound.
+    /// Time for which all samples must have crossed a bound before the crossing is believed.
     pub debounce: Duration,
     /// Least plausible value.
     pub minimum: Option<BigRational>,
@@ -61,7 +66,7 @@ pub struct MeasuredSettings {
     pub jump: Option<BigRational>,
     /// Time without a plausible sample after which the sensor is silent; `None` for never.
     pub period: Option<Duration>,
-    /// Outcome for a silent sensor.
+    /// Value that is believed while the sensor is silent.
     pub stale: Stale,
 }
 
@@ -83,7 +88,8 @@ impl FilterSettings {
         Self { heal_time: Duration::ZERO, band: BigRational::default(), ..Self::default() }
     }
 
-    /// Errors for names that the knowledge base does not have, each with its key below `adaptation`.
+    /// Returns an error for each name that the knowledge base does not have. Each error comes with its key in the
+    /// section `adaptation` (`measured` or `components`) and the unknown name.
     pub(crate) fn mistakes(&self, knowledge: Option<&Knowledge>) -> Vec<(&'static str, String, Message)> {
         let view = knowledge.map(Knowledge::view);
         let attributes: Vec<String> = view
@@ -130,7 +136,7 @@ impl MeasuredSettings {
     }
 }
 
-/// Microseconds of a duration.
+/// Converts a duration to microseconds.
 pub(super) fn micros(time: Duration) -> Micros {
     u64::try_from(time.as_micros()).unwrap_or(u64::MAX)
 }

@@ -1,4 +1,5 @@
-//! Filters against their definitions: the oracles evaluate the whole history at each sample, without memory.
+//! Tests of the filters against their definitions: oracles evaluate the whole history of samples, without incremental
+//! state.
 
 use std::time::Duration;
 
@@ -18,8 +19,8 @@ fn bound(thousandths: i64, side: Side, band: i64) -> Bound {
     Bound { value: value(thousandths), side, band: value(band) }
 }
 
-/// Returns `true` if a bound is kept after some samples. The last sample that misses it, or keeps it by its band,
-/// decides. Without such a sample, the first one decides.
+/// Returns `true` if a bound with hysteresis counts as satisfied after the samples. The last sample that violates the
+/// bound, or satisfies it by at least its band, is decisive. Without such a sample, the first sample is decisive.
 fn is_kept(bound: &Bound, samples: &[BigRational]) -> bool {
     let decisive = samples.iter().rev().find(|sample| !bound.keeps(sample) || bound.keeps_clearly(sample));
     bound.keeps(decisive.unwrap_or(&samples[0]))
@@ -95,12 +96,12 @@ fn noise_within_the_band_crosses_at_most_once() {
     }
 }
 
-/// Samples in thousandths with their times in hundredths of a second; `None` for a tick.
+/// Times, in the unit of the filter's times, with samples in thousandths; `None` for a tick.
 type History = Vec<(u64, Option<i64>)>;
 
-/// Value believed at the end of a history, by definition. A sample of the believed cell counts at once. Another sample
-/// counts if, at some time in the history, all samples of the last `debounce` lie in other cells, and so do `agree` of
-/// the last `of` samples.
+/// Value in thousandths that is believed at the end of a history, computed from the definition of debouncing. A sample
+/// on the believed side of the bound 500 counts at once. Another sample counts if, at some time in the history, all
+/// samples of the last `debounce` and at least `agree` of the last `of` samples lie on the other side.
 fn believed(history: &History, debounce: u64, agree: usize, of: usize) -> i64 {
     let is_high = |value: i64| value > 500;
     let mut current = history.iter().find_map(|(_, sample)| *sample).expect("a sample");
@@ -110,7 +111,7 @@ fn believed(history: &History, debounce: u64, agree: usize, of: usize) -> i64 {
     for now in 0..=end {
         let times: Vec<u64> =
             history.iter().filter(|(_, sample)| sample.is_some()).map(|(time, _)| *time).collect();
-        // The previous sample may complete the time before a sample at the same time counts.
+        // The debounce time of earlier samples may end now, before a sample at the same time counts.
         for inclusive in [false, true] {
             let samples: Vec<(usize, u64, i64)> = history
                 .iter()
@@ -278,7 +279,8 @@ fn a_component_changes_after_reports_agree_for_the_confirmation_time() {
         let mut reports: Vec<(u64, bool)> = Vec::new();
         let mut expected = false;
         for now in 0..50 {
-            // By definition: all reports of the confirmation time differ from the belief.
+            // By definition, a change is believed if all reports of the confirmation time differ from the current
+            // belief.
             let is_ripe = |reports: &[(u64, bool)], believed: bool| {
                 let run = reports.iter().rev().take_while(|(_, fails)| *fails != believed);
                 let since = run.last().map(|(time, _)| *time);

@@ -12,7 +12,7 @@ use crate::mapek::{Loop, Observation, PlannedStep, Settings, Watch};
 use crate::mission::Mission;
 use crate::setup::Setup;
 
-/// A mission with its possible events.
+/// A mission with the event lines from which the test draws at random.
 struct World {
     name: String,
     mission: Mission,
@@ -90,7 +90,7 @@ fn uuv(name: &str) -> World {
     World { name: name.to_owned(), mission: shipped(name), events }
 }
 
-/// The ground vehicle on a grid of `width` by `height` waypoints, with corridors of all kinds.
+/// The ground vehicle on a grid of `width` by `height` waypoints, with corridors of random kinds and lengths.
 fn map(width: usize, height: usize, seed: u64) -> World {
     let mut random = fastrand::Rng::with_seed(seed);
     let count = width * height;
@@ -131,14 +131,15 @@ fn map(width: usize, height: usize, seed: u64) -> World {
 #[derive(Default)]
 struct Tally {
     compared: usize,
-    /// Questions that the incremental planner could not answer.
+    /// Number of planning problems that the incremental planner did not support.
     unanswered: usize,
     live: Duration,
     scratch: Duration,
 }
 
 impl Tally {
-    /// Plans in both ways and compares the results.
+    /// Plans incrementally and from scratch, and asserts that the plans are equal. `goes_on` says whether the action
+    /// under way is continued.
     fn compare(&mut self, control: &mut Loop, goes_on: bool, context: &dyn Fn() -> String) {
         let problem = control.beliefs.filled();
         let running = control.beliefs.running.as_ref().filter(|_| goes_on);
@@ -168,7 +169,8 @@ impl Tally {
     }
 }
 
-/// Applies `count` random events. After each, compares plans with and without the action under way.
+/// Applies `count` random events. After each event, compares incremental plans with plans from scratch, with and
+/// without the action under way.
 fn check(world: &World, seed: u64, count: usize) -> Tally {
     let mut random = fastrand::Rng::with_seed(seed);
     let mut control = Loop::new(world.mission.clone(), Settings::default()).expect("a loop");
