@@ -22,7 +22,7 @@ fn main() {
             Err(fault) => println!("not proved that no plan costs less than {cost}: {fault}"),
         }
     }
-    // The task has a plan, so the claim that there is none is not proved.
+    // The task has a plan, so the claim of unsolvability is not proved.
     match check(TASK, ARGUMENT, None) {
         Ok(_) => println!("there is no plan"),
         Err(Fault::Goal(label)) => println!("there may be a plan: label {label} is a goal"),

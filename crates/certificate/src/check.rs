@@ -61,7 +61,7 @@ pub enum Fault {
         /// Description of the entry or operator that violates the bound.
         reason: String,
     },
-    /// No label covers the initial state, so the induction has no base case.
+    /// The initial state is neither covered by a label nor pruned by a bound.
     #[error("no label covers the initial state")]
     Initial,
     /// A label is a goal state with a smaller cost than claimed.
@@ -217,8 +217,8 @@ impl Checker<'_> {
         })
     }
 
-    /// Returns `true` if every plan through a state, reached at cost `paid`, costs at least the
-    /// claim. A label or a lower bound must prove it.
+    /// Returns `true` if a label or a lower bound proves that every plan through a state, reached
+    /// at cost `paid`, costs at least the claim.
     fn is_covered(&self, state: &State, paid: &Integer) -> bool {
         let too_expensive = self.potentials.iter().any(|potential| match (potential.at(state), &self.cost) {
             (None, _) => true,

@@ -164,7 +164,7 @@ pub(super) fn check_potential(model: &Model, table: &Table<'_>) -> Result<(), St
 
 /// The effect of an operator on a number, as far as needs are concerned.
 enum Use {
-    /// Decreases the number by at most this amount (≥ 0), and requires that the result is at least
+    /// Decreases the number by at least this amount (≥ 0), and requires that the result is at least
     /// 0.
     Lowers(Integer),
     /// Any other effect.

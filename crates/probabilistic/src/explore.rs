@@ -96,7 +96,7 @@ impl<S: Clone, N: Number> Choices<S, N> {
         [self.transitions.len(), self.ends.len(), self.rewards.len()]
     }
 
-    /// Removes everything written after the position `mark()` returned.
+    /// Removes everything that was written after [`Self::mark`] returned this position.
     pub(crate) fn back_to(&mut self, [transitions, ends, rewards]: [usize; 3]) {
         self.transitions.truncate(transitions);
         self.ends.truncate(ends);

@@ -3,8 +3,8 @@
 //! A model is PRISM-language text ([`prism`]) or an [`explore::Generator`] that computes successors
 //! natively. Exploration turns the model into a sparse process ([`mdp`]). [`solve`] computes least
 //! and greatest probabilities and expected rewards with bounds and policies. [`policy`] evaluates a
-//! given policy; [`pareto`] trades two objectives. [`check`] performs all these steps for a
-//! property in PRISM's syntax.
+//! given policy; [`pareto`] computes trade-offs between two objectives. [`check`] performs all
+//! these steps for a property in PRISM's syntax.
 //!
 //! Absent: OWL, PDDL, file access and output.
 

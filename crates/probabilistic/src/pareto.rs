@@ -4,9 +4,10 @@
 //! Each objective is a loss to be minimised: an expected cost until a target is reached, or the
 //! probability of missing a target. Until the first target is reached, a weighted sum of both
 //! losses is minimised. Afterwards only one objective remains, and its optimal value is the
-//! terminal value of the state (Etessami et al., LMCS 4(4:8), 2008). Vertices are searched by the
-//! normals of segments (Forejt, Kwiatkowska and Parker, ATVA 2012). Each vertex is attained by a
-//! policy whose memory is the set of reached targets.
+//! terminal value of the state (Etessami et al., LMCS 4(4:8), 2008). The weights are normals of the
+//! segments between known vertices, so each minimum is a new vertex or proves the segment (Forejt,
+//! Kwiatkowska and Parker, ATVA 2012). Each vertex is attained by a policy whose memory is the set
+//! of reached targets.
 
 use std::collections::VecDeque;
 

@@ -186,7 +186,7 @@ impl<S: Eq + Hash> States<S> {
     }
 
     /// Frees the index from states to numbers. Afterwards, [`number`](Self::number) returns `None`,
-    /// and no state can be inserted.
+    /// and no state may be inserted.
     pub(crate) fn forget_numbers(&mut self) {
         self.numbers = Numbers::Table(Vec::new());
     }

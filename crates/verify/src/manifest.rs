@@ -48,7 +48,7 @@ pub struct Manifest {
     pub format: String,
     /// The claim that the certificate proves.
     pub claim: Claim,
-    /// The refutation, or the reason why there is none.
+    /// The refutation, or the reason for its absence.
     pub refutation: Refutation,
     /// All files of the certificate except the manifest.
     pub files: Vec<File>,

@@ -2,7 +2,7 @@
 //! (RUP) through the clauses that its hints name, in this order. The last clause is empty.
 //!
 //! A clause follows if its negation leads to a contradiction. Each hint names a clause with at most
-//! one literal that is not false. This literal becomes true; if there is none, the clause is the
+//! one literal that is not false. This literal becomes true; without such a literal, the clause is the
 //! contradiction. The check does not search and visits each hint once. The clauses of the formula
 //! are numbered from 1, followed by the clauses of the proof.
 

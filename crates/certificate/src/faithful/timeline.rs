@@ -51,8 +51,8 @@ pub(super) struct Timeline {
 pub(super) struct Passage {
     from: usize,
     to: usize,
-    /// Whether the action starts exactly at the event that begins phase `from`; `at_end` is the
-    /// same for the end and phase `to`.
+    /// Whether the action starts exactly at the event that begins phase `from`. The flag `at_end`
+    /// states this for the end and phase `to`.
     at_start: bool,
     at_end: bool,
     /// The latest start time; `None` if there is no limit.

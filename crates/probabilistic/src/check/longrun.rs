@@ -68,8 +68,8 @@ impl<N: Number> Query<'_, N> {
     pub fn total(&self, direction: Direction, rewards: &[N]) -> Checked<Valued<N>> {
         self.no_given_policy()?;
         if direction == Direction::Min || self.program.kind == ModelKind::Dtmc {
-            // A total is finite only if all rewards are eventually 0 forever, so such states are
-            // the goal.
+            // A total is finite only if rewards are eventually 0 forever. The goal is to reach the
+            // states from which a policy can achieve this.
             let free = self.free_forever(rewards);
             return self.solved(self.problem(Direction::Min, Some(rewards), &free)).map(without_policy);
         }

@@ -94,7 +94,7 @@ pub enum Filter {
 /// The query of an operator: either for its value, or for the comparison of the value with a bound.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Question {
-    /// Whether the minimum or maximum over policies is meant. `None` if the model has only one policy, or if the
+    /// The queried optimum: minimum or maximum over all policies. `None` if the model has only one policy, or if the
     /// bound determines the direction.
     pub direction: Option<Direction>,
     /// Comparison operator and bound; `None` to query the value.

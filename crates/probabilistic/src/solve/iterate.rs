@@ -108,8 +108,8 @@ fn improve<N: Number>(
     Some(changed)
 }
 
-/// Returns a policy that leaves the component with positive probability from every block that can.
-/// Rows are chosen by breadth-first search backwards from the exits.
+/// Returns a policy under which every block from which the component can be left reaches an exit with positive
+/// probability. Rows are chosen by breadth-first search backwards from the exits.
 pub fn leave<N: Number>(quotient: &Quotient<N>) -> Vec<u32> {
     let mut policy = vec![NONE; quotient.blocks()];
     let (owners, users) = (owners(&quotient.first), Users::new(&quotient.rows, quotient.blocks()));

@@ -1,5 +1,5 @@
-//! Solves a problem on a Markov decision process: computes the value of each state with bounds, and
-//! an optimal policy.
+//! Solves a problem on a Markov decision process: computes the value of each state with bounds, and an optimal
+//! policy.
 //!
 //! The strongly connected components of the graph are solved in reverse topological order. The
 //! values of an acyclic part (e.g. a battery that is never recharged) therefore result from a

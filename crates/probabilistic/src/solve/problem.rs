@@ -17,10 +17,9 @@ pub enum Direction {
 
 /// An optimisation problem on a Markov decision process.
 ///
-/// Without rewards, the value of a state is the expected value of the first terminal state on a
-/// path; a path without terminal states counts as 0. With rewards, it is the expected sum of
-/// rewards until a terminal state. This sum is infinite if the probability of reaching a terminal
-/// state is below 1.
+/// Without rewards, the value of a state is the expected value of the first terminal state on a path; a path without
+/// terminal states counts as 0. With rewards, the value is the expected sum of rewards until a terminal state. The
+/// sum is infinite if a terminal state is reached with a probability below 1.
 #[derive(Debug)]
 pub struct Problem<'a, N> {
     /// The Markov decision process.
@@ -34,8 +33,7 @@ pub struct Problem<'a, N> {
     /// The values of the terminal states, indexed by state. By default, they are 1 without rewards
     /// and 0 with rewards.
     pub terminal_values: Option<&'a [N]>,
-    /// States in which a path ends as a failure: with value 0 without rewards, with infinite value
-    /// with rewards.
+    /// States in which a path ends as a failure. Their value is 0 without rewards, and infinite with rewards.
     pub blocked: Option<&'a FixedBitSet>,
     /// The allowed choices; `None` allows all choices. Each nonterminal state needs an allowed
     /// choice.
@@ -102,8 +100,8 @@ pub struct Solution<N> {
 }
 
 impl<N: Number> Solution<N> {
-    /// Returns a lower and an upper bound on the value of a state, or `None` if the value is
-    /// infinite. In exact arithmetic, the bounds are the adjacent doubles.
+    /// Returns a lower and an upper bound on the value of a state, or `None` if the value is infinite. In exact
+    /// arithmetic, the bounds are the closest doubles that enclose the value.
     pub fn bounds(&self, state: usize) -> Option<(f64, f64)> {
         if self.infinite.contains(state) {
             return None;
@@ -136,8 +134,8 @@ pub(crate) struct Run<'a, N> {
 }
 
 impl<N: Number> Run<'_, N> {
-    /// Returns `true` if a state is sure (reaches a terminal state with probability 1) when some
-    /// policy makes it so, and `false` when all policies must.
+    /// Returns `true` if a state counts as sure when some policy reaches a terminal state with probability 1, and
+    /// `false` when all policies must do so.
     pub fn sure_by_choice(&self) -> bool {
         self.problem.rewards.is_some() == (self.problem.direction == Direction::Min)
     }
