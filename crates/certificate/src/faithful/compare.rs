@@ -318,8 +318,8 @@ impl<'c> Comparison<'c> {
         Ok(())
     }
 
-    /// Returns `true` if the operator updates the clock of the task correctly: if the clock
-    /// represents the start time before the case, it represents the end time after the case.
+    /// Returns `true` if the operator leaves the clock of the task unchanged, or advances it from
+    /// the start time to the end time of the case.
     fn keeps_time(&self, (operator, choice): (&Operator, &[u32]), case: &Case) -> bool {
         let Some(number) = self.task.names.numbers.get(&timeline::clock()) else { return true };
         // Time never decreases, so an unchanged clock is a lower bound on the time.

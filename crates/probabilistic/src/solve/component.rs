@@ -232,7 +232,7 @@ impl<N: Number> Run<'_, N> {
         }
     }
 
-    /// Returns the initial policy: the hint if it selects a row for every block, otherwise a policy
+    /// Returns the initial policy: the hint if it selects a row for every block that has rows, otherwise a policy
     /// that leaves the component with probability 1.
     fn start(&self, local: &Local<N>, quotient: &Quotient<N>) -> Vec<u32> {
         let mut policy = vec![NONE; quotient.blocks()];
