@@ -1,4 +1,4 @@
-//! A bound on all plans of a ground task, checked without a planner.
+//! Checks a lower bound on the cost of all plans of a ground task, without a planner.
 //!
 //! `cargo run -p metaplan-certificate --example argument`
 #![expect(clippy::print_stdout, reason = "an example prints")]
@@ -6,7 +6,7 @@
 use metaplan_certificate::{Fault, check};
 use num_rational::BigRational;
 
-/// A task without operators, whose goal holds at first.
+/// A ground task without operators whose goal holds initially.
 const TASK: &str = r#"{"format": "metaplan-task/1", "objects": [], "schemas": [],
   "variables": [["(p)", "none of these"]], "basic": 1, "values": [0], "numbers": [], "fluents": [], "number_scale": 1,
   "slots": [], "uses": [], "exclusions": [], "tables": [], "operators": [], "axioms": [], "goal": {"facts": [[0, 0]]},
@@ -22,7 +22,7 @@ fn main() {
             Err(fault) => println!("not proved that no plan costs less than {cost}: {fault}"),
         }
     }
-    // That there is no plan is not true, and nothing shows it.
+    // The task has a plan, so the claim of unsolvability is not proved.
     match check(TASK, ARGUMENT, None) {
         Ok(_) => println!("there is no plan"),
         Err(Fault::Goal(label)) => println!("there may be a plan: label {label} is a goal"),

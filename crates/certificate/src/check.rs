@@ -1,5 +1,5 @@
-//! Checks an optimality proof against the ground task, by induction over the labels and with
-//! integer arithmetic only.
+//! Checks an optimality proof (argument) against the ground task, by induction over the labels of
+//! the argument. Uses integer arithmetic only.
 
 use std::rc::Rc;
 
@@ -16,30 +16,30 @@ use crate::references;
 use crate::semantics::{State, holds_without_numbers};
 use crate::table::{Table, check_need, check_potential};
 
-/// Upper limit on the number of non-dominated design combinations, summed over all operators.
+/// Upper limit on the number of non-dominated combinations of designs, summed over all operators.
 const CHOICE_LIMIT: usize = 1 << 20;
 /// Upper limit on the number of pairwise comparisons of design combinations, summed over all
-/// operators (about 1 s).
+/// operators; about 1 s of work.
 const COMPARISON_LIMIT: usize = 1 << 25;
-/// Work of visiting one combination, in comparisons.
+/// Work of enumerating one combination of designs, in comparisons.
 const COMBINATION_COST: usize = 2;
 
-/// Sizes of the checked proof.
+/// Sizes of a checked optimality proof.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Checked {
-    /// Number of states in the induction.
+    /// Number of labels, i.e. of states in the induction.
     pub labels: usize,
-    /// Number of tables of lower bounds on cost.
+    /// Number of tables with lower bounds on the remaining cost (potentials).
     pub potentials: usize,
-    /// Number of tables of lower bounds on resources.
+    /// Number of tables with lower bounds on required numeric values (needs).
     pub needs: usize,
 }
 
-/// The first reason for which a certificate is rejected.
+/// The first reason why a certificate is rejected.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Fault {
-    /// A document is not well-formed.
+    /// A document (task or argument) is malformed.
     #[error("{document}: {reason}")]
     Form {
         /// Name of the document.
@@ -47,40 +47,41 @@ pub enum Fault {
         /// Description of the error.
         reason: String,
     },
-    /// No plan of the task can have the claimed cost.
+    /// The claimed cost is not the cost of any plan, because it is not integral in the units of the
+    /// task.
     #[error("no plan of the task can cost {0}")]
     Cost(String),
-    /// A table does not contain lower bounds.
+    /// An entry of a table is not a lower bound.
     #[error("{table} {position} is not a lower bound: {reason}")]
     Bound {
-        /// Kind of the table: `potential` or `need`.
+        /// Kind of the table: `potential` (remaining cost) or `need` (required numeric value).
         table: &'static str,
-        /// Position of the table, from 0.
+        /// Position of the table among the tables of this kind, from 0.
         position: usize,
-        /// Entry or operator that violates the bound.
+        /// Description of the entry or operator that violates the bound.
         reason: String,
     },
-    /// No label covers the initial state.
+    /// The initial state is neither covered by a label nor pruned by a bound.
     #[error("no label covers the initial state")]
     Initial,
     /// A label is a goal state with a smaller cost than claimed.
     #[error("label {0} is a goal state, and cheaper than claimed")]
     Goal(usize),
-    /// A successor of a label is neither covered by a label nor pruned by a bound.
+    /// A successor of a label is neither covered by another label nor pruned by a bound.
     #[error("label {label}, operator {operator}: nothing covers the state that follows")]
     Successor {
-        /// Position of the label, from 0.
+        /// Position of the label in the argument, from 0.
         label: usize,
-        /// Position of the operator, from 0.
+        /// Position of the operator in the task, from 0.
         operator: usize,
     },
 }
 
-/// Checks that no plan of the task has a better metric value than `claim`. Without a claim,
-/// checks that the task has no plan.
+/// Checks that no plan of the ground task `task` has a better metric value than `claim`. Without a
+/// claim, checks that the task has no plan. `argument` is the proof.
 ///
 /// # Errors
-/// The first fault that is found.
+/// The first fault found.
 pub fn check(task: &str, argument: &str, claim: Option<&BigRational>) -> Result<Checked, Fault> {
     let (model, argument, cost) = parse(task, argument, claim)?;
     let mut potentials = Vec::new();
@@ -125,8 +126,8 @@ pub fn check(task: &str, argument: &str, claim: Option<&BigRational>) -> Result<
     })
 }
 
-/// Parses both documents and checks their references. Also returns the claimed sum of operator
-/// costs.
+/// Parses the task and the argument and checks the references in them. Also returns the claimed
+/// cost, converted to a sum of operator costs.
 pub(super) fn parse(
     task: &str,
     argument: &str,
@@ -155,7 +156,7 @@ fn read<T: DeserializeOwned>(document: &'static str, text: &str) -> Result<T, Fa
     serde_json::from_str(text).map_err(|error| form(document, error.to_string()))
 }
 
-/// Converts a metric value to the sum of operator costs in units of the task.
+/// Converts a metric value to the sum of operator costs, in the integer cost units of the task.
 fn cost(model: &Model, metric: &BigRational) -> Result<Integer, Fault> {
     let scaled = metric * model.objective.scale.to_rational();
     let scaled = if model.objective.maximize { -scaled } else { scaled };
@@ -163,7 +164,7 @@ fn cost(model: &Model, metric: &BigRational) -> Result<Integer, Fault> {
     cost.ok_or_else(|| Fault::Cost(metric.to_string()))
 }
 
-/// A combination of designs and its cost.
+/// A combination of designs, one for each slot of an operator, with the cost of the operator.
 type Choice = (Vec<u32>, Integer);
 
 struct Checker<'c> {
@@ -173,13 +174,13 @@ struct Checker<'c> {
     needs: Vec<(usize, Table<'c>)>,
     labels: FxHashMap<&'c [u32], Vec<(&'c [Integer], &'c Integer)>>,
     monotone: bool,
-    /// The non-dominated combinations of each operator.
+    /// For each operator, the non-dominated combinations of designs.
     choices: Vec<Rc<[Choice]>>,
 }
 
 impl Checker<'_> {
     fn induction(&self, argument: &Argument) -> Result<(), Fault> {
-        // An empty clause: grounding has found that the goal never holds.
+        // An empty clause in the goal means that grounding has found the goal unreachable.
         if self.cost.is_none() && self.model.goal.clauses.iter().any(Vec::is_empty) {
             return Ok(());
         }
@@ -216,8 +217,8 @@ impl Checker<'_> {
         })
     }
 
-    /// Returns `true` if every continuation of a state costs at least the claim, by a label or by
-    /// a bound.
+    /// Returns `true` if a label or a lower bound proves that every plan through a state, reached
+    /// at cost `paid`, costs at least the claim.
     fn is_covered(&self, state: &State, paid: &Integer) -> bool {
         let too_expensive = self.potentials.iter().any(|potential| match (potential.at(state), &self.cost) {
             (None, _) => true,
@@ -239,10 +240,12 @@ impl Checker<'_> {
     }
 }
 
-/// Returns the non-dominated combinations of each operator. A combination dominates another one
-/// if it costs no more, satisfies every condition that the other one satisfies, and leaves every
-/// number at least as high (equal, if larger numbers may hurt). A label that covers the successor
-/// by the dominating combination then also covers the successor by the dominated one.
+/// Returns the non-dominated combinations of designs of each operator.
+///
+/// A combination dominates another one under three conditions. It costs no more, it satisfies every
+/// condition that the other satisfies, and it leaves every number at least as high (equal, if
+/// larger numbers may hurt). A label that covers the successor by the dominating combination then
+/// also covers the successor by the dominated combination.
 fn choices(model: &Model, monotone: bool) -> Result<Vec<Rc<[Choice]>>, Fault> {
     let mut fronts: FxHashMap<_, Rc<[Choice]>> = FxHashMap::default();
     let mut count = 0_usize;
@@ -250,7 +253,7 @@ fn choices(model: &Model, monotone: bool) -> Result<Vec<Rc<[Choice]>>, Fault> {
     let mut choices = Vec::new();
     for operator in &model.operators {
         let quantities: Vec<_> = quantities(operator).collect();
-        // Operators with equal tables share one Pareto front.
+        // Operators with equal tables share a Pareto front.
         let key = (operator.uses, operator.exclusions, &operator.cost, quantities.clone());
         let front = if let Some(known) = fronts.get(&key) {
             Rc::clone(known)
@@ -269,8 +272,8 @@ fn choices(model: &Model, monotone: bool) -> Result<Vec<Rc<[Choice]>>, Fault> {
     Ok(choices)
 }
 
-/// Computes the non-dominated combinations of one operator, see [`choices`]. Adds its work to
-/// `comparisons`.
+/// Computes the non-dominated combinations of designs of one operator, see [`choices`]. Adds the
+/// work to `comparisons`.
 fn front(
     model: &Model,
     operator: &Operator,
@@ -306,13 +309,15 @@ fn front(
     Ok(front.into_iter().map(|(choice, _)| choice).collect())
 }
 
-/// The design-dependent expressions in the conditions and changes of an operator.
+/// Returns the design-dependent quantities in the conditions and the numeric changes of an
+/// operator.
 fn quantities(operator: &Operator) -> impl Iterator<Item = &Quantity> {
     let changes = operator.changes.iter().map(|(_, value)| value);
     operator.condition.comparisons.iter().chain(changes).map(|linear| &linear.quantity)
 }
 
-/// Operators, indexed by one of their required facts.
+/// Index of the operators by one required fact each; `always` lists the operators without a
+/// required fact.
 struct Index {
     by_fact: FxHashMap<(u32, u32), Vec<usize>>,
     always: Vec<usize>,
@@ -322,7 +327,7 @@ impl Index {
     fn new(model: &Model) -> Self {
         let mut index = Self { by_fact: FxHashMap::default(), always: Vec::new() };
         for (operator, position) in model.operators.iter().zip(0..) {
-            // A fact of the variable with the largest domain is the most selective key.
+            // A fact about the variable with the largest domain is the most selective key.
             let widest =
                 operator.condition.facts.iter().max_by_key(|fact| model.variables[fact.0 as usize].len());
             match widest {

@@ -1,6 +1,6 @@
-//! Integers of any size: 128 bits if sufficient, else arbitrary precision. No operation wraps or
-//! saturates. Numbers of documents have at most [`MAX_DIGITS`] digits, because parsing takes
-//! quadratic time.
+//! Integers of any size: 128 bits if sufficient, otherwise arbitrary precision. No operation wraps
+//! or saturates. Integers in documents have at most [`MAX_DIGITS`] digits, because the time for
+//! parsing is quadratic.
 
 use std::cmp::Ordering;
 use std::iter::Sum;
@@ -14,15 +14,15 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::Number;
 
-/// Upper limit on the digits of a number in a document. A number of a PDDL file has at most 400
-/// digits.
+/// Upper limit on the number of digits of an integer in a document. (The limit for PDDL files is
+/// 400 digits.)
 pub const MAX_DIGITS: usize = 10_000;
 
-/// An arbitrary-precision integer with at most [`MAX_DIGITS`] digits in documents.
+/// An arbitrary-precision integer. In documents it has at most [`MAX_DIGITS`] digits.
 #[derive(Clone, PartialEq, Eq, Hash)]
 pub struct Integer(Repr);
 
-/// Canonical representation: `Small` whenever the value fits, so that equality is structural.
+/// Canonical representation: `Small` if and only if the value fits, so that equality is structural.
 #[derive(Clone, PartialEq, Eq, Hash)]
 enum Repr {
     Small(i128),
@@ -62,7 +62,7 @@ impl Integer {
         !self.is_positive() && !self.is_zero()
     }
 
-    /// The quotient by a positive divisor, rounded down.
+    /// Returns the quotient by a positive divisor, rounded down.
     pub(crate) fn div_floor(&self, divisor: &Self) -> Self {
         match (&self.0, &divisor.0) {
             (Small(own), Small(other)) => Self(Small(own.div_euclid(*other))),
@@ -70,7 +70,7 @@ impl Integer {
         }
     }
 
-    /// A bit in two's complement, counted from the lowest.
+    /// Returns a bit of the two's complement representation; position 0 is the lowest bit.
     pub(crate) fn bit(&self, position: usize) -> bool {
         match &self.0 {
             Small(small) => small >> position.min(127) & 1 == 1,
@@ -78,7 +78,7 @@ impl Integer {
         }
     }
 
-    /// Number of bits in two's complement, including the sign.
+    /// Returns the number of bits in two's complement, including the sign.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "at most 128 leading zeros, and bits that are held in memory"
@@ -88,7 +88,7 @@ impl Integer {
             Small(small) => {
                 (129 - if *small < 0 { (!small).leading_zeros() } else { small.leading_zeros() }) as usize
             }
-            // One bit more than the magnitude suffices for either sign.
+            // A magnitude needs one additional bit for the sign.
             Big(big) => usize::try_from(big.bits()).unwrap_or(usize::MAX - 1) + 1,
         }
     }
@@ -228,7 +228,7 @@ mod tests {
 
     use super::*;
 
-    /// Integers of every size, including the bounds of the small representation.
+    /// Integers of all sizes, including the bounds of the small representation.
     fn integer() -> impl Strategy<Value = BigInt> {
         prop_oneof![
             (-20_i128..20).prop_map(BigInt::from),
@@ -256,7 +256,7 @@ mod tests {
                 prop_assert_eq!(x.div_floor(&y).to_big(), a.div_floor(&b));
             }
             prop_assert_eq!(x.bit(position), a.bit(position as u64));
-            // All bits above the width equal the sign.
+            // All bits from position `width - 1` on equal the sign.
             let width = x.width();
             prop_assert!((width - 1..width + 3).all(|position| x.bit(position) == x.is_negative()));
             let written = serde_json::to_string(&x).expect("JSON");

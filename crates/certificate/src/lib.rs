@@ -1,17 +1,19 @@
 //! Checks optimality certificates of plans by integer arithmetic.
 //!
 //! The optimality proof is a closed set of labels \[1\]. A label is a state with the cost of
-//! reaching it. It *covers* a state with the same values if that state costs no less and has no
-//! larger numbers (equal numbers, if larger numbers may hurt). *Potentials* are lower bounds on
-//! the remaining cost, as tables over a few variables; *needs* are lower bounds on a required
-//! resource. If the initial state is covered or pruned, no label is a goal state cheaper than the
-//! claim, and each successor of a label is covered or pruned, then no plan of any length is
-//! cheaper than the claim, by induction over its steps. A claim without a cost states that the
-//! task has no plan.
+//! reaching it. A label *covers* another state with the same variable values if this state costs no
+//! less and has no larger numbers (equal numbers, if larger numbers may hurt). *Potentials* are
+//! lower bounds on the remaining cost, as tables over a few variables. *Needs* are lower bounds on
+//! a required resource.
 //!
-//! [`faithful()`] checks that a ground task refines its files, without grounding them.
-//! [`check_refutation`] checks a second proof for small tasks: a formula, its refutation, and a
-//! bound on the number of steps. [`verification_conditions`] exports the first proof to SMT
+//! Three conditions are checked. The initial state is covered or pruned, no label is a goal state
+//! cheaper than the claim, and each successor of a label is covered or pruned. Then no plan of any
+//! length is cheaper than the claim, by induction over its steps. A claim without a cost states
+//! that the task has no plan.
+//!
+//! [`faithful()`] checks that a ground task is faithful to its PDDL files, without grounding them.
+//! [`check_refutation`] checks an additional proof for small tasks: a formula, its refutation, and
+//! a bound on the number of steps. [`verification_conditions`] exports the label proof to SMT
 //! solvers.
 //!
 //! Absent: planner code. The crate links no grounder, no search and no SAT solver.
@@ -46,7 +48,7 @@ mod semantics;
 mod smt;
 mod table;
 
-/// The document types of a certificate.
+/// The types of the documents in a certificate.
 pub mod format {
     pub use crate::argument::{ARGUMENT_FORMAT, Argument, Label, Need, Potential};
     pub use crate::integer::{Integer, MAX_DIGITS};

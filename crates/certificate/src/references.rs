@@ -1,4 +1,5 @@
-//! Checks that a certificate is well-formed: after this check no index is out of range.
+//! Checks that a certificate is well-formed. After this check, no index in the documents is out of
+//! range.
 
 use crate::argument::Argument;
 use crate::integer::Integer;
@@ -6,9 +7,9 @@ use crate::model::{self, Condition, Exclusion, Fact, Linear, Literal, Model, Ope
 
 type Found = Result<(), String>;
 
-/// Upper limit on the design combinations of an operator.
+/// Upper limit on the number of design combinations for a list of slots.
 const CHOICE_LIMIT: usize = 1 << 20;
-/// Upper limit on the entries of a table.
+/// Upper limit on the number of entries of a table in the argument.
 const TABLE_LIMIT: usize = 1 << 22;
 
 fn require(holds: bool, message: impl FnOnce() -> String) -> Found {
@@ -23,7 +24,7 @@ fn are_distinct(numbers: impl Iterator<Item = u32>) -> bool {
     sorted.len() == count
 }
 
-/// Checks the references of a task.
+/// Checks all indices and sizes in a task.
 pub(super) fn task(model: &Model) -> Found {
     let count = model.variables.len();
     require(model.basic <= count, || "more basic variables than variables".into())?;
@@ -58,7 +59,7 @@ pub(super) fn task(model: &Model) -> Found {
     model.check_condition(&model.goal, &[])
 }
 
-/// Checks the references of an argument to its task.
+/// Checks all indices and sizes in an argument that refer to its task.
 pub(super) fn argument(model: &Model, argument: &Argument) -> Found {
     let potentials = argument.potentials.iter().map(|potential| (&potential.pattern, &potential.values));
     let needs = argument.needs.iter().map(|need| (&need.pattern, &need.values));

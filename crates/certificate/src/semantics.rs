@@ -1,12 +1,12 @@
-//! Semantics of a ground task: states, operators and costs. The implementation favours simplicity
-//! over speed; all arithmetic is exact.
+//! Semantics of a ground task: states, operators and costs. The implementation is simple rather
+//! than fast, because it has to be trusted. All arithmetic is exact.
 
 use std::ops::Range;
 
 use crate::integer::Integer;
 use crate::model::{Condition, Fact, Linear, Literal, Model, Operator, Quantity};
 
-/// Values of all variables and numbers.
+/// A state: the values of all variables and of all numbers.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) struct State {
     pub(super) values: Vec<u32>,
@@ -14,19 +14,19 @@ pub(super) struct State {
 }
 
 impl Model {
-    /// The basic (not derived) variables.
+    /// Returns the indices of the basic (not derived) variables.
     #[expect(clippy::cast_possible_truncation, reason = "fewer than 2^32 of each kind, see `references`")]
     pub(super) fn basic_variables(&self) -> Range<u32> {
         0..self.basic as u32
     }
 
-    /// The derived variables.
+    /// Returns the indices of the derived variables.
     #[expect(clippy::cast_possible_truncation, reason = "fewer than 2^32 of each kind, see `references`")]
     pub(super) fn derived_variables(&self) -> Range<u32> {
         self.basic as u32..self.variables.len() as u32
     }
 
-    /// The value that means that no atom of a variable holds.
+    /// Returns the value which means that no atom of a variable holds: the last one.
     #[expect(
         clippy::cast_possible_truncation,
         clippy::arithmetic_side_effects,
@@ -36,7 +36,8 @@ impl Model {
         self.variables[variable as usize].len() as u32 - 1
     }
 
-    /// Creates a state with these basic values and evaluates the axioms.
+    /// Creates a state from the values of the basic variables and the numbers, and evaluates the
+    /// axioms.
     pub(super) fn state(&self, basic: &[u32], numbers: &[Integer]) -> State {
         let mut values = basic.to_vec();
         values.resize(self.variables.len(), 0);
@@ -49,7 +50,8 @@ impl Model {
         self.state(&self.values[..self.basic], &self.numbers)
     }
 
-    /// Evaluates the axioms: the least fixpoint of the rules, layer by layer.
+    /// Computes the derived variables by the axioms: the least fixpoint of the rules, layer by
+    /// layer.
     fn derive(&self, state: &mut State) {
         for variable in self.derived_variables() {
             state.values[variable as usize] = self.none(variable);
@@ -70,12 +72,13 @@ impl Model {
         }
     }
 
-    /// Number of suitable designs for each slot of an operator.
+    /// Returns the number of suitable designs for each slot of an operator.
     pub(super) fn sizes(&self, operator: &Operator) -> Vec<usize> {
         self.uses[operator.uses as usize].iter().map(|(_, designs)| designs.len()).collect()
     }
 
-    /// All design combinations that an operator admits.
+    /// Returns all combinations of designs that an operator permits, as positions in its lists of
+    /// suitable designs.
     #[expect(clippy::cast_possible_truncation, reason = "a slot has fewer designs, see `references`")]
     pub(super) fn choices(&self, operator: &Operator) -> Vec<Vec<u32>> {
         let mut choices: Vec<Vec<u32>> = vec![Vec::new()];
@@ -95,7 +98,8 @@ impl Model {
         choices
     }
 
-    /// The value of a quantity for a combination of designs.
+    /// Returns the value of a quantity for a combination of designs; `sizes` are the numbers of
+    /// suitable designs of the slots.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "a row is below the size of its table, see `references`"
@@ -103,7 +107,7 @@ impl Model {
     pub(super) fn quantity(&self, quantity: &Quantity, choice: &[u32], sizes: &[usize]) -> Integer {
         let mut sum = quantity.constant.clone();
         for (slots, table) in &quantity.tables {
-            // The row number is the mixed-radix number of the chosen designs.
+            // The row is the mixed-radix number of the chosen designs.
             let mut row = 0;
             for slot in slots {
                 row = row * sizes[*slot as usize] + choice[*slot as usize] as usize;
@@ -113,14 +117,14 @@ impl Model {
         sum
     }
 
-    /// Lower bound on a quantity over all combinations of designs.
+    /// Returns a lower bound on a quantity over all combinations of designs.
     pub(super) fn least(&self, quantity: &Quantity) -> Integer {
         let tables =
             quantity.tables.iter().filter_map(|(_, table)| self.tables[*table as usize].iter().min());
         tables.chain([&quantity.constant]).sum()
     }
 
-    /// Upper bound on a quantity over all combinations of designs.
+    /// Returns an upper bound on a quantity over all combinations of designs.
     pub(super) fn most(&self, quantity: &Quantity) -> Integer {
         let tables =
             quantity.tables.iter().filter_map(|(_, table)| self.tables[*table as usize].iter().max());
@@ -133,7 +137,8 @@ impl Model {
         numbers.fold(quantity, |sum, (number, factor)| &sum + &(&state.numbers[*number as usize] * factor))
     }
 
-    /// Returns `true` if a condition holds. Its finite-domain part does not depend on designs.
+    /// Returns `true` if a condition holds in a state for a choice of designs. Only its comparisons
+    /// depend on the choice.
     pub(super) fn holds(
         &self,
         condition: &Condition,
@@ -148,7 +153,7 @@ impl Model {
                 .all(|linear| !self.linear(linear, state, choice, sizes).is_negative())
     }
 
-    /// The state after an applicable operator.
+    /// Returns the state after an operator, which must be applicable, with a choice of designs.
     pub(super) fn successor(
         &self,
         operator: &Operator,
@@ -175,8 +180,8 @@ impl Model {
         next
     }
 
-    /// Returns `true` if larger numbers never hurt: no factor in any condition or change is
-    /// negative, and no derived variable depends on numbers.
+    /// Returns `true` if larger numbers never hurt: no factor in a condition or change is negative,
+    /// and no derived variable depends on numbers.
     pub(super) fn more_never_hurts(&self) -> bool {
         let rules = self.axioms.iter().flat_map(|layer| &layer.rules);
         let conditions = self.operators.iter().map(|operator| &operator.condition).chain([&self.goal]);

@@ -1,10 +1,10 @@
 //! Writes the optimality proof of a certificate as verification conditions in SMT-LIB 2, for
 //! independent checkers.
 //!
-//! With the claimed cost C, the invariant of a state and the accumulated cost is: a label covers
-//! it, or a potential or a need prunes it. The conditions ask for counterexamples: the initial
-//! state violates the invariant, a goal state in the invariant is cheaper than C, or an operator
-//! leaves the invariant. An SMT solver must answer `unsat` to each.
+//! The invariant is a property of a state and its accumulated cost: a label covers the state, or a
+//! potential or a need prunes it. Each condition asks for a counterexample, where C is the claimed
+//! cost: the initial state violates the invariant, a goal state in the invariant is cheaper than C,
+//! or an operator leads out of the invariant. An SMT solver must answer `unsat` to each condition.
 
 use std::fmt::Write as _;
 
@@ -15,12 +15,12 @@ use crate::check::{Fault, parse};
 use crate::integer::Integer;
 use crate::model::{Condition, Fact, Linear, Literal, Model, Operator, Quantity};
 
-/// Returns the verification conditions for a claim, which is interpreted as in [`crate::check`].
-/// Returns `None` for tasks with derived variables, whose least fixpoints have no compact
-/// encoding.
+/// Returns the verification conditions for a claim, as SMT-LIB text. The claim is interpreted as in
+/// [`crate::check`]. Returns `None` for tasks with derived variables, because their least fixpoints
+/// have no compact encoding.
 ///
 /// # Errors
-/// The documents are not well-formed.
+/// A document is malformed.
 pub fn verification_conditions(
     task: &str,
     argument: &str,
@@ -41,7 +41,8 @@ struct Writer<'w> {
     monotone: bool,
 }
 
-/// Joins parts by an operation. Returns the neutral element if there are no parts.
+/// Applies an n-ary operation to parts. Returns `neutral`, the neutral element, if there are no
+/// parts.
 fn join(operation: &str, neutral: &str, parts: impl IntoIterator<Item = String>) -> String {
     let parts: Vec<String> = parts.into_iter().collect();
     match &parts[..] {
@@ -71,7 +72,7 @@ fn literal((own, positive): &Literal) -> String {
     if *positive { fact(*own) } else { format!("(not {})", fact(*own)) }
 }
 
-/// Writes a query for a state that satisfies all assertions.
+/// Writes a query whether a state satisfies all assertions; `about` becomes a comment.
 fn question(text: &mut String, about: &str, declarations: &str, assertions: &[String]) {
     let _ = write!(text, "; {about}\n(push)\n{declarations}");
     for assertion in assertions {
@@ -115,22 +116,24 @@ impl Writer<'_> {
         format!("(invariant {})", self.names().join(" "))
     }
 
-    /// The invariant as a function of the variables and the accumulated cost.
+    /// Returns the definition of the invariant as a function of all variables, numbers and the
+    /// accumulated cost.
     fn invariant(&self) -> String {
         let parameters: Vec<String> = self.names().iter().map(|name| format!("({name} Int)")).collect();
         let potentials = self.argument.potentials.iter().map(|potential| self.cut_off(potential));
         let needs = self.argument.needs.iter().map(|need| self.exhausted(need));
         let labels = self.argument.labels.iter().map(|label| self.covers(label));
         let mut parts = any(potentials.chain(needs).chain(labels));
-        // An empty clause means that grounding found the goal unreachable; the invariant is then
-        // trivial.
+        // An empty clause in the goal means that grounding found the goal unreachable; the
+        // invariant is then trivial.
         if self.model.goal.clauses.iter().any(Vec::is_empty) {
             "true".clone_into(&mut parts);
         }
         format!("(define-fun invariant ({}) Bool {parts})", parameters.join(" "))
     }
 
-    /// The disjunction over all entries of a table that yield a formula.
+    /// Returns the disjunction over the entries of a table for which `entry` returns a formula.
+    /// Each formula is conjoined with the variable values of its entry.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "a row and its parts are below the size of a table, see `references`"
@@ -189,8 +192,8 @@ impl Writer<'_> {
         join("+", "0", factors.chain([self.quantity(&linear.quantity, sizes)]))
     }
 
-    /// Encodes a quantity. Tables become case distinctions over the choices `c0`, `c1`, … of the
-    /// operator's slots.
+    /// Encodes a quantity as a term. Tables become case distinctions over the designs `c0`, `c1`, …
+    /// chosen for the operator's slots.
     fn quantity(&self, quantity: &Quantity, sizes: &[usize]) -> String {
         let tables = quantity.tables.iter().map(|(slots, table)| {
             let rows = &self.model.tables[*table as usize];
@@ -238,14 +241,15 @@ impl Writer<'_> {
     }
 }
 
-/// Writes a condition whose comparisons are already written.
+/// Encodes a condition, given the terms of its comparisons.
 fn condition_with(condition: &Condition, comparisons: impl Iterator<Item = String>) -> String {
     let facts = condition.facts.iter().copied().map(fact);
     let clauses = condition.clauses.iter().map(|clause| any(clause.iter().map(literal)));
     all(facts.chain(clauses).chain(comparisons.map(|sum| format!("(>= {sum} 0)"))))
 }
 
-/// The value of a variable after an operator; later effects override earlier ones.
+/// Returns a term for the value of a variable after an operator; later effects override earlier
+/// ones.
 fn value_after(operator: &Operator, variable: u32) -> String {
     let of = |effects: &[Fact]| effects.iter().rev().find(|fact| fact.0 == variable).map(|fact| fact.1);
     let plain = of(&operator.effects).map_or_else(|| format!("v{variable}"), |value| value.to_string());

@@ -1,20 +1,21 @@
-//! Tables of lower bounds over the values of a few variables (abstract heuristics), and the check
-//! that they are bounds.
+//! Tables of lower bounds over the values of a few variables (abstraction heuristics), and the
+//! check that they are lower bounds.
 //!
-//! A potential is a lower bound on the remaining cost if it is at most 0 wherever the goal can
-//! hold and no operator decreases it by more than its cost. A need is a lower bound on the
-//! required value of a number if every operator that decreases the number requires that it stays
-//! at least 0, and every other change of the number occurs only where the need is 0. The
-//! requirement may be stronger: `battery >= 5` suffices for a use of 4.
+//! A potential is a lower bound on the remaining cost under two conditions: it is at most 0
+//! wherever the goal can hold, and no operator decreases it by more than its cost. A need is a
+//! lower bound on the required value of a number under two conditions. Every operator that
+//! decreases the number requires that it stays at least 0, and every other change of the number
+//! occurs only where the need is 0. An operator may require more: `battery >= 5` suffices for a use
+//! of 4.
 
 use crate::integer::Integer;
 use crate::model::{Conditional, Fact, Linear, Literal, Model, Operator, Quantity};
 use crate::semantics::State;
 
-/// A bound; `None` is infinity.
+/// A lower bound; `None` is infinity.
 type Bound<'b> = Option<&'b Integer>;
 
-/// A bound for each combination of values of the pattern.
+/// A table with a lower bound for each combination of values of the variables in the pattern.
 pub(super) struct Table<'t> {
     pattern: &'t [u32],
     sizes: Vec<usize>,
@@ -35,7 +36,7 @@ impl<'t> Table<'t> {
         self.at_row(self.row(values))
     }
 
-    /// The row of a combination of values.
+    /// Returns the row of a combination of values of the pattern's variables.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "a row is below the size of its table, see `references`"
@@ -44,13 +45,13 @@ impl<'t> Table<'t> {
         self.sizes.iter().zip(values).fold(0, |row, (size, value)| row * size + *value as usize)
     }
 
-    /// The row of the values of a state.
+    /// Returns the row of a state, which depends on the values of the pattern's variables.
     pub(super) fn row_of(&self, state: &State) -> usize {
         let values: Vec<u32> = self.pattern.iter().map(|variable| state.values[*variable as usize]).collect();
         self.row(&values)
     }
 
-    /// Number of combinations of values.
+    /// Returns the number of rows, i.e. of combinations of values.
     pub(super) fn rows(&self) -> usize {
         self.values.len()
     }
@@ -59,7 +60,7 @@ impl<'t> Table<'t> {
         self.values[row].as_ref()
     }
 
-    /// All combinations that agree with some facts.
+    /// Returns all combinations of values that agree with the facts about variables of the pattern.
     #[expect(
         clippy::arithmetic_side_effects,
         clippy::cast_possible_truncation,
@@ -89,8 +90,9 @@ impl<'t> Table<'t> {
         facts.any(|fact| self.pattern.contains(&fact.0))
     }
 
-    /// The combinations that an operator may reach. A conditional effect whose condition mentions
-    /// variables outside of the pattern may apply or not.
+    /// Returns the combinations of values to which an operator may lead from `values`. A
+    /// conditional effect may apply or not if its condition contains variables outside of the
+    /// pattern.
     pub(super) fn targets(&self, operator: &Operator, values: &[u32]) -> Vec<Vec<u32>> {
         let truth = |((variable, value), positive): &Literal| {
             let position = self.pattern.iter().position(|own| own == variable)?;
@@ -113,9 +115,9 @@ impl<'t> Table<'t> {
         targets
     }
 
-    /// Calls `check` with the bounds before and after each abstract transition of each operator.
-    /// An operator that does not touch the pattern is checked once. Returns an error if `check`
-    /// returns `false`.
+    /// Calls `check` with the bounds before and after each abstract transition of each operator. An
+    /// operator whose condition and effects do not contain the pattern's variables is checked once.
+    /// Returns an error if `check` returns `false`.
     fn each_transition(
         &self,
         model: &Model,
@@ -123,8 +125,8 @@ impl<'t> Table<'t> {
     ) -> Result<(), String> {
         for (operator, position) in model.operators.iter().zip(0..) {
             if !self.touches(operator) {
-                // The operator maps each combination to itself, so one finite value represents
-                // all.
+                // The operator leads from each combination to itself, so checking a single finite
+                // value suffices.
                 let finite = self.values.iter().flatten().max();
                 if finite.is_some() && !check(operator, finite, finite) {
                     return Err(format!("operator {position}, which changes nothing that the table knows"));
@@ -148,7 +150,7 @@ fn at_most(left: Bound<'_>, right: Bound<'_>, step: &Integer) -> bool {
     right.is_none_or(|right| left.is_some_and(|left| *left <= right + step))
 }
 
-/// Checks that a table is a lower bound on the remaining cost.
+/// Checks that a table is a lower bound on the remaining cost of every state.
 pub(super) fn check_potential(model: &Model, table: &Table<'_>) -> Result<(), String> {
     for values in table.matching(&model.goal.facts) {
         if !at_most(table.value(&values), Some(&Integer::ZERO), &Integer::ZERO) {
@@ -160,10 +162,10 @@ pub(super) fn check_potential(model: &Model, table: &Table<'_>) -> Result<(), St
     })
 }
 
-/// The effect of an operator on a number.
+/// The effect of an operator on a number, as far as needs are concerned.
 enum Use {
-    /// Decreases the number by at least this amount (≥ 0), and requires that the result is at
-    /// least 0.
+    /// Decreases the number by at least this amount (≥ 0), and requires that the result is at least
+    /// 0.
     Lowers(Integer),
     /// Any other effect.
     Other,
@@ -182,8 +184,8 @@ fn use_of(model: &Model, operator: &Operator, number: u32) -> Use {
     }
 }
 
-/// Returns `true` if `guard` is at most `wanted` in all states and with all designs, so that
-/// `wanted` is at least 0 if `guard` is. `false` means undecided.
+/// Returns `true` if `guard` is at most `wanted` in all states and with all designs. Then `guard >=
+/// 0` implies `wanted >= 0`. `false` means undecided.
 fn implies(model: &Model, guard: &Linear, wanted: &Linear) -> bool {
     let same_designs = guard.quantity.tables == wanted.quantity.tables
         && guard.quantity.constant <= wanted.quantity.constant;
@@ -191,7 +193,8 @@ fn implies(model: &Model, guard: &Linear, wanted: &Linear) -> bool {
         && (same_designs || model.most(&guard.quantity) <= model.least(&wanted.quantity))
 }
 
-/// Checks that a table is a lower bound on the required value of a number.
+/// Checks that a table is a lower bound on the value of a number that is required to reach the
+/// goal.
 pub(super) fn check_need(model: &Model, number: u32, table: &Table<'_>) -> Result<(), String> {
     if table.values.iter().flatten().any(Integer::is_negative) {
         return Err("it is negative".into());
@@ -215,13 +218,14 @@ pub(super) fn check_need(model: &Model, number: u32, table: &Table<'_>) -> Resul
     })
 }
 
-/// The lower bound on a number that a comparison implies, if it mentions no other number.
+/// Returns the lower bound on a number that a comparison implies, if the comparison has the form
+/// "number + constant >= 0".
 fn lower_end(linear: &Linear, number: u32) -> Option<Integer> {
     let Quantity { constant, tables } = &linear.quantity;
     (is_alone(linear, number) && tables.is_empty()).then(|| -constant)
 }
 
-/// Returns `true` if a linear expression is one number plus a quantity.
+/// Returns `true` if a linear expression is the number itself (factor 1) plus a quantity.
 pub(super) fn is_alone(linear: &Linear, number: u32) -> bool {
     linear.factors == [(number, Integer::from(1))]
 }

@@ -1,5 +1,5 @@
-//! Adversarial documents are checked in polynomial time or rejected early with a message that
-//! names the size. The tests run in threads with a stack of 2 MB, without optimisation.
+//! Adversarial documents are checked in polynomial time, or rejected early with a message that
+//! names the exceeded size. The tests run unoptimised, in threads with a stack of 2 MB.
 
 use std::fmt::Write as _;
 
@@ -14,8 +14,8 @@ fn read(domain: &str, problem: &str) -> (Domain, Problem) {
     (domain, problem)
 }
 
-/// A task with variables of one atom each. An operator is given by its name, its arguments, the
-/// variable that it requires, if any, and the variable that it sets.
+/// Creates a task in which each variable has a single atom. Operators are given by name, arguments,
+/// optionally the variable that is required to be true, and the variable that becomes true.
 fn task(objects: &str, atoms: &[&str], operators: &[(&str, &str, Option<usize>, usize)]) -> String {
     let variables: Vec<String> = atoms.iter().map(|atom| format!(r#"["{atom}", "none of these"]"#)).collect();
     let values: Vec<&str> = atoms.iter().map(|_| "1").collect();
@@ -43,8 +43,8 @@ fn task(objects: &str, atoms: &[&str], operators: &[(&str, &str, Option<usize>, 
     )
 }
 
-/// Compares a task that reaches `(b)` in two steps with files that have additional declarations,
-/// rules, objects and facts.
+/// Compares a task that reaches `(b)` in two steps with PDDL files for this task, which contain
+/// additional declarations, actions and rules (`more`), objects and facts.
 fn compare(declarations: &str, more: &str, objects: &str, facts: &str) -> Faithful {
     let domain = format!(
         "(define (domain d) (:predicates (a) (b) {declarations}) {more}
@@ -60,7 +60,7 @@ fn compare(declarations: &str, more: &str, objects: &str, facts: &str) -> Faithf
     }
 }
 
-/// Numbered names with a prefix, from 0.
+/// Returns the names `prefix0`, `prefix1` and so on, separated by spaces.
 fn names(prefix: &str, count: usize) -> String {
     (0..count).fold(String::new(), |mut text, number| {
         let _ = write!(text, " {prefix}{number}");
@@ -68,7 +68,7 @@ fn names(prefix: &str, count: usize) -> String {
     })
 }
 
-/// Facts `(next o0 o1)` and so on, and `(end oN)`.
+/// Returns the facts `(next o0 o1)`, `(next o1 o2)` and so on, and `(end oN)`.
 fn chain(length: usize) -> String {
     let mut facts = format!("(end o{length})");
     for number in 0..length {
@@ -87,7 +87,7 @@ fn long_chains_of_derived_atoms_are_unfolded() {
     assert!(matches!(found, Faithful::Yes { instances: 3, .. }), "{found:?}");
 }
 
-/// The nesting of unfolded conditions is limited even if each atom adds only one level.
+/// The nesting of unfolded conditions is limited even if each derived atom adds only one level.
 #[test]
 fn conditions_that_nest_too_deeply_are_rejected() {
     let length = 5_000;
@@ -140,8 +140,8 @@ fn long_chains_of_derived_predicates_are_compared_quickly() {
     assert!(matches!(found, Faithful::Yes { .. }), "{found:?}");
 }
 
-/// No combination dominates another one: each costs less than the combinations with a higher
-/// number, and allows less.
+/// The combinations of designs do not dominate each other: of two combinations, one costs less, and
+/// the other satisfies more conditions.
 #[test]
 fn many_non_dominated_design_combinations_are_rejected() {
     let slots = 19;
@@ -166,8 +166,8 @@ fn many_non_dominated_design_combinations_are_rejected() {
     assert!(reason.starts_with("an operator with 524288 combinations of designs"), "{reason}");
 }
 
-/// Checks a need of two walking steps with a battery of 7: each step uses 4 and requires at least
-/// `required`.
+/// Checks the need of 8 for two walking steps with a battery of 7. Each step uses 4 and requires at
+/// least `required`.
 fn walk(required: i32) -> Result<(), Fault> {
     let task = format!(
         r#"{{"format": "metaplan-task/1", "objects": [], "schemas": ["walk"],
@@ -178,7 +178,7 @@ fn walk(required: i32) -> Result<(), Fault> {
         step(0, required),
         step(1, required)
     );
-    // Two steps are required from `(s)`, which use 8.
+    // From `(s)`, two steps are required, which use 8.
     let argument = r#"{"format": "metaplan-argument/1", "potentials": [],
       "needs": [{"number": 0, "pattern": [0], "values": [8, 4, 0, null]}], "labels": []}"#;
     check(&task, argument, None).map(|_| ())
@@ -195,8 +195,8 @@ fn step(from: u32, required: i32) -> String {
     )
 }
 
-/// A charge of 7 does not suffice for two steps if each step requires at least its use. If it
-/// requires less, the charge may fall below 0.
+/// With a battery of 7, two steps are impossible if each step requires at least the charge that it
+/// uses. If steps require less, the charge may fall below 0 and the need is not proved.
 #[test]
 fn needs_are_proved_only_if_each_step_requires_at_least_its_use() {
     for required in [4, 5, 100] {
@@ -212,7 +212,8 @@ const STAGES: &str = "(define (domain d) (:predicates (idle) (loading) (loaded) 
   (:action load :parameters () :precondition (loading) :effect (and (not (loading)) (loaded)))
   (:action finish :parameters () :precondition (loaded) :effect (and (not (loaded)) (idle) (done))))";
 
-/// The task of [`STAGES`], whose first variable has two of three exclusive atoms.
+/// Creates a task for [`STAGES`] whose first variable contains only two of the three mutually
+/// exclusive atoms.
 fn stages() -> String {
     let operator = |schema: u32, facts: &str, effects: &str| {
         format!(
@@ -241,7 +242,7 @@ fn a_mutex_group_proves_its_subsets_exclusive() {
     assert!(made.contains(group), "{made}");
     let compared = |witness: &str| faithful(&domain, &problem, &stages(), witness, &|| false);
     assert_eq!(compared(&made), Faithful::Yes { instances: 3, idle: 0, timed: false });
-    // Without the group the check is undecided and reports no difference.
+    // Without the group, the check is undecided and reports no difference.
     let found = compared(&made.replace(group, ""));
     let Faithful::Undecided(cause @ Cause::Exclusion { .. }) = &found else { panic!("{found:?}") };
     assert!(cause.to_string().starts_with("cannot tell whether the ground task"), "{cause}");

@@ -1,4 +1,4 @@
-//! A plan of three steps as a picture and as lines of a terminal.
+//! Draws a plan of three steps as an SVG picture and as text for a terminal.
 //!
 //! `cargo run -p metaplan-picture --example timeline -- plan.svg`
 #![expect(clippy::print_stdout, reason = "an example prints")]

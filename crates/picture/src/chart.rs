@@ -1,5 +1,5 @@
-//! Charts: a numeric fluent over a plan with the bounds of conditions, and the best cost and lower
-//! bound during a search.
+//! Charts of two kinds: a numeric fluent over a plan with the bounds of conditions, and the best
+//! cost and the lower bound during a search.
 
 use maud::{Markup, html};
 
@@ -11,7 +11,7 @@ use crate::svg::Picture;
 const HEIGHT: f64 = 110.0;
 const TOP: f64 = 10.0;
 
-/// Draws a curve over a plan.
+/// Draws a numeric fluent over a plan, with the bounds that conditions impose.
 pub(crate) fn curve(plan: &Plan, curve: &Curve, span: &Span, canvas: Canvas) -> Picture {
     let frame = Frame::of(plan, span, canvas);
     let top = TOP + canvas.name_height();
@@ -39,7 +39,7 @@ pub(crate) fn curve(plan: &Plan, curve: &Curve, span: &Span, canvas: Canvas) -> 
         (frame.axis(top, top + HEIGHT))
         (values_axis(&scale, (canvas.left, frame.width - RIGHT)))
         @let place = canvas.name_place(top, top + HEIGHT / 2.0 + 4.0);
-        // The labels of the axis are between the name on the left and the curve.
+        // The labels of the axis are placed between the name and the curve.
         @let aside = if canvas.has_names_above { 0.0 } else { 48.0 };
         text class="label" x=(px(place.x - aside)) y=(px(place.y)) text-anchor=(place.anchor) {
             title { (curve.name) }
@@ -62,8 +62,8 @@ pub(crate) fn curve(plan: &Plan, curve: &Curve, span: &Span, canvas: Canvas) -> 
     Picture { width: frame.width, height: top + HEIGHT + 24.0, title, description, body }
 }
 
-/// Draws the progress of a search by its messages, equally spaced: their times differ between runs,
-/// but their contents do not.
+/// Draws the best cost and the lower bound during a search. The messages are equally spaced,
+/// because their times differ between runs but their contents do not.
 pub(crate) fn search(search: &[Progress], canvas: Canvas) -> Picture {
     let (left, right) = (canvas.left, canvas.width - RIGHT);
     let costs = search.iter().filter_map(|moment| moment.cost);
@@ -105,7 +105,7 @@ pub(crate) fn search(search: &[Progress], canvas: Canvas) -> Picture {
     Picture { width: canvas.width, height: TOP + HEIGHT + 26.0, title, description, body }
 }
 
-/// Vertical scale of a range of values, larger values above smaller ones.
+/// Creates the vertical scale for a range of values; larger values are placed higher.
 fn vertical(top: f64, (low, high): (f64, f64)) -> Scale {
     let margin = (high - low) * 0.05;
     Scale::new((low - margin, high + margin), (top + HEIGHT, top))

@@ -1,232 +1,235 @@
-//! Input data of pictures: names and numbers, independent of their source.
+//! Input data of pictures: texts and numbers, independent of their source.
 
-/// A plan and the search that found it.
+/// A plan and the progress of the search that found it.
 #[derive(Debug, Clone, Default)]
 pub struct Plan {
-    /// The cost and its proof of optimality, in a sentence.
+    /// A sentence about the cost of the plan and the proof of its optimality.
     pub verdict: String,
-    /// Executed actions, ordered by start.
+    /// The executed actions, ordered by start.
     pub steps: Vec<Step>,
-    /// Quantity of the horizontal axis.
+    /// The quantity on the horizontal axis.
     pub axis: Axis,
-    /// All numeric fluents that actions change, and the cost.
+    /// The accumulated cost, and each numeric fluent that the plan changes or a condition bounds.
     pub curves: Vec<Curve>,
-    /// The places between which an object moves, if there are any.
+    /// The map of places if the plan moves an object.
     pub map: Option<Map>,
-    /// Progress of the search.
+    /// The messages of the search, in chronological order.
     pub search: Vec<Progress>,
     /// All designs of the knowledge base.
     pub designs: Vec<Design>,
 }
 
-/// Quantity of the horizontal axis.
+/// The quantity on the horizontal axis of a plan.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Axis {
-    /// Time, in the unit of the domain.
+    /// Time, in the time unit of the domain.
     #[default]
     Time,
     /// Steps of equal length, for actions without durations.
     Steps,
 }
 
-/// An action with its configuration.
+/// An executed action with its configuration.
 #[derive(Debug, Clone, Default)]
 pub struct Step {
-    /// The action with its arguments, without functions and designs.
+    /// The action with its arguments; arguments that are functions and designs are omitted.
     pub label: String,
-    /// Start on the axis.
+    /// Position of the start on the horizontal axis.
     pub start: f64,
-    /// End on the axis.
+    /// Position of the end on the horizontal axis.
     pub end: f64,
-    /// Start as text.
+    /// The start, formatted as text.
     pub start_text: String,
-    /// Duration as text.
+    /// The duration, formatted as text.
     pub duration_text: String,
-    /// Contribution to the metric as text.
+    /// The contribution to the metric, formatted as text.
     pub cost_text: String,
-    /// Functions with their designs.
+    /// The functions that the action uses, each with its design.
     pub configuration: Vec<(String, String)>,
-    /// Functions that change their design, with the former design.
+    /// The functions whose design differs from the design at their previous use in the plan, each
+    /// with the previous design.
     pub reconfigured: Vec<(String, String)>,
-    /// Origin and destination of a move, as positions in [`Map::places`].
+    /// Origin and destination if the action is a move, as indices in [`Map::places`].
     pub way: Option<(usize, usize)>,
 }
 
-/// A numeric fluent over the plan.
+/// The values of a numeric fluent over a plan.
 #[derive(Debug, Clone, Default)]
 pub struct Curve {
     /// Name of the fluent.
     pub name: String,
-    /// Points of change on the axis, each with the new value. The first point is the beginning.
+    /// The changes: position on the horizontal axis, and new value. The first entry is the initial
+    /// value.
     pub points: Vec<(f64, f64)>,
-    /// Bounds that conditions impose.
+    /// The bounds that conditions impose on the fluent.
     pub bounds: Vec<Bound>,
 }
 
-/// A bound that an action or the goal imposes on a number.
+/// A bound that a condition of an action or the goal imposes on a numeric fluent.
 #[derive(Debug, Clone, Default)]
 pub struct Bound {
-    /// Start on the axis.
+    /// Position on the horizontal axis from which the bound applies.
     pub from: f64,
-    /// End on the axis.
+    /// Position on the horizontal axis up to which the bound applies.
     pub to: f64,
-    /// Limit with which the number is compared.
+    /// The value with which the fluent is compared.
     pub value: f64,
-    /// Description: `step 3 needs battery >= 14`.
+    /// Description of the bound, such as `step 3 needs battery >= 14`.
     pub text: String,
 }
 
-/// Places and the ways between them.
+/// A map: places and the ways between them.
 #[derive(Debug, Clone, Default)]
 pub struct Map {
     /// The places.
     pub places: Vec<Place>,
-    /// Pairs of neighbouring places, each once.
+    /// Pairs of places that are connected by a way, as indices in `places`; each pair occurs once.
     pub ways: Vec<(usize, usize)>,
 }
 
-/// A place.
+/// A place of a map.
 #[derive(Debug, Clone, Default)]
 pub struct Place {
     /// Name of the place.
     pub name: String,
-    /// Coordinates, x to the right and y upwards. If they are missing, the places are laid out by
-    /// their ways.
+    /// Coordinates: x increases to the right, y increases upwards. If coordinates are missing, the
+    /// places are laid out by their ways.
     pub position: Option<(f64, f64)>,
-    /// `true` if an object is at the place initially.
+    /// Whether an object is at the place initially.
     pub is_start: bool,
-    /// `true` if an object must be at the place finally.
+    /// Whether an object must be at the place finally.
     pub is_goal: bool,
 }
 
-/// State of a search at a point in time.
+/// The state of a search when it sent a message.
 #[derive(Debug, Clone, Default)]
 pub struct Progress {
-    /// Metric of the best known plan.
+    /// Metric value of the best known plan, if there is one.
     pub cost: Option<f64>,
-    /// Lower bound on the metric of every plan.
+    /// Lower bound on the metric value of every plan.
     pub lower_bound: f64,
-    /// Both numbers as text.
+    /// Description with both numbers.
     pub text: String,
 }
 
-/// A function design.
+/// A function design: a way to provide a function.
 #[derive(Debug, Clone, Default)]
 pub struct Design {
-    /// Its name.
+    /// Name of the design.
     pub name: String,
-    /// The functions that it solves.
+    /// The names of the functions that the design provides.
     pub functions: Vec<String>,
-    /// `true` if the design can be selected.
+    /// Whether the design can be selected.
     pub available: bool,
-    /// Estimated values: `battery_usage 4`.
+    /// Estimated quality attributes, such as `battery_usage 4`.
     pub estimations: Vec<String>,
-    /// Requirements with their state: `c_kinect (failed)`, `ambient_light at most 0.8 (now 0.3)`.
+    /// Required components and environment conditions with their states, such as `c_kinect
+    /// (failed)` or `ambient_light at most 0.8 (now 0.3)`.
     pub needs: Vec<String>,
-    /// Numbers of the steps that use the design, from 1.
+    /// The numbers of the steps of the plan that use the design, from 1.
     pub steps: Vec<usize>,
-    /// Derivation of its availability.
+    /// Derivation of why the design is available or unavailable.
     pub because: Vec<Reason>,
 }
 
-/// Derivation of a fact.
+/// A derivation tree of an inferred fact.
 #[derive(Debug, Clone, Default)]
 pub struct Reason {
-    /// The fact and its justification.
+    /// The derived fact with its justification.
     pub text: String,
     /// Derivations of the premises.
     pub supports: Vec<Reason>,
 }
 
-/// A difference between two situations.
+/// A difference between two situations or plans.
 #[derive(Debug, Clone, Default)]
 pub struct Change {
-    /// Description in a sentence.
+    /// Description of the difference, in a sentence.
     pub text: String,
-    /// Derivations of the difference.
+    /// Derivations that explain the difference.
     pub because: Vec<Reason>,
 }
 
 /// Result of checking a certificate.
 #[derive(Debug, Clone, Default)]
 pub struct Checked {
-    /// `true` if all parts hold.
+    /// Whether all parts of the check succeeded.
     pub verified: bool,
-    /// Result in a sentence.
+    /// The result in a sentence.
     pub verdict: String,
-    /// Parts of the check: name, success and finding.
+    /// The parts of the check: name, whether it succeeded, and finding.
     pub parts: Vec<(String, bool, String)>,
 }
 
-/// Contents of the page about a plan.
+/// The contents of the page about a plan.
 #[derive(Debug, Clone, Default)]
 pub struct Report {
     /// Name of the mission.
     pub name: String,
     /// Description of the mission.
     pub description: String,
-    /// Differences from the files of the mission, each in a few words.
+    /// Differences of the current situation from the mission's files, each in a few words.
     pub situation: Vec<String>,
-    /// The plan without these differences, if there are any.
+    /// The plan without these differences, if there are differences.
     pub before: Option<Plan>,
-    /// The plan.
+    /// The plan for the current situation.
     pub plan: Plan,
-    /// Differences between the two plans.
+    /// Differences between the plan `before` and the current plan.
     pub changes: Vec<Change>,
-    /// Result of checking the certificate.
+    /// Result of checking the certificate, if there is one.
     pub checked: Option<Checked>,
 }
 
-/// Record of an adaptation loop.
+/// The journal of an adaptation loop.
 #[derive(Debug, Clone, Default)]
 pub struct Log {
-    /// Name of the record.
+    /// Name of the journal.
     pub name: String,
-    /// Usability of the record, in a sentence.
+    /// A sentence that states whether the journal is usable.
     pub verdict: String,
-    /// Contents of the record, each in a sentence.
+    /// Summary of the contents, each entry in a sentence.
     pub parts: Vec<String>,
-    /// Errors of the record.
+    /// Errors found in the journal.
     pub messages: Vec<String>,
-    /// All events, in chronological order.
+    /// All inputs and decisions, in chronological order.
     pub happenings: Vec<Happening>,
 }
 
-/// An input or a decision of a loop.
+/// An input or a decision of an adaptation loop.
 #[derive(Debug, Clone)]
 pub struct Happening {
-    /// Number of the record that contains the event.
+    /// Number of the journal record that contains the input or decision.
     pub record: u64,
-    /// Time in seconds since the beginning.
+    /// Time in seconds since the start of the journal.
     pub time: f64,
-    /// Kind of the event.
+    /// Kind of the input or decision.
     pub kind: Kind,
     /// Description in a sentence.
     pub text: String,
-    /// Derivation or details.
+    /// Derivations or other details.
     pub because: Vec<Reason>,
 }
 
 /// Kind of a [`Happening`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// A report of the robot.
+    /// A report from the robot.
     Event,
     /// A change of the inferred facts.
     Inference,
-    /// A plan was requested, found, kept or not found.
+    /// A plan was requested, found, kept, or not found.
     Plan,
-    /// A command for the robot.
+    /// A command to the robot.
     Effect,
-    /// A refused or repeated input.
+    /// An input that was refused or repeated.
     Refusal,
 }
 
 impl Kind {
-    /// All kinds, causes before effects.
+    /// All kinds, in causal order.
     pub const ALL: [Self; 5] = [Self::Event, Self::Inference, Self::Plan, Self::Effect, Self::Refusal];
 
-    /// Plural name of the kind.
+    /// Returns the plural name of the kind.
     pub fn name(self) -> &'static str {
         match self {
             Self::Event => "events",
@@ -238,16 +241,16 @@ impl Kind {
     }
 }
 
-/// Page of parts, for answers other than a single plan.
+/// The contents of a page for an answer other than a single plan.
 #[derive(Debug, Clone, Default)]
 pub struct Sheet {
-    /// Subject of the page.
+    /// Name of the subject of the page.
     pub name: String,
-    /// Subject in a sentence.
+    /// Description of the subject, in a sentence.
     pub description: String,
-    /// Answer in a sentence.
+    /// The answer, in a sentence.
     pub verdict: String,
-    /// Contents of the page, in order.
+    /// The parts of the page, in order.
     pub parts: Vec<Part>,
 }
 
@@ -256,32 +259,32 @@ pub struct Sheet {
 pub enum Part {
     /// A heading.
     Heading(String),
-    /// Sentences with their derivations.
+    /// A list of sentences with their derivations.
     Sentences(Vec<Change>),
-    /// Scatter plot.
+    /// A scatter plot.
     Points(Points),
-    /// Distributions of values, a row per group.
+    /// Distributions of values, with a row for each group.
     Rows(Rows),
     /// A table: its name, its heading and its rows.
     Table(String, Vec<String>, Vec<Vec<String>>),
-    /// Expandable plans, each with its title.
+    /// Expandable plans, each with a title.
     Plans(Vec<(String, Plan)>),
 }
 
-/// Scatter plot.
+/// A scatter plot with a connecting line.
 #[derive(Debug, Clone, Default)]
 pub struct Points {
     /// Title of the plot.
     pub title: String,
     /// Names of the horizontal and the vertical axis.
     pub axes: [String; 2],
-    /// Vertices of the connecting line, in order.
+    /// Vertices of the connecting line, in order; x and y.
     pub line: Vec<(f64, f64)>,
-    /// Points: short name, description, coordinates.
+    /// The points: short name, description, x and y.
     pub points: Vec<(String, String, f64, f64)>,
 }
 
-/// Distributions of values, a row per group.
+/// A plot of the distributions of values, with a row for each group.
 #[derive(Debug, Clone, Default)]
 pub struct Rows {
     /// Title of the plot.
@@ -292,15 +295,15 @@ pub struct Rows {
     pub groups: Vec<Group>,
 }
 
-/// A group of values.
+/// A group of values, drawn as a row.
 #[derive(Debug, Clone, Default)]
 pub struct Group {
     /// Name of the group.
     pub name: String,
-    /// Values with their descriptions.
+    /// The values, each with a description.
     pub values: Vec<(f64, String)>,
-    /// Mean, and half the width of its confidence interval.
+    /// Mean of the values, and half the width of the mean's confidence interval.
     pub mean: Option<(f64, f64)>,
-    /// Text shown for a group without values, such as `0 of 20 accomplished`.
+    /// Text for a group without values, such as `0 of 20 accomplished`.
     pub nothing: String,
 }

@@ -1,4 +1,4 @@
-//! Frame of a picture: its width, the positions of row names, and the horizontal axis.
+//! The frame of a picture: its width, the positions of row names, and the horizontal axis.
 
 use std::collections::BTreeMap;
 
@@ -7,22 +7,23 @@ use maud::{Markup, html};
 use crate::data::{Axis, Plan};
 use crate::scale::{Scale, number, px, range, width};
 
-/// Right margin in pixels.
+/// Right margin, in pixels.
 pub(crate) const RIGHT: f64 = 16.0;
-/// Maximum width of a drawing in pixels.
+/// Upper limit on the width of a drawing, in pixels.
 const WIDEST: f64 = 16_000.0;
-/// Height in pixels of a name above its row.
+/// Height of a name above its row, in pixels.
 const NAME: f64 = 14.0;
 
-/// Dimensions of a picture. All lengths are in pixels.
+/// The dimensions of a picture, in pixels.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Canvas {
-    /// Width of the picture, unless its contents need more.
+    /// Width of the picture, unless the contents need more.
     pub(crate) width: f64,
-    /// Left edge of the drawing area. The numbers of vertical axes are to its left.
+    /// Left edge of the drawing area. The tick labels of vertical axes are to the left of this
+    /// edge.
     pub(crate) left: f64,
-    /// `true` if the names of rows are above the rows instead of to their left, which leaves more
-    /// width.
+    /// Whether the names of rows are above the rows instead of to their left, which leaves more
+    /// width for the drawing.
     pub(crate) has_names_above: bool,
     /// Minimum width of a step of a plan.
     pub(crate) step: f64,
@@ -30,33 +31,34 @@ pub(crate) struct Canvas {
     pub(crate) apart: f64,
 }
 
-/// Canvas of a picture in a separate file.
+/// The canvas of a picture in a separate file.
 pub(crate) const FILE: Canvas =
     Canvas { width: 826.0, left: 170.0, has_names_above: false, step: 60.0, apart: 46.0 };
-/// Canvases of the pictures in a page, the widest first. The first one that fits its column is shown. `page.css` has
-/// the same widths.
+/// The canvases of the pictures in a page, in descending width. The page shows the first picture
+/// that fits its column; `page.css` must contain the same widths.
 pub(crate) const PAGE: [Canvas; 3] = [WIDE, COLUMN, TELEPHONE];
-/// Canvases of the pictures of two plans that a page shows side by side.
+/// The canvases of the pictures of two plans that a page shows side by side.
 pub(crate) const PAIR: [Canvas; 2] = [COLUMN, TELEPHONE];
-/// Full width of a page.
+/// Canvas for the full width of a page.
 const WIDE: Canvas = Canvas { width: 1146.0, left: 170.0, has_names_above: false, step: 4.0, apart: 20.0 };
-/// Half the width of a page.
+/// Canvas for half the width of a page.
 const COLUMN: Canvas = Canvas { width: 560.0, left: 60.0, has_names_above: true, step: 4.0, apart: 20.0 };
-/// A telephone in portrait orientation.
+/// Canvas for a telephone in portrait orientation.
 const TELEPHONE: Canvas = Canvas { width: 328.0, left: 60.0, has_names_above: true, step: 4.0, apart: 20.0 };
 
 impl Canvas {
-    /// Width between the margins.
+    /// Returns the width between the margins.
     pub(crate) fn inner(&self) -> f64 {
         self.width - self.left - RIGHT
     }
 
-    /// Height of a name above its row.
+    /// Returns the height that a name above its row takes; 0 if names are to the left of rows.
     pub(crate) fn name_height(&self) -> f64 {
         if self.has_names_above { NAME } else { 0.0 }
     }
 
-    /// Position of a row's name: its end to the left of the row, on the base line `base`, or its start above the row.
+    /// Returns the position of a row's name: either to the left of the row, right-aligned on the
+    /// base line `base`, or above the row at `top`, left-aligned.
     pub(crate) fn name_place(&self, top: f64, base: f64) -> NamePlace {
         if self.has_names_above {
             NamePlace { x: self.left, y: top - 4.0, anchor: "start", room: self.inner() }
@@ -70,19 +72,20 @@ impl Canvas {
 pub(crate) struct NamePlace {
     pub(crate) x: f64,
     pub(crate) y: f64,
-    /// The end of the text at this position, as SVG's `text-anchor`: `start` or `end`.
+    /// The end of the text that is at this position, as in SVG's `text-anchor`: `start` or `end`.
     pub(crate) anchor: &'static str,
-    /// Maximum width of the name.
+    /// Upper limit on the width of the name.
     pub(crate) room: f64,
 }
 
-/// Ranges shared by the axes of plans that are shown side by side, so that one scale serves all of them.
+/// Ranges of the axes over several plans. Plans that are shown side by side share these ranges, and
+/// so have the same scales.
 pub(crate) struct Span {
-    /// Number of steps of the plan with most steps.
+    /// Greatest number of steps of a plan.
     steps: usize,
-    /// Latest end of the plans.
+    /// Latest end of a plan.
     until: f64,
-    /// Minimum and maximum of each number, including bounds.
+    /// Minimum and maximum of each numeric fluent over all plans, including bounds of conditions.
     values: BTreeMap<String, (f64, f64)>,
 }
 
@@ -95,13 +98,13 @@ impl Span {
         }
     }
 
-    /// Returns the range of a number in all plans.
+    /// Returns the range of a numeric fluent over all plans.
     pub(crate) fn values(&self, name: &str) -> (f64, f64) {
         self.values.get(name).copied().unwrap_or((0.0, 1.0))
     }
 }
 
-/// Computes the range of each number in some plans.
+/// Computes the range of each numeric fluent over the given plans, including bounds of conditions.
 fn values(plans: &[&Plan]) -> BTreeMap<String, (f64, f64)> {
     let mut by_name: BTreeMap<String, Vec<f64>> = BTreeMap::new();
     for curve in plans.iter().flat_map(|plan| &plan.curves) {
@@ -112,20 +115,20 @@ fn values(plans: &[&Plan]) -> BTreeMap<String, (f64, f64)> {
     by_name.into_iter().map(|(name, values)| (name, range(values))).collect()
 }
 
-/// End of a plan on its axis.
+/// Returns the end of a plan on its horizontal axis.
 fn end(plan: &Plan) -> f64 {
     plan.steps.iter().map(|step| step.end).fold(0.0, f64::max)
 }
 
-/// Horizontal axis of a plan.
+/// The horizontal axis of a plan, with the scale from axis positions to pixels.
 pub(crate) struct Frame {
     pub(crate) canvas: Canvas,
     pub(crate) scale: Scale,
-    /// End of the plan.
+    /// End of the plan on the axis.
     pub(crate) end: f64,
     /// End of the axis.
     until: f64,
-    /// Width of the whole picture.
+    /// Width of the whole picture, in pixels.
     pub(crate) width: f64,
     label: &'static str,
 }
@@ -136,14 +139,14 @@ impl Frame {
             Axis::Time => "time",
             Axis::Steps => "step",
         };
-        // A plan with many steps widens the picture instead of becoming illegible.
+        // With many steps, the picture becomes wider instead of illegible.
         let inner = (span.steps as f64 * canvas.step).min(WIDEST).max(canvas.inner());
         let scale = Scale::new((0.0, span.until), (canvas.left, canvas.left + inner));
         let width = canvas.left + inner + RIGHT;
         Self { canvas, scale, end: end(plan), until: span.until, width, label }
     }
 
-    /// Draws the axis below all rows, with grid lines up to `top`.
+    /// Draws the axis at `bottom`, below all rows, with grid lines up to `top`.
     pub(crate) fn axis(&self, top: f64, bottom: f64) -> Markup {
         let widest = width(&number(self.until)) + 24.0;
         let max_ticks = ((self.width - self.canvas.left - RIGHT) / widest.max(60.0)) as usize;

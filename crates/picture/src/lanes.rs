@@ -1,7 +1,7 @@
-//! Assigns intervals to rows without overlaps.
+//! Assigns intervals to rows such that intervals in the same row do not overlap.
 
-/// Returns the row of each interval, from 0. Greedy interval partitioning: in the order of starts,
-/// each interval takes the first free row.
+/// Returns the row of each interval, from 0. Uses greedy interval partitioning: in the order of
+/// starts, each interval is placed in the first free row.
 pub(crate) fn rows(intervals: &[(f64, f64)]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..intervals.len()).collect();
     order.sort_by(|left, right| intervals[*left].0.total_cmp(&intervals[*right].0).then(left.cmp(right)));
@@ -9,7 +9,7 @@ pub(crate) fn rows(intervals: &[(f64, f64)]) -> Vec<usize> {
     let mut rows = vec![0; intervals.len()];
     for index in order {
         let (start, end) = intervals[index];
-        // The tolerance admits rounded times of consecutive intervals.
+        // The tolerance admits rounding errors in the times of consecutive intervals.
         let row = ends.iter().position(|taken| *taken <= start + 1e-6).unwrap_or(ends.len());
         if row == ends.len() {
             ends.push(end);

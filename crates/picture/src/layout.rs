@@ -1,20 +1,20 @@
-//! Graph layout for places without coordinates: distances in the picture approximate the numbers of
-//! ways on shortest paths.
+//! Graph layout for places without coordinates. Distances in the picture approximate the lengths of
+//! shortest paths, in numbers of ways.
 //!
-//! Stress majorization (E. Gansner, Y. Koren, S. North: Graph drawing by stress majorization, GD
-//! 2004). The start is deterministic: distances from two places that are far apart, and from a
-//! third one.
+//! The method is stress majorization (E. Gansner, Y. Koren, S. North: Graph drawing by stress
+//! majorization, GD 2004). The start layout is deterministic: coordinates are path lengths from two
+//! places far apart, and from a third place far from both.
 
 use std::collections::VecDeque;
 
-/// Limit on the number of pairwise distances. Larger maps keep the start layout.
+/// Upper limit on the number of pairwise distances. Larger maps keep the start layout.
 const DISTANCES: usize = 4_000_000;
-/// Limit on the number of updates of a place by another one.
+/// Upper limit on the total work of majorization, in pairs of places.
 const WORK: usize = 30_000_000;
-/// Limit on the number of rounds, after which the layout hardly changes.
+/// Upper limit on the number of rounds of majorization; after these the layout hardly changes.
 const ROUNDS: usize = 300;
 
-/// Computes coordinates for `places` places, with ways of length about 1.
+/// Computes coordinates for the places `0..places`, such that ways have a length of about 1.
 pub(crate) fn layout(places: usize, ways: &[(usize, usize)]) -> Vec<(f64, f64)> {
     let mut neighbours = vec![Vec::new(); places];
     for &(one, other) in ways.iter().filter(|(one, other)| one != other && *one.max(other) < places) {
@@ -22,7 +22,7 @@ pub(crate) fn layout(places: usize, ways: &[(usize, usize)]) -> Vec<(f64, f64)> 
         neighbours[other].push(one);
     }
     let mut points = vec![(0.0, 0.0); places];
-    // Components are placed side by side.
+    // Connected components are placed side by side.
     let mut right = 0.0_f64;
     for component in components(&neighbours) {
         let component_points = placed(&component, &neighbours);
@@ -37,7 +37,7 @@ pub(crate) fn layout(places: usize, ways: &[(usize, usize)]) -> Vec<(f64, f64)> 
     points
 }
 
-/// Returns the connected components, each in ascending order.
+/// Returns the connected components of the places, each in ascending order.
 fn components(neighbours: &[Vec<usize>]) -> Vec<Vec<usize>> {
     let mut visited = vec![false; neighbours.len()];
     let mut groups = Vec::new();
@@ -54,7 +54,8 @@ fn components(neighbours: &[Vec<usize>]) -> Vec<Vec<usize>> {
     groups
 }
 
-/// Returns the breadth-first distances from a place.
+/// Returns the number of ways on a shortest path from a place to each place; `None` for unreachable
+/// places.
 fn distances(from: usize, neighbours: &[Vec<usize>]) -> Vec<Option<u32>> {
     let mut distances = vec![None; neighbours.len()];
     let mut queue = VecDeque::from([(from, 0)]);
@@ -70,7 +71,7 @@ fn distances(from: usize, neighbours: &[Vec<usize>]) -> Vec<Option<u32>> {
     distances
 }
 
-/// Computes coordinates for a connected component.
+/// Computes coordinates for the places of a connected component.
 fn placed(group: &[usize], neighbours: &[Vec<usize>]) -> Vec<(f64, f64)> {
     let of = |from: usize| -> Vec<f64> {
         let distances_from = distances(from, neighbours);
@@ -81,14 +82,15 @@ fn placed(group: &[usize], neighbours: &[Vec<usize>]) -> Vec<(f64, f64)> {
             .max_by(|left, right| distances[*left].total_cmp(&distances[*right]).then(right.cmp(left)));
         order.unwrap_or(0)
     };
-    // Both ends of a long path, and a place far from both: their distances span two dimensions.
+    // Both ends of a long path, and a place far from both ends: the distances from these places
+    // span two dimensions.
     let first = farthest(&of(group[0]));
     let from_first = of(group[first]);
     let from_last = of(group[farthest(&from_first)]);
     let least: Vec<f64> = from_first.iter().zip(&from_last).map(|(one, other)| one.min(*other)).collect();
     let from_side = of(group[farthest(&least)]);
     let start = (0..group.len()).map(|place| {
-        // Coincident points have no direction in which majorization could separate them.
+        // Majorization cannot separate points at equal positions, because no direction is given.
         let little = 0.05 * (place as f64 * 0.754_877_666).fract();
         (
             from_first[place] - from_last[place] + little,
@@ -106,8 +108,8 @@ fn placed(group: &[usize], neighbours: &[Vec<usize>]) -> Vec<(f64, f64)> {
     turned(&points)
 }
 
-/// Performs a round of majorization: each place moves to the weighted mean of the positions that
-/// the other places prefer. Near places have more weight.
+/// Performs one round of majorization: each place moves to the weighted mean of the positions that
+/// its desired distances to the other places suggest. Near places have more weight.
 fn majorized(points: &[(f64, f64)], distances: &[Vec<f64>]) -> Vec<(f64, f64)> {
     let place = |moved: usize| {
         let (mut x, mut y, mut weights) = (0.0, 0.0, 0.0);
@@ -123,8 +125,8 @@ fn majorized(points: &[(f64, f64)], distances: &[Vec<f64>]) -> Vec<(f64, f64)> {
     (0..points.len()).map(place).collect()
 }
 
-/// Rotates the points so that the longest extent is horizontal, with the first place at the upper
-/// left.
+/// Rotates the points such that their longest extent is horizontal, and mirrors them such that the
+/// first place is at the upper left.
 fn turned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let count = points.len() as f64;
     let sum = points.iter().fold((0.0, 0.0), |(x, y), point| (x + point.0, y + point.1));
@@ -133,7 +135,7 @@ fn turned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
         let (dx, dy) = (point.0 - x, point.1 - y);
         (xx + dx * dx, xy + dx * dy, yy + dy * dy)
     });
-    // For a symmetric extent such as a square, every direction is equally good.
+    // For a symmetric extent such as a square, all directions are equally good.
     let angle = 0.5 * (2.0 * moments.1).atan2(moments.0 - moments.2);
     let (sin, cos) = angle.sin_cos();
     let mut turned: Vec<(f64, f64)> = points
@@ -143,7 +145,7 @@ fn turned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
             (dx * cos + dy * sin, dy * cos - dx * sin)
         })
         .collect();
-    // The tolerances prevent rounding from mirroring a symmetric layout.
+    // The tolerances prevent that rounding mirrors a symmetric layout.
     let (flip_x, flip_y) = (turned[0].0 > 1e-9, turned[0].1 < -1e-9);
     for point in &mut turned {
         *point = (if flip_x { -point.0 } else { point.0 }, if flip_y { -point.1 } else { point.1 });
@@ -151,8 +153,9 @@ fn turned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     turned
 }
 
-/// Moves points at equal positions, or closer to each other than `same`, to a ring around their
-/// position, at least `apart` from each other. All other points are unchanged.
+/// Separates points that are closer to each other than `same`: they are moved to a ring around
+/// their common position, with a distance of `apart` between neighbours. All other points are
+/// unchanged.
 pub(crate) fn spread(points: &mut [(f64, f64)], same: f64, apart: f64) {
     let mut groups: Vec<((f64, f64), Vec<usize>)> = Vec::new();
     for (index, (x, y)) in points.iter().enumerate() {
@@ -162,7 +165,7 @@ pub(crate) fn spread(points: &mut [(f64, f64)], same: f64, apart: f64) {
         }
     }
     for ((x, y), group) in groups.iter().filter(|(_, group)| group.len() > 1) {
-        // Neighbours on a ring of this radius are `apart` from each other (chord length).
+        // Neighbours on a ring of this radius have the distance `apart` (chord length).
         let part = std::f64::consts::PI / group.len() as f64;
         let radius = apart / 2.0 / part.sin();
         for (index, number) in group.iter().zip(0..) {
@@ -190,7 +193,7 @@ mod tests {
         }
     }
 
-    /// Edges of a square grid.
+    /// Returns the edges of a square grid.
     fn grid(side: usize) -> Vec<(usize, usize)> {
         let at = |row: usize, column: usize| row * side + column;
         let rows =

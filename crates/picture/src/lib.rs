@@ -1,9 +1,9 @@
 //! Pictures of plans: timelines, maps, charts and search progress as SVG, and self-contained HTML
 //! pages.
 //!
-//! Input is data ([`Report`], [`Plan`]), output is text, and equal data gives identical bytes. This
-//! crate has no planning, no PDDL and no knowledge bases, and accesses neither files, clock nor
-//! network. Names may be hostile; `maud` escapes all of them.
+//! The input is data ([`Report`], [`Plan`]), and the output is text. Equal data yields identical
+//! bytes. This crate contains no planning, no PDDL and no knowledge bases, and accesses neither
+//! files nor clock nor network. Names may be hostile; `maud` escapes all of them.
 
 mod chart;
 mod data;

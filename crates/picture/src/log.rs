@@ -1,4 +1,4 @@
-//! Page about an adaptation loop: its inputs, inferences, plans and commands on a time axis.
+//! The page about an adaptation loop: its inputs, inferences, plans and commands on a time axis.
 
 use std::collections::BTreeMap;
 
@@ -10,17 +10,17 @@ use crate::page::{page, reasons, shown, table};
 use crate::scale::{Scale, number, px, width};
 use crate::svg::Picture;
 
-/// Maximum width of the names of lanes in pixels.
+/// Width reserved for the names of lanes, in pixels.
 const NAMES: f64 = 90.0;
-/// Height of a lane in pixels.
+/// Height of a lane, in pixels.
 const LANE: f64 = 24.0;
 const TOP: f64 = 6.0;
-/// Width in pixels of the interval whose events share a mark.
+/// Width of the interval whose events share a mark, in pixels.
 const MARK: f64 = 4.0;
-/// Maximum number of events in the title of a mark.
+/// Upper limit on the number of events in the tooltip of a mark.
 const NAMED: usize = 5;
-/// Maximum number of listed events. The page of a long journal would otherwise be too large for
-/// browsers.
+/// Upper limit on the number of listed events. Otherwise the page of a long journal would be too
+/// large for browsers.
 const LISTED: usize = 1000;
 
 impl Log {
@@ -47,12 +47,13 @@ impl Log {
         page(&self.name, "What a loop heard, concluded, planned and asked for.", &body)
     }
 
-    /// Renders the picture of the page as an SVG file.
+    /// Renders the timeline of the page as an SVG file.
     pub fn svg(&self) -> String {
         self.picture(PAGE[0]).file()
     }
 
-    /// Returns the listed events in chronological order.
+    /// Returns the events that the page lists, in chronological order. If there are too many,
+    /// reports from the robot are omitted first, then the latest events.
     fn listed(&self) -> Vec<&Happening> {
         if self.happenings.len() <= LISTED {
             return self.happenings.iter().collect();
@@ -89,7 +90,7 @@ impl Log {
         Picture { width: canvas.width, height: bottom + 24.0, title, description, body }
     }
 
-    /// Groups the events of a kind by their position in pixels.
+    /// Groups the events of a kind into marks, by their positions in pixels.
     fn marks(&self, kind: Kind, scale: &Scale) -> BTreeMap<i64, Vec<&Happening>> {
         let mut marks: BTreeMap<i64, Vec<&Happening>> = BTreeMap::new();
         for happening in self.happenings.iter().filter(|happening| happening.kind == kind) {
@@ -114,7 +115,7 @@ fn draw(kind: Kind, marks: &BTreeMap<i64, Vec<&Happening>>, (left, right): (f64,
     }
 }
 
-/// Title of a mark: its first events.
+/// Returns the tooltip of a mark: descriptions of its first events, and the number of the others.
 fn titled(marked: &[&Happening]) -> String {
     let named = marked
         .iter()

@@ -1,7 +1,7 @@
-//! Map of the places of a mission with the moves of a plan, coloured by configuration.
+//! Draws the map of the places of a mission, with the moves of a plan coloured by configuration.
 //!
-//! Moves in opposite directions are drawn side by side. Each move has an arrow, with the numbers of
-//! its steps on the outer side.
+//! Moves in opposite directions are drawn side by side. Each move has an arrow; its step numbers
+//! are on the outer side of the arrow.
 
 use std::collections::BTreeMap;
 
@@ -14,68 +14,71 @@ use crate::palette::{Palette, configuration};
 use crate::scale::{px, range, width};
 use crate::svg::Picture;
 
-/// Side margins for the names of places: maximum in pixels, and as a fraction of the width.
+/// Side margins for the names of places: upper limit in pixels, and fraction of the width.
 const MARGIN: f64 = 70.0;
 const MARGIN_PART: f64 = 0.12;
-/// Upper and lower margin.
+/// Upper and lower margin, in pixels.
 const UPPER_MARGIN: f64 = 35.0;
-/// Minimum height of a map without its margins, and the maximum to which it is scaled.
+/// Minimum height of a map without its margins, and the height to which a map is scaled at most, in
+/// pixels.
 const LEAST_HEIGHT: f64 = 60.0;
 const HEIGHT: f64 = 420.0;
-/// Maximum distance of neighbouring places, which keeps small maps small.
+/// Upper limits in pixels: on the shortest way, which keeps small maps small, and on the size of a
+/// map that is enlarged to separate its places.
 const FARTHEST: f64 = 130.0;
 const LARGEST: f64 = 4_000.0;
-/// Radius of a place.
+/// Radius of the circle of a place, with its surrounding space.
 const RADIUS: f64 = 7.0;
-/// Height of a label.
+/// Height of a line of text.
 const LINE: f64 = 13.0;
-/// Offset of a move from the line of its way, so that opposite moves are on different sides.
+/// Offset of a move from the line of its way, so that moves in opposite directions are drawn side
+/// by side.
 const ASIDE: f64 = 2.5;
-/// Distances from the middle of an arrow to its tip and to its sides.
+/// Distances from the centre of an arrow to its tip and to its sides.
 const TIP: f64 = 7.0;
 const SIDE: f64 = 6.0;
-/// Radius of the loop of a move that ends at its origin.
+/// Radius of the loop that represents a move to its origin.
 const LOOP: f64 = 10.0;
-/// Distance below which places count as being at the same position.
+/// Distance in pixels below which two places have the same position.
 const SAME: f64 = 2.0;
-/// Margin for loops.
+/// Minimum margin of a map that contains loops.
 const LOOP_MARGIN: f64 = 58.0;
-/// Additional distance of names without space near their place.
+/// Additional distance of a name from its place, if no nearby position is free of lines.
 const FARTHER: f64 = 9.0;
-/// Length of a dash of a move with several configurations.
+/// Length of a dash, for moves that are drawn in the colours of several configurations.
 const DASH: f64 = 9.0;
 
 type Point = (f64, f64);
 
-/// An occupied rectangle: left, top, right, bottom.
+/// A rectangle that is occupied by a label or symbol: left, top, right, bottom.
 type Taken = (f64, f64, f64, f64);
 
-/// Start and end of a line.
+/// The start and end point of a line.
 type Line = (Point, Point);
 
-/// All moves of a plan from a place to another one.
+/// All moves of a plan from one place to another.
 struct Leg {
     from: usize,
     to: usize,
-    /// Numbers of the steps, from 1.
+    /// The numbers of the steps that are these moves, from 1.
     steps: Vec<usize>,
-    /// The configuration of each step.
+    /// The name of the configuration of each step.
     names: Vec<String>,
     shape: Shape,
 }
 
-/// Drawing of a leg: a line, or a loop around `centre`, with an arrow on it.
+/// The drawing of a leg: a line, or a loop around `centre`, with an arrow.
 struct Shape {
     line: Line,
     centre: Option<Point>,
     arrow: Point,
-    /// The direction of the arrow, of length 1.
+    /// The direction of the arrow, as a unit vector.
     along: Point,
-    /// The direction to the outer side, of length 1.
+    /// The direction to the side where step numbers are placed, as a unit vector.
     outwards: Point,
 }
 
-/// Draws a map with the moves of a plan.
+/// Draws a map of places and ways with the moves of a plan.
 pub(crate) fn map(plan: &Plan, map: &Map, palette: &Palette, canvas: Canvas) -> Picture {
     let has_loops = plan.steps.iter().any(|step| step.way.is_some_and(|(from, to)| from == to));
     let (points, drawn_width, drawn_height) = pixels(map, canvas, has_loops);
@@ -88,7 +91,7 @@ pub(crate) fn map(plan: &Plan, map: &Map, palette: &Palette, canvas: Canvas) -> 
     let loops = legs.iter().filter_map(|leg| leg.shape.centre).map(|centre| square(centre, LOOP));
     let arrows = legs.iter().map(|leg| square(leg.shape.arrow, SIDE));
     let mut occupied: Vec<Taken> = dots.chain(loops).chain(arrows).collect();
-    // Numbers have fewer possible positions than names, so they are placed first.
+    // Step numbers have fewer possible positions than names, so they are placed first.
     let numbers: Vec<_> =
         legs.iter().map(|leg| number(leg, &legs, (limits, &lines), &mut occupied)).collect();
     let labels = names(map, &points, &legs, (limits, &lines), &mut occupied);
@@ -120,7 +123,8 @@ pub(crate) fn map(plan: &Plan, map: &Map, palette: &Palette, canvas: Canvas) -> 
     Picture { width: drawn_width, height: drawn_height, title, description, body }
 }
 
-/// Collects the moves of a plan: a leg per pair of places, in the order of the pairs.
+/// Collects the moves of a plan as legs, one for each pair of origin and destination, in the order
+/// of these pairs.
 fn legs(plan: &Plan, map: &Map, points: &[Point]) -> Vec<Leg> {
     let mut moves: BTreeMap<(usize, usize), (Vec<usize>, Vec<String>)> = BTreeMap::new();
     for (step, number) in plan.steps.iter().zip(1..) {
@@ -147,21 +151,22 @@ fn legs(plan: &Plan, map: &Map, points: &[Point]) -> Vec<Leg> {
     legs.collect()
 }
 
-/// Shape of a move between two points, on the right-hand side of its way.
+/// Returns the shape of a move between two different points: a line on the right-hand side of the
+/// way.
 fn straight((x1, y1): Point, (x2, y2): Point) -> Shape {
     let length = (x2 - x1).hypot(y2 - y1).max(1e-6);
     let along = ((x2 - x1) / length, (y2 - y1) / length);
     let outwards = (-along.1, along.0);
     let (sx, sy) = (outwards.0 * ASIDE, outwards.1 * ASIDE);
-    // The arrow is beyond the middle, so that the arrows of opposite moves do not meet, even on
-    // short ways.
+    // The arrow is beyond the middle of the line, so the arrows of opposite moves do not overlap,
+    // even on short ways.
     let part = (0.5 + TIP / length).clamp(0.62, 0.75);
     let arrow = (x1 + (x2 - x1) * part + sx, y1 + (y2 - y1) * part + sy);
     Shape { line: ((x1 + sx, y1 + sy), (x2 + sx, y2 + sy)), centre: None, arrow, along, outwards }
 }
 
-/// Shape of a move that ends at its origin: a loop at a side of the place without ways. Above and
-/// below are preferred, because the numbers need least space there.
+/// Returns the shape of a move that ends at its origin: a loop at a side of the place without ways.
+/// The sides above and below are preferred, because step numbers need least space there.
 fn looped((x, y): Point, neighbours: &[Point]) -> Shape {
     let diagonal = std::f64::consts::FRAC_1_SQRT_2;
     let upright = [(0.0, -1.0), (0.0, 1.0)];
@@ -171,7 +176,7 @@ fn looped((x, y): Point, neighbours: &[Point]) -> Shape {
         let parts = neighbours
             .iter()
             .map(|(nx, ny)| ((nx - x) * dx + (ny - y) * dy) / (nx - x).hypot(ny - y).max(1e-6));
-        // All angles of at least 90 degrees are equally good.
+        // All angles of at least 90 degrees to the ways are equally good.
         parts.fold(0.0, f64::max)
     };
     let best = directions.min_by(|one, other| nearness(*one).total_cmp(&nearness(*other)));
@@ -181,15 +186,15 @@ fn looped((x, y): Point, neighbours: &[Point]) -> Shape {
     Shape { line: (centre, arrow), centre: Some(centre), arrow, along: (-dy, dx), outwards: (dx, dy) }
 }
 
-/// Step numbers of a leg as text.
+/// Formats the step numbers of a leg; at most three numbers are listed.
 fn numbers(leg: &Leg) -> String {
     let numbers: Vec<String> = leg.steps.iter().take(3).map(ToString::to_string).collect();
     numbers.join(",") + if leg.steps.len() > 3 { "…" } else { "" }
 }
 
-/// Position of the numbers of a leg: the left end of their base line. It is nearer to the leg's own arrow than to all
-/// others. The numbers touch nothing that is already placed, and cross no line if possible. Their space is marked as
-/// taken. Returns `None` if no position is free.
+/// Finds a position for the step numbers of a leg and marks it as occupied. The position is nearer
+/// to the leg's arrow than to all other arrows, overlaps nothing, and crosses no line if possible.
+/// Returns the left end of the base line, or `None` if no position is free.
 fn number(
     leg: &Leg,
     legs: &[Leg],
@@ -198,7 +203,7 @@ fn number(
 ) -> Option<Point> {
     let Shape { arrow, along, outwards, .. } = leg.shape;
     let (half_width, half_height) = (width(&numbers(leg)) / 2.0 + 1.0, LINE / 2.0 + 1.0);
-    // A move in the opposite direction has its numbers on the other side.
+    // The step numbers of a move in the opposite direction are placed on the other side.
     let is_one_way = !legs.iter().any(|other| (other.from, other.to) == (leg.to, leg.from));
     let sides: &[f64] = if is_one_way && leg.from != leg.to { &[1.0, -1.0] } else { &[1.0] };
     let reach = outwards.0.abs() * half_width + outwards.1.abs() * half_height + SIDE + 1.0;
@@ -223,7 +228,8 @@ fn number(
     choose(places, (limits, &other_lines), taken)
 }
 
-/// Places the names of places, the most important ones first.
+/// Finds positions for the names of places, the most important ones first. Returns `None` for a
+/// name without a free position.
 fn names(
     map: &Map,
     points: &[Point],
@@ -237,7 +243,8 @@ fn names(
         (used[leg.from], used[leg.to]) = (true, true);
     }
     let mut order: Vec<usize> = (0..points.len()).collect();
-    // Ends of the route first, then places on it; ties in a fixed order, for a reproducible picture.
+    // First start and goal places, then places of the plan's moves. Ties are broken by index, for a
+    // reproducible picture.
     order.sort_by_key(|place| (!is_end(*place), !used[*place], *place));
     let mut labels = vec![None; points.len()];
     for place in order {
@@ -248,8 +255,8 @@ fn names(
     labels
 }
 
-/// Draws a leg: the arrow, the numbers, and a line that is dashed in several colours if its steps
-/// have several configurations.
+/// Draws a leg: the arrow, the step numbers, and a line. If the steps have several configurations,
+/// the line is dashed in their colours.
 fn draw_leg(leg: &Leg, map: &Map, palette: &Palette, number: Option<Point>) -> Markup {
     let mut names: Vec<&String> = Vec::new();
     for name in leg.names.iter().filter(|name| !name.is_empty()) {
@@ -262,7 +269,7 @@ fn draw_leg(leg: &Leg, map: &Map, palette: &Palette, number: Option<Point>) -> M
     let about: Vec<String> =
         about.map(|(step, name)| format!("step {step}, from {from} to {to}: {name}")).collect();
     let steps: Vec<String> = leg.steps.iter().map(ToString::to_string).collect();
-    // Each configuration draws one dash per period, so that the colours alternate along the line.
+    // Each configuration draws one dash per period, so the colours alternate along the line.
     let dash = format!("{} {}", px(DASH), px(DASH * names.len().saturating_sub(1) as f64));
     let last = names.last().map_or_else(String::new, |name| (*name).clone());
     let Shape { line: ((x1, y1), (x2, y2)), centre, arrow: (x, y), along: (dx, dy), .. } = leg.shape;
@@ -293,16 +300,16 @@ fn draw_leg(leg: &Leg, map: &Map, palette: &Palette, number: Option<Point>) -> M
     }
 }
 
-/// Finds a position for a text of this width near a point and marks it as occupied. The text
-/// touches nothing that is already placed, and no line if possible. `reach` is the radius of the
-/// point. Returns the left end of the base line.
+/// Finds a position for a text of this width near a point and marks it as occupied. The position
+/// overlaps nothing and crosses no line if possible. `reach` is the distance to keep from the
+/// point. Returns the left end of the base line, or `None` if no position is free.
 fn room(
     (x, y): Point,
     (reach, width): (f64, f64),
     (limits, lines): (Taken, &[Line]),
     taken: &mut Vec<Taken>,
 ) -> Option<Point> {
-    // The greater distance is used only if a line crosses all nearby positions.
+    // The greater distance is used only if each nearby position is occupied or crossed by a line.
     let places = [reach, reach + FARTHER].into_iter().flat_map(|reach| {
         let beside = [(x + reach, y), (x - reach - width, y)];
         let across = [y - reach - LINE / 2.0, y + reach + LINE / 2.0].into_iter();
@@ -315,8 +322,8 @@ fn room(
     choose(places, (limits, lines), taken)
 }
 
-/// Left end of the base line of a text in the first free rectangle, preferably one that no line crosses. The
-/// rectangle is marked as taken.
+/// Selects the first free rectangle, preferably one that no line crosses, and marks it as occupied.
+/// Returns the left end of the base line for a text in the rectangle, or `None` if none is free.
 fn choose(
     places: impl Iterator<Item = Taken>,
     (limits, lines): (Taken, &[Line]),
@@ -365,7 +372,7 @@ fn pixels(map: &Map, canvas: Canvas, has_loops: bool) -> (Vec<Point>, f64, f64) 
         .ways
         .iter()
         .map(|(one, other)| (points[*one].0 - points[*other].0).hypot(points[*one].1 - points[*other].1));
-    // Ways between places at equal positions are ignored, because these places are spread later.
+    // Ways between places at equal positions are ignored, because such places are separated later.
     let shortest = across.max(upwards) * SAME / LARGEST;
     let mut lengths: Vec<f64> = lengths.filter(|length| *length > shortest).collect();
     lengths.sort_by(f64::total_cmp);

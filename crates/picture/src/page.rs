@@ -1,4 +1,5 @@
-//! Frame of all pages: a self-contained file whose content security policy forbids network access.
+//! The HTML frame of all pages: a self-contained file whose content security policy forbids network
+//! access.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
@@ -6,20 +7,20 @@ use crate::data::Reason;
 use crate::frame::{Canvas, PAGE};
 use crate::svg::{Picture, clean};
 
-/// Style sheet of pages and their pictures.
+/// The style sheet of pages and of the pictures in them.
 pub const STYLE: &str = concat!(include_str!("picture.css"), include_str!("page.css"));
-/// The only script. A page is complete without it.
+/// The only script of a page. Without it, all contents are still visible.
 const SCRIPT: &str = include_str!("page.js");
-/// Digest of the script, the only one that the content security policy admits.
+/// Digest of the script, which is the only script that the content security policy admits.
 const DIGEST: &str = "sha256-fZ3YNffJKRqSukU6Y8OoyeJ/9kokzwiOieJxn4wpNoc=";
 
-/// CSS classes by the columns in which pictures are shown, in the order of [`PAGE`].
+/// The CSS classes of the columns in which pictures are shown, in the order of [`PAGE`].
 const COLUMNS: [&str; 3] = ["in-wide", "in-half", "in-narrow"];
 
-/// Maximum depth of expandable derivations.
+/// Upper limit on the depth to which derivations are rendered.
 const DEPTH: usize = 24;
 
-/// Renders a complete page.
+/// Renders a complete HTML page.
 pub(crate) fn page(title: &str, description: &str, body: &Markup) -> String {
     let policy =
         format!("default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src '{DIGEST}'");
@@ -52,9 +53,9 @@ pub(crate) fn page(title: &str, description: &str, body: &Markup) -> String {
     clean(&page.into_string()) + "\n"
 }
 
-/// Renders a picture for several canvases, the widest first. The page shows the widest drawing that
-/// fits its column. A picture that exceeds its canvas, such as the timeline of a thousand steps, is
-/// scrolled and not drawn for narrower canvases.
+/// Renders a picture for several canvases, given in descending width. The page shows the widest
+/// drawing that fits its column. If a picture exceeds its canvas, such as the timeline of a
+/// thousand steps, it gets a scroll bar and is not drawn for narrower canvases.
 pub(crate) fn shown(name: &str, canvases: &[Canvas], draw: &dyn Fn(Canvas) -> Picture) -> Markup {
     let mut drawn: Vec<(f64, Picture)> = Vec::new();
     for canvas in canvases {
@@ -66,7 +67,7 @@ pub(crate) fn shown(name: &str, canvases: &[Canvas], draw: &dyn Fn(Canvas) -> Pi
         }
     }
     let fits = |column: f64| drawn.iter().position(|(width, _)| *width <= column);
-    // Column for which each canvas is made, with the drawing shown in it.
+    // For each column of a page, the index of the drawing to show, and the CSS class of the column.
     let columns = PAGE.iter().zip(COLUMNS);
     let columns = columns.map(|(canvas, class)| (fits(canvas.width).unwrap_or(drawn.len() - 1), class));
     let columns: Vec<(usize, &str)> = columns.collect();
@@ -87,7 +88,7 @@ pub(crate) fn shown(name: &str, canvases: &[Canvas], draw: &dyn Fn(Canvas) -> Pi
     }
 }
 
-/// Table that can be scrolled horizontally.
+/// Renders a table that can be scrolled horizontally.
 pub(crate) fn table(name: &str, header: &[&str], rows: &Markup) -> Markup {
     html! {
         div class="scroll" tabindex="0" role="group" aria-label=(name) {
@@ -99,7 +100,7 @@ pub(crate) fn table(name: &str, header: &[&str], rows: &Markup) -> Markup {
     }
 }
 
-/// Derivations with their premises.
+/// Renders derivations as expandable lists of premises.
 pub(crate) fn reasons(reasons: &[Reason]) -> Markup {
     unfolding(reasons, 0)
 }

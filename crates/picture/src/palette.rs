@@ -1,21 +1,21 @@
-//! Colours of names, identical in all pictures of a page.
+//! Assigns colours to names, identically in all pictures of a page.
 
 use std::collections::BTreeMap;
 
 use crate::data::{Plan, Step};
 
-/// Number of colours, which are reused for further names.
+/// Number of colours; further names reuse the colours.
 pub(crate) const COLOURS: usize = 10;
 
-/// Assignment of colours to names.
+/// An assignment of colours to the names of designs and configurations.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Palette {
     colours: BTreeMap<String, usize>,
 }
 
 impl Palette {
-    /// Assigns colours to the designs of all plans in the order of use, then to configurations of
-    /// several designs.
+    /// Assigns colours to the designs of all plans in the order of their use, then to
+    /// configurations of several designs.
     pub(crate) fn of(plans: &[&Plan]) -> Self {
         let mut palette = Self::default();
         let steps = || plans.iter().flat_map(|plan| &plan.steps);
@@ -33,7 +33,7 @@ impl Palette {
         self.colours.entry(name.to_owned()).or_insert(next);
     }
 
-    /// CSS class for the colour of a name.
+    /// Returns the CSS class for the colour of a name, or `none` for an unknown or empty name.
     pub(crate) fn class(&self, name: &str) -> String {
         match self.colours.get(name) {
             Some(colour) if !name.is_empty() => format!("c{}", colour % COLOURS),
@@ -42,7 +42,7 @@ impl Palette {
     }
 }
 
-/// Name of the configuration of a step: `fd_a + fd_b`.
+/// Returns the name of the configuration of a step: its designs, as in `fd_a + fd_b`.
 pub(crate) fn configuration(step: &Step) -> String {
     let designs: Vec<&str> = step.configuration.iter().map(|(_, design)| design.as_str()).collect();
     designs.join(" + ")

@@ -1,4 +1,4 @@
-//! Page about a plan, or about two plans: without and with a difference.
+//! The page about a plan, or about two plans: without and with the differences of a situation.
 
 use maud::{Markup, html};
 
@@ -12,7 +12,7 @@ use crate::svg::clean;
 use crate::timeline::timeline;
 
 impl Report {
-    /// Renders the page as HTML.
+    /// Renders the page about the plan as HTML.
     pub fn html(&self) -> String {
         let palette = self.palette();
         let body = html! {
@@ -36,7 +36,8 @@ impl Report {
         page(&self.name, &self.description, &body)
     }
 
-    /// Renders the pictures of the page as SVG files. Returns their names and texts.
+    /// Renders the pictures of the page as SVG files. Returns for each its file name and its
+    /// contents.
     pub fn pictures(&self) -> Vec<(String, String)> {
         let palette = self.palette();
         let before = self.before.iter().map(|plan| ("before-", plan));
@@ -51,12 +52,12 @@ impl Report {
 }
 
 impl Plan {
-    /// Renders the timeline as an SVG file.
+    /// Renders the timeline of the plan as an SVG file.
     pub fn svg(&self) -> String {
         timeline(self, &Palette::of(&[self]), &Span::of(&[self]), FILE).file()
     }
 
-    /// Renders the plan as part of another page, which must contain the style sheet
+    /// Renders the plan as HTML for inclusion in another page, which must contain the style sheet
     /// [`crate::STYLE`].
     pub fn part(&self) -> String {
         let body = html! {
@@ -81,18 +82,19 @@ fn plan_pictures(plan: &Plan, prefix: &str, palette: &Palette) -> Vec<(String, S
     files
 }
 
-/// Axis ranges of two plans that are shown side by side: shared if both have the same kind of axis.
+/// Returns the axis ranges of two plans that are shown side by side. The ranges are equal if both
+/// plans have the same kind of axis.
 fn spans(before: &Plan, after: &Plan) -> [Span; 2] {
     let plans = [before, after];
     plans.map(|plan| if before.axis == after.axis { Span::of(&plans) } else { Span::of(&[plan]) })
 }
 
-/// Renders a plan over the full width of the page. `name` is a unique identifier on the page.
+/// Renders a plan over the full width of the page. `name` must be unique on the page.
 pub(crate) fn alone(own: &Plan, name: &str, palette: &Palette) -> Markup {
     plan(own, name, palette, (&Span::of(&[own]), &PAGE))
 }
 
-/// Renders a plan on these canvases.
+/// Renders a plan on the given canvases. `name` must be unique on the page.
 fn plan(plan: &Plan, name: &str, palette: &Palette, (span, canvases): (&Span, &[Canvas])) -> Markup {
     html! {
         @if plan.steps.is_empty() {
@@ -135,7 +137,7 @@ fn plan(plan: &Plan, name: &str, palette: &Palette, (span, canvases): (&Span, &[
     }
 }
 
-/// Legend of the colours of configurations.
+/// Renders the legend: the colours of designs and configurations, and the reconfiguration mark.
 fn legend(plan: &Plan, palette: &Palette) -> Markup {
     let mut names: Vec<String> =
         plan.steps.iter().flat_map(|step| &step.configuration).map(|(_, design)| design.clone()).collect();

@@ -1,9 +1,10 @@
-//! Scales, axis ticks, number formats and text widths.
+//! Linear scales, axis ticks, number formats and text widths.
 
-/// Maximum width in pixels of a character in the fixed-width font of the pictures, at 11 pixels.
+/// Upper limit on the width of a character in the fixed-width font of the pictures at 11 pixels, in
+/// pixels.
 const CHARACTER: f64 = 6.75;
 
-/// Linear map from a range of numbers to a range of pixels.
+/// A linear map from a range of numbers to a range of pixels.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Scale {
     from: (f64, f64),
@@ -11,7 +12,7 @@ pub(crate) struct Scale {
 }
 
 impl Scale {
-    /// Creates a scale. An empty range is widened to length 1.
+    /// Creates a scale. If `from` is a single number, it is widened to length 1.
     pub(crate) fn new(from: (f64, f64), to: (f64, f64)) -> Self {
         let is_point = (from.1 - from.0).abs() < f64::EPSILON * from.0.abs().max(1.0);
         Self { from: if is_point { (from.0, from.0 + 1.0) } else { from }, to }
@@ -22,20 +23,20 @@ impl Scale {
         self.to.0 + part * (self.to.1 - self.to.0)
     }
 
-    /// Returns round numbers in the range in ascending order, about `most` of them at most.
+    /// Returns round numbers in the range in ascending order, at most about `most`.
     pub(crate) fn ticks(&self, most: usize) -> Vec<f64> {
         if most == 0 {
             return Vec::new();
         }
         let step = round_step((self.from.1 - self.from.0) / most as f64);
-        // The tolerance keeps a tick at the end of the range despite rounding.
+        // The tolerance keeps a tick at the end of the range in spite of rounding.
         let (first, last) = ((self.from.0 / step).ceil(), (self.from.1 / step + 1e-9).floor());
         let count = if last >= first { (last - first) as usize + 1 } else { 0 };
         (0..count.min(1000)).map(|index| (first + index as f64) * step).collect()
     }
 }
 
-/// Rounds up to 1, 2 or 5 times a power of ten.
+/// Rounds a positive number up to 1, 2 or 5 times a power of ten.
 pub(crate) fn round_step(least: f64) -> f64 {
     let power = 10_f64.powf(least.max(f64::MIN_POSITIVE).log10().floor());
     let factors = [1.0, 2.0, 5.0, 10.0];
@@ -43,7 +44,7 @@ pub(crate) fn round_step(least: f64) -> f64 {
     enough.unwrap_or(10.0) * power
 }
 
-/// Range of the finite numbers; 0 to 1 without finite numbers.
+/// Returns the minimum and maximum of the finite numbers, or 0 and 1 if there are none.
 pub(crate) fn range(numbers: impl IntoIterator<Item = f64>) -> (f64, f64) {
     let finite = numbers.into_iter().filter(|number| number.is_finite());
     let range = finite.fold(None, |range: Option<(f64, f64)>, number| {
@@ -52,12 +53,12 @@ pub(crate) fn range(numbers: impl IntoIterator<Item = f64>) -> (f64, f64) {
     range.unwrap_or((0.0, 1.0))
 }
 
-/// Formats a coordinate, rounded to a tenth of a pixel.
+/// Formats a coordinate in pixels, rounded to a tenth.
 pub(crate) fn px(value: f64) -> String {
     number((value * 10.0).round() / 10.0)
 }
 
-/// Formats a number as briefly as possible, with up to ten digits.
+/// Formats a number without superfluous zeros, with up to ten digits.
 pub(crate) fn number(value: f64) -> String {
     let digits = 9 - value.abs().max(1.0).log10().floor() as i32;
     let text = format!("{value:.*}", digits.clamp(0, 9) as usize);
@@ -66,19 +67,20 @@ pub(crate) fn number(value: f64) -> String {
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
-/// Formats a number for an axis, with about seven characters at most.
+/// Formats a number for an axis, with at most about seven characters.
 pub(crate) fn compact(value: f64) -> String {
     let text = number(value);
     if text.len() <= 7 { text } else { format!("{value:.1e}") }
 }
 
-/// Width of a text in pixels.
+/// Returns the estimated width of a text, in pixels.
 pub(crate) fn width(text: &str) -> f64 {
-    // Characters of East Asian scripts are about twice as wide.
+    // Characters of East Asian scripts are about twice as wide as ASCII characters.
     text.chars().map(|character| if character.is_ascii() { CHARACTER } else { 2.0 * CHARACTER }).sum()
 }
 
-/// Truncates a text to a width in pixels.
+/// Truncates a text with an ellipsis to a width in pixels. Returns an empty text if fewer than two
+/// characters fit.
 pub(crate) fn fit(text: &str, room: f64) -> String {
     if width(text) <= room {
         return text.to_owned();
@@ -91,7 +93,7 @@ pub(crate) fn fit(text: &str, room: f64) -> String {
             break;
         }
     }
-    // A single letter with an ellipsis is not informative.
+    // A single letter with an ellipsis would not be informative.
     if short.chars().count() < 2 { String::new() } else { short + "…" }
 }
 

@@ -1,5 +1,5 @@
-//! Pages about Pareto fronts, comparisons and simulations: scatter plots, distributions, tables,
-//! and expandable plans.
+//! Pages about Pareto fronts, comparisons and simulations, with scatter plots, distributions,
+//! tables, and expandable plans.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,12 +13,12 @@ use crate::report::alone;
 use crate::scale::{Scale, compact, fit, number, px, range};
 use crate::svg::Picture;
 
-/// Height of the area of a scatter plot.
+/// Height of the drawing area of a scatter plot, in pixels.
 const HEIGHT: f64 = 300.0;
 const TOP: f64 = 24.0;
-/// Height of a row of a distribution.
+/// Height of a row of a distribution, in pixels.
 const ROW: f64 = 46.0;
-/// Distance in pixels below which values are stacked, and the maximum height of a stack.
+/// Distance below which values are stacked, and upper limit on the height of a stack, in pixels.
 const NEAR: f64 = 6.0;
 const HIGHEST: f64 = 28.0;
 
@@ -34,7 +34,7 @@ impl Sheet {
         page(&self.name, &self.description, &body)
     }
 
-    /// Renders the pictures of the page as SVG files. Returns their names and texts.
+    /// Renders the plots of the page as SVG files. Returns for each its file name and its contents.
     pub fn pictures(&self) -> Vec<(String, String)> {
         let pictures = self.parts.iter().filter_map(|part| match part {
             Part::Points(own) => Some(points(own, FILE)),
@@ -88,7 +88,7 @@ fn drawn(part: &Part, number: i32, palette: &Palette) -> Markup {
     }
 }
 
-/// Creates a scale for these values with a margin.
+/// Creates a scale that covers the values with a margin on both sides.
 fn scale(values: impl Iterator<Item = f64>, to: (f64, f64)) -> Scale {
     let (low, high) = range(values);
     let margin = ((high - low) * 0.08).max(high.abs() * 1e-6);
@@ -103,7 +103,7 @@ fn points(own: &Points, canvas: Canvas) -> Picture {
         scale(own.points.iter().map(|own| own.3).chain(own.line.iter().map(|own| own.1)), (bottom, TOP));
     let line: Vec<String> =
         own.line.iter().map(|(x, y)| format!("{} {}", px(across.at(*x)), px(upwards.at(*y)))).collect();
-    // Points at the same position share a label, in which each name occurs once.
+    // Points at the same position share a label, which contains each name once.
     let mut labels: BTreeMap<(String, String), BTreeSet<&str>> = BTreeMap::new();
     for (short, _, x, y) in &own.points {
         labels.entry((px(across.at(*x)), px(upwards.at(*y)))).or_default().insert(short);
@@ -142,7 +142,8 @@ fn points(own: &Points, canvas: Canvas) -> Picture {
     Picture { width: right + RIGHT, height: bottom + 40.0, title: own.title.clone(), description, body }
 }
 
-/// Finds space for the label of a point, above or below it, and marks it as occupied.
+/// Finds a free position for the label of a point, above or below the point, and marks it as
+/// occupied. Returns the left end of the base line and the possibly truncated text.
 fn label(
     x: &str,
     y: &str,
@@ -163,7 +164,7 @@ fn label(
     Some((start, place, text))
 }
 
-/// Number of axis ticks that fit.
+/// Returns the number of ticks that fit on the horizontal axis.
 fn ticks(canvas: Canvas) -> usize {
     (canvas.inner() / 75.0).min(8.0) as usize
 }
@@ -210,7 +211,7 @@ fn rows(own: &Rows, canvas: Canvas) -> Picture {
     Picture { width: canvas.width, height: bottom + 40.0, title: own.title.clone(), description, body }
 }
 
-/// Heights in pixels that stack nearby values.
+/// Returns a height in pixels for each value, such that nearby values are stacked.
 fn heights(values: &[(f64, String)], across: &Scale) -> Vec<f64> {
     let mut counts: BTreeMap<i64, usize> = BTreeMap::new();
     let mut place = |(value, _): &(f64, String)| {

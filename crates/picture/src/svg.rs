@@ -1,26 +1,26 @@
-//! SVG pictures, as part of a page or as a file.
+//! SVG pictures, either as a part of a page or as a file.
 
 use maud::{Markup, PreEscaped, html};
 
 use crate::scale::px;
 
-/// Style sheet for a white background. Pages add styles for dark screens.
+/// The style sheet for a white background. Pages contain additional styles for dark mode.
 const STYLE: &str = include_str!("picture.css");
 
-/// Contents of a picture; lengths are in pixels.
+/// A picture with its size in pixels.
 pub(crate) struct Picture {
     pub(crate) width: f64,
     pub(crate) height: f64,
-    /// Title in a few words.
+    /// The title in a few words.
     pub(crate) title: String,
-    /// Instructions for reading the picture.
+    /// A description of how to read the picture.
     pub(crate) description: String,
     pub(crate) body: Markup,
 }
 
 impl Picture {
-    /// Renders the picture for a page. `name` is a unique identifier on the page, and `classes`
-    /// determine the columns in which the picture is shown.
+    /// Renders the picture for a page. `name` must be unique on the page; `classes` are CSS classes
+    /// for the columns in which the picture is shown.
     pub(crate) fn inline(&self, name: &str, classes: &str) -> Markup {
         let (title, description) = (format!("{name}-title"), format!("{name}-description"));
         html! {
@@ -33,7 +33,7 @@ impl Picture {
         }
     }
 
-    /// Renders the picture as a file with real text and without scripts.
+    /// Renders the picture as an SVG file, with text as text and without scripts.
     pub(crate) fn file(&self) -> String {
         let picture = html! {
             svg xmlns="http://www.w3.org/2000/svg" class="picture" role="img"
@@ -49,7 +49,7 @@ impl Picture {
     }
 }
 
-/// Removes the characters that XML does not admit.
+/// Replaces the characters that XML does not permit by U+FFFD.
 pub(crate) fn clean(text: &str) -> String {
     let allowed = |character: char| {
         matches!(character, '\n' | '\t' | '\r')
@@ -58,7 +58,7 @@ pub(crate) fn clean(text: &str) -> String {
     text.chars().map(|character| if allowed(character) { character } else { '\u{fffd}' }).collect()
 }
 
-/// Formats the former value behind a changed one.
+/// Formats the previous value of something that has changed.
 pub(crate) fn alternative(before: &str) -> String {
     if before.is_empty() { " (changed)".to_owned() } else { format!(" (changed, before: {before})") }
 }

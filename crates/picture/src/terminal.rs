@@ -1,32 +1,35 @@
-//! Plan as text for a terminal: a row for the actions, and a row per function for its designs.
+//! Draws a plan as text for a terminal: a row for the actions, and a row for the designs of each
+//! function.
 
 use std::collections::BTreeMap;
 
 use crate::data::{Axis, Plan, Step};
 use crate::scale::number;
 
-/// Minimum number of columns for a picture.
+/// Minimum number of columns of a picture.
 const LEAST: usize = 60;
-/// Minimum number of columns of a step.
+/// Minimum number of columns of a step in a picture that is to scale.
 const COLUMN: usize = 4;
-/// Minimum number of columns of a step in a picture that is not to scale, including the mark of its beginning.
+/// Minimum number of columns of a step in a picture that is not to scale, including the mark at its
+/// start.
 const NARROW: usize = 7;
-/// Maximum number of bands below each other; more would give no overview.
+/// Upper limit on the number of bands (groups of rows for consecutive steps) below each other.
 const BANDS: usize = 6;
-/// Maximum length of the names of lanes.
+/// Upper limit on the number of characters of a lane's name.
 const NAME: usize = 24;
 
-/// Steps of one line, each with the columns at which it begins and ends.
+/// The steps of a band: the index of each step, and the columns at which it starts and ends.
 type Columns = Vec<(usize, (usize, usize))>;
 
 impl Plan {
-    /// Draws the plan in this number of columns. Returns `None` if the columns are too few, if actions overlap, or if
-    /// the picture takes too many lines.
+    /// Draws the plan in this number of columns. Returns `None` if there are too few columns, if
+    /// actions overlap, or if the picture needs too many lines.
     ///
-    /// Steps are as wide as they are long if each has enough columns at that scale. Otherwise short steps are wider,
-    /// and a plan of many steps continues below. The numbers of the axis are right in both cases.
+    /// The widths of steps are proportional to their durations if each step then has enough
+    /// columns. Otherwise short steps are widened, and a plan of many steps continues in further
+    /// bands below. The numbers on the axis are right in both cases.
     ///
-    /// Names are printed as they are given. Callers that write to a terminal have to make invisible characters
+    /// Names are printed unchanged. Callers that write to a terminal must make invisible characters
     /// visible first.
     pub fn text(&self, columns: usize) -> Option<String> {
         let mut lanes: BTreeMap<&str, Vec<(usize, &str)>> = BTreeMap::new();
@@ -55,8 +58,8 @@ impl Plan {
         Some(bands.join("\n"))
     }
 
-    /// Columns of the steps: in one line, or in several if they need more space. Returns `None` for plans that lines
-    /// cannot show.
+    /// Distributes the steps over bands, and returns the columns of each step. Returns `None` if
+    /// there are no steps, if steps overlap, or if too many bands are needed.
     fn bands(&self, room: usize) -> Option<Vec<Columns>> {
         let starts = self.steps.iter().skip(1).map(|step| step.start);
         let is_sequence = self.steps.iter().zip(starts).all(|(step, next)| step.end <= next + 1e-9);
@@ -77,8 +80,8 @@ impl Plan {
         })
     }
 
-    /// Columns at which each step begins and ends at one scale. Returns `None` if a step has fewer than [`COLUMN`]
-    /// columns then.
+    /// Returns the columns at which each step starts and ends if widths are proportional to
+    /// durations. Returns `None` if a step then has fewer than [`COLUMN`] columns.
     fn to_scale(&self, room: usize) -> Option<Vec<(usize, usize)>> {
         let end = self.steps.iter().map(|step| step.end).fold(0.0, f64::max);
         let column = |at: f64| if end > 0.0 { (at / end * room as f64).round() as usize } else { 0 };
@@ -87,7 +90,8 @@ impl Plan {
         is_wide.then_some(places)
     }
 
-    /// Places steps side by side with their minimum widths, and distributes the remaining columns by their durations.
+    /// Places steps side by side with their minimum widths. The remaining columns are distributed
+    /// in proportion to the durations.
     fn widened(&self, steps: std::ops::Range<usize>, room: usize) -> Columns {
         let duration = |index: usize| (self.steps[index].end - self.steps[index].start).max(0.0);
         let total: f64 = steps.clone().map(duration).sum();
@@ -123,7 +127,7 @@ impl Plan {
         line
     }
 
-    /// Draws the starts of steps and the end of the last one.
+    /// Draws the start times of the steps and the end time of the last step.
     fn ticks(&self, places: &Columns, room: usize) -> String {
         let last = places.last().map(|(index, (_, to))| (*to, self.steps[*index].end));
         let marks = places.iter().map(|(index, (from, _))| (*from, self.steps[*index].start)).chain(last);
@@ -131,7 +135,7 @@ impl Plan {
         for (column, value) in marks {
             let text = number(value);
             let free = length(&line) + usize::from(!line.is_empty());
-            // The last number ends at the right edge of the picture.
+            // The last number ends at the right edge of the picture at the latest.
             let column = column.min(room.saturating_sub(length(&text)));
             if column >= free {
                 line += &" ".repeat(column - length(&line));
@@ -146,7 +150,7 @@ fn length(text: &str) -> usize {
     text.chars().count()
 }
 
-/// Truncates a text to `most` characters.
+/// Truncates a text to `most` characters; the last one is then an ellipsis.
 fn short(text: &str, most: usize) -> String {
     if length(text) <= most {
         return text.to_owned();

@@ -1,5 +1,5 @@
-//! Timeline of a plan: a lane for the actions, a lane per function for its designs, and marks at
-//! changes of designs.
+//! The timeline of a plan: a lane for the actions, a lane for the designs of each function, and
+//! marks where a design changes.
 
 use std::collections::BTreeMap;
 
@@ -12,21 +12,23 @@ use crate::palette::Palette;
 use crate::scale::{fit, px, width};
 use crate::svg::{Picture, alternative};
 
-/// Heights of a row and of its bars.
+/// Height of a row, and height of the bars in it.
 const ROW: f64 = 26.0;
 const BAR: f64 = 20.0;
 /// Gap between lanes.
 const GAP: f64 = 8.0;
 /// Margin above the lanes.
 const TOP: f64 = 6.0;
-/// Width of steps without duration.
+/// Width of the bar of a step without duration.
 const LEAST: f64 = 3.0;
-/// Minimum number of characters of a shortened name, including the ellipsis.
+/// Minimum number of characters of a shortened name, including the ellipsis; shorter names are
+/// replaced by step numbers.
 const SHORTEST: usize = 5;
-/// Number of pixels, for both ends of a bar together, by which numbers may come nearer to them than names.
+/// Number of pixels by which a step number may be nearer to the ends of a bar than a name, for both
+/// ends together.
 const SLACK: f64 = 5.0;
 
-/// A bar of a lane.
+/// A bar of a lane: a step, its horizontal extent, and the text in the bar.
 struct Bar<'p> {
     step: usize,
     from: f64,
@@ -35,7 +37,7 @@ struct Bar<'p> {
     is_changed: bool,
 }
 
-/// A lane: its name, its bars, and the row of each bar.
+/// A lane of the timeline: its name, its bars, and the row of each bar.
 struct Lane<'p> {
     name: &'p str,
     bars: Vec<Bar<'p>>,
@@ -53,7 +55,7 @@ impl<'p> Lane<'p> {
     }
 }
 
-/// Draws a plan.
+/// Draws the timeline of a plan.
 pub(crate) fn timeline(plan: &Plan, palette: &Palette, span: &Span, canvas: Canvas) -> Picture {
     let frame = Frame::of(plan, span, canvas);
     let lanes = lanes(plan, &frame);
@@ -64,7 +66,7 @@ pub(crate) fn timeline(plan: &Plan, palette: &Palette, span: &Span, canvas: Canv
         tops.push(bottom);
         bottom += lane.height() + GAP;
     }
-    // The lines of changes are interrupted where names are between lanes.
+    // Where names are placed between lanes, the vertical lines of changes are interrupted.
     let marked: Vec<(f64, f64)> = if canvas.has_names_above {
         lanes.iter().zip(&tops).map(|(lane, top)| (*top, top + lane.height())).collect()
     } else {
@@ -89,11 +91,11 @@ pub(crate) fn timeline(plan: &Plan, palette: &Palette, span: &Span, canvas: Canv
     Picture { width: frame.width, height: bottom + 24.0, title, description, body }
 }
 
-/// Creates the lanes: the actions, then the functions in alphabetical order.
+/// Creates the lanes: first the actions, then the functions in alphabetical order.
 fn lanes<'p>(plan: &'p Plan, frame: &Frame) -> Vec<Lane<'p>> {
     let place = |step: &Step| {
         let from = frame.scale.at(step.start);
-        // A short step is placed by its true end, so that consecutive steps share a row.
+        // A short step keeps its true end, so that consecutive steps can share a row.
         (from, if step.end > step.start { frame.scale.at(step.end) } else { from + LEAST })
     };
     let mut functions: BTreeMap<&str, Vec<Bar<'p>>> = BTreeMap::new();
@@ -141,8 +143,8 @@ fn draw_bar(bar: &Bar<'_>, top: f64, (class, is_action): (&str, bool), about: &s
     let room = bar.to - bar.from - margin - 3.0;
     let number = (bar.step + 1).to_string();
     let mut text = fit(bar.text, room);
-    // A name shortened further is less informative than the number of the step, which map and table have, too, or
-    // than the colour of a design.
+    // A name that is shortened further is less informative than the step number, which also occurs
+    // in map and table, or than the colour of a design.
     if text != bar.text && text.chars().count() < SHORTEST {
         text = if is_action && width(&number) <= room + SLACK { number } else { String::new() };
     }
@@ -163,7 +165,7 @@ fn draw_bar(bar: &Bar<'_>, top: f64, (class, is_action): (&str, bool), about: &s
     }
 }
 
-/// Description of a bar in words.
+/// Describes a bar in words, for its tooltip.
 fn about(bar: &Bar<'_>, step: &Step, lane: &str, is_action: bool) -> String {
     let number = bar.step + 1;
     if is_action {

@@ -1,5 +1,5 @@
-//! Maps: each step number is nearer to the arrow of its own move than to any other arrow, for all
-//! connections between places that a plan uses.
+//! Maps: each step number is nearer to the arrow of its own move than to every other arrow, for
+//! various maps and plans.
 
 use metaplan_picture::{Map, Place, Plan, Report, Step};
 use roxmltree::{Document, Node};
@@ -9,18 +9,19 @@ type Point = (f64, f64);
 /// The width of a character and the height of a line in the pictures' font.
 const CHARACTER: (f64, f64) = (6.75, 13.0);
 
-/// Drawing of the moves between two places in one direction.
+/// The drawing of all moves from one place to another.
 struct Leg {
     from: String,
     to: String,
     steps: Vec<usize>,
-    /// The middle of the arrow, and its tip.
+    /// The centre of the arrow, and its tip.
     arrow: [Point; 2],
-    /// The middle of the numbers, and their text.
+    /// The centre of the step numbers, and their text.
     label: Option<(Point, String)>,
 }
 
-/// Places at these positions, and moves between them in this order; `designs` has a design for each move, over and over.
+/// Creates a plan with places at these positions and with these moves. The moves use the designs in
+/// turn.
 fn plan(positions: &[Option<Point>], moves: &[(usize, usize)], designs: &[&str]) -> Plan {
     let place = |(index, position): (usize, &Option<Point>)| Place {
         name: format!("place_{index}"),
@@ -81,8 +82,9 @@ fn distance(one: Point, other: Point) -> f64 {
     (one.0 - other.0).hypot(one.1 - other.1)
 }
 
-/// Asserts of a drawn map: each move is in the leg of its direction, the arrow points in that direction, the numbers are nearer to it than to any other
-/// arrow, and they are apart from each other. Returns how many legs have no numbers.
+/// Checks a drawn map. Each move must be in the leg of its direction, and the arrow must point in
+/// this direction. Step numbers must be nearer to the arrow of their leg than to every other arrow,
+/// and must not overlap. Returns the number of legs without step numbers.
 fn check(name: &str, picture: Node<'_, '_>, moves: &[(usize, usize)]) -> usize {
     let legs = legs(picture);
     let at = |name: &str| {
@@ -127,7 +129,7 @@ fn check(name: &str, picture: Node<'_, '_>, moves: &[(usize, usize)]) -> usize {
     legs.iter().filter(|leg| leg.label.is_none()).count()
 }
 
-/// The map of a plan as a file, and as each drawing of a page.
+/// Returns the map of a plan as drawn in a separate file, and as drawn for each column of a page.
 fn drawings(plan: &Plan) -> Vec<(String, String)> {
     let report = Report { plan: plan.clone(), before: Some(plan.clone()), ..Report::default() };
     let file = report.pictures().into_iter().find(|(name, _)| name == "map.svg").expect("a map").1;
@@ -167,7 +169,7 @@ fn numbers_stand_at_the_arrow_of_their_direction() {
     let star = known(&[(0.0, 0.0), (4.0, 0.0), (8.0, 3.0), (8.0, -3.0), (12.0, 0.0)]);
     let bed = |bed: usize| [(0, 1), (1, bed), (bed, 1), (1, 0)];
     check_all("a star", &star, &[bed(2), bed(3), bed(4)].concat(), &["fd_a"]);
-    // One short way among long ones, in any direction.
+    // A short way and a long way, in various directions.
     for turn in 0..16 {
         let (sin, cos) = (f64::from(turn) * std::f64::consts::PI / 8.0).sin_cos();
         let turned = |(x, y): Point| (x * cos - y * sin, x * sin + y * cos);
@@ -201,7 +203,8 @@ fn places_at_one_position_are_told_apart() {
     let moves = [(0, 1), (1, 2), (2, 1), (2, 3), (3, 4), (4, 2)];
     for (drawing, text) in drawings(&plan(&positions, &moves, &["fd_a"])) {
         let document = Document::parse(&text).expect("XML");
-        // There is not enough space for all numbers here, but no number may be at another leg's arrow.
+        // There is not enough space for all numbers here, but no number may be nearest to the arrow
+        // of a different leg.
         check(&drawing, document.root(), &moves);
         let circles = document.descendants().filter(|node| node.attribute("data-place").is_some());
         let at = |node: Node<'_, '_>| {
@@ -224,7 +227,7 @@ fn places_at_one_position_are_told_apart() {
     }
 }
 
-/// Random walks on random maps, by a linear congruential generator.
+/// Random walks on random maps; the random numbers come from a linear congruential generator.
 #[test]
 fn no_number_of_a_random_walk_stands_at_another_arrow() {
     let mut seed = 7_u64;

@@ -1,4 +1,4 @@
-//! Pictures contain all data with arbitrary names, and are identical for identical data.
+//! Pictures contain all data, accept arbitrary names, and are identical for identical data.
 
 use std::time::Instant;
 
@@ -10,7 +10,7 @@ use roxmltree::Document;
 
 const HOSTILE: &str = "</title></text><script>alert(1)</script>\"'&\u{1}\u{202e}";
 
-/// Creates a plan of `steps` steps around a ring of places, with names that begin as given.
+/// Creates a plan of `steps` steps around a ring of places. All names start with `name`.
 fn plan(steps: usize, name: &str) -> Plan {
     let count = steps.max(3);
     let step = |index: usize| Step {
@@ -86,7 +86,7 @@ fn report(steps: usize, name: &str) -> Report {
     }
 }
 
-/// The values of an attribute in a document, in its order.
+/// Returns the values of an attribute in a document, in document order.
 fn values<'a>(document: &'a Document<'_>, attribute: &str) -> Vec<&'a str> {
     document.descendants().filter_map(|node| node.attribute(attribute)).collect()
 }
@@ -156,11 +156,11 @@ fn a_thousand_steps_are_drawn_at_once() {
     let begun = Instant::now();
     let page = report.html();
     assert!(page.contains("data-step=\"1000\""));
-    // Debug builds are several times slower than release builds.
+    // Debug builds are several times slower than release builds, so the limit is generous.
     assert!(begun.elapsed().as_secs_f64() < 10.0, "{:?}", begun.elapsed());
 }
 
-/// Actions that overlap lie in rows of their own.
+/// Overlapping actions are drawn in different rows.
 #[test]
 fn overlapping_actions_do_not_cover_each_other() {
     let mut plan = plan(3, "");
@@ -196,7 +196,8 @@ actions  ▕move p0············▕move p1············▕
     assert_eq!(Plan::default().text(100), None);
 }
 
-/// Steps that are too short for one scale are wider, and many steps take several lines; none is longer than the terminal is wide.
+/// In a picture that is not to scale, short steps are widened and many steps continue on further
+/// lines. No line is longer than the terminal is wide.
 #[test]
 fn terminals_of_any_width_hold_the_picture() {
     let mut night = plan(16, "");
@@ -220,7 +221,8 @@ fn terminals_of_any_width_hold_the_picture() {
     assert_eq!(plan(200, "").text(80), None, "more than an overview");
 }
 
-/// The drawings of a page that a column of this width shows: how wide they are, and whether they are scrolled.
+/// Returns the drawings that a column of this width shows: name, width, and whether the drawing is
+/// scrolled.
 fn shown(page: &str, column: f64) -> Vec<(String, f64, bool)> {
     let class = match column {
         wide if wide >= 1146.0 => "in-wide",
@@ -240,7 +242,8 @@ fn shown(page: &str, column: f64) -> Vec<(String, f64, bool)> {
     shown.map(drawing).collect()
 }
 
-/// Each column shows each picture once, and no picture of an ordinary plan is wider than its column.
+/// Each column shows each picture exactly once. No picture of an ordinary plan is wider than its
+/// column.
 #[test]
 fn pictures_fit_their_column() {
     let alone = Report { before: None, ..report(20, "") };
@@ -260,7 +263,8 @@ fn pictures_fit_their_column() {
     }
 }
 
-/// A plan of very many steps is scrolled, and drawn once for all columns that are too narrow.
+/// A plan of very many steps is scrolled, and is drawn only once for all columns that are too
+/// narrow.
 #[test]
 fn long_plans_are_scrolled() {
     let page = Report { before: None, ..report(1000, "") }.html();
@@ -273,8 +277,8 @@ fn long_plans_are_scrolled() {
     assert_eq!(page.matches("-timeline-2-title").count(), 0);
 }
 
-/// Plans shown side by side share one axis: equal times are at equal positions, and the later half of the longer plan
-/// is shown.
+/// Plans shown side by side share their axes: equal times are at equal positions, and the longer
+/// plan is shown completely.
 #[test]
 fn before_and_after_share_one_axis() {
     let mut report = report(14, "");
@@ -308,7 +312,8 @@ fn before_and_after_share_one_axis() {
     let (before, after) = (ticks("before"), ticks("after"));
     assert_eq!(before.len(), 2, "a timeline and a number");
     assert_eq!(before, after, "the same numbers at the same places");
-    // The number falls to 98 in one plan and to 86 in the other: both are drawn on the range of both.
+    // The fluent falls to 98 in one plan and to 86 in the other; both curves are drawn on their
+    // common range.
     let values = |plan: &str| -> Vec<String> {
         let section = page.split(&format!("data-plan=\"{plan}\"")).nth(1).expect("a plan");
         let picture = section.split("number-1-1-title").nth(2).and_then(|rest| rest.split("</svg>").next());
@@ -324,7 +329,8 @@ fn before_and_after_share_one_axis() {
     assert!(last.1.parse::<f64>().is_ok_and(|x| x < 560.0), "{last:?}");
 }
 
-/// A bar too short for a name has the number of its step, which the map has, too.
+/// A bar that is too short for a name contains the number of its step, which also occurs in the
+/// map.
 #[test]
 fn short_bars_have_the_number_of_their_step() {
     let mut plan = plan(30, "");
@@ -350,7 +356,7 @@ fn short_bars_have_the_number_of_their_step() {
     assert!(narrow.contains(">30<") || narrow.contains("move p29"), "the long one is named");
 }
 
-/// A group without values shows the reason, and has no axis, which would mean nothing.
+/// A group without values shows the reason, and a plot without values has no axis.
 #[test]
 fn nothing_is_said_in_words() {
     let group = |values: Vec<(f64, String)>| Group {
@@ -371,7 +377,8 @@ fn nothing_is_said_in_words() {
     assert_eq!(some.pictures()[0].1.matches("none of its 20").count(), 1);
 }
 
-/// Creates a journal with the given number of events, each tenth with a decision.
+/// Creates a log with the given number of events. Every tenth event is a decision with a
+/// derivation.
 fn log(events: u64, name: &str) -> Log {
     let happening = |record: u64| Happening {
         record,
@@ -409,7 +416,7 @@ fn a_long_journal_is_a_page_that_opens() {
     assert_eq!(values(&document, "data-lane"), ["events", "inferences", "plans", "effects", "refusals"]);
 }
 
-/// A page with all kinds of parts.
+/// Creates a page with all kinds of parts.
 fn sheet(name: &str) -> Sheet {
     let points = Points {
         title: name.to_owned(),

@@ -1,4 +1,4 @@
-//! The best policy of a small decision process, with bounds that are proved.
+//! Computes the best policy of a small Markov decision process, with proved bounds on its value.
 //!
 //! `cargo run -p metaplan-probabilistic --example gamble`
 #![expect(clippy::print_stdout, reason = "an example prints")]

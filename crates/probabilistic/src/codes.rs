@@ -1,6 +1,6 @@
 //! The catalogue of this crate's error codes.
 
-/// The codes in ascending order: code, meaning, cause, remedy.
+/// The error codes in ascending order. Each entry has four parts: code, meaning, cause, remedy.
 pub const CODES: &[[&str; 4]] = &[
     [
         "Q101",

@@ -3,21 +3,21 @@
 use diagnostics::Errors;
 use thiserror::Error;
 
-/// A position in a text: line and column from 1, the column in characters.
+/// A position in a text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub struct Place {
-    /// Line, from 1.
+    /// Line number, from 1.
     pub line: usize,
-    /// Column, from 1, in characters.
+    /// Column number in characters, from 1.
     pub column: usize,
 }
 
-/// An error in a text.
+/// An error at a position in the text of a model or property.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("{}:{}: {message}", place.line, place.column)]
 #[non_exhaustive]
 pub struct Diagnostic {
-    /// The stable code of the cause, `Q…`.
+    /// The stable code of the kind of error, `Q…`.
     pub code: &'static str,
     /// Position of the error.
     pub place: Place,
@@ -31,7 +31,7 @@ impl Diagnostic {
     }
 }
 
-/// The reason for which a check has no answer.
+/// The reason why a check has no answer.
 #[derive(Debug, Clone, Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -49,7 +49,7 @@ pub enum Error {
     StateLimit {
         /// Number of reached states.
         states: usize,
-        /// The limit.
+        /// The upper limit on the number of states.
         limit: usize,
     },
     /// The caller cancelled the exploration.
@@ -64,7 +64,8 @@ pub enum Error {
 }
 
 impl Error {
-    /// The errors in the text of the model or of the property; empty for other errors.
+    /// Returns the errors located in the text of the model or the property; empty for other kinds
+    /// of error.
     pub fn diagnostics(&self) -> &[Diagnostic] {
         match self {
             Self::Model(problems) | Self::Property(problems) => problems,

@@ -1,7 +1,8 @@
-//! Explores the reachable states of a generator breadth first and builds the sparse process.
+//! Explores the reachable states of a model breadth first and builds a sparse Markov decision
+//! process.
 //!
-//! A generator computes the successors of a state. It is the only code that interprets states;
-//! all later stages use state numbers.
+//! A generator computes the successors of a state. Only the generator interprets states; all later
+//! stages use state numbers.
 
 use std::hash::Hash;
 
@@ -11,7 +12,7 @@ use crate::mdp::{MAX_COUNT, Mdp, dense};
 use crate::number::Number;
 use crate::states::{Probe, States};
 
-/// The action of the self-loop that a state without choices gets.
+/// The action number of the self-loop that is added to a state without choices.
 pub const DEADLOCK: u32 = u32::MAX;
 
 /// A model that generates states and transitions on the fly.
@@ -19,41 +20,41 @@ pub trait Generator<N: Number> {
     /// The type of states.
     type State: Clone + Eq + Hash;
 
-    /// The initial state.
+    /// Returns the initial state; if there are several, one of them.
     fn initial(&self) -> Self::State;
 
-    /// All initial states, if there are several.
+    /// Returns all initial states.
     fn starts(&self) -> Vec<Self::State> {
         vec![self.initial()]
     }
 
-    /// Number of rewards of each choice.
+    /// Returns the number of reward structures, i.e. the number of rewards per choice.
     fn rewards(&self) -> usize;
 
-    /// Number of codes, if [`code`](Self::code) numbers all conceivable states. States are then
-    /// indexed by a table instead of a hash map.
+    /// Returns the number of state codes if [`code`](Self::code) numbers all conceivable states,
+    /// otherwise `None`. With codes, states are indexed by a table instead of a hash map.
     fn codes(&self) -> Option<usize> {
         None
     }
 
-    /// The code of a state, less than [`codes`](Self::codes). States that are connected by
+    /// Returns the code of a state, which is less than [`codes`](Self::codes). States connected by
     /// transitions should have close codes, for locality of memory accesses.
     fn code(&self, _state: &Self::State) -> usize {
         0
     }
 
-    /// Writes all choices of a state.
+    /// Appends all choices of a state to `choices`.
     ///
     /// # Errors
     /// The model is invalid in this state, e.g. probabilities do not sum to 1.
     fn successors(&self, state: &Self::State, choices: &mut Choices<Self::State, N>) -> Result<(), Error>;
 }
 
-/// The choices that a generator writes, for one state after another.
+/// A buffer for the choices that a generator writes, for one state after another.
 #[derive(Debug)]
 pub struct Choices<S, N> {
     transitions: Vec<(S, N)>,
-    /// Action and end of the transitions of each choice.
+    /// For each choice, its action and the end of its transitions in `transitions`.
     ends: Vec<(u32, usize)>,
     rewards: Vec<N>,
 }
@@ -64,11 +65,11 @@ impl<S, N> Default for Choices<S, N> {
     }
 }
 
-/// The transitions and rewards of a choice.
+/// The transitions (target and probability) and the rewards of a choice.
 pub type Written<'a, S, N> = (&'a [(S, N)], &'a [N]);
 
 impl<S: Clone, N: Number> Choices<S, N> {
-    /// The transitions and rewards of the first choice with an action.
+    /// Returns the transitions and rewards of the first choice with this action, or `None`.
     pub fn find(&self, action: u32) -> Option<Written<'_, S, N>> {
         let at = self.ends.iter().position(|(candidate, _)| *candidate == action)?;
         let begin = at.checked_sub(1).map_or(0, |before| self.ends[before].1);
@@ -77,25 +78,25 @@ impl<S: Clone, N: Number> Choices<S, N> {
         Some((&self.transitions[begin..self.ends[at].1], rewards))
     }
 
-    /// Adds a transition to the current choice. Transitions of probability 0 are dropped.
+    /// Adds a transition to the current choice, unless the probability is 0.
     pub fn to(&mut self, state: S, probability: N) {
         if !probability.is_zero() {
             self.transitions.push((state, probability));
         }
     }
 
-    /// Ends the current choice.
+    /// Ends the current choice and sets its action and its rewards.
     pub fn end(&mut self, action: u32, rewards: impl IntoIterator<Item = N>) {
         self.rewards.extend(rewards);
         self.ends.push((action, self.transitions.len()));
     }
 
-    /// The current position, for [`Self::back_to`].
+    /// Returns the current position, for [`Self::back_to`].
     pub(crate) fn mark(&self) -> [usize; 3] {
         [self.transitions.len(), self.ends.len(), self.rewards.len()]
     }
 
-    /// Removes everything that was written after a mark.
+    /// Removes everything that was written after [`Self::mark`] returned this position.
     pub(crate) fn back_to(&mut self, [transitions, ends, rewards]: [usize; 3]) {
         self.transitions.truncate(transitions);
         self.ends.truncate(ends);
@@ -109,11 +110,11 @@ impl<S: Clone, N: Number> Choices<S, N> {
     }
 }
 
-/// Limits of exploration. Each `with_` method sets one limit.
+/// Limits of an exploration. Each `with_` method sets one limit.
 #[derive(Clone, Copy)]
 #[non_exhaustive]
 pub struct Bounds<'a> {
-    /// Upper limit on the number of states.
+    /// Upper limit on the number of reached states.
     pub states: usize,
     /// Callback that receives the number of states periodically; `false` cancels the exploration.
     pub progress: &'a dyn Fn(usize) -> bool,
@@ -143,19 +144,19 @@ impl Default for Bounds<'_> {
 /// An explored process with its states and rewards.
 #[derive(Debug)]
 pub struct Explored<S, N> {
-    /// The process. The initial states are the first ones.
+    /// The process. The initial states have the smallest numbers.
     pub mdp: Mdp<N>,
     /// Number of initial states.
     pub starts: usize,
-    /// The states by number.
+    /// The states, indexed by state number.
     pub states: States<S>,
-    /// For each reward structure, the reward of each choice.
+    /// For each computed reward structure, the reward of each choice.
     pub rewards: Vec<Vec<N>>,
-    /// Number of states without a choice, which got a self-loop.
+    /// Number of states without an enabled choice; each of them got a self-loop.
     pub deadlocks: usize,
 }
 
-/// Explores all reachable states.
+/// Explores all states reachable from the initial states.
 ///
 /// # Errors
 /// The model is invalid in a reachable state, a limit is exceeded, or the caller cancels.
@@ -168,18 +169,18 @@ pub fn explore<N: Number, G: Generator<N>>(
     Ok(exploration.explored)
 }
 
-/// A resumable exploration.
+/// An exploration that can be interrupted and resumed.
 pub(crate) struct Exploration<S, N> {
     /// The explored part of the process.
     pub explored: Explored<S, N>,
-    /// The next state to expand.
+    /// The number of the next state to expand.
     next: usize,
-    /// The state at which progress is reported next.
+    /// The number of the expanded state at which progress is reported next.
     next_report: usize,
 }
 
 impl<S: Clone + Eq + Hash, N: Number> Exploration<S, N> {
-    /// Creates an exploration with the initial states.
+    /// Creates an exploration that contains the initial states only.
     pub fn new<G: Generator<N, State = S>>(generator: &G, bounds: &Bounds<'_>) -> Result<Self, Error> {
         let mut states = States::new(generator.codes());
         for start in generator.starts() {
@@ -195,8 +196,8 @@ impl<S: Clone + Eq + Hash, N: Number> Exploration<S, N> {
         Ok(Self { explored, next: 0, next_report: 0 })
     }
 
-    /// Explores until all states are expanded or `transitions` is reached, possibly exceeded by
-    /// one batch. Returns `true` if all states are expanded.
+    /// Expands states until none is left or the process has at least `transitions` transitions; the
+    /// limit can be exceeded by one batch. Returns `true` if all states are expanded.
     pub fn run<G: Generator<N, State = S>>(
         &mut self,
         generator: &G,
@@ -227,18 +228,18 @@ impl<S: Clone + Eq + Hash, N: Number> Exploration<S, N> {
     }
 }
 
-/// Number of states whose successors are generated before they are looked up, so that memory
-/// latencies overlap.
+/// Number of states whose successors are generated before the first target is looked up, so that
+/// memory latencies overlap.
 const BATCH: usize = 32;
-/// Number of states between two progress reports.
+/// Number of expanded states between two progress reports.
 const REPORT_INTERVAL: usize = 65_536;
 
-/// The choices of a few consecutive states.
+/// The choices of up to [`BATCH`] consecutive states.
 struct Batch<S, N> {
     choices: Choices<S, N>,
-    /// The end of the choices of each state.
+    /// For each state, the end of its choices in `choices`.
     ends: Vec<usize>,
-    /// For each transition, a first lookup of its target.
+    /// For each transition, the result of a first lookup of its target state.
     probes: Vec<Probe>,
 }
 
@@ -263,7 +264,8 @@ impl<S: Clone + Eq + Hash, N: Number> Batch<S, N> {
 }
 
 impl<S: Clone + Eq + Hash, N: Number> Explored<S, N> {
-    /// Adds the choices of the states from `first` on.
+    /// Adds the choices of a batch to the process; `first` is the number of the first state in the
+    /// batch.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "no more deadlocks than states, which are counted by 32 bits, and positions in lists"
@@ -306,7 +308,7 @@ impl<S: Clone + Eq + Hash, N: Number> Explored<S, N> {
 }
 
 impl<S: Clone> Exploration<S, Fraction> {
-    /// Converts to doubles. Returns `None` if a number is out of range.
+    /// Converts all numbers to doubles. Returns `None` if a number is out of range.
     pub fn rounded(&self) -> Option<Exploration<S, f64>> {
         Some(Exploration {
             explored: self.explored.rounded()?,
@@ -317,7 +319,7 @@ impl<S: Clone> Exploration<S, Fraction> {
 }
 
 impl<S: Clone> Explored<S, Fraction> {
-    /// Converts to doubles. Returns `None` if a number is out of range.
+    /// Converts all numbers to doubles. Returns `None` if a number is out of range.
     pub(crate) fn rounded(&self) -> Option<Explored<S, f64>> {
         let rewards = self.rewards.iter().map(|values| values.iter().map(Fraction::rounded).collect());
         Some(Explored {

@@ -1,9 +1,9 @@
 //! Rational numbers with a compact representation of small values.
 //!
-//! Probabilities and rewards of models are mostly fractions of small integers. A fraction whose
-//! parts fit into one word each needs no heap memory, and its arithmetic cancels common factors
-//! before it multiplies (Knuth, The Art of Computer Programming 2, 4.5.1). Other values are
-//! arbitrary-precision rationals.
+//! Probabilities and rewards of models are mostly fractions of small integers. If numerator and
+//! denominator fit into one 64-bit word each, the fraction needs no heap memory. Common factors are
+//! cancelled before multiplication (Knuth, The Art of Computer Programming 2, 4.5.1). Other
+//! fractions are stored as arbitrary-precision rationals.
 
 use std::borrow::Cow;
 use std::cmp::Ordering;
@@ -18,7 +18,7 @@ use crate::number::{Number, rounded};
 /// A fraction in lowest terms with a positive denominator.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Fraction {
-    /// Numerator and denominator, whenever both fit into a signed word.
+    /// Numerator and denominator, if both fit into a signed 64-bit word.
     Short(i64, NonZeroU64),
     /// All other fractions.
     Long(Box<BigRational>),
@@ -26,11 +26,11 @@ pub enum Fraction {
 
 use Fraction::{Long, Short};
 
-/// Integers up to this magnitude are exact doubles.
+/// Upper limit on the magnitude of integers that are certainly exact as doubles.
 const WHOLE: u64 = 1 << 53;
 
-/// The greatest common divisor by the binary algorithm (Stein, J. Comp. Phys. 1, 1967); at least
-/// 1.
+/// Returns the greatest common divisor by the binary algorithm (Stein, J. Comp. Phys. 1, 1967). The
+/// result is at least 1, also if both arguments are 0.
 #[expect(clippy::arithmetic_side_effects, reason = "the smaller one is taken off the greater one")]
 const fn divisor(mut left: u64, mut right: u64) -> u64 {
     if left == 0 || right == 0 {
@@ -50,7 +50,7 @@ const fn divisor(mut left: u64, mut right: u64) -> u64 {
     }
 }
 
-/// Creates a fraction from coprime parts; the denominator is not zero.
+/// Creates a fraction from a coprime numerator and denominator. The denominator must not be zero.
 fn reduced(numerator: i128, denominator: u128) -> Fraction {
     let below = i64::try_from(denominator).ok().and_then(|below| NonZeroU64::new(below.unsigned_abs()));
     if let (Ok(numerator), Some(denominator)) = (i64::try_from(numerator), below) {
@@ -59,7 +59,7 @@ fn reduced(numerator: i128, denominator: u128) -> Fraction {
     Long(Box::new(BigRational::new_raw(BigInt::from(numerator), BigInt::from(denominator))))
 }
 
-/// The sum or the difference of two short fractions.
+/// Returns the sum of two short fractions, or their difference if `is_difference`.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "products of two words below 2^63 and the sum of two such products fit into 128 bits; divisors are at least 1"
@@ -70,12 +70,12 @@ fn sum((a, b): (i64, NonZeroU64), (c, d): (i64, NonZeroU64), is_difference: bool
     let common = if b == d { b } else { divisor(b, d) };
     let (left, right) = (b / common, d / common);
     let sum = i128::from(a) * i128::from(right) + c * i128::from(left);
-    // The remaining common factor divides the common divisor of the denominators.
+    // Only factors of the denominators' common divisor can remain in numerator and denominator.
     let factor = if common == 1 { 1 } else { divisor(remainder(sum, common), common) };
     reduced(sum / i128::from(factor), u128::from(left) * u128::from(d / factor))
 }
 
-/// The magnitude of a sum modulo a divisor.
+/// Returns the absolute value of `sum` modulo `divisor`.
 #[expect(
     clippy::arithmetic_side_effects,
     clippy::cast_possible_truncation,
@@ -86,8 +86,8 @@ const fn remainder(sum: i128, divisor: u64) -> u64 {
     if magnitude >> 64 == 0 { magnitude as u64 % divisor } else { (magnitude % divisor as u128) as u64 }
 }
 
-/// The product of two short fractions; the second one is given by its sign and the magnitudes of
-/// its parts.
+/// Returns the product of the short fraction `a / b` and the fraction `c / d`, which is negative if
+/// `is_negative`.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "the product of two magnitudes up to 2^63 fits into 128 bits; divisors are at least 1"
@@ -116,17 +116,19 @@ impl Fraction {
         Self::fitting(&rational).unwrap_or_else(|| Long(Box::new(rational)))
     }
 
-    /// Converts a rational whose parts fit into words.
+    /// Converts a rational to a short fraction. Returns `None` if a part does not fit into a signed
+    /// word.
     fn fitting(rational: &BigRational) -> Option<Self> {
         let denominator = rational.denom().to_i64()?.unsigned_abs();
         Some(Short(rational.numer().to_i64()?, NonZeroU64::new(denominator)?))
     }
 
-    /// The quotient of the parts if both are exact doubles, so that the division rounds once.
+    /// Returns numerator divided by denominator, rounded once. Returns `None` if a part may not be
+    /// an exact double.
     ///
-    /// The quotient is an integer only if it is exact: its magnitude is below 2^53 / d for the
-    /// denominator d, so the rounding error is less than 1 / d, and a fraction that is not an
-    /// integer differs from every integer by at least 1 / d.
+    /// The quotient is an integer only if it is exact. For the denominator d, its magnitude is
+    /// below 2^53 / d, so the rounding error is less than 1 / d. A fraction that is not an integer
+    /// differs from every integer by at least 1 / d.
     #[expect(clippy::cast_precision_loss, reason = "both are at most 2^53")]
     fn quotient(&self) -> Option<f64> {
         match self {
@@ -139,7 +141,8 @@ impl Fraction {
         }
     }
 
-    /// The nearest double, see [`rounded`].
+    /// Returns the nearest double, or `None` if its magnitude is too small or too large, see
+    /// [`rounded`].
     pub fn rounded(&self) -> Option<f64> {
         self.quotient().or_else(|| rounded(&self.long()))
     }
@@ -230,7 +233,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Integers of all lengths, including the bounds of a word.
+    /// Integers of all bit lengths, including values around the limits of a signed word.
     fn part() -> impl Strategy<Value = i128> {
         let sizes = (0_u32..72, any::<i128>()).prop_map(|(bits, number)| number >> (127 - bits));
         let word = i128::from(i64::MAX);
@@ -243,8 +246,8 @@ mod tests {
             .prop_map(|(above, below)| BigRational::new(BigInt::from(above), BigInt::from(below)))
     }
 
-    /// Checks that a fraction has a value, and that it is short exactly if both parts fit into
-    /// words.
+    /// Checks that `fraction` has the expected value, and that it is short if and only if both
+    /// parts fit into words.
     fn is(fraction: &Fraction, expected: &BigRational) {
         let fits = i64::try_from(expected.numer()).is_ok() && i64::try_from(expected.denom()).is_ok();
         assert_eq!(matches!(fraction, Short(..)), fits, "{fraction:?} {expected}");

@@ -1,17 +1,18 @@
 //! Computes strongly connected components in reverse topological order, without recursion.
 //!
-//! Tarjan's algorithm with one number per node (Pearce, "A Space-Efficient Algorithm for Finding
-//! Strongly Connected Components", IPL 116(1), 2016). Trivial components, the majority in
-//! practice, never enter the stack, and each component is reported as soon as it is complete.
+//! Tarjan's algorithm with a single number per node (Pearce, "A Space-Efficient Algorithm for
+//! Finding Strongly Connected Components", IPL 116(1), 2016). Most components have one node; they
+//! never enter the stack. Each component is reported as soon as it is complete.
 
 use crate::mdp::dense;
 
-/// The number of an unvisited node.
+/// Number that marks an unvisited node.
 const UNSEEN: u32 = 0;
-/// The number of a node whose component is complete.
+/// Number that marks a node whose component is complete.
 const DONE: u32 = u32::MAX;
 
-/// Size of a component from which on memory is released before the component is reported.
+/// Number of nodes from which on a component is large: unused stack memory is released before the
+/// component is reported.
 const SHRINK_THRESHOLD: usize = 100_000;
 
 /// A call frame of the depth-first search.
@@ -19,15 +20,15 @@ struct Frame {
     node: u32,
     /// The visit number of the node.
     visit_number: u32,
-    /// Number of its edges that have been followed.
+    /// Number of edges of the node that were already followed.
     followed: u32,
 }
 
-/// Reports the strongly connected components of the nodes `0..n`, each after all components that
-/// it can reach.
+/// Calls `take` for each strongly connected component of the nodes `0..n`. Components are reported
+/// in reverse topological order: successors first.
 ///
 /// # Errors
-/// The first error of `take`.
+/// The first error that `take` returns; it ends the search.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "nodes are numbered from 1 to n, which is below the greatest number of 32 bits; begin is above 0"
@@ -37,7 +38,8 @@ pub fn visit_components<'a, E>(
     successors: impl Fn(u32) -> &'a [u32],
     mut take: impl FnMut(&[u32]) -> Result<(), E>,
 ) -> Result<(), E> {
-    // For each node, the least number of an incomplete node that it is known to reach.
+    // For each node, the least visit number of a node with an incomplete component that is known to
+    // be reachable from it.
     let mut low = vec![UNSEEN; n];
     let mut stack: Vec<u32> = Vec::new();
     let mut frames: Vec<Frame> = Vec::new();
@@ -87,8 +89,8 @@ pub fn visit_components<'a, E>(
             } else {
                 stack.push(node);
                 if stack.len() - begin >= SHRINK_THRESHOLD {
-                    // A deep search has used much memory, which the receiver of a large component
-                    // may require.
+                    // A deep search has allocated many frames. Processing a large component may
+                    // need this memory.
                     frames.shrink_to_fit();
                 }
                 take(&stack[begin..])?;
@@ -104,17 +106,17 @@ pub fn visit_components<'a, E>(
 pub struct Components {
     /// The nodes, component by component.
     nodes: Vec<u32>,
-    /// The start of each component in `nodes`, and the end.
+    /// The start of each component in `nodes`, followed by the length of `nodes`.
     starts: Vec<u32>,
 }
 
 impl Components {
-    /// Iterates over the components in reverse topological order: successors first.
+    /// Iterates over the components in reverse topological order (successors first).
     pub fn iter(&self) -> impl DoubleEndedIterator<Item = &[u32]> {
         self.starts.windows(2).map(|window| &self.nodes[window[0] as usize..window[1] as usize])
     }
 
-    /// Number of components.
+    /// Returns the number of components.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "the end is listed, too, so that the list is never empty"

@@ -1,8 +1,8 @@
 //! Translates PRISM models to JANI (jani-spec.org, version 1).
 //!
-//! Each module becomes an automaton with one location; automata synchronise on their actions.
-//! Labels become transient Boolean variables, rewards transient real variables. Formulas are
-//! expanded, so no name is used twice.
+//! Each module becomes an automaton with a single location. Automata synchronise on their common
+//! actions. Labels become transient Boolean variables; reward structures become transient real
+//! variables. Formulas are expanded; names that collide get a prefix.
 
 use std::collections::BTreeMap;
 
@@ -15,11 +15,11 @@ use crate::prism::ast::{
     Variable,
 };
 
-/// Translates a model to JANI. Undefined constants become parameters of the JANI model.
+/// Translates a PRISM model to JANI. Undefined constants become parameters of the JANI model.
 ///
 /// # Errors
-/// A construct that JANI cannot express (rewards of commands without an action), or a formula
-/// that contains itself.
+/// A construct that JANI cannot express (rewards of commands without an action), or a formula whose
+/// definition contains itself.
 pub fn write(name: &str, model: &Model) -> Result<Value, Error> {
     let recursive: Vec<Diagnostic> =
         model.formulas.iter().filter_map(|formula| recursion(model, formula)).collect();
@@ -39,7 +39,7 @@ pub fn write(name: &str, model: &Model) -> Result<Value, Error> {
         let name = reward_name(model, &rewards.name);
         variables.push(json!({ "name": name, "type": "real", "transient": true, "initial-value": 0 }));
     }
-    // Rewards and labels of states are assigned by the first automaton only.
+    // Only the first automaton assigns labels and state rewards.
     let automata: Vec<Value> = model
         .modules
         .iter()
@@ -84,12 +84,14 @@ fn is_taken(model: &Model, name: &str) -> bool {
     names.any(|existing| existing == name)
 }
 
-/// The name of a label; prefixed if it is taken.
+/// Returns the JANI variable name of a label: the label with the prefix `label_` if a variable or
+/// constant has the same name.
 fn label_name(model: &Model, name: &str) -> String {
     if is_taken(model, name) { format!("label_{name}") } else { name.to_owned() }
 }
 
-/// The name of a reward structure; prefixed if it is taken.
+/// Returns the JANI variable name of a reward structure, with the prefix `reward_` if the name is
+/// used already.
 fn reward_name(model: &Model, name: &str) -> String {
     let collides = is_taken(model, name) || model.labels.iter().any(|label| label.name == name);
     match name {
@@ -103,7 +105,7 @@ fn type_name(kind: Type) -> &'static str {
     if kind == Type::Double { "real" } else { kind.name() }
 }
 
-/// The actions with their participating modules.
+/// Maps each action to the indices of the modules that have commands with this action.
 fn actions(model: &Model) -> BTreeMap<&str, Vec<usize>> {
     let mut actions: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
     for (number, module) in model.modules.iter().enumerate() {
@@ -128,7 +130,8 @@ fn system(model: &Model, actions: &BTreeMap<&str, Vec<usize>>) -> Value {
     })
 }
 
-/// Reports a formula that contains itself, which cannot be expanded.
+/// Returns an error if a formula refers to itself, directly or indirectly, and so cannot be
+/// expanded.
 fn recursion(model: &Model, formula: &Named) -> Option<Diagnostic> {
     let mut used = Vec::new();
     formula.expression.names(&mut used);
@@ -147,7 +150,7 @@ fn recursion(model: &Model, formula: &Named) -> Option<Diagnostic> {
     None
 }
 
-/// The conjuncts of a condition.
+/// Returns the conjuncts of a condition from left to right.
 fn parts(condition: &Expr) -> Vec<&Expr> {
     let (mut stack, mut conjuncts) = (vec![condition], Vec::new());
     while let Some(part) = stack.pop() {
@@ -194,7 +197,8 @@ impl Writer<'_> {
     }
 
     fn edge(&self, model: &Model, module: &Module, command: &Command) -> Value {
-        // The first of the synchronised modules carries the rewards of the action.
+        // Among the modules that synchronise on an action, only the first assigns the rewards of
+        // the action.
         let action = command.action.as_deref();
         let shares = |candidate: &&Module| candidate.commands.iter().any(|c| c.action.as_deref() == action);
         let carries =
@@ -238,8 +242,9 @@ impl Writer<'_> {
         edge
     }
 
-    /// The sum of rewards under their guards. Conditions on variables in `fixed` are evaluated
-    /// statically.
+    /// Returns the sum of the rewards of `items`, each under its guard. Conjuncts of the form
+    /// `variable = value` on a variable in `fixed` are evaluated statically. Returns `None` if no
+    /// item remains.
     fn sum<'a>(&self, items: impl Iterator<Item = &'a RewardItem>, fixed: &[(&str, i64)]) -> Option<Value> {
         items
             .filter_map(|item| {
@@ -271,12 +276,14 @@ impl Writer<'_> {
             .reduce(|left, right| json!({ "op": "+", "left": left, "right": right }))
     }
 
-    /// The variables whose value a condition determines.
+    /// Returns the variables whose values are determined by conjuncts `variable = value` of a
+    /// condition.
     fn fixed<'a>(&self, condition: &'a Expr) -> Vec<(&'a str, i64)> {
         parts(condition).into_iter().filter_map(|part| self.fixes(part)).collect()
     }
 
-    /// The variable and the value of `variable = value`.
+    /// Returns the variable and the value of a condition `variable = value`, or `None` for another
+    /// condition.
     fn fixes<'a>(&self, part: &'a Expr) -> Option<(&'a str, i64)> {
         let ExprKind::Binary(BinaryOp::Equal, left, right) = &part.kind else { return None };
         let (ExprKind::Name(name), ExprKind::Int(value)) = (&left.kind, &right.kind) else { return None };
@@ -342,7 +349,7 @@ impl Writer<'_> {
     }
 }
 
-/// Writes a decimal as a number, and any other fraction as a division.
+/// Converts a rational to JANI: a decimal as a number literal, another fraction as a division.
 fn number(value: &num_rational::BigRational) -> Value {
     let (text, _) = crate::prism::decimal(value);
     text.parse::<serde_json::Number>().map_or_else(

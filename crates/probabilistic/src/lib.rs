@@ -1,9 +1,10 @@
 //! Probabilistic model checking of Markov decision processes, with bounds that are certified or exact.
 //!
-//! A model is PRISM-language text ([`prism`]) or an [`explore::Generator`] that computes successors natively.
-//! It becomes a sparse process ([`mdp`]); [`solve`] computes least and greatest probabilities and expected rewards with
-//! bounds and policies; [`policy`] evaluates a given policy; [`pareto`] trades two objectives. [`check`] does all of
-//! this for a property in PRISM's syntax.
+//! A model is PRISM-language text ([`prism`]) or an [`explore::Generator`] that computes successors
+//! natively. Exploration turns the model into a sparse process ([`mdp`]). [`solve`] computes least
+//! and greatest probabilities and expected rewards with bounds and policies. [`policy`] evaluates a
+//! given policy; [`pareto`] computes trade-offs between two objectives. [`check`] performs all
+//! these steps for a property in PRISM's syntax.
 //!
 //! Absent: OWL, PDDL, file access and output.
 
@@ -48,7 +49,7 @@ pub use number::Number;
 pub use solve::{Direction, Problem, Solution};
 pub use {fixedbitset::FixedBitSet, num_rational::BigRational, smallvec::SmallVec};
 
-/// The README's example is a test.
+/// Runs the example of the README as a doc test.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 mod readme {}

@@ -1,8 +1,7 @@
 //! Sparse Markov decision processes.
 //!
-//! States, choices and transitions are stored in three arrays; the choices of a state and the
-//! transitions of a choice are contiguous. All successors of a state are therefore one slice,
-//! which the graph algorithms iterate over.
+//! The choices of all states are stored contiguously, as are the transitions of all choices.
+//! Therefore all successors of a state form one slice, which the graph algorithms iterate over.
 
 use num_rational::BigRational;
 
@@ -10,12 +9,12 @@ use crate::error::Error;
 use crate::fraction::Fraction;
 use crate::number::Number;
 
-/// Upper limit on the number of states and of choices; the two greatest 32-bit numbers are
-/// reserved.
+/// Upper limit on the number of states and on the number of choices. The two greatest 32-bit
+/// numbers are reserved as markers.
 pub(crate) const MAX_COUNT: usize = 0xFFFF_FFFE;
 
-/// Converts a position to 32 bits. Positions of states, choices, transitions and characters of a
-/// text are below 2^32.
+/// Converts a position to 32 bits. Panics if the position is not below 2^32; states, choices,
+/// transitions and characters of a text are always fewer.
 pub(crate) fn dense(position: usize) -> u32 {
     u32::try_from(position).expect("invariant: positions are below 2^32")
 }
@@ -25,13 +24,13 @@ pub(crate) fn dense(position: usize) -> u32 {
 /// States are numbered from 0; choices are numbered consecutively over all states.
 #[derive(Debug, Clone)]
 pub struct Mdp<N> {
-    /// The first choice of each state, and the number of choices at the end.
+    /// The first choice of each state, followed by the number of choices.
     first_choice: Vec<u32>,
-    /// The first transition of each choice, and the number of transitions at the end.
+    /// The first transition of each choice, followed by the number of transitions.
     first_transition: Vec<u32>,
     targets: Vec<u32>,
     probabilities: Vec<N>,
-    /// The action of each choice.
+    /// The action number of each choice, as given by the generator.
     actions: Vec<u32>,
 }
 
@@ -48,7 +47,7 @@ impl<N: Number> Default for Mdp<N> {
 }
 
 impl<N: Number> Mdp<N> {
-    /// Number of states.
+    /// Returns the number of states.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "the end is listed, too, so that the list is never empty"
@@ -57,17 +56,17 @@ impl<N: Number> Mdp<N> {
         self.first_choice.len() - 1
     }
 
-    /// Number of choices in all states.
+    /// Returns the number of choices, summed over all states.
     pub fn choice_count(&self) -> usize {
         self.actions.len()
     }
 
-    /// Number of transitions.
+    /// Returns the number of transitions, summed over all choices.
     pub fn transition_count(&self) -> usize {
         self.targets.len()
     }
 
-    /// The choices of a state.
+    /// Returns the range of the choices of a state.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "the start of the next one is there, because the end is listed, too"
@@ -76,7 +75,7 @@ impl<N: Number> Mdp<N> {
         self.first_choice[state] as usize..self.first_choice[state + 1] as usize
     }
 
-    /// The state of a choice.
+    /// Returns the state to which a choice belongs, by binary search.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "the first state starts with choice 0, so that there is one that starts before"
@@ -85,7 +84,7 @@ impl<N: Number> Mdp<N> {
         self.first_choice.partition_point(|first| *first as usize <= choice) - 1
     }
 
-    /// The action of a choice, as numbered by the generator.
+    /// Returns the action number of a choice, as given by the generator.
     pub fn action(&self, choice: usize) -> u32 {
         self.actions[choice]
     }
@@ -98,25 +97,27 @@ impl<N: Number> Mdp<N> {
         self.first_transition[choice] as usize..self.first_transition[choice + 1] as usize
     }
 
-    /// The successors of a choice, without repetition.
+    /// Returns the successor states of a choice, without repetition.
     pub fn targets(&self, choice: usize) -> &[u32] {
         &self.targets[self.range(choice)]
     }
 
-    /// The transitions of a choice: successor and probability.
+    /// Iterates over the transitions of a choice: successor state and probability.
     pub fn transitions(&self, choice: usize) -> impl ExactSizeIterator<Item = (usize, &N)> {
         let range = self.range(choice);
         self.targets[range.clone()].iter().map(|state| *state as usize).zip(&self.probabilities[range])
     }
 
-    /// All successors of a state, by choice, possibly with repetition.
+    /// Returns the successor states of all choices of a state, in the order of the choices,
+    /// possibly with repetition.
     pub fn successors(&self, state: usize) -> &[u32] {
         let choices = self.choices(state);
         let first = self.first_transition[choices.start] as usize;
         &self.targets[first..self.first_transition[choices.end] as usize]
     }
 
-    /// Adds a transition to the current choice. Probabilities of equal targets are added.
+    /// Adds a transition to the current choice. If the choice already has this target, the
+    /// probabilities are added.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "a position in the list behind the first transition of the choice"
@@ -131,7 +132,7 @@ impl<N: Number> Mdp<N> {
         }
     }
 
-    /// Ends the current choice.
+    /// Ends the current choice, which gets the number `action` as its action.
     ///
     /// # Errors
     /// More choices or transitions than 32 bits can count.
@@ -145,12 +146,12 @@ impl<N: Number> Mdp<N> {
         Ok(())
     }
 
-    /// Ends the current state.
+    /// Ends the current state. Its choices are those added since the previous call.
     pub fn end_state(&mut self) {
         self.first_choice.push(dense(self.actions.len()));
     }
 
-    /// Number of choices of the current state that were added.
+    /// Returns the number of choices added since the last [`Self::end_state`].
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "the state that is being written starts after the choices of those before"
@@ -176,7 +177,8 @@ impl<N: Number> Mdp<N> {
 }
 
 impl Mdp<Fraction> {
-    /// Converts the probabilities to doubles. Returns `None` if a probability is out of range.
+    /// Converts the probabilities to doubles. Returns `None` if a probability is too small for
+    /// doubles, see [`crate::number::rounded`].
     pub(crate) fn rounded(&self) -> Option<Mdp<f64>> {
         Some(Mdp {
             first_choice: self.first_choice.clone(),
@@ -188,7 +190,7 @@ impl Mdp<Fraction> {
     }
 }
 
-/// Converts an exact number of the model to the kind of number that is solved in.
+/// Converts an exact number of the model to the number type of the solver.
 pub fn number<N: Number>(value: &BigRational) -> N {
     N::from_rational(value)
 }

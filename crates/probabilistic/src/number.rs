@@ -1,21 +1,21 @@
-//! The kinds of numbers that a model can be solved in: doubles and exact rationals.
+//! The number types of the solvers: doubles and exact rationals.
 //!
-//! Every algorithm is generic over them. Doubles scale to large models and require certified
-//! bounds; rationals serve small models.
+//! Every algorithm is generic in the number type. Doubles scale to large models, and their rounding
+//! errors are bounded; rationals are feasible for small models only.
 
 use std::fmt::Debug;
 
 use num_rational::BigRational;
 use num_traits::{One, ToPrimitive, Zero};
 
-/// Relative difference below which two doubles count as equally good.
+/// Relative difference below which two doubles are considered equal.
 const TOLERANCE: f64 = 1e-12;
 
-/// Integral doubles below this value are exact numbers of the model or exact sums of such
-/// numbers.
+/// Upper limit (exclusive) on integral doubles that are considered exact, either as numbers of the
+/// model or as sums of such numbers.
 const WHOLE: f64 = 4e15;
 
-/// Returns `true` if a double is an exact sum of integers.
+/// Returns `true` if a double is an integer small enough to be exact.
 pub(crate) fn is_whole(value: f64) -> bool {
     value.fract() == 0.0 && value < WHOLE
 }
@@ -29,47 +29,48 @@ pub(crate) fn count(things: usize) -> f64 {
     things as f64
 }
 
-/// An ordered field, for probabilities, rewards and values.
+/// A number type for probabilities, rewards and values: an ordered field.
 pub trait Number: Clone + Debug + PartialOrd + Send + Sync + 'static {
-    /// `true` if arithmetic is exact.
+    /// Whether arithmetic in this type is exact.
     const EXACT: bool;
 
     /// Zero.
     fn zero() -> Self;
     /// One.
     fn one() -> Self;
-    /// The nearest number of this kind. A double is integral only if it is exact: a value that
-    /// would be rounded to an integer becomes the adjacent double.
+    /// Converts a rational to the nearest number of this type. A double is integral only if it is
+    /// exact: a value that would be rounded to an integer becomes the adjacent double.
     fn from_rational(value: &BigRational) -> Self;
-    /// Converts a double; zero if it is not finite.
+    /// Converts a double; infinities and NaN become zero.
     fn from_f64(value: f64) -> Self;
-    /// The nearest double.
+    /// Converts to the nearest double.
     fn to_f64(&self) -> f64;
-    /// The rational value, if arithmetic is exact.
+    /// Returns the rational value if arithmetic is exact, otherwise `None`.
     fn to_rational(&self) -> Option<BigRational>;
-    /// Sum.
+    /// Returns the sum.
     #[must_use]
     fn plus(&self, other: &Self) -> Self;
-    /// Difference.
+    /// Returns the difference.
     #[must_use]
     fn minus(&self, other: &Self) -> Self;
-    /// Product.
+    /// Returns the product.
     #[must_use]
     fn times(&self, other: &Self) -> Self;
-    /// Quotient; the divisor must not be zero.
+    /// Returns the quotient; the divisor must not be zero.
     #[must_use]
     fn over(&self, other: &Self) -> Self;
-    /// Returns `true` for exactly zero.
+    /// Returns `true` if the number is exactly zero.
     fn is_zero(&self) -> bool;
-    /// Returns `true` for exactly one.
+    /// Returns `true` if the number is exactly one.
     fn is_unit(&self) -> bool;
-    /// Returns `true` if the number is less than `other` by more than rounding errors explain.
+    /// Returns `true` if the number is less than `other` by more than the tolerance for rounding
+    /// errors.
     fn clearly_less(&self, other: &Self) -> bool;
-    /// Size of the number in bits, the measure of the cost of exact arithmetic.
+    /// Returns the size of the number in bits, which measures the cost of exact arithmetic.
     fn size(&self) -> u64;
 }
 
-/// The operations that both kinds implement by operators.
+/// Implements the arithmetic methods of [`Number`] by operators.
 macro_rules! arithmetic {
     () => {
         fn plus(&self, other: &Self) -> Self {
@@ -168,15 +169,16 @@ impl Number for BigRational {
     }
 }
 
-/// Converts a probability or a reward to the kind of number that is solved in. Returns `None` if
-/// it is so small or large that doubles lose digits on which the bounds depend.
+/// Converts a probability or a reward of the model to the number type of the solver. Returns `None`
+/// if the value is so small or large that a double could underflow or overflow in later products.
 pub(crate) fn rounded<N: Number>(value: &BigRational) -> Option<N> {
     let number = N::from_rational(value);
     let magnitude = number.to_f64().abs();
     (N::EXACT || Zero::is_zero(value) || (1e-250..=1e250).contains(&magnitude)).then_some(number)
 }
 
-/// Parses a decimal such as `1.25e-3` exactly. Returns `None` if the text is not a number.
+/// Parses a decimal such as `1.25e-3` exactly. Returns `None` if the text is not a decimal or is
+/// too long.
 pub fn parse_decimal(text: &str) -> Option<BigRational> {
     let (mantissa, exponent) = match text.split_once(['e', 'E']) {
         Some((mantissa, exponent)) => (mantissa, exponent.parse::<i32>().ok()?),
@@ -194,15 +196,16 @@ pub fn parse_decimal(text: &str) -> Option<BigRational> {
 
 /// Converts a double to the rational value of its shortest decimal representation.
 ///
-/// `0.1` in a file means one tenth, not the nearest double. Returns `None` for infinities and
-/// NaN.
+/// The decimal `0.1` in a file thus means one tenth, not the nearest double. Returns `None` for
+/// infinities and NaN.
 pub fn from_shortest_decimal(value: f64) -> Option<BigRational> {
     let negative = value.is_sign_negative();
     let magnitude = parse_decimal(&format!("{:e}", value.abs()))?;
     Some(if negative { -magnitude } else { magnitude })
 }
 
-/// The greatest double that is at most the rational, and the least that is at least the rational.
+/// Returns the greatest double that is at most `value`, and the least double that is at least
+/// `value`.
 pub fn enclosing(value: &BigRational) -> (f64, f64) {
     let nearest = Number::to_f64(value);
     match BigRational::from_float(nearest) {

@@ -1,12 +1,13 @@
-//! Computes the Pareto front of two objectives, and the optimum of one under a bound on the
-//! other.
+//! Computes the Pareto front of two objectives, and the optimum of one objective under a bound on
+//! the other.
 //!
-//! Each objective is a loss: an expected cost until its target, or the probability of missing its
-//! target. Until the first target is reached, a weighted sum of both losses is minimised;
-//! afterwards only one objective remains, and its optimal value is the terminal value of the
-//! state (Etessami et al., LMCS 4(4:8), 2008; the search for vertices by normals is that of
-//! Forejt, Kwiatkowska and Parker, ATVA 2012). The vertices are attained by policies whose memory
-//! is the set of reached targets.
+//! Each objective is a loss to be minimised: an expected cost until a target is reached, or the
+//! probability of missing a target. Until the first target is reached, a weighted sum of both
+//! losses is minimised. Afterwards only one objective remains, and its optimal value is the
+//! terminal value of the state (Etessami et al., LMCS 4(4:8), 2008). The weights are normals of the
+//! segments between known vertices, so each minimum is a new vertex or proves the segment (Forejt,
+//! Kwiatkowska and Parker, ATVA 2012). Each vertex is attained by a policy whose memory is the set
+//! of reached targets.
 
 use std::collections::VecDeque;
 
@@ -17,44 +18,44 @@ use crate::number::Number;
 use crate::policy::{choices_of, conserving};
 use crate::solve::{Direction, NONE, Problem, Solution, solve};
 
-/// Exact arithmetic exceeds its budget.
+/// Error: exact arithmetic exceeds its budget.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Exhausted;
 
-/// One of two objectives.
+/// An objective of a multi-objective problem.
 #[derive(Debug, Clone)]
 pub struct Objective<N> {
-    /// The rewards whose expected sum is minimised; `None` for the probability of the target,
-    /// which is maximised.
+    /// The reward of each choice; the expected sum until the target is minimised. With `None`, the
+    /// probability of reaching the target is maximised instead.
     pub rewards: Option<Vec<N>>,
-    /// The target states.
+    /// The states in which the objective is reached.
     pub target: FixedBitSet,
 }
 
-/// A policy and its losses.
+/// A policy and its loss in each objective.
 #[derive(Debug, Clone)]
 pub struct Point<N> {
-    /// The losses: expected cost, or probability of missing the target.
+    /// The two losses: expected cost, or probability of missing the target.
     pub losses: [N; 2],
     /// Upper limit on the absolute error of each loss; 0 if arithmetic is exact.
     pub errors: [f64; 2],
-    /// The choices until the first target.
+    /// For each state, the choice of the policy until the first target is reached.
     pub policy: Vec<u32>,
 }
 
-/// The minimum of the first objective under a bound on the second.
+/// The minimum of the first loss under an upper limit on the second loss.
 ///
-/// In doubles, the bound may be exceeded by 10^-12 (relative to the bound, if that is above 1).
+/// In doubles, the limit may be exceeded by 10^-12 (relative to the limit if the limit is above 1).
 #[derive(Debug, Clone)]
 pub struct Constrained<N> {
-    /// Over randomised policies.
+    /// The minimum over randomised policies.
     pub randomised: Bounded<N>,
-    /// Over deterministic policies whose memory is the set of reached targets, with `true` if it
-    /// is proved optimal. `None` if no such policy was found.
+    /// The minimum over deterministic policies whose memory is the set of reached targets, and
+    /// `true` if it is proved optimal. `None` if no such policy was found.
     pub deterministic: Option<(Bounded<N>, bool)>,
 }
 
-/// A loss with bounds, which are unused if arithmetic is exact.
+/// A loss with its bounds. If arithmetic is exact, the bounds are unused.
 #[derive(Debug, Clone)]
 pub struct Bounded<N> {
     /// The loss.
@@ -65,29 +66,31 @@ pub struct Bounded<N> {
     pub upper: f64,
 }
 
-/// Upper limit on the number of vertices.
+/// Upper limit on the number of computed vertices of a Pareto front.
 const MAX_VERTICES: usize = 2000;
-/// Upper limit on the number of branch-and-bound nodes for the best deterministic policy.
+/// Upper limit on the number of branch-and-bound nodes in the search for the best deterministic
+/// policy.
 const MAX_BRANCHES: usize = 3000;
 
-/// Two objectives in one process.
+/// A problem with two objectives in the same process, prepared for optimisation.
 #[derive(Debug)]
 pub struct Pareto<'a, N> {
     mdp: &'a Mdp<N>,
     objectives: &'a [Objective<N>; 2],
-    /// The optimal loss of each objective alone, except in states of infinite cost.
+    /// For each objective, the optimal loss in each state if only this objective is optimised.
+    /// Unspecified in states of infinite cost.
     alone: [Vec<N>; 2],
-    /// The greatest error of `alone`.
+    /// For each objective, the greatest error of its losses in `alone`.
     alone_errors: [f64; 2],
-    /// The states of either target.
+    /// The states in either target, without the blocked states.
     terminal: FixedBitSet,
-    /// The states from which a cost is infinite.
+    /// The states from which an expected cost is infinite under every policy.
     blocked: FixedBitSet,
     has_costs: bool,
 }
 
 impl<'a, N: Number> Pareto<'a, N> {
-    /// Prepares two objectives.
+    /// Prepares the optimisation of two objectives by solving each objective alone.
     ///
     /// # Errors
     /// Exact arithmetic exceeds its budget.
@@ -107,7 +110,7 @@ impl<'a, N: Number> Pareto<'a, N> {
             alone_errors[number] = solution.errors.iter().fold(0.0, |most: f64, error| most.max(*error));
             blocked.union_with(&solution.infinite);
         }
-        // A state of infinite cost must be avoided before the target of that cost, not after it.
+        // A state of infinite cost must be avoided only until the target of this cost is reached.
         let avoided: Vec<usize> = blocked.ones().collect();
         for state in avoided {
             let pending = objectives.iter().any(|o| o.rewards.is_some() && !o.target.contains(state));
@@ -117,7 +120,7 @@ impl<'a, N: Number> Pareto<'a, N> {
         Ok(Self { mdp, objectives, alone, alone_errors, terminal, blocked, has_costs })
     }
 
-    /// The terminal values for one objective.
+    /// Returns the terminal value of each state for one objective: the loss from the state on.
     fn worth(&self, objective: usize) -> Vec<N> {
         let target = &self.objectives[objective].target;
         let terminal_value = |state: usize| {
@@ -126,7 +129,8 @@ impl<'a, N: Number> Pareto<'a, N> {
         (0..self.mdp.states()).map(terminal_value).collect()
     }
 
-    /// Minimises a weighted loss over the allowed choices.
+    /// Minimises the weighted sum of both losses over the allowed choices. Returns the solution and
+    /// all its optimal choices.
     fn solve(
         &self,
         weights: &[N; 2],
@@ -163,7 +167,7 @@ impl<'a, N: Number> Pareto<'a, N> {
         Ok((solution, optimal_choices))
     }
 
-    /// The losses of a policy.
+    /// Computes both losses of a policy in the initial state.
     fn point(&self, policy: Vec<u32>) -> Result<Point<N>, Exhausted> {
         let allowed = choices_of(self.mdp, &policy);
         let unit = [[N::one(), N::zero()], [N::zero(), N::one()]];
@@ -173,7 +177,7 @@ impl<'a, N: Number> Pareto<'a, N> {
             let value = solution.values[0].clone();
             losses[number] = if self.has_costs { value } else { N::one().minus(&value) };
             if !N::EXACT {
-                // Complements of probabilities are rounded twice more, in the terminal values and
+                // Complements of probabilities are rounded twice more: in the terminal values and
                 // in the result.
                 errors[number] = solution.errors[0] + self.alone_errors[number] + 2.0 * f64::EPSILON;
             }
@@ -181,7 +185,8 @@ impl<'a, N: Number> Pareto<'a, N> {
         Ok(Point { losses, errors, policy })
     }
 
-    /// The lexicographic optimum with `first` as the primary objective.
+    /// Returns the lexicographic optimum with `first` as the primary objective; `None` if its loss
+    /// is infinite.
     fn extreme(&self, first: usize, allowed: Option<&FixedBitSet>) -> Result<Option<Point<N>>, Exhausted> {
         let unit = |number: usize| {
             let mut weights = [N::zero(), N::zero()];
@@ -198,8 +203,8 @@ impl<'a, N: Number> Pareto<'a, N> {
         self.point(policy.collect()).map(Some)
     }
 
-    /// The vertices of the front in the order of the first objective; empty if a cost is infinite
-    /// under every policy.
+    /// Returns the vertices of the Pareto front, ordered by increasing first loss. Only the choices
+    /// in `allowed` are used. The list is empty if a cost is infinite under every policy.
     ///
     /// # Errors
     /// Exact arithmetic exceeds its budget.
@@ -229,7 +234,7 @@ impl<'a, N: Number> Pareto<'a, N> {
             } else {
                 let next = open.pop();
                 if flat && done.is_empty() && open.is_empty() {
-                    // One point is optimal for both objectives.
+                    // A single point is optimal for both objectives.
                     return Ok(vec![at]);
                 }
                 done.push(std::mem::replace(&mut at, next.ok_or(Exhausted)?));
@@ -239,8 +244,8 @@ impl<'a, N: Number> Pareto<'a, N> {
         Ok(done)
     }
 
-    /// The minimum of the first loss under an upper limit on the second one; `None` if no policy
-    /// satisfies the limit.
+    /// Minimises the first loss under an upper limit on the second loss. Returns `None` if no
+    /// policy satisfies the limit.
     ///
     /// # Errors
     /// Exact arithmetic exceeds its budget.
@@ -253,8 +258,8 @@ impl<'a, N: Number> Pareto<'a, N> {
         Ok(Some(Constrained { randomised, deterministic }))
     }
 
-    /// Lower bound on the first loss of every mixture of policies within the limit: its weighted
-    /// loss is at least the minimum.
+    /// Lower bound on the first loss of every randomised policy within the limit. It follows from
+    /// the minimal weighted loss, with the normal of `segment` as weights.
     fn below(
         &self,
         vertices: &[Point<N>],
@@ -279,11 +284,13 @@ impl<'a, N: Number> Pareto<'a, N> {
         Ok(((least - spent - error - rounding) / first).next_down().max(0.0))
     }
 
-    /// Branch and bound over the choices of states in which two neighbouring vertices differ. The
-    /// randomised optimum of a restricted process is the lower bound of a node.
+    /// Searches for the best deterministic policy within the limit, by branch and bound. A node
+    /// branches over the choices of a state in which two neighbouring vertices differ. Its lower
+    /// bound is the randomised optimum over its allowed choices. Returns the best policy's loss,
+    /// and `true` if it is proved optimal.
     fn deterministic(&self, limit: &N) -> Result<Option<(Bounded<N>, bool)>, Exhausted> {
         let mut best: Option<Bounded<N>> = None;
-        // Lower bound on all pruned nodes.
+        // Lower bound on the first loss in all pruned nodes.
         let mut lower = f64::INFINITY;
         let mut choices = FixedBitSet::with_capacity(self.mdp.choice_count());
         choices.insert_range(..);
@@ -321,7 +328,8 @@ impl<'a, N: Number> Pareto<'a, N> {
         Ok(best.map(|best| (Bounded { lower: lower.min(best.upper), ..best }, true)))
     }
 
-    /// The first state, in breadth-first order under a policy, in which another policy differs.
+    /// Returns the first state, in breadth-first order under `policy`, in which the two policies
+    /// choose differently.
     fn difference(&self, policy: &[u32], other: &[u32]) -> Option<usize> {
         let mut visited = FixedBitSet::with_capacity(self.mdp.states());
         let mut queue = VecDeque::from([0]);
@@ -356,18 +364,19 @@ fn keeps<N: Number>(loss: &N, limit: &N) -> bool {
     if N::EXACT { loss <= limit } else { loss.to_f64() <= kept_limit(limit.to_f64()) }
 }
 
-/// The limit with its tolerance in doubles.
+/// Returns the limit plus the tolerance that doubles are granted.
 fn kept_limit(limit: f64) -> f64 {
     limit + 1e-12 * limit.max(1.0)
 }
 
-/// Upper bound on the first loss of a mixture of two vertices within the limit.
+/// Upper bound on the first loss of a mixture of the two vertices of `segment` that satisfies the
+/// limit.
 fn above<N: Number>(vertices: &[Point<N>], segment: Option<(usize, usize)>, limit: &N) -> f64 {
     let worst = |point: &Point<N>, number: usize| point.losses[number].to_f64() + point.errors[number];
     let limit = limit.to_f64();
     let (left, right) = segment.unwrap_or((0, 0));
     let (a, b) = (&vertices[left], &vertices[right]);
-    // The limit itself may be rounded.
+    // The limit itself may be rounded, so it is decreased by the rounding error.
     let strict = limit - 2.0 * f64::EPSILON * limit.max(1.0);
     let limit = if worst(b, 1) <= strict { strict } else { kept_limit(limit) };
     if worst(b, 1) > limit {
@@ -379,8 +388,9 @@ fn above<N: Number>(vertices: &[Point<N>], segment: Option<(usize, usize)>, limi
     bound + 16.0 * f64::EPSILON * (worst(a, 0) + worst(b, 0))
 }
 
-/// The least first loss of mixtures of vertices within the limit, with the two mixed vertices if
-/// there are two.
+/// Returns the least first loss of a mixture of vertices within the limit. Also returns the indices
+/// of the two mixed vertices, unless a single vertex is optimal. Returns `None` if no vertex
+/// satisfies the limit.
 fn lower_hull<N: Number>(vertices: &[Point<N>], limit: &N) -> Option<(N, Option<(usize, usize)>)> {
     // The vertices are ordered by increasing first and decreasing second loss.
     let right = vertices.iter().position(|vertex| keeps(&vertex.losses[1], limit))?;

@@ -1,4 +1,4 @@
-//! Policy evaluation, secondary objectives, and conditioning on success.
+//! Evaluates policies, breaks ties by a secondary reward, and conditions a policy on success.
 
 use fixedbitset::FixedBitSet;
 
@@ -6,7 +6,7 @@ use crate::mdp::{Mdp, dense};
 use crate::number::Number;
 use crate::solve::{Direction, NONE, Problem, Solution, solve};
 
-/// The choices of a policy.
+/// Returns the set of the choices that a policy makes in any state.
 pub fn choices_of<N: Number>(mdp: &Mdp<N>, policy: &[u32]) -> FixedBitSet {
     let mut allowed = FixedBitSet::with_capacity(mdp.choice_count());
     for choice in policy.iter().filter(|choice| **choice != NONE) {
@@ -15,15 +15,16 @@ pub fn choices_of<N: Number>(mdp: &Mdp<N>, policy: &[u32]) -> FixedBitSet {
     allowed
 }
 
-/// Evaluates a policy in a problem. States without a choice count as unsuccessful ends.
+/// Evaluates a policy in a problem. In a state without a choice, the policy ends without success.
+/// Returns `None` if exact arithmetic exceeds its budget.
 pub fn evaluate<N: Number>(problem: Problem<'_, N>, policy: &[u32]) -> Option<Solution<N>> {
     let allowed = choices_of(problem.mdp, policy);
     solve(Problem { allowed: Some(&allowed), ..problem }, None)
 }
 
-/// The optimal choices with respect to a solution, in the states of finite value.
+/// Returns the optimal choices with respect to a solution, in the states of finite value.
 ///
-/// In doubles, differences within rounding errors are ignored.
+/// In doubles, choices within a tolerance of the optimum count as optimal.
 pub fn conserving<N: Number>(problem: &Problem<'_, N>, solution: &Solution<N>) -> FixedBitSet {
     let mdp = problem.mdp;
     let mut optimal = FixedBitSet::with_capacity(mdp.choice_count());
@@ -52,10 +53,12 @@ pub fn conserving<N: Number>(problem: &Problem<'_, N>, solution: &Solution<N>) -
 
 /// Minimises a secondary reward over the policies that are optimal for a problem.
 ///
-/// An optimal policy for a probability may contain cycles before success or after failure, which
-/// are free. The result reaches a state that decides the first problem (a terminal state or a
-/// state of value 0) at the least expected secondary reward. Returns `None` if exact arithmetic
-/// exceeds its budget, or if the optimum of the first problem may require to continue forever.
+/// A policy that maximises a probability may contain cycles before success or after failure, which
+/// do not change the probability. The resulting policy instead reaches a terminal state or a state
+/// of value 0 with the least expected secondary reward.
+///
+/// Returns `None` if exact arithmetic exceeds its budget, or if an optimal policy may have to
+/// continue forever (a minimal probability or a maximal reward).
 pub fn with_secondary<N: Number>(
     problem: &Problem<'_, N>,
     solution: &Solution<N>,
@@ -84,9 +87,9 @@ pub fn with_secondary<N: Number>(
     solve(second, None)
 }
 
-/// The Markov chain of a policy conditioned on reaching `end` (Doob's h-transform): each
-/// transition is weighted with the probability of success after it. Also returns the original
-/// choice of each choice of the result.
+/// Returns the Markov chain of a policy, conditioned on reaching `end` (Doob's h-transform). Each
+/// transition is weighted with the probability `success` of its target. Also returns the original
+/// choice of each choice in the result.
 pub fn conditioned<N: Number>(
     mdp: &Mdp<N>,
     policy: &[u32],

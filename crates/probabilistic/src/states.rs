@@ -1,4 +1,5 @@
-//! The states of a process in order of discovery, and the map from states to their numbers.
+//! The states of a process in the order of their discovery, with the map from states to state
+//! numbers.
 
 use std::hash::{BuildHasher, Hash};
 
@@ -6,11 +7,11 @@ use rustc_hash::FxBuildHasher;
 
 use crate::mdp::{MAX_COUNT, dense};
 
-/// Upper limit on the number of codes for which a table is used. Its memory is provided on first access, so that a
-/// sparse table costs less.
+/// Upper limit on the number of state codes for which a table is used. The operating system
+/// provides its memory on first access, so a sparse table needs less memory.
 const MAX_TABLE_CODES: usize = 1 << 29;
 
-/// States and their numbers.
+/// A list of states with an index from states to their positions (state numbers).
 #[derive(Debug, Clone)]
 pub struct States<S> {
     list: Vec<S>,
@@ -19,17 +20,17 @@ pub struct States<S> {
 
 #[derive(Debug, Clone)]
 enum Numbers {
-    /// For each code, the number of its state plus one, or 0 if the state is not known.
+    /// For each state code, the number of the state plus one, or 0 if the state was not inserted.
     Table(Vec<u32>),
-    /// Numbers by the hashes of the states.
+    /// State numbers by the hashes of the states.
     Hash(HashTable),
 }
 
-/// A hash table with linear probing. The upper half of an entry is the hash of a state, the lower half its number plus
-/// one; 0 is a free slot.
+/// A hash table with linear probing. The upper half of an entry is the hash of a state; the lower
+/// half is the state's number plus one. The value 0 is a free slot.
 ///
-/// The home slot of a hash is its leading bits. Slots are therefore in the order of hashes, and growing writes the larger
-/// table from one end to the other.
+/// The home slot of a hash is given by its leading bits. Slots are therefore in the order of
+/// hashes, and growing writes the larger table sequentially.
 #[derive(Debug, Clone)]
 struct HashTable {
     entries: Vec<u64>,
@@ -37,7 +38,7 @@ struct HashTable {
     shift: u32,
 }
 
-/// Bits of the slot numbers of the initial table.
+/// Number of bits of a slot number in the initial table.
 const INITIAL_BITS: u32 = 8;
 
 impl HashTable {
@@ -45,12 +46,13 @@ impl HashTable {
         Self { entries: vec![0; 1 << bits], shift: 32_u32.saturating_sub(bits) }
     }
 
-    /// The first slot that is probed for a hash.
+    /// Returns the first slot that is probed for a hash.
     const fn home(&self, hash: u32) -> usize {
         hash as usize >> self.shift
     }
 
-    /// Returns the number of the entry with this hash for which `is_match` holds, or else the free slot for it.
+    /// Returns `Ok` with the number of the entry that has this hash and satisfies `is_match`, or
+    /// `Err` with the free slot for a new entry.
     #[expect(clippy::arithmetic_side_effects, reason = "there are at least 2^8 entries")]
     fn find(&self, hash: u32, is_match: impl Fn(u32) -> bool) -> Result<u32, usize> {
         let last = self.entries.len() - 1;
@@ -64,7 +66,8 @@ impl HashTable {
         }
     }
 
-    /// Doubles the table if less than a third of its slots is free. Returns `None` if hashes have no further bits.
+    /// Doubles the table if at most a third of its slots is free. Returns `None` if a larger table
+    /// would need more bits than hashes have.
     fn grow_if_full(&mut self, count: usize) -> Option<()> {
         if count.saturating_mul(3) < self.entries.len().saturating_mul(2) {
             return Some(());
@@ -84,28 +87,30 @@ const fn upper(entry: u64) -> u32 {
     (entry >> 32) as u32
 }
 
-/// Returns the number of an entry if the entry has the given hash.
+/// Returns the state number of an entry if the entry has the given hash, otherwise `None`.
 #[expect(clippy::cast_possible_truncation, reason = "the lower half")]
 const fn number_of(entry: u64, hash: u32) -> Option<u32> {
     if upper(entry) == hash { (entry as u32).checked_sub(1) } else { None }
 }
 
 fn hash<S: Hash>(state: &S) -> u32 {
-    // The hasher rotates its best bits away from the top; the multiplication brings them back.
+    // The hasher rotates its best bits away from the top; the multiplication mixes all bits into
+    // the top again.
     upper(FxBuildHasher.hash_one(state).wrapping_mul(0x9E37_79B9_7F4A_7C15))
 }
 
-/// Result of the first probe for a state.
+/// The result of a first lookup of a state, without following collisions.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Probe {
-    /// The code or the hash of the state.
+    /// The code or the hash of the state, depending on the kind of index.
     key: usize,
-    /// Number of the state plus one, or 0 if the first probe did not find it.
+    /// The number of the state plus one, or 0 if the lookup did not find the state.
     number_plus_one: u32,
 }
 
 impl<S: Eq + Hash> States<S> {
-    /// Creates an empty set. `codes` is the number of codes, if the generator numbers all conceivable states.
+    /// Creates an empty list. `codes` is the number of state codes if the generator numbers all
+    /// conceivable states.
     pub fn new(codes: Option<usize>) -> Self {
         let numbers = match codes.filter(|codes| *codes <= MAX_TABLE_CODES) {
             Some(codes) => Numbers::Table(vec![0; codes]),
@@ -114,7 +119,8 @@ impl<S: Eq + Hash> States<S> {
         Self { list: Vec::new(), numbers }
     }
 
-    /// Probes once for a state. Memory accesses dominate the time of a lookup; those of several probes overlap.
+    /// Looks a state up in its home slot only. Memory accesses dominate the time of a lookup; those
+    /// of several calls overlap.
     pub(crate) fn probe(&self, state: &S, code: impl FnOnce(&S) -> usize) -> Probe {
         match &self.numbers {
             Numbers::Table(table) => {
@@ -133,7 +139,8 @@ impl<S: Eq + Hash> States<S> {
         }
     }
 
-    /// Returns the number of a probed state; adds the state if it is new. `None` if there are too many states.
+    /// Returns the number of a state after [`Self::probe`], and adds the state if it is new.
+    /// Returns `None` if there are too many states.
     pub(crate) fn insert(&mut self, state: S, probe: Probe) -> Option<u32> {
         if let Some(number) = probe.number_plus_one.checked_sub(1) {
             return Some(number);
@@ -144,7 +151,7 @@ impl<S: Eq + Hash> States<S> {
         let next = dense(self.list.len());
         match &mut self.numbers {
             Numbers::Table(table) => {
-                // The state may have been inserted after the probe.
+                // The state may have been inserted since the probe.
                 let number = &mut table[probe.key];
                 if let Some(number) = number.checked_sub(1) {
                     return Some(number);
@@ -166,7 +173,8 @@ impl<S: Eq + Hash> States<S> {
         Some(next)
     }
 
-    /// Returns the number of a state, given the state and its code.
+    /// Returns the number of a state, given the state and its code. Returns `None` if the state was
+    /// not inserted.
     pub fn number(&self, code: usize, state: &S) -> Option<usize> {
         let number = match &self.numbers {
             Numbers::Table(table) => table.get(code).copied().unwrap_or(0).checked_sub(1),
@@ -177,12 +185,13 @@ impl<S: Eq + Hash> States<S> {
         number.map(|number| number as usize)
     }
 
-    /// Frees the map from states to numbers. Afterwards, [`number`](Self::number) returns `None`.
+    /// Frees the index from states to numbers. Afterwards, [`number`](Self::number) returns `None`,
+    /// and no state may be inserted.
     pub(crate) fn forget_numbers(&mut self) {
         self.numbers = Numbers::Table(Vec::new());
     }
 
-    /// Number of states.
+    /// Returns the number of states.
     pub fn len(&self) -> usize {
         self.list.len()
     }
@@ -192,7 +201,7 @@ impl<S: Eq + Hash> States<S> {
         self.list.is_empty()
     }
 
-    /// The states by number.
+    /// Iterates over the states in the order of their numbers.
     pub fn iter(&self) -> std::slice::Iter<'_, S> {
         self.list.iter()
     }

@@ -1,4 +1,5 @@
-//! Bounds enclose the true value even if doubles round, and models that would exhaust memory or time are rejected.
+//! Bounds enclose the true value although doubles are rounded. Models that would exhaust memory or
+//! time are rejected.
 
 use metaplan_probabilistic::check::{Answer, Exactness, Options, Outcome, PolicyTable, Quantity, check};
 use metaplan_probabilistic::{Error, prism, property};
@@ -23,7 +24,7 @@ fn encloses(quantity: &Quantity, exact: &BigRational) -> bool {
         && end(quantity.upper).is_some_and(|upper| upper >= *exact)
 }
 
-/// Returns the exact value, after checking that the bounds in doubles enclose it.
+/// Returns the exact value, after checking that the bounds computed in doubles enclose it.
 fn enclosed(model: &str, question: &str) -> BigRational {
     let exact = value(model, question, Exactness::Always).exact.expect("a fraction");
     let rounded = value(model, question, Exactness::Never);
@@ -31,7 +32,7 @@ fn enclosed(model: &str, question: &str) -> BigRational {
     exact
 }
 
-/// Codes of the errors in a model.
+/// Returns the codes of the errors in a model.
 fn error_codes(model: &str, question: &str, exactness: Exactness) -> Vec<&'static str> {
     match outcome(model, question, &Options::default().with_exactness(exactness)) {
         Err(Error::Model(problems)) => problems.iter().map(|problem| problem.code).collect(),
@@ -83,7 +84,7 @@ fn constants_are_exact() {
         module m s:[0..1] init 0; [] s=0 -> 1-p-0.3:(s'=1) + p+0.3:(s'=0); endmodule
         label \"goal\" = s=1;";
     assert_eq!(enclosed(model, "P=? [ F \"goal\" ]").to_string(), "0");
-    // In doubles, this probability would be negative.
+    // In doubles, the probability `0.3-0.2-0.1` would be negative.
     enclosed(&model.replace("1-p-0.3", "0.3-0.2-0.1").replace("p+0.3", "1"), "P=? [ F \"goal\" ]");
     let guard = "dtmc
         module m s:[0..3] init 0; [] s*0.1!=0.3 -> (s'=min(s+1,3)); endmodule
@@ -124,7 +125,7 @@ fn step_bounded_values_are_enclosed() {
         endmodule
         label \"goal\" = s=2;";
     enclosed(model, "P=? [ F<=50 \"goal\" ]");
-    // Exact arithmetic exceeds its budget, so that the answer is in doubles.
+    // Exact arithmetic exceeds its budget, so the answer is in doubles.
     let rounded = value(model, "P=? [ F<=1000000 \"goal\" ]", Exactness::Auto);
     assert!(rounded.exact.is_none() && rounded.lower <= 1.0 && rounded.upper >= 1.0, "{rounded:?}");
 }
@@ -250,7 +251,7 @@ fn extreme_models_are_rejected_or_answered() {
     assert_eq!(error_codes(empty, "Pmax=? [ F \"goal\" ]", Exactness::Auto), ["Q207"]);
 }
 
-/// The test needs a thread with a large stack, because stack frames are large without optimisation.
+/// The test runs in a thread with a large stack, because unoptimised stack frames are large.
 #[test]
 fn deep_and_large_expressions_are_rejected() {
     let deep = || {

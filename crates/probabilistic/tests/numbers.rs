@@ -1,4 +1,5 @@
-//! Numbers at the limits of their types: each is computed as defined, or rejected with its position, and none wraps around.
+//! Numbers at the limits of their types: each number is computed as defined or rejected with its
+//! position, and none wraps around.
 
 use metaplan_probabilistic::check::{Exactness, Options, Outcome, PolicyTable, check};
 use metaplan_probabilistic::explore::Bounds;
@@ -9,7 +10,7 @@ fn first(problems: &[Diagnostic]) -> String {
     format!("{} {}:{}", problem.code, problem.place.line, problem.place.column)
 }
 
-/// Value of a property as text, or code, line and column of the first error.
+/// Returns the value of a property as text, or the code, line and column of the first error.
 fn value_or_error(model: &str, question: &str) -> String {
     value_or_error_with(model, question, Exactness::Auto)
 }
@@ -24,7 +25,7 @@ fn value_or_error_with(model: &str, question: &str, exactness: Exactness) -> Str
         Err(Error::Property(problems)) => return first(&problems),
         Err(other) => panic!("{other}"),
     };
-    // Memory and the range of state numbers are the only limits.
+    // The only limits are memory and the range of state numbers.
     let bounds = Bounds::default().with_states(usize::MAX);
     match check(&model, &property, &Options::default().with_bounds(bounds).with_exactness(exactness)) {
         Ok(report) => match report.outcome {
@@ -38,7 +39,8 @@ fn value_or_error_with(model: &str, question: &str, exactness: Exactness) -> Str
     }
 }
 
-/// A model with a range and an initial value on the second line, and a command on the third.
+/// Creates a model with a range and an initial value on the second line, and a command on the third
+/// line.
 fn counter_model(range: &str, initial: &str, command: &str) -> String {
     let least = "const int least = -9223372036854775807-1; const int greatest = 9223372036854775807;";
     format!("mdp {least}\nmodule m s:[{range}] init {initial};\n{command}\nendmodule")
@@ -64,11 +66,12 @@ fn ranges_may_span_the_integer_type() {
         ("0..9223372036854775808", "0", "[] true -> (s'=1);", "s>0", "Q105 2:16"),
         ("0..greatest+1", "0", "[] true -> (s'=1);", "s>0", "Q303 2:16"),
         ("0..9", "pow(2,9223372036854775807)", "[] true -> (s'=1);", "s>0", "Q303 2:24"),
-        // Powers of 0, 1 and -1 fit, whatever the exponent.
+        // Powers of 0, 1 and -1 fit into the range for every exponent.
         ("-1..1", "pow(-1,greatest)", "[] s<0 -> (s'=pow(1,greatest));", "s=1", "1"),
         ("-1..1", "pow(-1,greatest-1)", "[] s>0 -> (s'=pow(0,greatest));", "s=0", "1"),
         ("0..1", "0", "[] s=0 -> (s'=pow(0,0));", "s=1", "1"),
-        // Commands are indexed by the value that they fix, which may lie outside the range.
+        // Commands are indexed by the value to which their guard fixes a variable; the value may be
+        // outside the range.
         ("0..3", "0", "[a] s=greatest -> (s'=1); [a] s=least -> (s'=1); [a] s=0 -> (s'=2);", "s=2", "1"),
         ("-3..3", "-3", "[a] s=-4 -> (s'=1); [a] s=4 -> (s'=1); [a] s=-3 -> (s'=2);", "s=2", "1"),
     ] {
@@ -98,7 +101,7 @@ fn probabilities_and_rewards_beyond_doubles_are_rejected() {
 
 #[test]
 fn step_bounds_are_integers_and_are_not_rounded() {
-    // The state is 3 after 3 steps, and not before.
+    // The state is 3 after 3 steps and not earlier.
     let model = counter_model("0..3", "0", "[] s<3 -> (s'=s+1);");
     for (bound, expected) in [
         ("<=3", "1"),
@@ -106,7 +109,7 @@ fn step_bounds_are_integers_and_are_not_rounded() {
         ("<3", "0"),
         ("<4", "1"),
         ("<=(2.5)", "Q203 1:15"),
-        // The nearest double is 3.
+        // The nearest double of this number is 3.
         ("<=(2.99999999999999999999)", "Q203 1:15"),
         ("<=999999999", "1"),
         ("<=1000000000", "Q503 1:14"),

@@ -1,4 +1,5 @@
-//! Properties beyond plain reachability. Values are those of Storm (stormpy 2.0.0, exact), unless a comment names another source.
+//! Properties beyond plain reachability. Expected values come from Storm (stormpy 2.0.0, exact),
+//! unless a comment states another source.
 
 use metaplan_probabilistic::check::{Answer, Exactness, Options, Outcome, check, check_all};
 use metaplan_probabilistic::{Error, prism, property};
@@ -52,7 +53,7 @@ fn error(model: &str, question: &str) -> (&'static str, String) {
     }
 }
 
-/// Checks the exact value, and that the bounds in doubles enclose it tightly.
+/// Checks the exact value, and that the bounds computed in doubles enclose it tightly.
 fn agree(model: &str, question: &str, expected: &str) {
     let value = |exactness| match outcome(model, question, exactness) {
         Outcome::Value(answer) => answer,
@@ -91,7 +92,7 @@ fn paths_and_rewards_of_a_chain_have_the_expected_values() {
         ("R{\"r\"}=? [ I=3 ]", "53/40"),
         ("R{\"r\"}=? [ C<=4 ]", "799/120"),
         ("P=? [ F (P>=0.45 [ X \"a\" ] & s>0) ]", "7/10"),
-        // Storm reads these as `F[3,3]`, `X X X F`, and their complements.
+        // Storm interprets these properties as `F[3,3]`, `X X X F`, and their complements.
         ("P=? [ F=3 \"b\" ]", "31/120"),
         ("P=? [ G=3 !\"b\" ]", "89/120"),
         ("P=? [ !\"a\" U=4 \"b\" ]", "349/1200"),
@@ -104,8 +105,9 @@ fn paths_and_rewards_of_a_chain_have_the_expected_values() {
         ("P=? [ G<=3 s<3 ]", "7/12"),
         ("P=? [ s<3 W<=4 \"b\" ]", "53/72"),
         ("P=? [ G[2,4] s>=3 ]", "5/12"),
-        // Storm has no form for the remaining properties. States 3 and 4 are visited infinitely often once they are reached, and
-        // `a W b` and `b R !a` are equal to `a U b`, because 3 or 5 is reached with probability 1.
+        // Storm cannot express the remaining properties. States 3 and 4 are visited infinitely
+        // often once they are reached. `a W b` and `b R !a` are equal to `a U b`, because 3 or 5 is
+        // reached with probability 1.
         ("P=? [ F>=3 \"a\" ]", "7/10"),
         ("1 - P=? [ F \"a\" ]", "3/10"),
         ("P=? [ s<3 W \"b\" ]", "3/5"),
@@ -148,7 +150,8 @@ fn paths_and_rewards_of_a_process_have_the_expected_values() {
     }
 }
 
-/// The aggregates are computed by hand. The values of P [ F d=1 ] are 3/10, 1/5, 2/5, 0, 0, 1 and 1.
+/// The expected aggregates are computed by hand. In states 0 to 6, P [ F d=1 ] has the values 3/10,
+/// 1/5, 2/5, 0, 0, 1 and 1.
 #[test]
 fn filters_aggregate_the_values_of_states() {
     for (question, expected) in [
@@ -182,7 +185,8 @@ fn filters_aggregate_the_values_of_states() {
     assert_eq!(values, [0, 1, 2, 5, 6]);
 }
 
-/// The values of P [ F d=1 ] in the initial states are those of the states above.
+/// The values of P [ F d=1 ] in the initial states 0, 1 and 2 are 3/10, 1/5 and 2/5, as in the test
+/// of filters.
 #[test]
 fn several_initial_states_yield_a_range() {
     let model = CHAIN.replace(" init 0;", ";") + " init s<=2 & d=0 endinit";
@@ -196,14 +200,14 @@ fn several_initial_states_yield_a_range() {
     assert!(matches!(result, Outcome::Truth(true, _)), "{result:?}");
 }
 
-/// A bound on a reward is equivalent to a bound on a counter in the model.
+/// A bound on an accumulated reward is equivalent to a bound on a counter in the model.
 #[test]
 fn reward_bounds_agree_with_a_counter() {
     let counted = PROCESS
         .replace("s : [0..5] init 0;", "s : [0..5] init 0; c : [0..40] init 0;")
         .replace("(s'=", "(c'=min(40,c+COST))&(s'=")
         .replace("[wait] s=0 -> true;", "[wait] s=0 -> (c'=min(40,c+2));");
-    // Cost of each command.
+    // The cost of each command.
     let mut priced = String::new();
     for line in counted.lines() {
         let cost = match line.trim() {
@@ -300,7 +304,7 @@ fn models_without_a_keyword_and_actions_named_like_functions() {
     agree(model, "Pmax=? [ F round=1 ]", "1");
 }
 
-/// `R` begins a reward property, and is also a path operator.
+/// The letter `R` begins a reward property, and is also a path operator.
 #[test]
 fn properties_of_rewards_need_no_semicolon_before() {
     let text = "P=? [ F \"a\" ]\nR{\"t\"}=? [ C ]\n// RESULT: 0\nR=? [ I=6 ]\nR<100 [ C<=3 ]\n\"last\": P=? [ \"b\" R s!=3 ]";
@@ -312,7 +316,7 @@ fn properties_of_rewards_need_no_semicolon_before() {
     );
 }
 
-/// Each unsupported property is rejected alone; all others in the file are answered.
+/// Each unsupported property is rejected alone; all other properties of the file are answered.
 #[test]
 fn unsupported_properties_do_not_affect_the_others() {
     let text = "P=? [ F \"a\" ]
@@ -343,7 +347,8 @@ fn unsupported_properties_do_not_affect_the_others() {
     );
 }
 
-/// The expanded properties occur in the tests above. A label of the model takes precedence over a property of the same name.
+/// The expanded forms of the properties are checked in the tests above. A label of the model takes
+/// precedence over a property with the same name.
 #[test]
 fn named_properties_are_expanded() {
     let text = "

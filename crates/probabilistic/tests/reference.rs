@@ -1,4 +1,5 @@
-//! Models with known values: exact ones, and values of Storm and PRISM for larger models.
+//! Models with known values: exact reference values, and values computed by Storm and PRISM for
+//! larger models.
 
 #![allow(clippy::print_stdout)]
 
@@ -43,7 +44,8 @@ fn rational(text: &str) -> BigRational {
     parse_decimal(numerator).expect("number") / parse_decimal(denominator).expect("number")
 }
 
-/// Checks value, bounds and exact form of an answer; `exact` is a fraction or `inf`.
+/// Checks the value, the bounds and the exact value of an answer. `exact` is the expected fraction,
+/// or `inf`.
 fn expect(description: &str, answer: &Answer, exact: &str, is_exact: bool) {
     match answer {
         Answer::Infinite => assert_eq!(exact, "inf", "{description}"),
@@ -151,7 +153,7 @@ fn map_models_agree_with_storm() {
             println!("skipped: no python3 to generate the models");
             return;
         }
-        // Large models are checked only once, in doubles.
+        // Large models are checked once only, in doubles.
         let large = case["storm"]["states"].as_u64().is_some_and(|states| states > 5_000);
         let modes = if large { &[Exactness::Never][..] } else { &[Exactness::Auto, Exactness::Never] };
         for exactness in modes.iter().copied() {

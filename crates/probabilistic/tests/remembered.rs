@@ -1,5 +1,5 @@
-//! The cache of module behaviours does not change results: random models are explored with and without it, to the same
-//! process or to the same error.
+//! The cache of module behaviours does not change results: random models are explored with and
+//! without the cache, and yield the same process or the same error.
 
 use std::fmt::Write as _;
 
@@ -20,7 +20,7 @@ impl Random {
     }
 }
 
-/// A guard over the variables of a module, and sometimes of another module.
+/// Creates a guard over the variables of a module, and sometimes of another module.
 fn guard(random: &mut Random, module: u64, modules: u64) -> String {
     let other = random.below(modules);
     match random.below(6) {
@@ -39,7 +39,7 @@ fn assignment(random: &mut Random, module: u64, modules: u64, global: bool) -> S
         0 => format!("(a{module}'=min(3, a{module}+1))"),
         1 => format!("(a{module}'=mod(a{module}+a{other}, 4)) & (b{module}'=!b{module})"),
         2 => format!("(a{module}'={})", random.below(4)),
-        // Sometimes leaves its range.
+        // The assignment may leave the range of the variable.
         3 if random.below(12) == 0 => format!("(a{module}'=a{module}+1)"),
         5 => "(g'=mod(g+1, 3))".to_owned(),
         _ => "true".to_owned(),
@@ -58,7 +58,8 @@ fn command(random: &mut Random, module: u64, modules: u64) -> String {
     format!("  [{action}] {} -> {updates};\n", guard(random, module, modules))
 }
 
-/// A model of one to four modules. Some have values of many bits, so that the cache uses a hash map, or is not used.
+/// Creates a model of one to four modules. Some models have variables of many bits, so that the
+/// cache uses a hash map or is not used.
 fn model(random: &mut Random) -> String {
     let modules = random.below(4) + 1;
     let mut text = format!("{}\nglobal g : [0..3];\n", random.one_of(&["mdp", "dtmc"]));
@@ -94,7 +95,7 @@ fn agree<N: Number>(text: &str) {
     let bounds = Bounds::default().with_states(3000);
     let plain = shown(explore(&program, &bounds));
     let remembered = shown(explore(&Remembered::new(&program), &bounds));
-    // The cache may detect the state limit a few states later.
+    // With the cache, the state limit may be detected a few states later.
     if !plain.starts_with("StateLimit") || !remembered.starts_with("StateLimit") {
         assert_eq!(plain, remembered, "{text}");
     }
@@ -111,7 +112,7 @@ fn random_models_are_explored_to_the_same_process() {
     }
 }
 
-/// Behaviours beyond the limit of the cache are computed again on every request.
+/// Behaviours beyond the limit of the cache are recomputed on every request.
 #[test]
 fn behaviours_beyond_the_cache_limit_are_recomputed() {
     let text = "mdp

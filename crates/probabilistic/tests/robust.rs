@@ -1,4 +1,5 @@
-//! No text makes the parser or the checker panic, and a written model parses to the same model.
+//! No text makes the parser or the checker panic. A model that is written as text and parsed again
+//! is unchanged.
 
 use metaplan_probabilistic::check::{Answer, Exactness, Options, Outcome, check};
 use metaplan_probabilistic::explore::Bounds;
@@ -100,7 +101,7 @@ const PROPERTY_WORDS: [&str; 32] = [
     "s",
 ];
 
-/// Parses, checks and translates a model; only a panic is a failure.
+/// Parses, checks and translates a model. Errors are accepted; only a panic fails the test.
 fn survive(text: &str) {
     if let Ok(model) = prism::parse(text) {
         let property = property::parse("Pmax=? [ F \"goal\" ]").expect("a property");
@@ -110,7 +111,8 @@ fn survive(text: &str) {
     }
 }
 
-/// Checks a property of `MODEL`, if the text is a property; only a panic is a failure.
+/// Checks a property of `MODEL` if the text can be parsed. Errors are accepted; only a panic fails
+/// the test.
 fn survive_property(question: &str) {
     thread_local! {
         static READ: prism::ast::Model = prism::parse(MODEL).expect("a model");
@@ -123,7 +125,7 @@ fn survive_property(question: &str) {
     }
 }
 
-/// All properties that other tests break are valid and supported.
+/// The properties that other tests mutate are valid and supported.
 #[test]
 fn intact_properties_have_answers() {
     let model = prism::parse(MODEL).expect("a model");
@@ -194,7 +196,7 @@ fn exact_and_rounded_answers_agree() {
     }
 }
 
-/// Number of random cases: `PROPTEST_CASES`, or 200.
+/// Returns the number of random cases: the value of `PROPTEST_CASES`, or 200.
 fn cases() -> u32 {
     std::env::var("PROPTEST_CASES").ok().and_then(|text| text.parse().ok()).unwrap_or(200)
 }
@@ -239,7 +241,8 @@ proptest! {
     }
 }
 
-/// A random walk on a square. Elimination has much fill-in in two dimensions, so that interval iteration is used.
+/// A random walk on a square. Elimination would have much fill-in in two dimensions, so interval
+/// iteration is used.
 #[test]
 #[ignore = "20 s in release, minutes in debug: a component of 90,000 states"]
 fn a_large_component_gets_bounds() {

@@ -1,5 +1,5 @@
-//! Stiff processes, in which a set of states is left with a tiny probability. The inductive certificate does not
-//! exist in doubles for them, but state elimination has a small relative error.
+//! Stiff processes, in which the probability of leaving a set of states is tiny. In doubles, these
+//! processes have no inductive certificate, but state elimination has a small relative error.
 
 #![allow(clippy::print_stdout)]
 
@@ -15,7 +15,8 @@ fn value(model: &str, question: &str, exactness: Exactness) -> Quantity {
     let options = Options::default().with_exactness(exactness);
     let start = Instant::now();
     let report = check(&model, &property::parse(question).expect("a property"), &options).expect("an answer");
-    // Elimination takes milliseconds, iteration took minutes. The margin is for slow machines and unoptimised code.
+    // Elimination takes milliseconds, whereas iteration would take minutes. The limit is generous
+    // for slow machines and unoptimised code.
     assert!(start.elapsed() < Duration::from_secs(5), "{question}: {:?}", start.elapsed());
     match report.outcome {
         Outcome::Value(Answer::Finite(quantity)) => quantity,
@@ -23,7 +24,8 @@ fn value(model: &str, question: &str, exactness: Exactness) -> Quantity {
     }
 }
 
-/// Checks the exact value, by request and by default, and that the bounds in doubles are tight.
+/// Checks the exact value, both by request and by default, and that the bounds computed in doubles
+/// are tight.
 fn agree(model: &str, question: &str, expected: &BigRational) {
     for exactness in [Exactness::Always, Exactness::Auto] {
         assert_eq!(value(model, question, exactness).exact.as_ref(), Some(expected), "{question}");
@@ -37,7 +39,8 @@ fn agree(model: &str, question: &str, expected: &BigRational) {
     assert!(rounded.upper - rounded.lower <= 1e-6 * rounded.value, "{rounded:?} is wide");
 }
 
-/// Haddad and Monmege, TCS 735, 2018, section 4: value iteration from below stops immediately, far from one half.
+/// Example of Haddad and Monmege, TCS 735, 2018, section 4: value iteration from below stops early,
+/// far from the value one half.
 #[test]
 fn equally_rare_exits_have_probability_one_half() {
     for n in [20, 27, 28, 40, 60, 100] {
@@ -54,7 +57,8 @@ fn equally_rare_exits_have_probability_one_half() {
     }
 }
 
-/// From each x one step up or back to 0, and from 0 to 1: 3·2^(N−1) − 3 expected steps, by recurrence.
+/// From each x the process moves one step up or back to 0, and from 0 to 1. The expected number of
+/// steps is 3·2^(N−1) − 3, by a recurrence.
 #[test]
 fn a_huge_expected_time_is_exact() {
     for n in [26_u32, 28, 40, 60, 100] {
@@ -71,7 +75,7 @@ fn a_huge_expected_time_is_exact() {
     }
 }
 
-/// Choices in a stiff process. The values after one step of the better and the other choice are almost equal in doubles.
+/// A stiff process with a choice, whose alternatives have almost equal values in doubles.
 #[test]
 fn the_better_choice_in_a_stiff_process_is_found() {
     for n in [28, 50] {
@@ -90,7 +94,8 @@ fn the_better_choice_in_a_stiff_process_is_found() {
     }
 }
 
-/// A gambler who wins with probability 2/5 and stops at 1,000: (3/2 − 1) / ((3/2)^1000 − 1), about 4.5·10^−177, from 1.
+/// A gambler starts with 1, wins each round with probability 2/5, and stops at 1,000. The
+/// probability of reaching 1,000 is (3/2 − 1) / ((3/2)^1000 − 1), about 4.5·10^−177.
 #[test]
 fn bounds_of_tiny_values_are_relative() {
     let model = "dtmc module m x:[0..1000] init 1;
@@ -108,8 +113,9 @@ fn bounds_of_tiny_values_are_relative() {
     assert!(bounded.value > 0.0 && bounded.upper - bounded.lower <= 1e-6 * bounded.value, "{bounded:?}");
 }
 
-/// Wide bounds are available immediately, and their improvement must not take 17 s. The value is Metaplan's own exact
-/// value; the model belongs to the Quantitative Verification Benchmark Set.
+/// Wide bounds are available immediately; improving them would take 17 s and must be skipped. The
+/// expected value was computed exactly by Metaplan itself. The model is from the Quantitative
+/// Verification Benchmark Set.
 #[test]
 fn wide_bounds_are_improved_only_if_that_is_cheap() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/real/qvbs/mdp/zeroconf/zeroconf.prism");

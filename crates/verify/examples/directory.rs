@@ -1,4 +1,4 @@
-//! Verifies certificates and prints the result of each part.
+//! Verifies certificates, and prints the result of each part.
 //!
 //! `cargo run -p metaplan-verify --example directory -- CERTIFICATE…`
 #![expect(clippy::print_stdout, reason = "an example prints")]

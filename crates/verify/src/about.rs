@@ -1,4 +1,4 @@
-//! Comparison of a certificate with the present files and situation of a mission.
+//! Compares a certificate with the current files and the current situation of a mission.
 
 use mission::Mission;
 use mission::knowledge::rule_text;
@@ -7,8 +7,8 @@ use pddl::{print_domain, print_problem};
 
 use crate::knowledge::{KnowledgeFiles, ORIGIN, Origin, first_message};
 
-/// Checks that a certificate matches the present files and situation of a mission. Returns a
-/// confirmation, or the first difference as the error.
+/// Checks that a certificate matches the current files and situation of a mission. Returns a
+/// confirmation, or the first difference as an error.
 pub(crate) fn about(
     certified: Option<&KnowledgeFiles<'_>>,
     (domain, problem): (&str, &str),

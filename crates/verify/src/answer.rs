@@ -39,7 +39,7 @@ struct PartAnswer<'a> {
 }
 
 impl<'a> VerificationAnswer<'a> {
-    /// Creates the answer for a verification.
+    /// Creates the answer for the result of a verification.
     pub fn new(report: &'a Verification) -> Self {
         let part = |part: &'a VerifiedPart| PartAnswer {
             part: part.part,
@@ -56,7 +56,7 @@ impl<'a> VerificationAnswer<'a> {
     }
 }
 
-/// Writes one line per part and the verdict. Control characters are made visible.
+/// Formats a line for each part and then the verdict. Control characters are made visible.
 impl fmt::Display for Verification {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&text(self))
@@ -83,7 +83,7 @@ fn text(report: &Verification) -> String {
     visible(&text).into_owned()
 }
 
-/// The extent of a verification, in words.
+/// Describes in words what a verification covers.
 fn extent(subject: &Subject) -> String {
     let checked = match (&subject.mission, subject.kind) {
         (Some(name), _) => format!("the mission `{name}` with digest {:.12}", subject.digest),
@@ -98,7 +98,7 @@ fn extent(subject: &Subject) -> String {
     if unchecked.is_empty() { checked } else { format!("{checked}; not checked: {}", unchecked.join(", ")) }
 }
 
-/// Returns the JSON text of the [`VerificationAnswer`].
+/// Returns the [`VerificationAnswer`] of a verification as JSON text.
 pub fn json(report: &Verification) -> String {
     visible_json(&pretty(&VerificationAnswer::new(report))).into_owned()
 }

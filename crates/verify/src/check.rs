@@ -21,7 +21,7 @@ use crate::plan::plan;
 use crate::task::{read_pddl, same_task};
 use crate::{derivations, knowledge};
 
-/// Checks the certificate in a directory, without trusting what wrote it.
+/// Checks the certificate in a directory. The program that wrote the certificate is not trusted.
 ///
 /// ```
 /// use std::path::Path;
@@ -40,25 +40,27 @@ pub struct Verifier<'a> {
 }
 
 impl<'a> Verifier<'a> {
-    /// Creates a verifier without limits and without a mission to compare with.
+    /// Creates a verifier without limits, which does not compare the certificate with a mission.
     pub fn new(directory: &'a Path) -> Self {
         Self { directory, mission: None, until: None, stop: Box::new(|| false) }
     }
 
-    /// Also checks that the certificate matches a mission in its present situation.
+    /// Sets a mission. The verifier then also checks that the certificate matches the mission in
+    /// its current situation.
     #[must_use]
     pub fn mission(self, mission: impl Into<Option<&'a Mission>>) -> Self {
         Self { mission: mission.into(), ..self }
     }
 
-    /// Limits the time of the grounding check, which may take long, counted from this call. The
-    /// check then fails.
+    /// Sets a time limit, counted from this call, for the checks that may take long (grounding and
+    /// plan). A check that reaches the limit fails.
     #[must_use]
     pub fn time_limit(self, time: Duration) -> Self {
         Self { until: Instant::now().checked_add(time), ..self }
     }
 
-    /// Lets the grounding check fail when `stop` returns `true`.
+    /// Sets a function that is polled by the checks that may take long. When `stop` returns `true`,
+    /// the check fails.
     #[must_use]
     pub fn stop(self, stop: impl Fn() -> bool + 'a) -> Self {
         Self { stop: Box::new(stop), ..self }
@@ -90,12 +92,12 @@ impl<'a> Verifier<'a> {
         report
     }
 
-    /// Returns the argument of the certificate as verification conditions in SMT-LIB 2, without
-    /// checking it.
+    /// Returns the optimality proof (argument) of the certificate as verification conditions in
+    /// SMT-LIB 2. The proof itself is not checked.
     ///
     /// # Errors
-    /// M121: the certificate cannot be read, or its task has derived variables, for which there
-    /// are no such conditions.
+    /// M121: the certificate cannot be read or its plan is not as claimed, or its task has derived
+    /// variables, for which there are no verification conditions.
     pub fn conditions(&self) -> Result<String, Errors> {
         conditions(self.directory, &|| self.is_over()).map_err(Errors::from)
     }
@@ -149,8 +151,9 @@ fn parts(
     }
     let (task_result, timed) = match same_task(&domain, &problem, (text(TASK), text(WITNESS)), stop) {
         Ok((summary, timed)) => (Ok(summary), timed),
-        // Without a task, it is unknown whether the plan is timed. The certificate is rejected in
-        // any case; the plan is still checked, as an untimed one.
+        // If the task is rejected, it is unknown whether plans are measured by time. The
+        // certificate is rejected in any case; the plan is still checked, as if plans were not
+        // measured by time.
         Err(reason) => (Err(reason), false),
     };
     parts.push(VerifiedPart { part: "task", result: task_result });
@@ -163,7 +166,7 @@ fn parts(
                 Err(reason) => (Err(reason), None),
             };
             parts.push(VerifiedPart { part: "plan", result });
-            // Without the metric value, the remaining parts have nothing to compare with.
+            // Without the metric value, the remaining parts cannot be checked.
             let Some(value) = value else { return parts };
             Some(value)
         }
@@ -186,7 +189,7 @@ fn parts(
     parts
 }
 
-/// The knowledge files of a certificate, if it has any.
+/// Returns the knowledge files of a certificate, or `None` if it has none.
 fn written(contents: &[(String, String)]) -> Option<knowledge::KnowledgeFiles<'_>> {
     contents.iter().any(|(name, _)| name == knowledge::ORIGIN).then(|| knowledge::KnowledgeFiles {
         document: text(contents, knowledge::DOCUMENT),

@@ -1,6 +1,6 @@
-//! Explanations of the message codes of this crate.
+//! Explanations of the codes of this crate's error messages.
 
-/// Codes in ascending order, each with its meaning, its cause and its remedy.
+/// The error codes in ascending order. Each entry has four parts: code, meaning, cause, remedy.
 pub const CODES: &[[&str; 4]] = &[[
     "M121",
     "A certificate cannot be read.",

@@ -1,74 +1,77 @@
-//! The JSON file of all inferred facts of a mission's knowledge with their derivations.
-//! `rules::replay` checks it without code of the inference engine.
+//! The JSON format of derivations: all facts of a mission's knowledge, the inferred ones with their
+//! derivations. `rules::replay` checks them without code of the inference engine.
 
 use rules::{Derivation, DerivationStep, Fact, Literal, Reason, RuleIdentity, Symbol, Symbols};
 use serde::{Deserialize, Serialize};
 
-/// Name of the file.
+/// Name of the file with the derivations.
 pub const DERIVATIONS: &str = "derivations.json";
-/// Version of the format.
+/// Name and version of the format.
 pub const FORMAT: &str = "metaplan-derivations/1";
 
-/// The document. Each step follows the steps that support it.
+/// The contents of the file. Each derivation step follows the steps that support it.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Document {
-    /// [`FORMAT`].
+    /// The format identifier, [`FORMAT`].
     pub format: String,
-    /// Names and literals; other parts refer to them by position.
+    /// The names and literals; other parts refer to them by index.
     pub terms: Vec<Term>,
-    /// The rules that the steps refer to.
+    /// The rules; derivation steps refer to them by index.
     pub rules: Vec<Rule>,
-    /// The derivation steps.
+    /// The derivation steps, one for each fact.
     pub steps: Vec<Step>,
 }
 
-/// A name or a literal.
+/// An IRI or an RDF literal.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Term {
-    /// An IRI.
+    /// An IRI, for an individual, class or property.
     Name(String),
-    /// A typed literal: lexical form, datatype.
+    /// A typed literal: lexical form, IRI of the datatype.
     Literal(String, String),
     /// A language-tagged string: text, `rdf:langString`, language.
     Text(String, String, String),
 }
 
-/// A rule, identified by its position in its source.
+/// A rule, identified by its file and its position in the file.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Rule {
-    /// Name of the file.
+    /// Name of the rule file.
     pub source: String,
     /// Position of the rule in the file.
     pub position: u32,
-    /// Name of the rule, if it has one.
+    /// Label of the rule, if it has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub label: Option<String>,
-    /// The variables that have a value in each step.
+    /// The variables to which each step of the rule binds values, in the order of
+    /// [`Step::bindings`].
     pub variables: Vec<String>,
 }
 
-/// A fact. It is asserted if neither `rule` nor `supports` is present.
+/// A derivation step: a fact and its justification. The fact is asserted if neither `rule` nor
+/// `supports` is present.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Step {
-    /// Predicate and arguments.
+    /// Predicate and arguments, as indices of terms.
     pub fact: Vec<u32>,
-    /// The rule that derives the fact.
+    /// Index of the rule that derives the fact.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rule: Option<u32>,
-    /// The values of the rule's variables.
+    /// The values of the rule's variables, as indices of terms.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub bindings: Vec<u32>,
-    /// The steps of the facts that match the relation atoms of the rule's body, in order, or the
-    /// steps that support an equality.
+    /// For a rule, the indices of the steps whose facts match the relation atoms of the rule's
+    /// body, in the order of the atoms. Without a rule, the indices of the steps that support an
+    /// equality.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub supports: Option<Vec<u32>>,
 }
 
-/// Parses derivations and interns their names and values in `symbols`.
+/// Parses the derivations and interns their names and literals in `symbols`.
 pub(crate) fn read(text: &str, symbols: &mut Symbols) -> Result<Derivation, String> {
     let wrong = |reason: &str| format!("{DERIVATIONS}: {reason}");
     let document: Document = serde_json::from_str(text).map_err(|error| wrong(&error.to_string()))?;

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use sha2::{Digest as _, Sha256};
 
-/// Returns the size and the SHA-256 of a file, reading it in blocks.
+/// Returns the size of a file in bytes and its SHA-256 digest. The file is read in blocks.
 ///
 /// # Errors
 /// The file cannot be read.
@@ -16,7 +16,7 @@ pub fn digest_of(path: &Path) -> std::io::Result<(u64, String)> {
     Ok((bytes, hexadecimal(&hasher.finalize())))
 }
 
-/// The SHA-256 of a byte string.
+/// Returns the SHA-256 digest of a byte string in hexadecimal.
 pub fn digest(bytes: &[u8]) -> String {
     hexadecimal(&Sha256::digest(bytes))
 }

@@ -1,4 +1,4 @@
-//! Reads the files of a certificate. They must be exactly the files that the manifest lists.
+//! Reads the files of a certificate. They must be the files that the manifest lists.
 
 use std::fs;
 use std::io::Read as _;
@@ -11,13 +11,13 @@ use crate::manifest::{
 };
 use crate::{derivations, knowledge};
 
-/// Returns the text of a named file, or the empty string.
+/// Returns the text of the file with this name, or the empty string without such a file.
 pub fn text<'t, N: AsRef<str>>(files: &'t [(N, String)], name: &str) -> &'t str {
     files.iter().find(|(file_name, _)| file_name.as_ref() == name).map_or("", |(_, text)| text.as_str())
 }
 
-/// Reads the manifest and the files, and checks their sizes and digests. Streamed files are
-/// checked but not returned.
+/// Reads the manifest and the files that it lists, and checks their names, sizes and digests.
+/// Streamed files are checked, but their contents are not returned.
 pub(crate) fn read(directory: &Path) -> Result<(Manifest, Vec<(String, String)>), String> {
     let manifest = read_file(directory, "manifest.json", 1 << 20)?;
     let manifest: Manifest =
@@ -39,7 +39,7 @@ pub(crate) fn read(directory: &Path) -> Result<(Manifest, Vec<(String, String)>)
     let mut names: Vec<&str> = manifest.files.iter().map(|file| file.name.as_str()).collect();
     names.sort_unstable();
     if names != expected {
-        // The list may be long; the first names suffice to show the error.
+        // The list may be long; its beginning suffices to show the difference.
         names.truncate(expected.len() + 1);
         return Err(format!(
             "manifest.json: lists {}, where {} are expected",
@@ -79,7 +79,7 @@ pub(crate) fn read(directory: &Path) -> Result<(Manifest, Vec<(String, String)>)
     Ok((manifest, contents))
 }
 
-/// Checks the size and the SHA-256 of a file that is not kept in memory.
+/// Checks the size and the SHA-256 digest of a streamed file, without keeping it in memory.
 fn check_streamed(directory: &Path, file: &File) -> Result<(), String> {
     let File { name, bytes, sha256 } = file;
     let wrong = |what: String| format!("{name}: {what}");
@@ -96,8 +96,8 @@ fn check_streamed(directory: &Path, file: &File) -> Result<(), String> {
     Ok(())
 }
 
-/// Returns the path of a regular file of at most `limit` bytes. Symbolic links are rejected, because they
-/// could point outside of the certificate.
+/// Returns the path of a regular file of at most `limit` bytes. A symbolic link is rejected,
+/// because it could point outside of the certificate.
 fn plain_file(directory: &Path, name: &str, limit: u64) -> Result<PathBuf, String> {
     let path = directory.join(name);
     let wrong = |what: String| format!("{name}: {what}");
@@ -112,13 +112,14 @@ fn plain_file(directory: &Path, name: &str, limit: u64) -> Result<PathBuf, Strin
     Ok(path)
 }
 
-/// Reads a regular file of at most `limit` bytes.
+/// Reads a regular file of at most `limit` bytes as text.
 fn read_file(directory: &Path, name: &str, limit: u64) -> Result<String, String> {
     let path = plain_file(directory, name, limit)?;
     let wrong = |what: String| format!("{name}: {what}");
     let mut text = String::new();
     fs::File::open(&path)
-        // The file may have grown since its size was read.
+        // At most `limit` bytes are read, because the file may have grown since its size was
+        // checked.
         .and_then(|file| file.take(limit).read_to_string(&mut text))
         .map_err(|error| wrong(format!("cannot be read: {error}")))?;
     Ok(text)

@@ -1,5 +1,5 @@
-//! The origin of a mission's problem: its knowledge base, later changes, and the derivations of
-//! the inferred facts.
+//! Checks the origin of a certificate's problem: a knowledge base, later changes, and the
+//! derivations of the inferred facts.
 
 use std::collections::BTreeMap;
 
@@ -15,42 +15,44 @@ use mission::knowledge::{COADAPTATION, Knowledge, Sources, Stated, Statements, T
 use mission::message::Message;
 use mission::{Bindings, Mission, Names};
 
-/// Name of the file with the knowledge base and its imports, as N-Triples.
+/// Name of the file with the knowledge base and its imports in N-Triples.
 pub const DOCUMENT: &str = "knowledge.nt";
-/// Name of the file with all other inputs.
+/// Name of the file with the other inputs of the mission, see [`Origin`].
 pub const ORIGIN: &str = "origin.json";
 
-/// The connection between a knowledge base and PDDL, and the changes since the knowledge base was
+/// The inputs that connect a knowledge base with PDDL, and the changes since the knowledge base was
 /// read.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Origin {
     /// Text of the domain file.
     pub domain: String,
-    /// The problem without the parts that the knowledge base contributes.
+    /// The problem as PDDL text, without the parts that the knowledge base contributes.
     pub problem: String,
-    /// Query of each PDDL symbol, beyond the defaults.
+    /// For each PDDL symbol with a binding other than the default, the query that yields its facts
+    /// or values.
     pub bindings: BTreeMap<String, String>,
-    /// Object names of individuals, where they differ.
+    /// For each individual whose PDDL object has a different name, the name of the object.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub names: BTreeMap<String, String>,
-    /// Names and texts of the rule files.
+    /// The rule files: name and text.
     pub rules: Vec<(String, String)>,
-    /// SHA-256 of the rule files that the program ships, by name.
+    /// SHA-256 digests of the rule files that were shipped with the program, by name.
     pub shipped: BTreeMap<String, String>,
-    /// Changes since the documents were read.
+    /// The changes of statements since the knowledge base was read.
     pub changes: Statements,
 }
 
-/// The texts of the knowledge files of a certificate.
+/// The texts of the three knowledge files of a certificate.
 pub(crate) struct KnowledgeFiles<'w> {
     pub(crate) document: &'w str,
     pub(crate) origin: &'w str,
     pub(crate) derivations: &'w str,
 }
 
-/// Replays the derivations and fills the problem with the inferred facts. The result must equal
-/// the certificate's problem except for the metric.
+/// Replays the derivations, and fills the mission's problem with the inferred facts. The result
+/// must equal `problem`, the problem of the certificate, except for the metric. Returns the results
+/// of both checks.
 pub(crate) fn check(
     written: &KnowledgeFiles<'_>,
     domain: &Domain,
@@ -63,12 +65,13 @@ pub(crate) fn check(
     [Ok(summary), filled(knowledge, &origin, domain, problem)]
 }
 
-/// Returns `true` if a rule file is the shipped file of that name.
+/// Returns `true` if a rule file equals the shipped rule file with this name.
 pub fn is_shipped(name: &str, text: &str) -> bool {
     [(COADAPTATION, rules::COADAPTATION_RULES), (TOMASYS, rules::TOMASYS_RULES)].contains(&(name, text))
 }
 
-/// Reports for each rule file whether it is the shipped one, and checks the recorded digests.
+/// Describes each rule file, e.g. as a shipped one. Returns an error if a recorded digest differs
+/// from the digest of the text.
 fn provenance(origin: &Origin) -> Result<String, String> {
     let mut descriptions = Vec::new();
     for (name, text) in &origin.rules {
@@ -101,10 +104,10 @@ pub(crate) fn first_message(messages: &[Message]) -> String {
     error.map_or_else(String::new, |message| message.message.clone())
 }
 
-/// Reads the documents and applies the later changes.
+/// Reads the knowledge base and the rules of a certificate and applies the later changes.
 ///
 /// # Errors
-/// A description of the error.
+/// A description of the first error.
 pub fn stated(document: &str, origin: &Origin) -> Result<Stated, String> {
     let directory = tempfile::tempdir().map_err(|error| format!("no temporary directory: {error}"))?;
     let write = |name: &str, text: &str| {
@@ -117,7 +120,7 @@ pub fn stated(document: &str, origin: &Origin) -> Result<Stated, String> {
     let rules = rules
         .map(|((_, text), number)| Ok(write(&format!("rules-{number}.swrl"), text)?.display().to_string()));
     let rules = rules.collect::<Result<Vec<_>, String>>()?;
-    // Imports would refer to documents outside of the certificate, so they are not followed.
+    // Imports would refer to documents outside of the certificate, so they are not loaded.
     let options = ReadOptions { closed: true, ..ReadOptions::default() };
     let sources = Sources { documents, rules, options, ..Sources::default() };
     let mut stated =
@@ -132,7 +135,8 @@ pub fn stated(document: &str, origin: &Origin) -> Result<Stated, String> {
     Ok(stated)
 }
 
-/// Derives the inferred knowledge from the derivations alone.
+/// Replays the derivations, without the inference engine. Returns the knowledge, a summary, and the
+/// origin.
 fn replayed(written: &KnowledgeFiles<'_>) -> Result<(Knowledge, String, Origin), String> {
     let origin: Origin =
         serde_json::from_str(written.origin).map_err(|error| format!("{ORIGIN}: {error}"))?;
@@ -153,7 +157,8 @@ fn replayed(written: &KnowledgeFiles<'_>) -> Result<(Knowledge, String, Origin),
     Ok((knowledge, summary, origin))
 }
 
-/// The code that connects knowledge and PDDL, which verifier and planner share.
+/// Names the code between knowledge and PDDL that verifier and planner share, and that must be
+/// trusted.
 fn shared(mission: &Mission) -> &'static str {
     match (mission.adaptation(), mission.completed_predicates()) {
         (Some(_), _) => "the bindings, and the explicit form of the plain domain",
@@ -188,7 +193,7 @@ fn filled(
     if actual != expected {
         return Err("the knowledge says more or less than the problem".to_owned());
     }
-    // The metric is the only part that a user chooses for each plan.
+    // The metric is the only part of a problem that a user chooses for each plan.
     let metric = if unchanged_metric == expected { "" } else { ", with another metric than the mission's" };
     Ok(format!("the problem is what follows{metric}; on trust: {}", shared(&mission)))
 }

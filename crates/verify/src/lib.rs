@@ -1,6 +1,6 @@
 //! Verifies optimality certificates, from the knowledge base to the refutation of a formula.
 //!
-//! A certificate is a directory with everything that is required to check that a plan is optimal
+//! A certificate is a directory with all files that are required to check that a plan is optimal,
 //! or that no plan exists:
 //!
 //! | file | holds |
@@ -12,7 +12,7 @@
 //! | `derivations.json` | all inferred facts, each with the rule, its bindings and its supports; absent without a knowledge base |
 //! | `task.json` | the ground task |
 //! | `witness.json` | the reachable atoms and the ranges of numbers: the reason why other instances of actions need no operator |
-//! | `formula.cnf`, `legend.txt`, `proof.drat`, `hints.txt` | for small tasks: "a cheaper plan has at most T steps" in DIMACS, the meaning of its variables, its refutation, the antecedents of each line of the refutation |
+//! | `formula.cnf`, `legend.txt`, `proof.drat`, `hints.txt` | for small tasks: the formula "some plan of at most T steps is cheaper" in DIMACS, the meaning of its variables, its refutation, the antecedents of each line of the refutation |
 //! | `argument.json` | the proof that no plan is cheaper: labels, potentials, needs (see `metaplan-certificate`) |
 //!
 //! Absent: planner code. The crate links none.

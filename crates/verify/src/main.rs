@@ -11,7 +11,8 @@ use mission::file;
 use mission::message::{ErrorAnswer, Errors, Message};
 use mission::visible::{pretty, visible, visible_json};
 
-/// Exit statuses, equal to those of `metaplan verify`.
+/// Exit statuses, which are equal to those of `metaplan verify`: verified, unreadable input,
+/// rejected certificate, internal error.
 const VERIFIED: u8 = 0;
 const BAD_INPUT: u8 = 3;
 const INVALID: u8 = 30;
@@ -44,7 +45,7 @@ enum Format {
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    // The default hook would print a stack trace; the message is printed below instead.
+    // The default panic hook would print a stack trace; the message is printed below instead.
     std::panic::set_hook(Box::new(|_| {}));
     let outcome = std::panic::catch_unwind(|| run(&arguments));
     ExitCode::from(match outcome {
@@ -60,7 +61,7 @@ fn main() -> ExitCode {
     })
 }
 
-/// Verifies the certificate under the limits.
+/// Verifies the certificate under the limits on time and memory.
 fn run(arguments: &Arguments) -> Result<Verification, Errors> {
     let Arguments { directory, format, smt, time_limit } = arguments.clone();
     let watch = Watch::start(time_limit, move |report| std::process::exit(show(report, format).into()));
@@ -71,7 +72,7 @@ fn run(arguments: &Arguments) -> Result<Verification, Errors> {
     Ok(watch.end(verifier.verify()))
 }
 
-/// Prints the verification and returns the exit status.
+/// Prints the result of the verification and returns the exit status.
 fn show(report: &Verification, format: Format) -> u8 {
     let written = document(&match format {
         Format::Text => report.to_string(),
@@ -84,7 +85,7 @@ fn show(report: &Verification, format: Format) -> u8 {
     }
 }
 
-/// Prints an error: text on standard error, or a JSON object as the answer.
+/// Prints an error: as text on standard error, or as a JSON object on standard output.
 fn fail(messages: &[Message], format: Format) {
     match format {
         Format::Text => {
@@ -98,8 +99,8 @@ fn fail(messages: &[Message], format: Format) {
     }
 }
 
-/// Writes to standard output. Returns `false` on failure. A closed pipe is not an error, unlike a
-/// full disk.
+/// Writes a text to standard output. Returns `false` and prints an error on failure. A closed pipe
+/// does not count as a failure.
 fn document(text: &str) -> bool {
     let mut stdout = std::io::stdout().lock();
     match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {

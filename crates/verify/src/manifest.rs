@@ -1,4 +1,4 @@
-//! The manifest of a certificate, its claim, and the result of a verification.
+//! The manifest of a certificate with its claim, and the result of a verification.
 
 use std::fmt::Write as _;
 
@@ -6,59 +6,61 @@ use serde::{Deserialize, Serialize};
 
 use crate::digest::digest;
 
-/// Version of the format.
+/// Name and version of the certificate format.
 pub const FORMAT: &str = "metaplan-certificate/3";
-/// Upper limit on the total size of the streamed files, in bytes.
+/// Upper limit on the total size of the streamed files, in bytes; see [`STREAMED`].
 pub const SIZE_LIMIT: u64 = 1 << 30;
 /// Upper limit on the total size of the files that are read into memory, in bytes.
 pub const TEXT_LIMIT: u64 = 1 << 28;
-/// Name of the file with the planned PDDL domain.
+/// Name of the file with the PDDL domain of the planning problem.
 pub const DOMAIN: &str = "domain.pddl";
-/// Name of the file with the planned problem, with availability and values filled in.
+/// Name of the file with the PDDL problem, in which the knowledge base's facts and values are
+/// filled in.
 pub const PROBLEM: &str = "problem.pddl";
-/// Name of the file with the plan; absent if there is no plan.
+/// Name of the file with the plan; absent if the claim is that no plan exists.
 pub const PLAN: &str = "plan.txt";
 /// Name of the file with the ground task.
 pub const TASK: &str = "task.json";
-/// Name of the file with the possible atoms and the ranges of numbers.
+/// Name of the file with the witness, an over-approximation of the reachable states: possible atoms
+/// and ranges of numbers.
 pub const WITNESS: &str = "witness.json";
-/// Name of the file with the optimality proof.
+/// Name of the file with the optimality proof: labels, potentials and needs.
 pub const ARGUMENT: &str = "argument.json";
-/// Name of the file with the formula "a cheaper plan has at most T steps" of a small task, in
-/// DIMACS.
+/// Name of the file with the formula "some plan of at most T steps is cheaper" in DIMACS; for small
+/// tasks only.
 pub const FORMULA: &str = "formula.cnf";
 /// Name of the file with the meaning of the formula's variables.
 pub const LEGEND: &str = "legend.txt";
 /// Name of the file with the refutation of the formula.
 pub const PROOF: &str = "proof.drat";
-/// Name of the file with the antecedents of each line of the refutation.
+/// Name of the file with the antecedents (numbers of clauses) of each line of the refutation.
 pub const HINTS: &str = "hints.txt";
-/// Names of the files that may be large and are never read into memory as a whole.
+/// Names of the files that may be large, and are never read into memory as a whole.
 pub const STREAMED: [&str; 4] = [FORMULA, LEGEND, PROOF, HINTS];
-/// Upper limit on the size of the proof and of its hints, each in bytes.
+/// Upper limit on the size of the refutation, and on the size of its hints, in bytes.
 pub const PROOF_LIMIT: u64 = 1 << 28;
 
-/// The claim and the files of a certificate.
+/// The claim of a certificate, and the list of its files.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
-    /// The constant [`FORMAT`].
+    /// The format identifier, [`FORMAT`].
     pub format: String,
-    /// The claim.
+    /// The claim that the certificate proves.
     pub claim: Claim,
-    /// The refutation, if there is one.
+    /// The refutation, or the reason for its absence.
     pub refutation: Refutation,
-    /// All files except the manifest.
+    /// All files of the certificate except the manifest.
     pub files: Vec<File>,
 }
 
-/// The second proof of the claim, by a formula and its refutation.
+/// The additional proof of the claim by a formula and its refutation.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Refutation {
-    /// A formula for plans of at most this number of steps; longer plans are not cheaper.
+    /// The formula encodes plans of at most this number of steps; longer plans are not cheaper.
     Steps(usize),
-    /// No formula, and the reason.
+    /// There is no formula; the text is the reason.
     None(String),
 }
 
@@ -84,11 +86,11 @@ pub struct File {
     pub name: String,
     /// Size in bytes.
     pub bytes: u64,
-    /// SHA-256 in hexadecimal digits.
+    /// SHA-256 digest in hexadecimal digits.
     pub sha256: String,
 }
 
-/// Names of the files that [`Subject::digest`] covers.
+/// Names of the files that identify the subject of a certificate; [`Subject::digest`] covers them.
 pub const SUBJECT: [&str; 4] = [DOMAIN, PROBLEM, crate::knowledge::DOCUMENT, crate::knowledge::ORIGIN];
 
 /// The files or the mission that a claim was checked for.
@@ -131,7 +133,8 @@ pub enum Unchecked {
 }
 
 impl Subject {
-    /// The subject of a certificate with these files.
+    /// Creates the subject of a certificate with these files, which was compared with the mission
+    /// of this name if there is one.
     pub(crate) fn new(files: &[File], mission: Option<&str>) -> Self {
         let mut lines = String::new();
         for name in SUBJECT {
@@ -150,32 +153,33 @@ impl Subject {
     }
 }
 
-/// The result of one part of a verification.
+/// The result of checking one part of a certificate.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct VerifiedPart {
-    /// Name of the part: `files`, `derivations`, `knowledge`, `plan`, `task`, `argument`,
+    /// Name of the part: `files`, `derivations`, `knowledge`, `task`, `plan`, `argument`,
     /// `formula`, `proof`, `steps` or `mission`; or `limits` if the time or memory limit was
     /// reached.
     pub part: &'static str,
-    /// A summary of the check, or the first defect.
+    /// A summary of the check, or a description of the first defect as an error.
     pub result: Result<String, String>,
 }
 
-/// The result of a verification.
+/// The result of verifying a certificate.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Verification {
-    /// The claim; `None` if the manifest cannot be read.
+    /// The claim of the certificate; `None` if the files cannot be read.
     pub claim: Option<Claim>,
-    /// The files or the mission that the claim was checked for; `None` if the files cannot be
+    /// The files or the mission for which the claim was checked; `None` if the files cannot be
     /// read.
     pub subject: Option<Subject>,
-    /// The parts in order. Parts that depend on a failed part may be absent.
+    /// The results of the parts in the order of checking. Parts that depend on a failed part may be
+    /// absent.
     pub parts: Vec<VerifiedPart>,
 }
 
 impl Verification {
-    /// Returns `true` if the claim is proved.
+    /// Returns `true` if the files could be read and no part has failed.
     pub fn verified(&self) -> bool {
         self.claim.is_some() && self.parts.iter().all(|part| part.result.is_ok())
     }

@@ -1,13 +1,13 @@
-//! The value of a plan according to the validator: its metric, or else its duration or its
-//! length.
+//! The value of a plan according to the validator: its metric if the problem has one, otherwise its
+//! duration or its length.
 
 use num_rational::BigRational;
 use pddl::ast::Problem;
 use pddl::validate::Verdict;
 
-/// Returns the value of a valid plan of `steps` steps, not counting waits. Without a metric it is
-/// the total time if the task is `timed` (see [`crate::task::same_task`]), and the number of
-/// steps otherwise. Returns `None` if the metric is undefined after the plan.
+/// Returns the value of a valid plan; `steps` is its number of steps without waits. Without a
+/// metric, the value is the total time if the task is `timed` (see [`crate::task::same_task`]),
+/// otherwise the number of steps. Returns `None` if the metric is undefined after the plan.
 pub fn measure(problem: &Problem, verdict: &Verdict, steps: usize, timed: bool) -> Option<BigRational> {
     match (&problem.metric, &verdict.metric) {
         (_, Some(metric)) => Some(metric.clone()),

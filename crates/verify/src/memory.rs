@@ -1,15 +1,15 @@
-//! The memory limit: a thread measures the process and sets a flag.
+//! The memory limit: a thread measures the memory of the process and sets a flag.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// Interval between two measurements. The process may exceed the limit for this time.
+/// Interval between two measurements. The process may exceed the limit for about this time.
 const INTERVAL: Duration = Duration::from_millis(5);
 
-/// Starts a thread that sets the flag as soon as the process occupies more than `megabytes` of
-/// main memory (units of 2^20 bytes). Child processes do not count. Returns `false`, and sets no
-/// limit, if the platform does not report the memory of a process.
+/// Starts a thread that sets `interrupt` as soon as the process occupies more than `megabytes` of
+/// main memory (units of 2^20 bytes). Child processes do not count. Returns `false`, without an
+/// effect, if the platform does not report the memory of a process.
 #[must_use]
 pub fn watch(megabytes: u64, interrupt: Arc<AtomicBool>) -> bool {
     let occupied = || memory_stats::memory_stats().map(|stats| stats.physical_mem as u64);

@@ -1,4 +1,4 @@
-//! Validates the plan of a certificate.
+//! Validates the plan of a certificate and compares its metric with the claim.
 
 use num_rational::BigRational;
 use num_traits::Zero;
@@ -9,12 +9,12 @@ use pddl::{Source, to_decimal};
 use crate::manifest::PLAN;
 use crate::measure::measure;
 
-/// Executes the plan in the validator until `stop` returns `true`. Returns a summary and the
-/// metric value.
+/// Executes the plan text in the validator and compares its metric with the claimed one. Returns a
+/// summary and the metric value. The validation is aborted when `stop` returns `true`.
 ///
 /// # Errors
-/// The plan is malformed, cannot be executed, or has another metric than claimed; or the
-/// validation was stopped.
+/// The plan is malformed, cannot be executed, or has a metric other than claimed; or the validation
+/// was aborted.
 pub fn plan(
     domain: &Domain,
     problem: &Problem,
@@ -28,9 +28,9 @@ pub fn plan(
     if plan.steps.iter().all(|step| step.start.is_some()) {
         plan.steps.sort_by(|left, right| left.start.cmp(&right.start));
     }
-    // The steps are executed in sequence, each with the duration of the files unless the files
-    // leave a choice, because written times may be rounded. Without timed events, each step
-    // starts when the previous one has ended. With timed events, it starts at its written time or
+    // The steps are executed in sequence. Durations are those of the PDDL files unless the files
+    // leave a choice, because written times may be rounded. Without timed events, each step starts
+    // when the previous one has ended. With timed events, each step starts at its written time or
     // within the tolerance after it.
     let is_timed = problem.init.iter().any(|element| matches!(element, InitialElement::Timed(..)));
     for step in &mut plan.steps {
@@ -46,7 +46,7 @@ pub fn plan(
     }
     let steps = plan.steps.len();
     let value = measure(problem, &verdict, steps, timed).ok_or("the metric has no value after the plan")?;
-    // The claim is a decimal if the value has one, or else a fraction.
+    // The claim is written as a decimal if the value has a finite one, otherwise as a fraction.
     if value.to_string() != claimed && to_decimal(&value).is_none_or(|decimal| decimal != claimed) {
         return Err(format!("its metric is {value}, where {claimed} is claimed"));
     }
@@ -54,7 +54,7 @@ pub fn plan(
     Ok((format!("{steps} step{ending}, valid, metric {claimed}"), value))
 }
 
-/// Returns `true` if an action of this name has a duration that is not fixed.
+/// Returns `true` if an action of this name has a duration that its constraints leave open.
 fn is_chosen(domain: &Domain, name: &Name) -> bool {
     let mut bodies =
         domain.actions.iter().filter(|action| action.identifier.name == *name).map(|action| &action.body);

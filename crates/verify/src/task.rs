@@ -1,4 +1,4 @@
-//! Reads the PDDL files of a certificate and checks the grounding of its task.
+//! Reads the PDDL files of a certificate and checks that its ground task is faithful to them.
 
 use certificate::{Faithful, faithful};
 use pddl::Source;
@@ -6,21 +6,22 @@ use pddl::ast::{Domain, Problem};
 
 use crate::manifest::{DOMAIN, PROBLEM};
 
-/// Parses the domain and the problem.
+/// Parses the domain and the problem of a certificate.
 ///
 /// # Errors
-/// Returns the message of the first error in the texts.
+/// The message of the first error in the texts.
 pub fn read_pddl(domain: &str, problem: &str) -> Result<(Domain, Problem), String> {
     let parsed = pddl::read(&Source::new(DOMAIN, domain), &Source::new(PROBLEM, problem));
     let first = |errors: pddl::Errors| errors.first().map_or_else(String::new, |error| error.message.clone());
     parsed.map(|(domain, problem, _)| (domain, problem)).map_err(first)
 }
 
-/// Checks that the task refines the files. Also returns `true` if plans are measured by time
-/// because there is no metric. The check ends when `stop` returns `true`.
+/// Checks that a ground task is faithful to its PDDL files. Returns a summary, and `true` if plans
+/// are measured by time because there is no metric. The check is aborted when `stop` returns
+/// `true`.
 ///
 /// # Errors
-/// Returns the first difference, or the reason why the check is undecided.
+/// The first difference, or the reason why the check is undecided.
 pub fn same_task(
     domain: &Domain,
     problem: &Problem,

@@ -1,5 +1,5 @@
-//! The time and memory limits of a verification. A certificate is untrusted and may require
-//! unlimited resources.
+//! The time and memory limits of a verification. They are needed because a certificate is untrusted
+//! and may require unlimited resources.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -10,13 +10,13 @@ use crate::memory;
 
 /// Upper limit on the memory of the process, in megabytes of 2^20 bytes.
 const MEMORY_LIMIT: u64 = 4096;
-/// Time after a limit, in addition to a tenth of the time limit, until a verification that has
-/// not stopped is aborted.
+/// Time after reaching a limit, in addition to a tenth of the time limit, after which a
+/// verification that is still running is aborted.
 const GRACE: Duration = Duration::from_millis(100);
 const LATE: &str = "it takes longer than `--time-limit` allows";
 const INTERVAL: Duration = Duration::from_millis(50);
 
-/// The limits of a running verification. Clones share the same limits.
+/// The time and memory limits of a running verification. Clones share the same limits.
 #[derive(Debug, Clone)]
 pub struct Watch {
     started: Instant,
@@ -26,13 +26,13 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// Starts measuring time and memory. Not every computation polls the limits, so a separate
-    /// thread calls `give_up` some time after a limit was reached if the verification has not
-    /// ended. `give_up` should end the program.
+    /// Starts measuring time and memory. Some computations do not poll the limits. A separate
+    /// thread therefore calls `give_up` some time after a limit was reached if the verification has
+    /// not ended. `give_up` should end the program.
     pub fn start(time: Duration, give_up: impl FnOnce(&Verification) + Send + 'static) -> Self {
         let (interrupt, answered) = (Arc::default(), Arc::default());
         let watch = Self { started: Instant::now(), time, interrupt, answered };
-        // Without a measurement of the platform, memory is unlimited.
+        // If the platform does not report the memory of a process, memory is unlimited.
         let _ = memory::watch(MEMORY_LIMIT, Arc::clone(&watch.interrupt));
         let watcher = watch.clone();
         std::thread::spawn(move || {
@@ -49,19 +49,21 @@ impl Watch {
         watch
     }
 
-    /// Returns `true` if a limit is reached.
+    /// Returns `true` if the time or memory limit is reached.
     pub fn reached(&self) -> bool {
         self.interrupt.load(Ordering::Relaxed) || self.started.elapsed() >= self.time
     }
 
-    /// Ends the verification and returns its report, which fails if the time limit is exceeded.
-    /// `give_up` is not called afterwards.
+    /// Ends the verification and returns its report, with a failed part `limits` if the time limit
+    /// is exceeded. Afterwards `give_up` is not called; if it is being called already, this
+    /// function does not return.
     #[must_use]
     pub fn end(&self, mut report: Verification) -> Verification {
         if self.started.elapsed() > self.time {
             report.parts.push(VerifiedPart { part: "limits", result: Err(LATE.to_owned()) });
         }
-        // The watching thread is already reporting the limit and ends the program.
+        // If the flag was set already, the watching thread is reporting the limit and ends the
+        // program.
         while self.answered.swap(true, Ordering::Relaxed) {
             std::thread::park();
         }
@@ -69,10 +71,10 @@ impl Watch {
     }
 }
 
-/// Parses a duration in seconds, for command-line options.
+/// Parses a command-line value as a duration in seconds.
 ///
 /// # Errors
-/// The text is not a number of seconds, or the number is negative.
+/// The text is not a number, or the number is negative or too large.
 pub fn seconds(text: &str) -> Result<Duration, String> {
     let seconds: f64 = text.parse().map_err(|_| format!("`{text}` is not a number of seconds"))?;
     Duration::try_from_secs_f64(seconds).map_err(|error| error.to_string())

@@ -1,9 +1,9 @@
-//! Tests of the program `metaplan-verify`. The tests of `metaplan`, which can create certificates, compare
-//! its output with that of `metaplan verify`.
+//! Tests of the program `metaplan-verify`. The tests of `metaplan`, which can create certificates,
+//! compare the output of `metaplan-verify` with that of `metaplan verify`.
 
 use std::process::Command;
 
-/// Returns the exit status, the standard output and the standard error.
+/// Runs the program. Returns the exit status, the standard output and the standard error.
 fn run(arguments: &[&str]) -> (Option<i32>, String, String) {
     let output = Command::new(env!("CARGO_BIN_EXE_metaplan-verify")).args(arguments).output();
     let output = output.expect("the program runs");

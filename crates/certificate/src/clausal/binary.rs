@@ -1,34 +1,36 @@
-//! Two's complement arithmetic in clauses, lowest bit first.
+//! Two's complement arithmetic in clauses. Bits are ordered from the lowest to the highest.
 
 use crate::clausal::formula::Formula;
 use crate::clausal::literal::Literal;
 use crate::integer::Integer;
 
-/// The bits of a number, lowest first; the last one is the sign.
+/// The bits of a number, from the lowest to the highest; the last bit is the sign.
 pub(super) type Bits = Vec<Literal>;
 
-/// The sign bit of a number.
+/// Returns the sign bit of a number, which is true for negative numbers.
 pub(super) fn sign(number: &Bits) -> Literal {
     *number.last().expect("invariant: a number has a sign")
 }
 
-/// Number of bits that represent every integer from `least` to `most`.
+/// Returns the number of bits that represent every integer from `least` to `most`.
 pub(super) fn width(least: &Integer, most: &Integer) -> usize {
     least.width().max(most.width())
 }
 
 impl Formula {
-    /// Adds variables for a number of `width` bits.
+    /// Creates a number with `width` new variables as its bits. `name` describes the number in the
+    /// legend.
     pub(super) fn bits(&mut self, width: usize, name: &str) -> Bits {
         (0..width).map(|position| self.variable(|| format!("bit {position} of {name}"))).collect()
     }
 
-    /// The bits of a constant.
+    /// Returns the bits of a constant, in `width` bits.
     pub(super) fn constant(&self, number: &Integer, width: usize) -> Bits {
         (0..width).map(|position| if number.bit(position) { self.truth() } else { -self.truth() }).collect()
     }
 
-    /// Encodes the sum of two numbers by a ripple-carry adder. The sum must not overflow.
+    /// Encodes the sum of two numbers of equal width by a ripple-carry adder, and returns its bits.
+    /// The sum must not overflow.
     #[expect(clippy::arithmetic_side_effects, reason = "positions in a number whose bits are held in memory")]
     pub(super) fn add(&mut self, left: &Bits, right: &Bits, name: &str) -> Bits {
         let sum = self.bits(left.len(), name);
@@ -39,8 +41,8 @@ impl Formula {
                 let sign =
                     |literal: Literal, place: u32| if signs >> place & 1 == 1 { literal } else { -literal };
                 let (a, b, c) = (sign(a, 0), sign(b, 1), sign(c, 2));
-                // All three literals are false under exactly one assignment, which has this
-                // number of ones.
+                // All three literals are false under exactly one assignment of the inputs; `ones`
+                // is the number of true inputs in it.
                 let ones = 3 - u32::count_ones(signs);
                 self.clause(&[a, b, c, if ones % 2 == 1 { s } else { -s }]);
             }
@@ -85,8 +87,8 @@ impl Formula {
     }
 }
 
-/// Pairs the literals of a number with the bits of a constant. The sign bits are negated so that
-/// the lexicographic order of the bits is the order of the numbers.
+/// Pairs the literals of a number with the bits of a constant. Both sign bits are negated, so that
+/// the lexicographic order of the bits is the numeric order.
 #[expect(clippy::arithmetic_side_effects, reason = "positions in a number whose bits are held in memory")]
 fn ordered(number: &Bits, constant: &Integer) -> Vec<(Literal, bool)> {
     let last = number.len() - 1;

@@ -1,4 +1,5 @@
-//! Encodes a task as the formula "a plan of at most T steps costs less than the claim".
+//! Encodes a task as the propositional formula "some plan of at most T steps costs less than the
+//! claim".
 
 use crate::clausal::formula::Formula;
 use crate::clausal::sums::Sums;
@@ -6,7 +7,8 @@ use crate::clausal::timeline::Timeline;
 use crate::integer::Integer;
 use crate::model::Model;
 
-/// Encodes a task. Returns the reason if the task has a construct that is not supported.
+/// Encodes that some plan of at most `steps` steps costs less than `cost`. Returns the reason if
+/// the task has an unsupported construct or the formula exceeds `limit` literals.
 pub(super) fn encode(model: &Model, cost: &Integer, steps: usize, limit: usize) -> Result<Formula, String> {
     if !model.axioms.is_empty() {
         return Err("derived predicates are not covered".into());

@@ -1,5 +1,5 @@
-//! Propositional formulas in clausal form, with names for their variables; written in DIMACS and
-//! compared with written files.
+//! Propositional formulas in clausal form, whose variables have descriptions. Formulas are written
+//! in DIMACS, and compared with written files.
 
 use std::fmt::Write as _;
 use std::io::{BufRead, Read, Write};
@@ -7,21 +7,21 @@ use std::io::{BufRead, Read, Write};
 use crate::clausal::lines;
 use crate::clausal::literal::Literal;
 
-/// A CNF formula with named variables.
+/// A CNF formula. Each variable has a description, which is written to a legend.
 pub struct Formula {
-    /// Literals of all clauses, concatenated.
+    /// The literals of all clauses, concatenated.
     literals: Vec<Literal>,
-    /// End of each clause in `literals`.
+    /// The end of each clause in `literals`.
     ends: Vec<usize>,
     names: Vec<String>,
     limit: usize,
-    /// Number of bits of the widest number.
+    /// Number of bits of the widest number in the encoding.
     widest: usize,
 }
 
 impl Formula {
-    /// Creates a formula with one variable that is true. At most about `limit` literals are
-    /// stored.
+    /// Creates a formula with a single variable, which is always true. The formula stores at most
+    /// about `limit` literals; [`Self::within_limit`] reports an excess.
     pub(super) fn new(limit: usize) -> Self {
         let mut formula =
             Self { literals: Vec::new(), ends: Vec::new(), names: Vec::new(), limit, widest: 0 };
@@ -30,12 +30,12 @@ impl Formula {
         formula
     }
 
-    /// Records a number of `bits` bits.
+    /// Records that the encoding contains a number of `bits` bits; see [`Self::widest`].
     pub(super) fn has_number(&mut self, bits: usize) {
         self.widest = self.widest.max(bits);
     }
 
-    /// Returns an error if the formula exceeds its limit.
+    /// Returns an error if the formula exceeds its limit on literals or variables.
     pub(super) fn within_limit(&self) -> Result<(), String> {
         if self.literals.len() > self.limit || self.names.len() >= self.limit {
             return Err(format!("the formula has more than {} literals", self.limit));
@@ -43,31 +43,32 @@ impl Formula {
         Ok(())
     }
 
-    /// Adds a variable.
+    /// Adds a variable with a description, and returns its positive literal.
     pub(super) fn variable(&mut self, name: impl FnOnce() -> String) -> Literal {
-        // Variables beyond the limit need no name: `within_limit` rejects the formula.
+        // Variables beyond the limit need no description, because `within_limit` rejects the
+        // formula.
         if self.names.len() < self.limit {
             self.names.push(name());
         }
         Literal::of_variable(self.names.len()).unwrap_or(Literal::FIRST)
     }
 
-    /// The literal that is always true.
+    /// Returns the literal that is always true.
     #[allow(clippy::unused_self, reason = "part of the formula")]
     pub(super) fn truth(&self) -> Literal {
         Literal::FIRST
     }
 
     pub(super) fn clause(&mut self, clause: &[Literal]) {
-        // Clauses beyond the limit are not stored: `within_limit` rejects the formula.
+        // Clauses beyond the limit are not stored, because `within_limit` rejects the formula.
         if self.literals.len() <= self.limit {
             self.literals.extend(clause);
             self.ends.push(self.literals.len());
         }
     }
 
-    /// Encodes that at most one variable is true: pairwise for up to 5 variables, else by the
-    /// sequential counter encoding [1].
+    /// Encodes that at most one of the variables is true: pairwise for up to 5 variables, otherwise
+    /// by the sequential counter encoding [1].
     ///
     /// [1] Sinz, "Towards an optimal CNF encoding of Boolean cardinality constraints", CP 2005.
     #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
@@ -92,7 +93,7 @@ impl Formula {
         }
     }
 
-    /// Number of variables.
+    /// Returns the number of variables.
     pub fn variables(&self) -> usize {
         self.names.len()
     }
@@ -103,7 +104,7 @@ impl Formula {
         begins.zip(&self.ends).map(|(begin, end)| &self.literals[begin..*end])
     }
 
-    /// Number of bits of the widest number.
+    /// Returns the number of bits of the widest number in the encoding.
     pub fn widest(&self) -> usize {
         self.widest
     }
@@ -112,25 +113,25 @@ impl Formula {
         self.ends.len()
     }
 
-    /// Writes the formula in DIMACS.
+    /// Writes the formula in the DIMACS format.
     ///
     /// # Errors
-    /// Errors of the output.
+    /// I/O errors of the output.
     pub fn write_dimacs(&self, output: &mut dyn Write) -> std::io::Result<()> {
         self.dimacs(&mut |line| output.write_all(line))?;
         output.flush()
     }
 
-    /// Writes one line for each variable: its number and its meaning.
+    /// Writes the legend: one line for each variable, with its number and its description.
     ///
     /// # Errors
-    /// Errors of the output.
+    /// I/O errors of the output.
     pub fn write_legend(&self, output: &mut dyn Write) -> std::io::Result<()> {
         self.legend(&mut |line| output.write_all(line))?;
         output.flush()
     }
 
-    /// Calls `visit` with each line of the formula.
+    /// Calls `visit` with each line of the formula in the DIMACS format.
     fn dimacs<E>(&self, visit: &mut dyn FnMut(&[u8]) -> Result<(), E>) -> Result<(), E> {
         visit(format!("p cnf {} {}\n", self.variables(), self.count()).as_bytes())?;
         let mut line = Vec::new();
@@ -140,7 +141,7 @@ impl Formula {
         })
     }
 
-    /// Calls `visit` with each line of the legend.
+    /// Calls `visit` with each line of the legend (variable number and description).
     fn legend<E>(&self, visit: &mut dyn FnMut(&[u8]) -> Result<(), E>) -> Result<(), E> {
         let mut line = String::new();
         (1..).zip(&self.names).try_for_each(|(number, name): (usize, _)| {
@@ -150,7 +151,8 @@ impl Formula {
         })
     }
 
-    /// Checks that a written formula and its legend equal this formula, line by line.
+    /// Checks that a written formula and its legend equal this formula and its legend, line by
+    /// line.
     pub(super) fn compare(&self, formula: &mut dyn BufRead, legend: &mut dyn BufRead) -> Result<(), String> {
         let mut legend = LineComparer { what: "legend", text: legend, line: Vec::new(), number: 0 };
         self.legend(&mut |line| legend.compare(line))?;
@@ -161,12 +163,12 @@ impl Formula {
     }
 }
 
-/// Compares a text line by line with the expected lines.
+/// Compares a text line by line with expected lines.
 struct LineComparer<'w> {
     what: &'static str,
     text: &'w mut dyn BufRead,
     line: Vec<u8>,
-    /// Number of lines read.
+    /// Number of lines that were read.
     number: usize,
 }
 
@@ -175,7 +177,8 @@ impl LineComparer<'_> {
     fn compare(&mut self, expected: &[u8]) -> Result<(), String> {
         self.number += 1;
         self.line.clear();
-        // Reading at most the expected length bounds memory; a longer line differs in any case.
+        // At most the expected length is read, which bounds memory; a longer line differs in any
+        // case.
         let mut line = Read::take(&mut *self.text, expected.len() as u64);
         line.read_until(b'\n', &mut self.line)
             .map_err(|error| format!("the {} cannot be read: {error}", self.what))?;

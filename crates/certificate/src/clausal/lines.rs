@@ -1,4 +1,4 @@
-//! Reads and writes lines of integers that end with 0, the syntax of DIMACS and DRAT.
+//! Reads and writes lines of integers that end with 0, as in the DIMACS and DRAT formats.
 
 use std::io::{BufRead, Read};
 
@@ -7,18 +7,18 @@ use crate::clausal::literal::Literal;
 /// Upper limit on the length of a line, in bytes.
 const LINE_LIMIT: u64 = 1 << 22;
 
-/// Reads a line without its terminator. Returns `None` at the end of the input.
+/// Reads a line without its line feed into a buffer. Returns `None` at the end of the input.
 ///
 /// # Errors
-/// Errors of the input.
+/// I/O errors of the input.
 pub fn read<'l>(input: &mut dyn BufRead, line: &'l mut Vec<u8>) -> std::io::Result<Option<&'l [u8]>> {
     line.clear();
     Read::take(&mut *input, LINE_LIMIT).read_until(b'\n', line)?;
     Ok((!line.is_empty()).then(|| line.trim_ascii_end()))
 }
 
-/// Parses the literals of a line. Returns `None` if the line is malformed or has a variable above
-/// `variables`.
+/// Parses a line of literals in the DIMACS syntax. Returns `None` if the line is malformed or has a
+/// variable above `variables`.
 pub fn literals(line: &[u8], variables: usize, literals: &mut Vec<Literal>) -> Option<()> {
     literals.clear();
     numbers(line, variables, &mut |negative, variable| {
@@ -28,8 +28,8 @@ pub fn literals(line: &[u8], variables: usize, literals: &mut Vec<Literal>) -> O
     })
 }
 
-/// Parses clause numbers from 1 to `clauses` and converts them to positions from 0. Returns
-/// `None` if the line is malformed.
+/// Parses a line of clause numbers from 1 to `clauses`, and converts them to indices from 0.
+/// Returns `None` if the line is malformed or a number is out of range.
 pub(crate) fn places(line: &[u8], clauses: usize, places: &mut Vec<usize>) -> Option<()> {
     places.clear();
     numbers(line, clauses, &mut |negative, number| {
@@ -38,8 +38,9 @@ pub(crate) fn places(line: &[u8], clauses: usize, places: &mut Vec<usize>) -> Op
     })
 }
 
-/// Visits the numbers of a line except the final 0. Returns `None` if the line is malformed or a
-/// number exceeds the limit.
+/// Calls `visit` with the sign (`true` if negative) and the magnitude of each number in a line,
+/// except the final 0. Returns `None` if the line is malformed, a magnitude exceeds `limit`, or
+/// `visit` returns `None`.
 fn numbers(line: &[u8], limit: usize, visit: &mut dyn FnMut(bool, usize) -> Option<()>) -> Option<()> {
     let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
     loop {
@@ -61,7 +62,7 @@ fn numbers(line: &[u8], limit: usize, visit: &mut dyn FnMut(bool, usize) -> Opti
     }
 }
 
-/// Formats a line of numbers with the final 0 and a line feed.
+/// Formats numbers as a line that ends with 0 and a line feed.
 pub fn format(line: &mut Vec<u8>, numbers: impl Iterator<Item = i32>) {
     line.clear();
     let mut digits = itoa::Buffer::new();

@@ -2,43 +2,43 @@
 
 use std::ops::Neg;
 
-/// A variable, numbered from 1, or its negation. `i32::MIN` is excluded so that every literal can
-/// be negated.
+/// A propositional variable or its negation. Variables are numbered from 1; a negative number is a
+/// negated variable. `i32::MIN` is excluded, so that every literal can be negated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Literal(i32);
 
 impl Literal {
-    /// The literal of the first variable.
+    /// The positive literal of variable 1.
     pub(crate) const FIRST: Self = Self(1);
 
-    /// Returns `None` if the number is 0 or `i32::MIN`.
+    /// Creates a literal from a DIMACS number. Returns `None` if the number is 0 or `i32::MIN`.
     pub(crate) fn new(number: i32) -> Option<Self> {
         (number != 0 && number != i32::MIN).then_some(Self(number))
     }
 
-    /// The positive literal of a variable. Returns `None` if the number is 0 or does not fit 31
-    /// bits.
+    /// Returns the positive literal of a variable, or `None` if the variable number is 0 or exceeds
+    /// 31 bits.
     pub(crate) fn of_variable(number: usize) -> Option<Self> {
         i32::try_from(number).ok().and_then(Self::new)
     }
 
-    /// The literal as a DIMACS number.
+    /// Returns the literal as a DIMACS number, negative for a negated variable.
     pub fn number(self) -> i32 {
         self.0
     }
 
-    /// Number of the variable, from 1.
+    /// Returns the number of the variable, from 1.
     pub fn variable(self) -> usize {
         self.0.unsigned_abs() as usize
     }
 
-    /// Index of the literal in an array of [`Self::places`] entries.
+    /// Returns the index of the literal in an array of [`Self::places`] entries.
     #[expect(clippy::arithmetic_side_effects, reason = "twice a number below 2^31 in 64 bits")]
     pub fn index(self) -> usize {
         2 * self.variable() + usize::from(self.0 < 0)
     }
 
-    /// Length of an array that is indexed by the literals of `variables` variables.
+    /// Returns the length of an array that is indexed by the literals over `variables` variables.
     #[expect(clippy::arithmetic_side_effects, reason = "variables have names that are held in memory")]
     pub fn places(variables: usize) -> usize {
         2 * variables + 2

@@ -1,14 +1,15 @@
-//! A second proof of the same claim, for small tasks: a formula "a cheaper plan has at most T
-//! steps", its refutation, and a proof that no longer plan is cheaper.
+//! An additional, independent optimality proof for small tasks. It has three parts: a formula "some
+//! plan of at most T steps is cheaper", a refutation of the formula, and a proof that no longer
+//! plan is cheaper.
 //!
-//! [`encoding`] is deliberately simple: one operator per step, explicit states, sums in binary.
-//! It has no time windows, no reduced costs and no symmetry breaking, and shares no code with the
-//! planner's encoding. A SAT solver refutes this formula for the certificate, not the formula
-//! that found the plan. [`proof`] checks the refutation clause by clause along its hints (linear
-//! RUP, as in LRAT [1]); it does not search. [`steps`] bounds the number of steps by arithmetic
-//! on a potential.
+//! [`encoding`] is deliberately simple: one operator per step, explicit states, sums in binary. It
+//! has no time windows, no reduced costs and no symmetry breaking, and shares no code with the
+//! planner's encoding. For the certificate, a SAT solver refutes this formula, not the formula that
+//! found the plan. [`proof`] checks the refutation clause by clause along its hints (linear RUP, as
+//! in LRAT [1]) without search. [`steps`] bounds the number of steps by arithmetic on a potential,
+//! i.e. a table of lower bounds on the remaining cost.
 //!
-//! The check encodes the task again and compares the result with the written formula.
+//! The checker encodes the task again and compares the result with the written formula.
 //!
 //! [1] Cruz-Filipe et al., "Efficient certified RAT verification", CADE 2017.
 
@@ -36,25 +37,25 @@ pub use steps::StepBound;
 
 /// Upper limit on the number of literals of a formula.
 const LITERAL_LIMIT: usize = 4_000_000;
-/// Input streams of a refutation.
+/// The input streams of a refutation.
 pub struct Inputs<'i> {
-    /// The formula in DIMACS.
+    /// The formula in the DIMACS format.
     pub formula: &'i mut dyn BufRead,
-    /// One line for each variable: its number and its meaning.
+    /// The legend: one line for each variable, with its number and its description.
     pub legend: &'i mut dyn BufRead,
-    /// The proof in DRAT without deletions; each clause follows by unit propagation.
+    /// The refutation in the DRAT format without deletions. Each clause follows by unit
+    /// propagation.
     pub proof: &'i mut dyn BufRead,
-    /// For each line of the proof, the numbers of its antecedents: the clauses of the formula
-    /// from 1, then those of the proof.
+    /// For each line of the proof, the numbers of the clauses from which it follows. Clauses of the
+    /// formula are numbered from 1, followed by the clauses of the proof.
     pub hints: &'i mut dyn BufRead,
 }
 
-/// Encodes "a plan that is cheaper than the claim has at most T steps" and returns the formula
-/// with T. The claim is interpreted as in [`crate::check`].
+/// Encodes "some plan of at most T steps is cheaper than the claim" for a T such that no longer
+/// plan is cheaper. Returns the formula and T. The claim is interpreted as in [`crate::check`].
 ///
 /// # Errors
-/// A construct that the encoding does not support, no bound on the number of steps, or an
-/// exceeded limit.
+/// An unsupported construct, no provable bound on the number of steps, or an exceeded limit.
 pub fn formula(
     (task, argument): (&str, &str),
     claim: Option<&BigRational>,
@@ -66,9 +67,9 @@ pub fn formula(
     Ok((encoding::encode(&model, &cost, steps, LITERAL_LIMIT)?, steps))
 }
 
-/// Checks a refutation in three parts: the formula encodes the task, the proof refutes the
-/// formula, and no plan of more steps is cheaper. Returns a summary or the reason of failure for
-/// each part.
+/// Checks the three parts of a refutation: the formula encodes the task, the proof refutes the
+/// formula, and no plan of more than `steps` steps is cheaper. Returns for each part its name, and
+/// a summary or the reason of failure.
 pub fn check_refutation(
     (task, argument): (&str, &str),
     claim: Option<&BigRational>,

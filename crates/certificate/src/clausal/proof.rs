@@ -1,10 +1,10 @@
-//! Checks clausal proofs with hints: each added clause must follow by reverse unit propagation
-//! (RUP) through the clauses that its hints name, in their order. The last clause is empty.
+//! Checks clausal proofs with hints. Each added clause must follow by reverse unit propagation
+//! (RUP) through the clauses that its hints name, in this order. The last clause is empty.
 //!
-//! A clause follows if its negation leads to a contradiction. Each hint names a clause with at
-//! most one literal that is not false: that literal becomes true, or the clause is the
+//! A clause follows if its negation leads to a contradiction. Each hint names a clause with at most
+//! one literal that is not false. This literal becomes true; without such a literal, the clause is the
 //! contradiction. The check does not search and visits each hint once. The clauses of the formula
-//! are numbered from 1, followed by those of the proof.
+//! are numbered from 1, followed by the clauses of the proof.
 
 use std::io::BufRead;
 use std::ops::Range;
@@ -12,14 +12,14 @@ use std::ops::Range;
 use crate::clausal::lines;
 use crate::clausal::literal::Literal;
 
-/// Upper limit on the number of literals of all clauses.
+/// Upper limit on the number of literals of all clauses in formula and proof.
 const LITERAL_LIMIT: usize = 1 << 26;
 
-/// Checks that a proof refutes clauses over variables numbered from 1. Returns the number of
-/// added clauses.
+/// Checks that a proof refutes `clauses`, which contain the variables `1..=variables`. Returns the
+/// number of clauses of the proof.
 ///
 /// # Errors
-/// The first line that does not follow, or a missing empty clause.
+/// The first line that is malformed or does not follow, or a missing empty clause.
 pub(super) fn check<'c>(
     clauses: impl Iterator<Item = &'c [Literal]>,
     variables: usize,
@@ -59,13 +59,13 @@ pub(super) fn check<'c>(
 }
 
 struct Checker {
-    /// Literals of all clauses, concatenated.
+    /// The literals of all clauses, concatenated.
     literals: Vec<Literal>,
-    /// Range of each clause in `literals`.
+    /// The range of each clause in `literals`.
     places: Vec<Range<usize>>,
-    /// For each literal, whether it is true.
+    /// For each literal, whether it is true in the current propagation.
     is_true: Vec<bool>,
-    /// The true literals, for resetting `is_true`.
+    /// The true literals, in order to reset `is_true`.
     settled: Vec<Literal>,
 }
 
@@ -81,7 +81,8 @@ impl Checker {
         self.settled.push(literal);
     }
 
-    /// Returns `true` if the hints derive a contradiction from the negation of a clause.
+    /// Returns `true` if the clauses named by `hints` derive a contradiction from the negation of
+    /// `clause`.
     fn follows(&mut self, clause: &[Literal], hints: &[usize]) -> bool {
         for literal in clause {
             self.settle(-*literal);
@@ -115,7 +116,7 @@ mod tests {
     use crate::clausal::lines;
     use crate::clausal::literal::Literal;
 
-    /// A deterministic pseudo-random generator.
+    /// A deterministic pseudo-random number generator.
     struct Random(u64);
 
     impl Random {
@@ -149,7 +150,7 @@ mod tests {
         text
     }
 
-    /// A clause is a set: repeated literals have no effect.
+    /// A clause is a set of literals, so repeated literals have no effect.
     #[test]
     fn a_clause_may_repeat_a_literal() {
         let literal = |number: &i32| Literal::new(*number).expect("a literal");

@@ -1,30 +1,34 @@
-//! Bounds the number of steps of a cheaper plan by arithmetic on a potential.
+//! Bounds the number of steps of a plan that is cheaper than the claim.
 //!
-//! The first T + 1 steps of a plan lead to some values of the potential's variables and cost at
-//! least as much as the cheapest T + 1 operators that lead there. The remaining steps cost at
-//! least the potential (or, for [`StepBound::Spent`], at least 0). If the sum is at least the
-//! claim for all values, a cheaper plan has at most T steps.
+//! Consider the first T + 1 steps of a plan. They lead to some values of the variables of a
+//! potential (a table of lower bounds on the remaining cost). They cost at least as much as the
+//! cheapest sequence of T + 1 operators that leads to these values. The remaining steps cost at
+//! least the potential (or, for [`StepBound::Spent`], at least 0). If the sum is at least the claim
+//! for all values, a cheaper plan has at most T steps.
 
 use crate::argument::Argument;
 use crate::integer::Integer;
 use crate::model::Model;
 use crate::table::Table;
 
-/// The argument that bounds the number of steps.
+/// The lower bound on the cost of a plan with more than T steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StepBound {
-    /// The cost of the steps alone. The formula alone then implies that no plan is cheaper.
+    /// The cost of the first T + 1 steps alone. T then does not depend on the values of a
+    /// potential.
     Spent,
-    /// The cost of the steps plus the potential: fewer steps and a smaller formula.
+    /// The cost of the first T + 1 steps plus the potential, which gives a smaller T and a smaller
+    /// formula.
     Potential,
 }
 
-/// Upper limit on the number of steps of a formula.
+/// Upper limit on the number of steps that a formula encodes.
 const STEP_LIMIT: usize = 64;
-/// Upper limit on the number of edges of the abstract transition graph.
+/// Upper limit on the number of transitions between the rows of a potential.
 const EDGE_LIMIT: usize = 1 << 22;
 
-/// Returns the smallest bound that a potential proves.
+/// Returns the least number of steps T, over all potentials, such that no plan of more than T steps
+/// costs less than `cost`. Returns an error if there is no such T within the limit.
 pub(super) fn bound(
     model: &Model,
     argument: &Argument,
@@ -43,7 +47,7 @@ pub(super) fn bound(
     bounds.min().ok_or_else(|| format!("a cheaper plan may have more than {STEP_LIMIT} steps"))
 }
 
-/// Checks that no plan of more than `steps` steps is cheaper. Returns the position of the
+/// Checks that no plan of more than `steps` steps costs less than `cost`. Returns the position of a
 /// potential that proves it.
 pub(super) fn check(
     model: &Model,
@@ -64,10 +68,11 @@ pub(super) fn check(
     position.ok_or_else(|| format!("a cheaper plan may have more than {steps} steps"))
 }
 
-/// Minimal cost of reaching each combination of values in exactly k steps (Bellman-Ford layers).
+/// For each row of a potential, the minimal cost of reaching it in exactly k steps (Bellman-Ford
+/// layers).
 struct Layers<'l> {
     table: &'l Table<'l>,
-    /// Abstract transitions: (source row, target row, minimal cost).
+    /// The transitions between rows: (source row, target row, minimal cost).
     edges: Vec<(usize, usize, Integer)>,
     costs: Vec<Option<Integer>>,
 }
@@ -78,7 +83,8 @@ impl<'l> Layers<'l> {
         let mut idle: Option<Integer> = None;
         for operator in &model.operators {
             let cost = model.least(&operator.cost);
-            // Operators that leave the pattern unchanged are self-loops of every row.
+            // Operators that do not change the variables of the pattern are self-loops of every
+            // row.
             if !table.touches(operator) {
                 idle = Some(idle.map_or(cost.clone(), |cheapest| cheapest.min(cost)));
                 continue;
@@ -95,7 +101,7 @@ impl<'l> Layers<'l> {
         let rows = table.rows();
         edges.extend((0..rows).filter_map(|row| Some((row, row, idle.clone()?))));
         edges.sort_unstable();
-        // The cost is the last sort key, so the first edge of each pair is the cheapest.
+        // The cost is the last sort key, so the first edge between two rows is the cheapest.
         edges.dedup_by_key(|edge| (edge.0, edge.1));
         let mut costs = vec![None; rows];
         costs[table.row_of(&model.initial())] = Some(Integer::ZERO);
@@ -115,12 +121,14 @@ impl<'l> Layers<'l> {
         self.costs = next;
     }
 
-    /// Minimal cost of the counted steps.
+    /// Returns the minimal cost of the first k steps, or `None` if no row is reachable in exactly k
+    /// steps.
     fn spent(&self) -> Option<Integer> {
         self.costs.iter().flatten().min().cloned()
     }
 
-    /// Minimal cost of a plan that has not reached the goal yet: cost of the counted steps plus potential.
+    /// Returns the minimal sum of the cost of the first k steps and the potential, or `None` if no
+    /// such state can reach the goal.
     fn least(&self) -> Option<Integer> {
         let rows = self.costs.iter().enumerate();
         rows.filter_map(|(row, cost)| Some(cost.as_ref()? + self.table.at_row(row)?)).min()

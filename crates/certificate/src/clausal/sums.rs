@@ -1,9 +1,9 @@
-//! Encodes the accumulated cost and the numeric variables after each step, in binary.
+//! Encodes the accumulated cost and the values of the numeric variables after each step, in binary.
 //!
-//! All numbers are in two's complement. An operator adds a constant and one entry from each of its
-//! tables, which the designs of the step select. An assignment adds these summands to 0 instead of
-//! the previous value. No sum overflows: the accumulated cost is limited after each step, and each
-//! variable is wide enough for its range after all steps of the formula.
+//! All numbers are in two's complement. An operator adds a constant, and one entry of each of its
+//! tables; the designs chosen at the step select the entries. An assignment adds these summands to
+//! 0 instead of the previous value. No sum overflows: the accumulated cost is limited after each
+//! step, and each number is wide enough for its range after all steps of the formula.
 
 use std::collections::BTreeMap;
 
@@ -15,18 +15,18 @@ use crate::integer::Integer;
 use crate::model::{Linear, Model, Operator, Quantity};
 use crate::table::is_alone;
 
-/// Upper limit on the number of bits of a number.
+/// Upper limit on the number of bits of each number.
 const WIDTH_LIMIT: usize = 4_096;
 
-/// The sums after the latest step.
+/// The accumulated cost and the numeric variables after the latest step.
 pub(super) struct Sums {
     spent: Bits,
-    /// Upper limit on the accumulated cost.
+    /// Upper limit on the accumulated cost: the claimed cost minus 1.
     limit: Integer,
     numbers: Vec<Bits>,
 }
 
-/// The effect of an operator on a number.
+/// The effect of an operator on a numeric variable.
 enum Change<'c> {
     Add(&'c Quantity),
     Assign(&'c Quantity),
@@ -43,13 +43,14 @@ fn change(operator: &Operator, number: u32) -> Result<Option<Change<'_>>, String
     }
 }
 
-/// Iterates over all comparisons of a task.
+/// Iterates over all numeric comparisons in the conditions and the goal of a task.
 fn comparisons(model: &Model) -> impl Iterator<Item = &Linear> {
     let conditions = model.operators.iter().map(|operator| &operator.condition).chain([&model.goal]);
     conditions.flat_map(|condition| &condition.comparisons)
 }
 
-/// Number of bits that a number needs for `steps` steps and for its comparisons.
+/// Returns the number of bits that a numeric variable needs, including its values after `steps`
+/// steps and the sums in its comparisons.
 fn number_width(model: &Model, number: u32, steps: usize) -> Result<usize, String> {
     let initial = &model.numbers[number as usize];
     let (mut least, mut greatest) = (initial.clone(), initial.clone());
@@ -105,7 +106,7 @@ impl Sums {
         Ok(sums)
     }
 
-    /// Number of bits of the widest number.
+    /// Returns the number of bits of the widest number.
     pub(super) fn widest(&self) -> usize {
         self.numbers.iter().chain([&self.spent]).map(Vec::len).max().unwrap_or(0)
     }
@@ -135,8 +136,8 @@ impl Sums {
                     return Err("a comparison of several numbers, or of none, is not covered".into());
                 };
                 if operator.changes.iter().any(|(changed, value)| changed == number && value == linear) {
-                    // The condition says that the number after the step is not negative, so its
-                    // sign bit is the test.
+                    // The condition is equivalent to a nonnegative number after the step, so the
+                    // sign bit of this number is tested.
                     let after = &self.numbers[*number as usize];
                     formula.clause(&[-*literal, -sign(after)]);
                 } else if linear.quantity.tables.is_empty() {
@@ -165,7 +166,8 @@ impl Sums {
     }
 }
 
-/// Encodes that `factor` times the number plus `constant` is at least 0, under a condition.
+/// Encodes that `factor` times the number plus `constant` is at least 0 if all literals of
+/// `condition` hold.
 fn compare(
     formula: &mut Formula,
     (condition, number): (&[Literal], &Bits),
@@ -181,7 +183,8 @@ fn compare(
     }
 }
 
-/// Key of equal tables: the uses of the operator, the slots of the table, the table.
+/// Key that identifies a table with its use: the index of the operator's slots, the slots that
+/// select the row, and the table.
 type Kind<'k> = (u32, &'k [u32], u32);
 
 struct Adder<'a> {
@@ -191,7 +194,7 @@ struct Adder<'a> {
 }
 
 impl Adder<'_> {
-    /// Returns the number after the step.
+    /// Encodes a numeric variable after the step, given its bits before the step.
     fn change(&mut self, formula: &mut Formula, before: &Bits, number: u32) -> Result<Bits, String> {
         let changes: Vec<Option<Change<'_>>> =
             self.model.operators.iter().map(|operator| change(operator, number)).collect::<Result<_, _>>()?;
@@ -207,7 +210,7 @@ impl Adder<'_> {
                 formula.clause(&[-idle, -assigned]);
             }
             base = formula.bits(before.len(), &format!("what is kept of {name} at step {}", self.step));
-            // An assignment adds its value to 0, any other change to the previous value.
+            // An assignment adds its value to 0, every other change to the previous value.
             for (kept, bit) in base.iter().zip(before) {
                 formula.clause(&[-assigned, -*kept]);
                 formula.clause(&[assigned, -*kept, *bit]);
@@ -224,7 +227,7 @@ impl Adder<'_> {
         Ok(self.sum(formula, &base, &parts, &name))
     }
 
-    /// Encodes comparisons with tables as separate sums that must not be negative.
+    /// Encodes comparisons that involve tables: each one as a sum that must not be negative.
     fn tests(&mut self, formula: &mut Formula, before: &[Bits]) {
         let table_comparisons = |operator: &Operator, number: u32| -> Vec<Linear> {
             let linear_conditions = operator.condition.comparisons.iter().filter(|linear| {
@@ -251,7 +254,8 @@ impl Adder<'_> {
         }
     }
 
-    /// Encodes `base` plus the quantity that the operator of this step adds.
+    /// Encodes `base` plus the quantity that the operator of this step adds. `parts` contains the
+    /// quantity of each operator.
     fn sum(&mut self, formula: &mut Formula, base: &Bits, parts: &[Option<&Quantity>], name: &str) -> Bits {
         let step = self.step;
         let constants = parts.iter().map(|part| part.map_or(&Integer::ZERO, |quantity| &quantity.constant));
@@ -260,7 +264,7 @@ impl Adder<'_> {
             kinds.entry(constant).or_default().push(*literal);
         }
         let mut sum = base.clone();
-        // A sum of zero constants needs no adder.
+        // If all constants are zero, no adder is needed.
         if kinds.keys().any(|constant| !constant.is_zero()) {
             kinds.entry(&Integer::ZERO).or_default().extend(self.timeline.idle);
             let added = formula.bits(base.len(), &format!("the constant added to {name} at step {step}"));
@@ -283,7 +287,8 @@ impl Adder<'_> {
         sum
     }
 
-    /// Encodes the table entry that the operator of this step adds.
+    /// Encodes the table entry that the operator of this step adds, for the table at position
+    /// `place` of each quantity.
     #[expect(
         clippy::arithmetic_side_effects,
         clippy::cast_possible_truncation,
@@ -322,8 +327,8 @@ impl Adder<'_> {
             }
             let uses = &self.model.uses[uses as usize];
             for (row, value) in self.model.tables[table as usize].iter().enumerate() {
-                // The row number is the mixed-radix number of the designs, the last slot being
-                // the lowest digit.
+                // The row is the mixed-radix number of the designs; the last slot is the lowest
+                // digit.
                 let mut remaining_row = row;
                 let mut condition = vec![-chosen];
                 for slot in slots.iter().rev() {

@@ -1,8 +1,9 @@
-//! Encodes states and steps: after each step every variable has exactly one value; each step has
+//! Encodes states and steps. After each step, every variable has exactly one value. Each step has
 //! exactly one operator or is idle, and all steps after an idle step are idle.
 //!
 //! An operator implies its conditions, its effects, and a suitable design in each of its slots.
-//! Frame axioms: a value that did not hold before the step is an effect of the step's operator.
+//! Frame axioms: a value that did not hold before the step must be an effect of the step's
+//! operator.
 
 use std::collections::BTreeMap;
 
@@ -10,14 +11,15 @@ use crate::clausal::formula::Formula;
 use crate::clausal::literal::Literal;
 use crate::model::{self, Argument, Fact, Model, Operator};
 
-/// The state after the latest step and the choices of that step.
+/// The literals of the state after the latest step, and of the operators and designs of this step.
 pub(super) struct Timeline {
-    /// For each variable and value, its literal after the latest step.
+    /// For each variable and value, the literal that the variable has this value after the latest
+    /// step.
     values: Vec<Vec<Literal>>,
-    /// For each operator, its literal at the latest step.
+    /// For each operator, the literal that it is the operator of the latest step.
     pub(super) operators: Vec<Literal>,
     pub(super) idle: Option<Literal>,
-    /// For each slot and design, its literal at the latest step.
+    /// For each slot and design, the literal that this design is chosen at the latest step.
     pub(super) chosen: Vec<Vec<Literal>>,
 }
 
@@ -71,14 +73,15 @@ impl Timeline {
                 let literals = clause.iter().map(|literal| Self::literal(&self.values, literal));
                 formula.clause(&std::iter::once(-*literal).chain(literals).collect::<Vec<_>>());
             }
-            // Later effects override earlier ones.
+            // If an operator assigns a variable several times, the last effect counts.
             let last: BTreeMap<u32, u32> = operator.effects.iter().copied().collect();
             for fact in last {
                 formula.clause(&[-*literal, Self::fact(&next, fact)]);
                 makers.entry(fact).or_default().push(*literal);
             }
         }
-        // Frame axioms: a value persists or has an operator that makes it true.
+        // Frame axioms: a value after the step held before, or an operator of the step makes it
+        // true.
         for (variable, values) in (0..).zip(&next) {
             for (value, after) in (0..).zip(values) {
                 let before = Self::fact(&self.values, (variable, value));
@@ -94,8 +97,8 @@ impl Timeline {
         if *positive { literal } else { -literal }
     }
 
-    /// Encodes that every operator fills its slots with suitable designs and without excluded
-    /// combinations.
+    /// Encodes that the operator of the step has a suitable design in each of its slots, and that
+    /// the combination of designs is not excluded.
     fn choose(&mut self, model: &Model, formula: &mut Formula, number: usize) {
         self.chosen = Vec::new();
         for (slot, designs) in model.slots.iter().enumerate() {
@@ -105,8 +108,8 @@ impl Timeline {
             formula.at_most_one(&literals, &format!("the designs of slot {slot} at step {number}"));
             self.chosen.push(literals);
         }
-        // Operators with equal slots and exclusions share one variable, which keeps the clauses
-        // few.
+        // Operators with equal slots and exclusions share a variable, which reduces the number of
+        // clauses.
         let mut kinds: BTreeMap<(u32, u32), Vec<Literal>> = BTreeMap::new();
         for (operator, literal) in model.operators.iter().zip(&self.operators) {
             kinds.entry((operator.uses, operator.exclusions)).or_default().push(*literal);
@@ -132,8 +135,8 @@ impl Timeline {
         }
     }
 
-    /// The literal of a design, given by its position among the suitable designs of a slot of an
-    /// operator.
+    /// Returns the literal of a design, given by its position among the suitable designs of an
+    /// operator's slot.
     pub(super) fn design(&self, uses: &[(u32, Vec<u32>)], slot: u32, design: u32) -> Literal {
         let (slot, suited) = &uses[slot as usize];
         self.chosen[*slot as usize][suited[design as usize] as usize]
@@ -151,7 +154,7 @@ impl Timeline {
     }
 }
 
-/// The name of an operator in PDDL; a slot is written as `?` and its number.
+/// Formats an operator as a PDDL action; a slot is written as `?` and its number.
 fn show(model: &Model, operator: &Operator) -> String {
     let argument = |argument: &Argument| match argument {
         Argument::Object(number) => format!(" {}", object(model, *number)),

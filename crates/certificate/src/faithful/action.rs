@@ -1,7 +1,9 @@
-//! Computes the conditions and effects of an action instance as a list of cases over the state
-//! before it. A durative action is one step: its start effects precede the evaluation of its
-//! over-all and at-end conditions and its end effects. An instantaneous action is one happening.
-//! With timed events there are separate cases for each passage of time.
+//! Computes the conditions and effects of a ground action (instance) as a list of cases over the
+//! state before it.
+//!
+//! A durative action is one step: its start effects precede the evaluation of its over-all and
+//! at-end conditions and its end effects. An instantaneous action is one happening. With timed
+//! events there are separate cases for each interval of time in which the action can be executed.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -24,7 +26,7 @@ use pddl::ast::{
     Expression,
 };
 
-/// The cases of waiting until the next event, one per event.
+/// Returns the cases of waiting until an event, for each event that has not happened initially.
 #[expect(clippy::arithmetic_side_effects, reason = "the place of an event that is held in memory")]
 pub(super) fn waits(timeline: &Timeline, structure: &Structure) -> Result<Vec<Case>, Cause> {
     let mut cases = Vec::new();
@@ -48,11 +50,11 @@ pub(super) fn waits(timeline: &Timeline, structure: &Structure) -> Result<Vec<Ca
     Ok(cases)
 }
 
-/// New values of fluents.
+/// The new values of numeric fluents.
 type Changes = BTreeMap<Key, Linear>;
 
-/// Returns the cases in which an instance may be executable in a state that satisfies the reader's
-/// invariant. The reader has the binding of its parameters.
+/// Returns the cases in which an action instance may be executable in a state that satisfies the
+/// reader's invariant. The reader contains the binding of the action's parameters.
 pub(super) fn cases<'r>(
     mut reader: Reader<'r>,
     structure: &Structure,
@@ -92,8 +94,8 @@ pub(super) fn cases<'r>(
     }
 }
 
-/// Conjoins a condition with two others. Borrows the condition if both others are true, the most
-/// frequent case.
+/// Returns the conjunction of a condition and two additional ones. Borrows `condition` if both
+/// others are true, the most frequent case.
 fn all_of(condition: &Formula, additional: [Formula; 2]) -> Cow<'_, Formula> {
     if additional.iter().all(|extra| extra.is(true)) {
         return Cow::Borrowed(condition);
@@ -119,7 +121,7 @@ impl<'r> Durative<'r> {
         self.effects.iter().filter(move |(time, _)| *time == wanted).map(|(_, effect)| effect)
     }
 
-    /// The atoms and fluents that the start or the end reads.
+    /// Returns the atoms and fluents that the start (or the end) of the action reads.
     fn reads(&self, reader: &Reader<'r>, wanted: EffectTime) -> Reads<'r> {
         let time = match wanted {
             EffectTime::AtStart => ConditionTime::AtStart,
@@ -134,8 +136,8 @@ impl<'r> Durative<'r> {
         )
     }
 
-    /// The cases for duration 0: start and end are one happening, and over-all conditions apply
-    /// to no state.
+    /// Returns the cases of an action with duration 0: start and end are one happening, and
+    /// over-all conditions apply to no state.
     fn at_once(&self, mut reader: Reader<'r>, structure: &Structure) -> Result<Vec<Case>, Cause> {
         let mut ends = Vec::new();
         for (condition, effect) in
@@ -208,8 +210,8 @@ impl<'r> Durative<'r> {
         Ok(cases)
     }
 
-    /// The cases after the start effects: events during the action, over-all conditions, and the
-    /// end.
+    /// Returns the cases after the start effects: considers the events during the action, the
+    /// over-all conditions, and the end.
     fn after_start(
         &self,
         reader: &mut Reader<'r>,
@@ -246,7 +248,8 @@ impl<'r> Durative<'r> {
 }
 
 impl<'r> Reader<'r> {
-    /// The atoms and fluents that a happening with these conditions and effects reads.
+    /// Describes the atoms and fluents that a happening with these conditions, effects and duration
+    /// expressions reads.
     fn reads(
         &self,
         conditions: Vec<&'r Condition>,
@@ -294,14 +297,14 @@ impl<'r> Reader<'r> {
 }
 
 impl Moment {
-    /// The condition that no effect contradicts an event of the same time.
+    /// Returns the condition that no effect contradicts an event at the same time.
     fn leaves(&self, event: Option<&Event>) -> Formula {
         let Some(event) = event else { return Formula::truth(true) };
         let opposite = self.atoms.iter().filter(|(_, key, holds)| event.truths.get(key) == Some(&!holds));
         Formula::junction(opposite.map(|(guard, ..)| guard.negated()), true)
     }
 
-    /// Truth values of the affected atoms when all guards are decided.
+    /// Returns the truth values of the affected atoms, if `known` decides all guards.
     fn truths(&self, structure: &Structure, known: &Known) -> BTreeMap<Key, bool> {
         let active = |guard: &Formula| known.decide(structure, guard) == Some(true);
         let mut truths = BTreeMap::new();
@@ -315,7 +318,7 @@ impl Moment {
         truths
     }
 
-    /// The cases of the end of an instance, after its start effects.
+    /// Returns the cases of the last happening of an instance, after the start effects `applied`.
     fn last(
         &self,
         structure: &Structure,
@@ -336,8 +339,9 @@ impl Moment {
         Ok(cases)
     }
 
-    /// The new values of numbers when all guards are decided. Empty if active effects contradict
-    /// each other or are undefined.
+    /// Returns the new values of numeric fluents, if `known` decides all guards, with the cases in
+    /// which they are consistent. The result is empty if active effects contradict each other or
+    /// are undefined.
     fn numbers(
         &self,
         structure: &Structure,
@@ -365,8 +369,8 @@ impl Moment {
     }
 }
 
-/// Combines simultaneous effects on one number. Returns `None` if they contradict each other.
-/// Values that are assigned twice yield equations.
+/// Combines simultaneous effects on one number. Returns `None` if they contradict each other. If
+/// several values are assigned, their equality is appended to `equations`.
 fn together(
     before: Linear,
     effects: &[(Assignment, &Linear)],

@@ -1,4 +1,5 @@
-//! Facts about derived atoms that hold in every state of the witness.
+//! Facts about derived atoms that hold in every state of the witness, i.e. of the
+//! over-approximation of the reachable states.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -7,21 +8,22 @@ use crate::faithful::relation::Relation;
 
 #[derive(Debug, Default)]
 pub(super) struct Axioms {
-    /// Derived atoms that may hold in a state of the witness.
+    /// The derived atoms that may hold in a state of the witness.
     pub(super) may: FxHashSet<Key>,
-    /// Derived atoms that hold in every state of the witness.
+    /// The derived atoms that hold in every state of the witness.
     pub(super) must: FxHashSet<Key>,
-    /// All derived atoms that may hold, and possibly more: an upper bound, from which the objects of variables are taken.
+    /// A superset of `may`, from which the candidate objects of variables are taken.
     pub(super) bound: Relation,
-    /// Derived atoms with circular dependencies; they are variables of the task. Every other
+    /// The derived atoms with circular dependencies that are variables of the task. Every other
     /// derived atom is replaced by its rules.
     pub(super) linked: FxHashSet<Key>,
-    /// Predicates and functions that the rules of each derived predicate mention.
+    /// For each derived predicate, the predicates and functions in its rules.
     pub(super) reads: FxHashMap<u32, FxHashSet<u32>>,
 }
 
 impl Axioms {
-    /// Returns the truth value of a derived atom if it is equal in all states of the witness.
+    /// Returns the truth value of a derived atom if the atom has the same value in all states of
+    /// the witness.
     pub(super) fn known(&self, key: &Key) -> Option<bool> {
         match (self.must.contains(key), self.may.contains(key)) {
             (true, _) => Some(true),
@@ -30,8 +32,8 @@ impl Axioms {
         }
     }
 
-    /// Returns `true` if a derived predicate depends on one of `symbols`, directly or through
-    /// other derived predicates.
+    /// Returns `true` if the derived predicate `symbol` depends on one of `symbols`, directly or
+    /// through other derived predicates.
     pub(super) fn depends(&self, symbol: u32, symbols: impl Iterator<Item = u32>) -> bool {
         let symbols: FxHashSet<u32> = symbols.collect();
         if symbols.is_empty() {

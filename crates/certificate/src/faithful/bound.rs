@@ -1,6 +1,8 @@
-//! Computes an upper bound on the derived atoms that may hold in states of the witness: the least
-//! fixpoint of the rules, in which every condition except positive derived atoms is relaxed.
-//! Semi-naive evaluation: each new atom is used once in each rule position that reads it.
+//! Computes an upper bound on the derived atoms that may hold in states of the witness, as the
+//! least fixpoint of relaxed rules. Relaxed conditions consist of positive derived atoms, literals
+//! over other atoms, and equalities; all other conditions are assumed to hold.
+//!
+//! Evaluation is semi-naive: each new atom is used once in each rule position that reads it.
 
 use std::rc::Rc;
 
@@ -17,22 +19,22 @@ use pddl::ast::{Atom, Condition, Derived, Name, Term, TypedName};
 /// Upper limit on the number of derived atoms.
 const ATOM_LIMIT: usize = 50_000;
 
-/// Upper limit on the conjuncts around an atom that give candidates.
+/// Upper limit on the number of conjuncts around an atom that are used for candidates.
 const CONJUNCT_LIMIT: usize = 64;
 
-/// A positive occurrence of a derived atom in a rule.
+/// A positive occurrence of a derived atom in the condition of a rule.
 struct Occurrence<'w> {
     rule: &'w Derived,
     atom: &'w Atom,
-    /// The variables of the existential quantifiers around it.
+    /// The variables of the existential quantifiers around the atom.
     variables: Rc<[&'w TypedName]>,
-    /// Conjuncts around the atom, which give candidates for variables.
+    /// The conjuncts around the atom, which restrict the candidates of variables.
     others: Rc<[&'w Condition]>,
-    /// `false` if a variable shadows another one, so that a name is ambiguous.
+    /// Whether all names are unambiguous, i.e. no variable shadows another one.
     has_distinct_names: bool,
 }
 
-/// Computes the bound and stores it in `axioms`.
+/// Computes the upper bound on the derived atoms and stores it in `axioms.bound`.
 pub(super) fn add(
     world: &World<'_>,
     invariant: &Invariant,
@@ -80,7 +82,7 @@ fn too_many() -> Cause {
     Cause::TooMany { what: "derived atoms".into(), limit: ATOM_LIMIT }
 }
 
-/// Collects the positive occurrences of derived atoms in a condition.
+/// Collects the positive occurrences of derived atoms in the condition of a rule, by predicate.
 fn collect<'w>(
     world: &World<'w>,
     rule: &'w Derived,
@@ -111,14 +113,15 @@ fn collect<'w>(
     }
 }
 
-/// Returns `true` if no variable around an atom shadows another one or a parameter of the rule.
+/// Returns `true` if no quantified variable shadows another one or a parameter of the rule.
 fn has_distinct_names(rule: &Derived, variables: &[&TypedName]) -> bool {
     let variables_in_scope = rule.head.parameters.iter().chain(variables.iter().copied());
     let mut names = FxHashSet::default();
     variables_in_scope.into_iter().all(|variable| names.insert(&variable.identifier.name))
 }
 
-/// Returns the new heads of all instances of a rule.
+/// Returns the heads of all instances of a rule whose conditions are possible and which are not in
+/// the bound yet.
 fn all_heads(
     world: &World<'_>,
     invariant: &Invariant,
@@ -141,7 +144,8 @@ fn all_heads(
 }
 
 impl Occurrence<'_> {
-    /// Returns the new heads that follow from the atom `key` at this occurrence.
+    /// Returns the new heads that become possible if the derived atom `key` matches this
+    /// occurrence.
     fn heads(
         &self,
         world: &World<'_>,
@@ -155,14 +159,15 @@ impl Occurrence<'_> {
         if !self.unify(&mut reader, key) {
             return Ok(Vec::new());
         }
-        // Extends each row by the candidates of one unbound parameter at a time.
+        // Rows are partial bindings. Each round extends each row by the candidates of one unbound
+        // parameter.
         let mut rows: Vec<Vec<(&Name, u32)>> = vec![Vec::new()];
         let open =
             parameters.iter().filter(|parameter| !reader.binding.contains_key(&parameter.identifier.name));
         for parameter in open.collect::<Vec<_>>() {
             let mut longer = Vec::new();
             for row in rows {
-                // Earlier parameters of the row restrict the candidates of later ones.
+                // The parameters that a row binds restrict the candidates of later parameters.
                 let before = reader.binding.clone();
                 reader.binding.extend(row.iter().copied());
                 for object in reader.candidates_where(parameter, &self.others) {
@@ -193,8 +198,8 @@ impl Occurrence<'_> {
         Ok(heads)
     }
 
-    /// Binds the variables of the atom to the objects of `key`. Returns `false` if they do not
-    /// match.
+    /// Binds the variables of the atom to the objects of `key`. Returns `false` if the atom does
+    /// not match `key`.
     fn unify<'r>(&'r self, reader: &mut Reader<'r>, key: &Key) -> bool {
         let typed = || self.rule.head.parameters.iter().chain(self.variables.iter().copied());
         self.atom.arguments.len() == key.1.len()
@@ -212,8 +217,8 @@ impl Occurrence<'_> {
 }
 
 impl<'r> Reader<'r> {
-    /// Returns `false` if a condition holds in no state of the witness. Negations, implications
-    /// and comparisons that may change are assumed to be possible.
+    /// Returns `false` if a condition holds in no state of the witness. Implications, universal
+    /// conditions, comparisons and negated compound conditions are assumed to be possible.
     fn is_possible(&mut self, condition: &'r Condition) -> Result<bool, Cause> {
         self.count()?;
         match condition {

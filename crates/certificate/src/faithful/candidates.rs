@@ -1,19 +1,20 @@
-//! Candidate objects of a quantified variable in a condition: objects that an equality, a static
-//! fact, an atom of the witness or a possible derived atom admits. With any other object the
-//! condition is false in every state of the witness.
+//! Candidate objects of a quantified variable in a condition. A candidate is admitted by an
+//! equality, a static fact, an atom of the witness, or a possible derived atom. With any other
+//! object, the condition is false in every state of the witness.
 
 use std::collections::BTreeSet;
 
 use crate::faithful::reader::Reader;
 use pddl::ast::{Atom, Condition, Name, Term, TypedName};
 
-/// A conjunct is skipped if it has more rows than this factor times the number of candidates so
-/// far.
+/// A conjunct is skipped if it has more rows than this factor times the number of candidates found
+/// so far.
 const WORTHWHILE: usize = 16;
 
 impl Reader<'_> {
-    /// Returns the candidates of the first variable in `bound` under the condition `within`. Returns
-    /// all objects of its type if there is no condition, or if it does not restrict the variable.
+    /// Returns the candidates of the first variable in `bound` under the condition `within`.
+    /// Returns all objects of its type if there is no condition, or if the condition does not
+    /// restrict the variable.
     pub(super) fn candidates(&self, bound: &[TypedName], within: Option<&Condition>) -> Vec<u32> {
         let Some(first) = bound.first() else { return Vec::new() };
         let hidden: Vec<&Name> = bound.iter().map(|variable| &variable.identifier.name).collect();
@@ -36,7 +37,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Returns the smallest candidate set among those of the visited conjuncts, or `None` if no
+    /// Returns the smallest set of candidates among those of the visited conjuncts, or `None` if no
     /// conjunct restricts the variable; see [`Reader::restricted`].
     fn restricted_by_all<'c>(
         &self,
@@ -44,8 +45,8 @@ impl Reader<'_> {
         parts: impl Iterator<Item = &'c Condition>,
         hidden: &[&Name],
     ) -> Option<BTreeSet<u32>> {
-        // Small conjuncts come first, because visiting the rows of a large one costs more than it
-        // prunes.
+        // Small conjuncts are visited first, because the rows of a large conjunct cost more time
+        // than the restriction saves.
         let mut parts: Vec<(usize, &Condition)> =
             parts.map(|part| (self.size(name, part, hidden), part)).collect();
         parts.sort_by_key(|(size, _)| *size);
@@ -61,7 +62,7 @@ impl Reader<'_> {
     }
 
     /// Returns the candidates of a variable in a condition, or `None` if the condition does not
-    /// restrict the variable. The values of `hidden` variables are unknown.
+    /// restrict the variable. The variables in `hidden` have no value yet.
     fn restricted(&self, name: &Name, condition: &Condition, hidden: &[&Name]) -> Option<BTreeSet<u32>> {
         match condition {
             Condition::And(parts) => self.restricted_by_all(name, parts.iter(), hidden),
@@ -87,7 +88,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Upper bound on the number of rows that [`Reader::restricted`] visits.
+    /// Returns an upper bound on the number of rows that [`Reader::restricted`] visits.
     fn size(&self, name: &Name, condition: &Condition, hidden: &[&Name]) -> usize {
         match condition {
             Condition::Equal(..) => 1,
@@ -128,7 +129,7 @@ impl Reader<'_> {
         if !self.world.changes(symbol) {
             return Some(self.world.rows(symbol, key).into_iter().filter_map(|row| of(row)).collect());
         }
-        // Start effects may add atoms that the witness of the state before does not contain.
+        // Start effects may add atoms that the witness does not contain.
         let is_before = self.applied.truths.is_empty();
         is_before.then(|| self.invariant.rows(symbol, key).filter_map(|key| of(&key.1)).collect())
     }

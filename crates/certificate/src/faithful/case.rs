@@ -1,4 +1,4 @@
-//! Outcomes of an action instance under a condition, and simultaneous effects.
+//! Cases, i.e. outcomes of an action instance under a condition, and simultaneous effects.
 
 use std::collections::BTreeMap;
 
@@ -9,28 +9,30 @@ use crate::faithful::linear::Linear;
 use crate::faithful::timeline::Passage;
 use pddl::ast::Assignment;
 
-/// One outcome of the conditions of an instance. Cases may overlap; together they cover all
-/// executions.
+/// An outcome of an action instance under a condition on the state before it. Cases may overlap;
+/// together they cover all executions of the instance.
 #[derive(Debug)]
 pub(super) struct Case {
-    /// Facts that hold before.
+    /// Facts and comparisons that hold in the state before the instance.
     pub(super) known: Known,
-    /// Truth values of atoms after the start effects.
+    /// The truth values of the atoms that start effects, events or the passage of time have
+    /// changed.
     pub(super) truths: BTreeMap<Key, bool>,
-    /// Conditional effects on atoms at the end: (condition, atom, added). An atom that is both
-    /// added and deleted holds.
+    /// Conditional effects on atoms at the end: (condition, atom, `true` if added). An atom that is
+    /// both added and deleted holds.
     pub(super) effects: Vec<(Formula, Key, bool)>,
-    /// Values of the changed fluents afterwards.
+    /// The values of the changed numeric fluents after the instance.
     pub(super) changes: BTreeMap<Key, Linear>,
-    /// The duration; `None` for instantaneous actions and waits.
+    /// The range of durations; `None` for instantaneous actions and waits.
     pub(super) length: Option<Length>,
     pub(super) passage: Passage,
 }
 
-/// Simultaneous conditional effects.
+/// The simultaneous conditional effects of a happening.
 #[derive(Default)]
 pub(super) struct Moment {
     pub(super) atoms: Vec<(Formula, Key, bool)>,
-    /// Effects on fluents; the value is `None` if it is undefined.
+    /// Effects on numeric fluents: (condition, kind of assignment, fluent, value). The value is
+    /// `None` if it is undefined.
     pub(super) numbers: Vec<(Formula, Assignment, Key, Option<Linear>)>,
 }

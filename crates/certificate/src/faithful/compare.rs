@@ -1,5 +1,6 @@
-//! Compares the PDDL files with the ground task: initial state, goal, rules of derived
-//! predicates, and each case of each action instance with the operator that represents it.
+//! Compares the PDDL files with the ground task: the initial state, the goal, and the rules of
+//! derived predicates. Each case of each action instance is compared with an operator that
+//! simulates it.
 
 use std::collections::BTreeSet;
 
@@ -22,36 +23,38 @@ use pddl::ast::{Action, Direction};
 
 type Result<T> = std::result::Result<T, Obstacle>;
 
-/// Upper limit on the case splits of one condition.
+/// Upper limit on the number of case splits for one condition.
 const SPLIT_LIMIT: usize = 256;
 
-/// Operators by action name and arguments; an argument is `None` for a slot.
+/// The positions of operators by action name and arguments; an argument is `None` if it is a slot
+/// (chosen design).
 type Calls = FxHashMap<(String, Vec<Option<u32>>), Vec<usize>>;
 
 pub(super) struct Comparison<'c> {
     pub(super) task: &'c Translation<'c>,
     objects: FxHashMap<String, u32>,
     operators: Calls,
-    /// Operators that wait for the next event.
+    /// The positions of the operators that wait for the next event.
     waits: Vec<usize>,
-    /// For each action, the sets of arguments that are slots.
+    /// For each action, the sets of parameters that are slots in an operator (`true` for a slot).
     masks: FxHashMap<String, BTreeSet<Vec<bool>>>,
-    /// The metric to be minimised; `None` if plans are measured by time or length.
+    /// The metric, as an expression to be minimised; `None` if plans are measured by time or by
+    /// length.
     metric: Option<Linear>,
     timed: bool,
-    /// Times of events and durations are multiples of this unit.
+    /// A number of which all times of events and all durations are multiples.
     unit: BigRational,
 }
 
-/// The name of an instance for messages, and the cost that it adds to the metric.
+/// The name of an action instance for messages, and the cost that the instance adds to the metric.
 struct Instance<'i> {
     name: &'i dyn Fn() -> String,
     cost: BigRational,
 }
 
 impl<'c> Comparison<'c> {
-    /// `timed` selects time instead of length as the measure without a metric. Times of events
-    /// and durations are multiples of `unit`.
+    /// Indexes the operators of the task. Without a metric, `timed` selects time instead of length
+    /// as the measure of plans. Times of events and durations are multiples of `unit`.
     pub(super) fn new(task: &'c Translation<'c>, timed: bool, unit: BigRational) -> Result<Self> {
         let model = task.model;
         let folded = |name: &String| name.to_ascii_lowercase();
@@ -146,12 +149,12 @@ impl<'c> Comparison<'c> {
         Ok(())
     }
 
-    /// Checks that the goal of the files implies the goal of the task.
+    /// Checks that the goal of the PDDL files implies the goal of the task.
     pub(super) fn goal(&self) -> Result<()> {
         let mut reader = Reader::new(self.task.world, self.task.invariant, self.task.axioms);
         let goal = reader.formula(&self.task.world.problem.goal, true)?;
         let task_goal = self.task.condition(&self.task.model.goal, &[], &[]);
-        // No plan ends with a wait.
+        // No plan ends with a wait operator.
         let not_waited = Formula::Atom(timeline::waited(), false);
         for known in Known::default()
             .assume(&self.task.names.structure, &Formula::junction([goal, not_waited], true))?
@@ -163,7 +166,7 @@ impl<'c> Comparison<'c> {
         Ok(())
     }
 
-    /// Checks that the rules of the task and the rules of the files are equivalent for each
+    /// Checks that the rules of the task and the rules of the PDDL files are equivalent, for each
     /// derived atom that is a variable of the task.
     pub(super) fn rules(&self) -> Result<()> {
         let task = self.task;
@@ -173,8 +176,8 @@ impl<'c> Comparison<'c> {
             let Some((variable, _)) = task.names.fact(key) else { continue };
             let files = Reader::new(task.world, task.invariant, task.axioms).unfold(key)?;
             let rules = task.rules(variable);
-            // A derivation must not depend on atoms that are derived later, so case splits on
-            // derived atoms are excluded.
+            // A derivation must not depend on atoms that are derived later, so there are no case
+            // splits on derived atoms.
             let admits = |leaf: &Formula| match leaf {
                 Formula::Atom(key, _) => task.world.rules(key.0).is_none(),
                 _ => true,
@@ -190,7 +193,8 @@ impl<'c> Comparison<'c> {
         Ok(())
     }
 
-    /// Returns `true` if `known` implies a condition, by case splits if necessary.
+    /// Returns `true` if `known` implies the condition `wanted`; uses case splits on the leaves
+    /// that `admits` accepts.
     fn follows(&self, known: Known, wanted: &Formula, admits: &dyn Fn(&Formula) -> bool) -> bool {
         let structure = &self.task.names.structure;
         let mut open = vec![known];
@@ -209,8 +213,9 @@ impl<'c> Comparison<'c> {
         open.is_empty()
     }
 
-    /// Checks that an operator simulates a case of an instance. Returns `false` if none is
-    /// needed, because the case does not change the task state.
+    /// Checks that an operator simulates a case of an action instance. Returns `false` if no
+    /// operator is needed, because the case does not change the task state and its cost is not
+    /// negative.
     pub(super) fn case(&self, action: &Action, arguments: &[u32], case: &Case) -> Result<bool> {
         let name = || {
             let words = arguments.iter().map(|object| self.task.world.name(*object));
@@ -226,7 +231,7 @@ impl<'c> Comparison<'c> {
         self.find(&self.candidates(action, arguments), case, &instance).map(|()| true)
     }
 
-    /// Checks that a wait operator simulates a wait until an event.
+    /// Checks that a wait operator of the task simulates a wait until an event.
     pub(super) fn wait(&self, case: &Case) -> Result<()> {
         let name = || {
             let phases = case.truths.iter().filter(|(key, holds)| key.0 == PHASE && **holds);
@@ -245,8 +250,8 @@ impl<'c> Comparison<'c> {
         self.find(&waits, case, &instance)
     }
 
-    /// Checks that one of the operators simulates a case, in every state in which the case can be
-    /// executed.
+    /// Checks that in every state in which a case can be executed, one of the candidate operators
+    /// simulates it.
     fn find(&self, candidates: &[(&Operator, Vec<u32>)], case: &Case, instance: &Instance<'_>) -> Result<()> {
         let structure = &self.task.names.structure;
         let conditions: Vec<Formula> = candidates
@@ -270,7 +275,7 @@ impl<'c> Comparison<'c> {
                         done = true;
                         break;
                     }
-                    // The error about the best matching operator is reported.
+                    // The error about the operator that matches best is reported.
                     Err(next) if rank(&next) >= rank(&reason) => reason = next,
                     Err(_) => {}
                 }
@@ -313,11 +318,11 @@ impl<'c> Comparison<'c> {
         Ok(())
     }
 
-    /// Returns `true` if the clock of the task, given that it represents the start time,
-    /// represents the end time after the case.
+    /// Returns `true` if the operator leaves the clock of the task unchanged, or advances it from
+    /// the start time to the end time of the case.
     fn keeps_time(&self, (operator, choice): (&Operator, &[u32]), case: &Case) -> bool {
         let Some(number) = self.task.names.numbers.get(&timeline::clock()) else { return true };
-        // Time never decreases, so a clock that stands still is a lower bound.
+        // Time never decreases, so an unchanged clock is a lower bound on the time.
         let Some((_, value)) = operator.changes.iter().find(|(changed, _)| changed == number) else {
             return true;
         };
@@ -333,7 +338,7 @@ impl<'c> Comparison<'c> {
         }
     }
 
-    /// Minimal increase of the metric by a case.
+    /// Returns the minimal increase of the metric by a case.
     fn cost(&self, case: &Case) -> Result<BigRational> {
         let one = BigRational::one();
         let time = |factor: &BigRational| match &case.length {
@@ -358,7 +363,8 @@ impl<'c> Comparison<'c> {
         }
     }
 
-    /// Returns operators with the choice of designs that yields these arguments.
+    /// Returns the operators that can represent an action with these arguments, each with the
+    /// choice of designs for its slots.
     fn candidates(&self, action: &Action, arguments: &[u32]) -> Vec<(&'c Operator, Vec<u32>)> {
         let name = action.identifier.name.as_str().to_ascii_lowercase();
         let world = self.task.world;
@@ -377,8 +383,8 @@ impl<'c> Comparison<'c> {
         candidates
     }
 
-    /// Returns the choice of designs for which an operator has these arguments, if it is not
-    /// excluded.
+    /// Returns the choice of designs for which an operator has these arguments. Returns `None` if
+    /// there is no such choice, or if it is excluded.
     fn choice(&self, operator: &Operator, objects: &[u32]) -> Option<Vec<u32>> {
         let model = self.task.model;
         let uses = &model.uses[operator.uses as usize];
@@ -404,7 +410,8 @@ impl<'c> Comparison<'c> {
     }
 }
 
-/// Rank of the reason for which an operator is rejected: higher if more of the operator matches.
+/// Returns the rank of a reason for rejecting an operator. The rank is higher if more of the
+/// operator matches.
 fn rank(reason: &Obstacle) -> u8 {
     match reason {
         Obstacle::Differs(Difference::NoOperatorFor { .. }) => 0,
@@ -414,7 +421,7 @@ fn rank(reason: &Obstacle) -> u8 {
     }
 }
 
-/// Adds the name of the instance to a reason.
+/// Inserts the name of the action instance in a reason that has no name yet.
 fn named(reason: Obstacle, instance: &str) -> Obstacle {
     let instance = instance.to_owned();
     match reason {

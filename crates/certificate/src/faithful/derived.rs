@@ -1,5 +1,5 @@
-//! Analyses derived atoms: which of them hold always or never, and which are variables of the
-//! task.
+//! Analyses the derived atoms: computes which of them hold in all states or in no state of the
+//! witness, and which are variables of the task.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -13,7 +13,8 @@ use crate::faithful::verdict::Cause;
 use crate::faithful::world::World;
 use pddl::ast::{Condition, Expression};
 
-/// Computes the facts about derived atoms that the witness implies.
+/// Computes the facts about derived atoms that hold in all states of the witness. `linked` contains
+/// the derived atoms that are variables of the task.
 pub(super) fn axioms(
     world: &World<'_>,
     invariant: &Invariant,
@@ -26,7 +27,7 @@ pub(super) fn axioms(
     }
     bound::add(world, invariant, &mut axioms, stop)?;
     let bodies = bodies(world, invariant, &axioms)?;
-    // Both sets are sound at any time; each iteration may sharpen either by the other.
+    // Both sets are correct bounds at any time; each iteration may sharpen one by the other.
     loop {
         let may =
             fixpoint(&bodies, |formula, atoms_so_far| possible(world, formula, atoms_so_far, &axioms.must));
@@ -43,8 +44,8 @@ pub(super) fn axioms(
     Ok(axioms)
 }
 
-/// Returns the derived atoms on dependency cycles and on paths between cycles, by repeated
-/// removal of atoms without a remaining predecessor or successor.
+/// Returns the derived atoms on dependency cycles and on paths between cycles. Atoms without a
+/// remaining predecessor or successor are removed until a fixpoint is reached.
 fn circular<'b>(axioms: &Axioms, bodies: &'b [(Key, Formula)]) -> FxHashSet<&'b Key> {
     let mut below: FxHashMap<&Key, FxHashSet<&Key>> = FxHashMap::default();
     for (key, body) in bodies.iter().filter(|(key, _)| axioms.known(key).is_none()) {
@@ -66,7 +67,8 @@ fn circular<'b>(axioms: &Axioms, bodies: &'b [(Key, Formula)]) -> FxHashSet<&'b 
     remaining
 }
 
-/// Removes atoms without links to remaining atoms until a fixpoint is reached.
+/// Removes atoms without links to remaining atoms, until a fixpoint is reached. `opposite` contains
+/// the reversed links.
 #[expect(clippy::arithmetic_side_effects, reason = "a link is taken away once")]
 fn take_ends_away<'b>(
     remaining: &mut FxHashSet<&'b Key>,
@@ -92,8 +94,8 @@ fn take_ends_away<'b>(
     }
 }
 
-/// Returns the derived atoms with the formulas under which they hold, over basic and derived
-/// atoms.
+/// Returns each derived atom that may hold, with the formula under which it holds. Formulas contain
+/// basic and derived atoms.
 fn bodies(world: &World<'_>, invariant: &Invariant, axioms: &Axioms) -> Result<Vec<(Key, Formula)>, Cause> {
     let mut heads: Vec<Key> = axioms.bound.atoms().cloned().collect();
     heads.sort_unstable();
@@ -106,7 +108,7 @@ fn bodies(world: &World<'_>, invariant: &Invariant, axioms: &Axioms) -> Result<V
     heads.into_iter().map(body).collect()
 }
 
-/// Collects all atoms of a formula.
+/// Collects all atoms of a formula in `keys`.
 fn atoms<'f>(formula: &'f Formula, keys: &mut FxHashSet<&'f Key>) {
     match formula {
         Formula::All(parts) | Formula::Any(parts) => parts.iter().for_each(|part| atoms(part, keys)),
@@ -117,8 +119,8 @@ fn atoms<'f>(formula: &'f Formula, keys: &mut FxHashSet<&'f Key>) {
     }
 }
 
-/// Computes the least set of atoms whose bodies hold by the set. Bodies are monotone, so a body
-/// is evaluated again only when one of its atoms is added.
+/// Computes the least set of atoms such that each atom is in the set if its body holds under the
+/// set. Bodies are monotone, so a body is evaluated again only when one of its atoms is added.
 fn fixpoint(bodies: &[(Key, Formula)], holds: impl Fn(&Formula, &FxHashSet<Key>) -> bool) -> FxHashSet<Key> {
     let mut readers: FxHashMap<&Key, Vec<usize>> = FxHashMap::default();
     for (place, (_, body)) in bodies.iter().enumerate() {
@@ -140,8 +142,8 @@ fn fixpoint(bodies: &[(Key, Formula)], holds: impl Fn(&Formula, &FxHashSet<Key>)
     fixpoint
 }
 
-/// Returns `true` if a body may hold when at most the derived atoms of `may` and at least those
-/// of `must` hold.
+/// Returns `true` if a body may hold, given that at most the derived atoms of `may` and at least
+/// the derived atoms of `must` hold.
 fn possible(world: &World<'_>, formula: &Formula, may: &FxHashSet<Key>, must: &FxHashSet<Key>) -> bool {
     match formula {
         Formula::All(parts) => parts.iter().all(|part| possible(world, part, may, must)),
@@ -152,8 +154,8 @@ fn possible(world: &World<'_>, formula: &Formula, may: &FxHashSet<Key>, must: &F
     }
 }
 
-/// Returns `true` if a body holds whenever at least the derived atoms of `must` and at most those
-/// of `may` hold.
+/// Returns `true` if a body certainly holds, given that at least the derived atoms of `must` and at
+/// most the derived atoms of `may` hold.
 fn certain(world: &World<'_>, formula: &Formula, must: &FxHashSet<Key>, may: &FxHashSet<Key>) -> bool {
     match formula {
         Formula::All(parts) => parts.iter().all(|part| certain(world, part, must, may)),
@@ -164,7 +166,7 @@ fn certain(world: &World<'_>, formula: &Formula, must: &FxHashSet<Key>, may: &Fx
     }
 }
 
-/// Collects the predicates and functions that the rules of each derived predicate mention.
+/// Maps each derived predicate to the predicates and functions in its rules.
 fn reads(world: &World<'_>) -> Result<FxHashMap<u32, FxHashSet<u32>>, Cause> {
     let mut reads: FxHashMap<u32, FxHashSet<u32>> = FxHashMap::default();
     for (symbol, rules) in world.derived() {

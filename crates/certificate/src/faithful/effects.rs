@@ -1,5 +1,5 @@
-//! Compares the effects of a case of an instance on the variables and numbers of the task with
-//! the effects of an operator.
+//! Compares the effects of a case of an action instance with the effects of an operator, on the
+//! variables and numbers of the task.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,27 +10,27 @@ use crate::faithful::linear::Linear;
 use crate::faithful::translation::Translation;
 use crate::model::Operator;
 
-/// Upper limit on the case splits for one variable.
+/// Upper limit on the number of case splits for one variable.
 const SPLIT_LIMIT: usize = 1_024;
 
-/// An operator with a choice of designs.
+/// An operator with a choice of designs for its slots.
 #[derive(Clone, Copy)]
 pub(super) struct Made<'m> {
     pub(super) operator: &'m Operator,
     pub(super) choice: &'m [u32],
 }
 
-/// The first variable or number whose values are not proved equal.
+/// The first variable or number for which the effects are not proved equal.
 pub(super) enum Mismatch {
-    /// The values of a variable or number differ.
+    /// The values of this variable or number differ.
     Differs(String),
-    /// The atoms of a variable are not proved exclusive after the case, or there are too many
-    /// cases.
+    /// The atoms of this variable are not proved to be mutually exclusive after the case, or there
+    /// are too many case splits.
     Unknown(String),
 }
 
-/// Compares the effects of a case with those of an operator, or with no effects if there is no
-/// operator.
+/// Compares the effects of a case with the effects of an operator, or with no effects if `operator`
+/// is `None`.
 pub(super) fn compare(
     task: &Translation<'_>,
     case: &Case,
@@ -74,32 +74,32 @@ fn numbers(task: &Translation<'_>, case: &Case, operator: Option<Made<'_>>) -> R
     Ok(())
 }
 
-/// Compares the values of one variable.
+/// Compares the effects of a case and of an operator on one variable.
 struct Variable<'v> {
     task: &'v Translation<'v>,
     own: u32,
     case: &'v Case,
-    /// End effects of the case on the atoms of the variable.
+    /// The end effects of the case on atoms of the variable.
     effects: Vec<&'v (Formula, Key, bool)>,
-    /// Atoms of the variable that the case may change.
+    /// The atoms of the variable that the case may change, by value.
     touched: BTreeMap<u32, &'v Key>,
-    /// The unconditional effect of the operator on the variable.
+    /// The value that the operator assigns unconditionally.
     certain: Option<u32>,
     conditional: Vec<(Formula, u32)>,
 }
 
-/// Result of a comparison under partial knowledge.
+/// The result of comparing the effects on a variable under partial knowledge.
 enum Outcome<'o> {
     Same,
     Other,
-    /// The atoms of the variable are not proved exclusive.
+    /// The atoms of the variable are not proved to be mutually exclusive.
     Unknown,
-    /// The result depends on this formula.
+    /// The result depends on the truth value of this formula.
     Open(Formula),
     OpenPart(&'o Formula),
 }
 
-/// A value of a variable; `None` if it is unchanged.
+/// A value of a variable; `None` if the value is unchanged or unknown.
 type Value = Option<u32>;
 
 impl<'v> Variable<'v> {
@@ -118,8 +118,8 @@ impl<'v> Variable<'v> {
         Self { task, own: variable, case, effects, touched, certain, conditional }
     }
 
-    /// Returns whether the case and the operator agree wherever `known` holds; `None` if
-    /// undecided.
+    /// Returns `Some(true)` if the case and the operator agree in all states that satisfy `known`,
+    /// `Some(false)` if they differ in some state, and `None` if this is undecided.
     fn agrees(&self, known: &Known) -> Option<bool> {
         let structure = &self.task.names.structure;
         let mut open = vec![known.clone()];
@@ -169,16 +169,16 @@ impl<'v> Variable<'v> {
         self.task.invariant.may_hold(key) && known.atom(&self.task.names.structure, key) != Some(false)
     }
 
-    /// The atoms of the variable that may hold before.
+    /// Returns the atoms of the variable that may hold before the case, with their values.
     fn possible(&self, known: &'v Known) -> impl Iterator<Item = (u32, &'v Key)> {
-        // If one atom holds, the other atoms of the variable do not.
+        // If one atom of the variable holds, the other atoms do not.
         let holding = known.holding(self.own);
         let held_atom = holding.and_then(|key| Some((self.task.names.fact(key)?.1, key)));
         let possible_atoms = if holding.is_some() { None } else { Some(self.task.possible(self.own)) };
         possible_atoms.into_iter().flatten().chain(held_atom).filter(|(_, key)| self.may_hold(known, key))
     }
 
-    /// The value before the case, if it is known.
+    /// Returns the value before the case, or `None` if it is unknown.
     fn current(&self, known: &Known) -> Value {
         let structure = &self.task.names.structure;
         match self.possible(known).next() {
@@ -188,8 +188,8 @@ impl<'v> Variable<'v> {
         }
     }
 
-    /// The value after the case according to the files. At most one atom of the variable may then
-    /// hold.
+    /// Returns the value after the case according to the PDDL files; `None` if it is unchanged. The
+    /// files must imply that at most one atom of the variable then holds.
     fn expected(&self, known: &Known, current: Value) -> Result<Value, Outcome<'_>> {
         let structure = &self.task.names.structure;
         let after = |key: &Key| {
@@ -217,7 +217,7 @@ impl<'v> Variable<'v> {
             ([], true) if deleted.is_none() => Ok(None),
             ([], true) => match (current, deleted) {
                 (None, Some(key)) => Err(Outcome::Open(Formula::Atom(key.clone(), true))),
-                // Another atom holds, which is not deleted.
+                // A different atom holds, which is not deleted.
                 _ => Ok(None),
             },
             ([value], false) => Ok(Some(*value)),

@@ -1,12 +1,12 @@
 //! Mutex groups (atoms of which at most one holds) in addition to the variables of the task. The
-//! witness lists them; each is preserved by every instance if all variables and groups are
-//! exclusive before it.
+//! witness lists these groups. Every action instance must preserve each group, given that all
+//! variables and groups are exclusive before the instance.
 //!
-//! They are required where the variables of the task share one invariant. Of `{idle, loading,
-//! loaded}` the task may keep `{loading, loaded}` as a variable, because another variable
-//! contains `idle`. The fact that loading starts only in `idle` then implies nothing about
-//! `loaded` without the whole group. [`search`] finds the group by invariant synthesis [1]: a
-//! group that an instance violates is extended by an atom that this instance requires and
+//! The groups are required where several variables of the task come from the same invariant. Of
+//! `{idle, loading, loaded}`, the task may keep `{loading, loaded}` as a variable because another
+//! variable contains `idle`. Loading starts only in `idle`, but without the whole group this
+//! implies nothing about `loaded`. [`search`] finds the group by invariant synthesis [1]: if an
+//! instance violates a group, the group is extended by an atom that the instance requires and
 //! deletes.
 //!
 //! [1] M. Helmert: Concise finite-domain representations for PDDL planning tasks, Artificial
@@ -21,25 +21,25 @@ use crate::faithful::formula::Structure;
 use crate::faithful::key::Key;
 use crate::faithful::world::World;
 
-/// Upper limit on the case splits for one instance and group.
+/// Upper limit on the number of case splits for one instance and group.
 const SPLIT_LIMIT: usize = 1_024;
-/// Upper limit on the checks of a group against a case during the search.
+/// Upper limit on the number of checks of a group against a case, during the whole search.
 const SEARCH_LIMIT: usize = 20_000_000;
-/// Upper limit on the groups tried for one variable.
+/// Upper limit on the number of groups that are tried for one variable.
 const GROUP_LIMIT: usize = 300;
 
-/// Atoms of which at most one holds.
+/// A mutex group: atoms of which at most one holds.
 pub(super) type Group = BTreeSet<Key>;
 
-/// Returns `true` if only actions change the atoms of a group and at most one atom holds
-/// initially.
+/// Returns `true` if no atom of a group is static or derived, and at most one atom of the group
+/// holds initially.
 pub(super) fn holds_initially(world: &World<'_>, group: &Group) -> bool {
     let is_basic = |key: &Key| world.changes(key.0) && world.rules(key.0).is_none();
     group.iter().all(is_basic) && group.iter().filter(|key| world.holds_initially(key)).count() <= 1
 }
 
 /// Returns `true` if at most one atom of a group holds after a case, given that at most one holds
-/// before.
+/// before the case.
 pub(super) fn keeps(
     structure: &Structure,
     may_hold: &dyn Fn(&Key) -> bool,
@@ -73,18 +73,18 @@ pub(super) fn keeps(
     open.is_empty()
 }
 
-/// The effect of a case on groups.
+/// The effect of a case on mutex groups.
 pub(super) struct Move {
-    /// Atoms that hold before.
+    /// The atoms that certainly hold before the case.
     holding: Vec<Key>,
-    /// Atoms that may be added.
+    /// The atoms that the case may add.
     pub(super) adds: BTreeSet<Key>,
-    /// Atoms that do not hold afterwards.
+    /// The atoms that certainly do not hold after the case.
     deletes: Vec<Key>,
 }
 
 impl Move {
-    /// Computes the effect of a case that may add the atoms `adds`.
+    /// Computes the effect of a case on mutex groups, given the atoms that the case may add.
     pub(super) fn new(structure: &Structure, case: &Case, adds: BTreeSet<Key>) -> Self {
         let at_end = case
             .effects
@@ -100,8 +100,8 @@ impl Move {
         !self.adds.is_empty()
     }
 
-    /// Checks that at most one atom of a group holds afterwards, given that at most one holds
-    /// before.
+    /// Checks that at most one atom of a group holds after the case, given that at most one holds
+    /// before it.
     ///
     /// # Errors
     /// The atoms each of which would repair the group if it were a member; empty if there is no
@@ -122,7 +122,8 @@ impl Move {
     }
 }
 
-/// Finds groups that prove the exclusiveness of variables that are not inductive by themselves.
+/// Searches for mutex groups that prove the exclusiveness of variables, for variables whose own
+/// atoms are not an inductive invariant.
 #[expect(clippy::arithmetic_side_effects, reason = "no more than the limit")]
 pub(super) fn search(
     world: &World<'_>,
@@ -176,12 +177,12 @@ pub(super) fn search(
     groups
 }
 
-/// Numbers the groups of a witness, after the variables of the task.
+/// Numbers the groups of a witness consecutively, after the variables of the task.
 pub(super) fn numbered(variables: usize, groups: &[Group]) -> impl Iterator<Item = (u32, &Group)> {
     (u32::try_from(variables).unwrap_or(u32::MAX)..).zip(groups)
 }
 
-/// Returns the groups to which a case adds an atom.
+/// Returns the groups to which a case may add an atom.
 pub(super) fn concerned<'g>(case: &Case, groups: &'g [Group]) -> impl Iterator<Item = &'g Group> {
     let at_end = case.effects.iter().filter(|(_, _, holds)| *holds).map(|(_, key, _)| key);
     let added: FxHashSet<&Key> =

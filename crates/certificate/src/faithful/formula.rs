@@ -1,4 +1,5 @@
-//! Conditions of an instance over the state before it, and partial states that decide them.
+//! Conditions of an action instance over the state before it, and partial states that decide such
+//! conditions.
 
 use std::collections::BTreeMap;
 
@@ -11,10 +12,10 @@ use crate::faithful::key::Key;
 use crate::faithful::linear::Linear;
 use crate::faithful::verdict::Cause;
 
-/// Upper limit on the number of cases of a condition.
+/// Upper limit on the number of cases into which a condition is split.
 const CASE_LIMIT: usize = 4_096;
 
-/// Upper limit on the nesting of a condition after derived atoms are replaced by their rules.
+/// Upper limit on the nesting depth of a condition after derived atoms are replaced by their rules.
 /// Functions on formulas recurse to this depth.
 pub(super) const DEPTH_LIMIT: usize = 300;
 
@@ -23,9 +24,9 @@ pub(super) const DEPTH_LIMIT: usize = 300;
 pub(super) enum Formula {
     All(Vec<Formula>),
     Any(Vec<Formula>),
-    /// An atom and its required truth value.
+    /// An atom with its required truth value.
     Atom(Key, bool),
-    /// The expression is at least 0, or more than 0 if strict.
+    /// The expression is at least 0, or greater than 0 if the flag (strict) is `true`.
     Compare(Linear, bool),
 }
 
@@ -42,7 +43,7 @@ impl Formula {
         }
     }
 
-    /// Creates a simplified conjunction (or disjunction).
+    /// Creates a simplified conjunction of the parts, or a disjunction if `all` is `false`.
     pub(super) fn junction(parts: impl IntoIterator<Item = Self>, all: bool) -> Self {
         let mut simplified = Vec::new();
         for part in parts {
@@ -61,7 +62,7 @@ impl Formula {
         }
     }
 
-    /// Number of atoms and comparisons.
+    /// Returns the number of atoms and comparisons.
     pub(super) fn size(&self) -> usize {
         match self {
             Self::All(parts) | Self::Any(parts) => parts.iter().map(Self::size).sum(),
@@ -69,7 +70,7 @@ impl Formula {
         }
     }
 
-    /// The nesting of conjunctions and disjunctions; 0 for an atom.
+    /// Returns the nesting depth of conjunctions and disjunctions; 0 for an atom or comparison.
     pub(super) fn depth(&self) -> usize {
         match self {
             Self::All(parts) | Self::Any(parts) => {
@@ -89,25 +90,25 @@ impl Formula {
     }
 }
 
-/// Knowledge of the task about atoms and fluents: the mutex groups of each atom, and the factors
-/// that make fluents integers.
+/// Properties that hold in every state: the mutex groups of each atom, and for each fluent of the
+/// task a factor that makes it an integer.
 #[derive(Debug, Default)]
 pub(super) struct Structure {
     pub(super) groups: FxHashMap<Key, SmallVec<[u32; 1]>>,
     pub(super) integers: FxHashMap<Key, BigRational>,
 }
 
-/// A partial state.
+/// A partial state: truth values of some atoms, and comparisons that hold.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Known {
     atoms: BTreeMap<Key, bool>,
-    /// For each group, the atom that holds.
+    /// For each mutex group, the atom that is known to hold.
     holding: BTreeMap<u32, Key>,
     pub(super) comparisons: Vec<(Linear, bool)>,
 }
 
 impl Known {
-    /// The atom of a group that is known to hold.
+    /// Returns the atom of a mutex group that is known to hold.
     pub(super) fn holding(&self, group: u32) -> Option<&Key> {
         self.holding.get(&group)
     }
@@ -125,7 +126,7 @@ impl Known {
         groups.iter().any(|group| self.holding.contains_key(group)).then_some(false)
     }
 
-    /// Returns the truth value of a condition if the partial state implies it.
+    /// Returns the truth value of a condition if the partial state implies it, otherwise `None`.
     pub(super) fn decide(&self, structure: &Structure, formula: &Formula) -> Option<bool> {
         match formula {
             Formula::All(parts) => self.junction(structure, parts, true),
@@ -158,7 +159,8 @@ impl Known {
         (!open).then_some(all)
     }
 
-    /// Returns an undecided leaf (atom or comparison) of an undecided condition.
+    /// Returns an undecided leaf (atom or comparison) that `admits` accepts. Returns `None` if the
+    /// condition is decided or has no such leaf.
     pub(super) fn open<'f>(
         &self,
         structure: &Structure,
@@ -176,7 +178,8 @@ impl Known {
         }
     }
 
-    /// Returns the partial states that cover all states in which a condition holds.
+    /// Extends the partial state by a condition. The resulting partial states together cover all
+    /// states in which the condition holds.
     pub(super) fn assume(&self, structure: &Structure, formula: &Formula) -> Result<Vec<Self>, Cause> {
         match self.decide(structure, formula) {
             Some(true) => return Ok(vec![self.clone()]),
@@ -206,7 +209,8 @@ impl Known {
             }
             Formula::All(parts) => {
                 let mut cases = vec![extended];
-                // Leaves come first: they do not split and may decide the remaining parts.
+                // Leaves are assumed first: they do not split the partial state, and they may
+                // decide the remaining parts.
                 let is_leaf = |part: &&Formula| matches!(part, Formula::Atom(..) | Formula::Compare(..));
                 let (leaves, others): (Vec<_>, Vec<_>) = parts.iter().partition(is_leaf);
                 for part in leaves.into_iter().chain(others) {
@@ -222,7 +226,7 @@ impl Known {
         }
     }
 
-    /// Returns cases in which each of the formulas is decided.
+    /// Splits the partial state into cases in which each of the formulas is decided.
     pub(super) fn split<'f>(
         self,
         structure: &Structure,
@@ -253,15 +257,15 @@ fn limited(cases: usize) -> Result<(), Cause> {
     Err(Cause::TooMany { what: "cases of one instance of an action".into(), limit: CASE_LIMIT })
 }
 
-/// Returns `true` if the comparison `known` implies that `wanted` is at least 0, or more than 0
-/// if strict.
+/// Returns `true` if the comparison `known` implies that `wanted` is at least 0, or greater than 0
+/// if `strict`.
 fn implies(structure: &Structure, known: &(Linear, bool), wanted: &Linear, strict: bool) -> bool {
     let Some(ratio) = wanted.ratio_to(&known.0).filter(Signed::is_positive) else { return false };
-    // Lower bound on the fluent part of `wanted`.
+    // Lower bound on `wanted` without its constant.
     let mut least = -(&known.0.constant * ratio);
     let mut is_strict = known.1;
     if let Some(unit) = unit(structure, wanted) {
-        // The fluent part is a multiple of the unit, so the bound can be rounded up.
+        // Without its constant, `wanted` is a multiple of the unit, so the bound can be rounded up.
         let multiple = &least / &unit;
         let rounded = if is_strict { multiple.floor() + BigRational::one() } else { multiple.ceil() };
         (least, is_strict) = (rounded * unit, false);
@@ -270,11 +274,12 @@ fn implies(structure: &Structure, known: &(Linear, bool), wanted: &Linear, stric
     least.is_positive() || least.is_zero() && (is_strict || !strict)
 }
 
-/// A number of which the fluent part of an expression is a multiple in every state.
+/// Returns a number of which the expression without its constant is a multiple in every state.
+/// Returns `None` if a fluent is not known to be integral.
 fn unit(structure: &Structure, linear: &Linear) -> Option<BigRational> {
     let mut unit: Option<BigRational> = None;
     for (key, factor) in &linear.factors {
-        // The fluent is a multiple of 1 / scale.
+        // The fluent is a multiple of 1 / scale in every state.
         let step = (factor / structure.integers.get(key)?).abs();
         unit = Some(match unit {
             None => step,
@@ -284,7 +289,7 @@ fn unit(structure: &Structure, linear: &Linear) -> Option<BigRational> {
     unit
 }
 
-/// The greatest common divisor of two positive fractions, by Euclid's algorithm.
+/// Returns the greatest common divisor of two positive fractions, by Euclid's algorithm.
 fn common(left: &BigRational, right: &BigRational) -> BigRational {
     let (mut left, mut right) = (left.clone(), right.clone());
     while !right.is_zero() {

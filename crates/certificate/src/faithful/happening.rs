@@ -1,5 +1,5 @@
-//! Interference of the start and the end of an action with duration 0, which are one happening:
-//! if they interfere, the action cannot be executed [1].
+//! Interference between the start and the end of an action with duration 0. Start and end are then
+//! one happening; if they interfere, the action cannot be executed [1].
 //!
 //! [1] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, sections 7 and 8 (no moving targets).
 
@@ -8,10 +8,10 @@ use crate::faithful::formula::Formula;
 use crate::faithful::reads::Reads;
 use pddl::ast::Assignment;
 
-/// The reads and the effects of the start or the end of an action.
+/// The start or the end of an action: the atoms and fluents that it reads, and its effects.
 type Half<'h> = (&'h Reads<'h>, &'h Moment);
 
-/// Returns the condition that two halves of an action do not interfere.
+/// Returns the condition under which the start and the end of an action do not interfere.
 pub(super) fn apart(left: Half<'_>, right: Half<'_>) -> Formula {
     let mut clashes = Vec::new();
     one_way(left.1, right, &mut clashes);
@@ -20,8 +20,8 @@ pub(super) fn apart(left: Half<'_>, right: Half<'_>) -> Formula {
     Formula::junction(clashes.iter().map(Formula::negated), true)
 }
 
-/// Collects the conditions under which one half changes a read of the other half, or adds an atom
-/// that the other half deletes.
+/// Collects the conditions under which `changing` changes an atom or fluent that the other half
+/// reads, or adds an atom that the other half deletes.
 fn one_way(changing: &Moment, (reads, other): Half<'_>, clashes: &mut Vec<Formula>) {
     for (guard, key, holds) in &changing.atoms {
         if reads.atom(key) {
@@ -34,8 +34,8 @@ fn one_way(changing: &Moment, (reads, other): Half<'_>, clashes: &mut Vec<Formul
     clashes.extend(numbers.map(|(guard, ..)| guard.clone()));
 }
 
-/// Collects the conditions under which both halves change a number, unless both increase or both
-/// scale it.
+/// Collects the conditions under which both halves change the same number, unless both increase (or
+/// decrease) it or both scale it.
 fn same_number(left: &Moment, right: &Moment, clashes: &mut Vec<Formula>) {
     let way = |kind: Assignment| match kind {
         Assignment::Assign => None,

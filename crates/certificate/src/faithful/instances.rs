@@ -1,5 +1,5 @@
-//! Enumerates the action instances whose static conditions hold: a join over static atoms, then
-//! the objects of the types of the remaining parameters.
+//! Enumerates the action instances whose static conditions hold: joins the static atoms of the
+//! condition, then adds all objects of the right types for the remaining parameters.
 
 use rustc_hash::FxHashMap;
 
@@ -7,17 +7,17 @@ use crate::faithful::verdict::Cause;
 use crate::faithful::world::World;
 use pddl::ast::{Action, ActionBody, Atom, Condition, Name, Term};
 
-/// Upper limit on the number of instances.
+/// Upper limit on the number of action instances.
 pub(super) const INSTANCE_LIMIT: usize = 400_000;
-/// Upper limit on the total number of arguments of all instances; they then take 256 MB.
+/// Upper limit on the total number of arguments of all instances, which then take 256 MB.
 pub(super) const ARGUMENT_LIMIT: usize = 1 << 26;
-/// Number of instances between two polls of the caller's limits.
+/// Number of instances between two calls of the function that reports whether to stop.
 const POLL_INTERVAL: usize = 1 << 10;
 
-/// A partial binding of the parameters.
+/// A partial binding of the parameters of an action to objects.
 type Binding<'b> = FxHashMap<&'b Name, u32>;
 
-/// Returns the arguments of all instances.
+/// Returns the argument lists of all instances of an action whose static conditions hold.
 pub(super) fn of(
     world: &World<'_>,
     action: &Action,
@@ -39,7 +39,7 @@ pub(super) fn of(
     let mut open: Vec<&Atom> = atoms.into_iter().filter(is_static).collect();
     let mut partial: Vec<Binding<'_>> = vec![Binding::default()];
     while !open.is_empty() {
-        // The atom with the fewest unbound parameters comes next, so that the join does not
+        // The atom with the fewest unbound parameters is joined next, so that the join does not
         // become a Cartesian product.
         let join_cost = |atom: &Atom| {
             let names = partial.first();
@@ -67,7 +67,7 @@ pub(super) fn of(
         partial = longer;
     }
     let mut instances = Vec::new();
-    // All bindings of the join bind the same parameters.
+    // All partial bindings bind the same parameters.
     let mut typed = Vec::new();
     for parameter in &action.parameters {
         let is_bound = partial.first().is_none_or(|own| own.contains_key(&parameter.identifier.name));
@@ -92,7 +92,7 @@ pub(super) fn conjuncts<'c>(condition: &'c Condition, atoms: &mut Vec<&'c Atom>)
     }
 }
 
-/// The error about too many instances of an action.
+/// Creates the error that an action has too many instances.
 pub(super) fn too_many(name: &str) -> Cause {
     Cause::TooMany { what: format!("instances of {name}"), limit: INSTANCE_LIMIT }
 }
@@ -125,8 +125,8 @@ fn extend<'b>(
     Ok(())
 }
 
-/// Adds the instances that extend a binding by objects for its unbound parameters. `typed` has
-/// those objects by parameter.
+/// Adds the instances that extend a binding by objects for its unbound parameters. `typed` contains
+/// the objects of the right type for each unbound parameter.
 #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
 fn complete(
     world: &World<'_>,
@@ -146,7 +146,7 @@ fn complete(
     if choices.iter().any(|own| own.is_empty()) {
         return Ok(());
     }
-    // Enumerates all combinations like an odometer, the last parameter fastest.
+    // Enumerates all combinations like an odometer; the last parameter changes fastest.
     let mut places = vec![0; choices.len()];
     loop {
         if are_too_many(instances.len(), action) {
@@ -164,7 +164,7 @@ fn complete(
     }
 }
 
-/// Returns `true` if an action has more instances than the limits admit.
+/// Returns `true` if this number of instances of an action exceeds the limits.
 fn are_too_many(instances: usize, action: &Action) -> bool {
     instances > INSTANCE_LIMIT || instances.saturating_mul(action.parameters.len()) > ARGUMENT_LIMIT
 }

@@ -1,11 +1,10 @@
-//! The witness: an inductive over-approximation of the reachable states, with the atoms that may
-//! hold and an interval for each number. It contains the initial state and is closed under all
-//! instances, under the delete relaxation [1], [2].
+//! The witness: an inductive over-approximation of the reachable states. It consists of the atoms
+//! that may hold, an interval for each number, and possibly mutex groups (`exclusive`). It contains
+//! the initial state and is closed under all action instances, under the delete relaxation [1],
+//! [2].
 //!
-//! It may contain mutex groups (`exclusive`).
-//!
-//! The witness is computed as a least fixpoint with widening of intervals [3]. The check visits
-//! all instances once and does not depend on the way the witness was computed.
+//! The witness is computed as a least fixpoint with widening of intervals [3]. Its check visits all
+//! instances once and does not depend on the computation of the witness.
 //!
 //! [1] J. Hoffmann: The Metric-FF planning system, JAIR 20, 2003 (relaxed reachability with
 //! intervals).
@@ -30,7 +29,7 @@ use crate::integer::MAX_DIGITS;
 
 pub(super) const WITNESS_FORMAT: &str = "metaplan-witness/1";
 
-/// Widening threshold: after this many moves an end of an interval becomes unbounded.
+/// Widening threshold: at this number of moves, an end of an interval becomes unbounded.
 const WIDENING_THRESHOLD: u32 = 8;
 
 /// The JSON format of a witness.
@@ -38,12 +37,12 @@ const WIDENING_THRESHOLD: u32 = 8;
 #[serde(deny_unknown_fields)]
 struct WitnessFile {
     format: String,
-    /// All atoms that may hold, of predicates that actions change.
+    /// All atoms of changing predicates that may hold.
     atoms: Vec<String>,
-    /// Fluents that actions change, each with its least and greatest value; `null` for no bound.
+    /// The least and greatest value of each fluent that actions change; `null` means unbounded.
     /// Fluents that are not listed are unbounded.
     numbers: Vec<(String, Option<String>, Option<String>)>,
-    /// Groups of atoms of which at most one holds, in addition to the variables of the task.
+    /// Mutex groups (atoms of which at most one holds) in addition to the variables of the task.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     exclusive: Vec<Vec<String>>,
 }
@@ -51,14 +50,14 @@ struct WitnessFile {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Invariant {
     atoms: Relation,
-    /// Intervals of fluents; static fluents have a single value.
+    /// The interval of each numeric fluent; the interval of a static fluent is a single value.
     numbers: FxHashMap<Key, Interval>,
-    /// Groups of atoms of which at most one holds.
+    /// Mutex groups: atoms of which at most one holds.
     pub(super) exclusive: Vec<Group>,
 }
 
 impl Invariant {
-    /// The initial state.
+    /// Creates the witness that contains only the initial state.
     pub(super) fn initial(world: &World<'_>) -> Self {
         let atoms = world.initial_atoms().filter(|key| world.changes(key.0)).collect();
         // The clock is unbounded.
@@ -144,17 +143,18 @@ impl Invariant {
         self.atoms.contains(key)
     }
 
-    /// The possible atoms of a predicate, optionally with an object at a position.
+    /// Iterates over the atoms of a predicate that may hold. `place` optionally restricts the
+    /// argument at a position to an object.
     pub(super) fn rows(&self, predicate: u32, place: Option<(usize, u32)>) -> impl Iterator<Item = &Key> {
         self.atoms.rows(predicate, place)
     }
 
-    /// Number of atoms of [`Invariant::rows`].
+    /// Returns the number of atoms that [`Invariant::rows`] yields.
     pub(super) fn count(&self, predicate: u32, place: Option<(usize, u32)>) -> usize {
         self.atoms.count(predicate, place)
     }
 
-    /// The fluent as an expression, or its value if it has only one.
+    /// Returns a fluent as an expression, or its value if the interval is a single value.
     pub(super) fn fluent(&self, key: Key) -> Linear {
         match self.numbers.get(&key).and_then(Interval::value) {
             Some(value) => Linear::constant(value.clone()),
@@ -162,7 +162,7 @@ impl Invariant {
         }
     }
 
-    /// Replaces fluents that have only one value.
+    /// Replaces the fluents of an expression whose intervals are single values.
     pub(super) fn settled(&self, linear: &Linear) -> Linear {
         let mut sum = Linear::constant(linear.constant.clone());
         for (key, factor) in &linear.factors {
@@ -171,8 +171,8 @@ impl Invariant {
         sum
     }
 
-    /// The condition that an expression is at least 0, or more than 0 if strict; decided if the
-    /// intervals decide it.
+    /// Returns the condition that an expression is at least 0, or greater than 0 if `strict`. The
+    /// result is a truth value if the intervals decide the condition.
     pub(super) fn compare(&self, linear: &Linear, strict: bool) -> Formula {
         let linear = self.settled(linear);
         let range = linear.range(|key| self.numbers.get(key));
@@ -186,7 +186,7 @@ impl Invariant {
         }
     }
 
-    /// The interval of an expression under partial knowledge of the state.
+    /// Returns the interval of an expression in states that satisfy `known`.
     fn range(&self, linear: &Linear, known: &Known) -> Interval {
         let mut range = linear.range(|key| self.numbers.get(key));
         for (own, _) in &known.comparisons {
@@ -203,7 +203,7 @@ impl Invariant {
         range
     }
 
-    /// The atoms that a case may make true.
+    /// Iterates over the atoms that a case may make true.
     pub(super) fn added<'c>(structure: &'c Structure, case: &'c Case) -> impl Iterator<Item = &'c Key> {
         let at_end = case
             .effects
@@ -215,7 +215,8 @@ impl Invariant {
         at_end.map(|(_, key, _)| key).chain(at_start.map(|(key, _)| key))
     }
 
-    /// Checks that the successors of a case are contained in the witness.
+    /// Checks that the witness contains all successors of a case and that the case preserves the
+    /// mutex groups.
     pub(super) fn admits(
         &self,
         world: &World<'_>,
@@ -244,10 +245,11 @@ impl Invariant {
     }
 }
 
-/// Computes a witness by iteration with widening.
+/// Computes a witness by fixpoint iteration with widening.
 pub(super) struct Widening {
     pub(super) invariant: Invariant,
-    /// Number of moves of each end of an interval.
+    /// For each fluent and end of its interval (`true` for the upper end), the number of times it
+    /// has moved.
     moves: FxHashMap<(Key, bool), u32>,
 }
 
@@ -256,7 +258,8 @@ impl Widening {
         Self { invariant: Invariant::initial(world), moves: FxHashMap::default() }
     }
 
-    /// Extends the invariant by the successors of a case. Returns `true` if it has changed.
+    /// Extends the invariant by the successors of a case. Returns `true` if the invariant has
+    /// changed.
     #[expect(clippy::arithmetic_side_effects, reason = "fewer moves than passes over the task")]
     pub(super) fn include(&mut self, structure: &Structure, case: &Case) -> bool {
         let mut news = false;
@@ -286,7 +289,7 @@ impl Widening {
     }
 }
 
-/// The error about too many rounds.
+/// Creates the error that the computation of a witness needs too many rounds.
 pub(super) fn too_many_rounds(limit: usize) -> Cause {
     Cause::TooMany { what: "rounds in search of a witness".into(), limit }
 }

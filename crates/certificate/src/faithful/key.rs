@@ -1,14 +1,15 @@
-//! Numeric identifiers of ground atoms and fluents, including the ones that the task adds to the
-//! files.
+//! Numeric identifiers of ground atoms and fluents of the PDDL files, and of additional ones that
+//! occur only in the task.
 
 use smallvec::SmallVec;
 
-/// A predicate or function symbol and its arguments, as numbers.
+/// A ground atom or fluent: predicate or function symbol, and arguments, all as numbers.
 pub(super) type Key = (u32, SmallVec<[u32; 4]>);
 
-/// `(the phase phase N)`, with the number N as its argument: the number of past events.
+/// Symbol of the atoms `(the phase phase N)`. The argument N is stored as a number; it is the
+/// number of past events.
 pub(super) const PHASE: u32 = u32::MAX - 1;
-/// `(has waited)`: no action has ended since the last event.
+/// Symbol of the atom `(has waited)`, which holds if no action has ended since the last event.
 pub(super) const WAITED: u32 = u32::MAX - 2;
-/// `(the clock)`, in the time unit of the files.
+/// Symbol of the fluent `(the clock)`, in the time unit of the PDDL files.
 pub(super) const CLOCK: u32 = u32::MAX - 3;

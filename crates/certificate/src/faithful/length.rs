@@ -1,11 +1,12 @@
-//! The range of durations of an instance.
+//! The range of durations of an action instance.
 
 use num_rational::BigRational;
 use num_traits::Signed;
 
 use crate::faithful::verdict::Cause;
 
-/// An interval of durations; either end may be excluded. Unbounded if `most` is `None`.
+/// An interval of durations; `most` is `None` if it is unbounded. Either end may be excluded, which
+/// is not recorded.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Length {
     pub(super) least: BigRational,
@@ -13,12 +14,12 @@ pub(super) struct Length {
 }
 
 impl Length {
-    /// The only duration of the interval, if there is one.
+    /// Returns the duration if the interval contains a single one.
     pub(super) fn fixed(&self) -> Option<&BigRational> {
         self.most.as_ref().filter(|most| **most == self.least)
     }
 
-    /// Minimal value of the duration times `factor`.
+    /// Returns the minimal value of `factor` times the duration. Fails if there is no minimum.
     pub(super) fn least_times(&self, factor: &BigRational) -> Result<BigRational, Cause> {
         if !factor.is_negative() {
             return Ok(&self.least * factor);

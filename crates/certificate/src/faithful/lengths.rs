@@ -8,14 +8,14 @@ use crate::faithful::reader::Reader;
 use crate::faithful::verdict::Cause;
 use pddl::ast::{Comparison, DurationConstraint};
 
-/// An end of an interval of durations, and `true` if it is excluded.
+/// An end of an interval of durations; the flag is `true` if the end itself is excluded.
 type End = (BigRational, bool);
 
 impl<'r> Reader<'r> {
-    /// Returns the durations that satisfy all constraints; `None` if no duration does or if a bound
-    /// is undefined.
+    /// Returns the durations that satisfy all constraints, or `None` if no duration does or if a
+    /// bound is undefined.
     pub(super) fn lengths(&mut self, constraints: &'r [DurationConstraint]) -> Result<Option<Length>, Cause> {
-        // Durations are not negative.
+        // Durations are never negative.
         let mut low: End = (BigRational::zero(), false);
         let mut high: Option<End> = None;
         for constraint in constraints {

@@ -7,14 +7,14 @@ use num_traits::{One, Signed, Zero};
 
 use crate::faithful::key::Key;
 
-/// A linear expression: nonzero factors of fluents plus a constant.
+/// A linear expression: a sum of fluents with nonzero factors, plus a constant.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Linear {
     pub(super) factors: BTreeMap<Key, BigRational>,
     pub(super) constant: BigRational,
 }
 
-/// An interval; a missing end is unbounded.
+/// A closed interval of rationals; a missing end is unbounded.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub(super) struct Interval {
     pub(super) low: Option<BigRational>,
@@ -26,7 +26,7 @@ impl Interval {
         Self { low: Some(value.clone()), high: Some(value.clone()) }
     }
 
-    /// The only number of the interval, if there is one.
+    /// Returns the number if the interval contains a single one.
     pub(super) fn value(&self) -> Option<&BigRational> {
         self.low.as_ref().filter(|low| Some(*low) == self.high.as_ref())
     }
@@ -71,13 +71,13 @@ impl Linear {
         self.times(&-BigRational::one())
     }
 
-    /// The value of the expression if it contains no fluent.
+    /// Returns the value of the expression if it contains no fluent.
     pub(super) fn value(&self) -> Option<&BigRational> {
         self.factors.is_empty().then_some(&self.constant)
     }
 
-    /// Returns the factor r such that the fluent part of this expression is r times the one of
-    /// `other`.
+    /// Returns the factor r such that this expression without its constant is r times `other`
+    /// without its constant. Returns `None` if there is no such factor.
     pub(super) fn ratio_to(&self, other: &Self) -> Option<BigRational> {
         let (key, own) = self.factors.first_key_value()?;
         let ratio = own / other.factors.get(key)?;
@@ -89,7 +89,7 @@ impl Linear {
         is_multiple.then_some(ratio)
     }
 
-    /// The interval of the expression when each fluent is in its interval.
+    /// Returns the interval of the expression if each fluent lies in its interval.
     pub(super) fn range<'i>(&self, interval: impl Fn(&Key) -> Option<&'i Interval>) -> Interval {
         let mut range = Interval::point(&self.constant);
         for (key, factor) in &self.factors {

@@ -1,20 +1,22 @@
-//! Checks that a ground task refines its PDDL files (translation validation), without grounding
-//! them again.
+//! Checks that a ground task is faithful to its PDDL files (translation validation), without
+//! grounding the files again.
 //!
-//! The proof is a simulation [1]: the initial states correspond; each effect of an action in a
-//! state of the files is matched by an operator with some choice of designs in the task, at no
-//! more cost; the goal of the files implies the goal of the task. Then the optimality proof about
-//! the task also holds for plans of the files. The task may allow more than the files and omit
+//! The proof is a simulation [1]. The initial states correspond. Each effect of an action in a
+//! state of the files is matched by an operator of the task, with some choice of designs, at no
+//! more cost. The goal of the files implies the goal of the task. Then the optimality proof about
+//! the task also holds for plans of the files. The task may permit more than the files and omit
 //! irrelevant parts.
 //!
-//! The check visits all instances of all actions: `instances` enumerates them by joins over
-//! static atoms, `reader` and `action` compute their conditions and effects case by case,
-//! `compare` searches the operator, and `effects` compares its effects. `translation` expresses
-//! the task in terms of the files. A variable of the task represents atoms of which at most one
-//! holds: this is checked initially and for every instance. An instance needs no operator if it
-//! does not change the task state, or if its conditions contradict static facts, each other, the
-//! variables or the witness. The witness (`invariant`) over-approximates the possible atoms and
-//! the ranges of numbers; the check proves that no instance leaves it.
+//! The check visits all instances of all actions. `instances` enumerates them by joins over static
+//! atoms. `reader` and `action` compute their conditions and effects case by case. `compare`
+//! searches for the operator, and `effects` compares its effects. `translation` expresses the task
+//! in terms of the files. A variable of the task represents atoms of which at most one holds; this
+//! is checked initially and for every instance.
+//!
+//! An instance needs no operator if it does not change the task state. Neither does an instance
+//! whose conditions contradict static facts, each other, the variables or the witness. The witness
+//! (`invariant`) over-approximates the possible atoms and the ranges of numbers; the check proves
+//! that no instance leaves it.
 //!
 //! Supported: all kinds of conditions; conditional and universal effects; linear numbers; derived
 //! predicates, including recursive ones that are variables of the task with equivalent rules;
@@ -70,12 +72,13 @@ use verdict::Obstacle;
 pub use verdict::{Cause, Difference, Faithful};
 use world::World;
 
-/// Upper limit on the iterations of the witness computation.
+/// Upper limit on the number of iterations when a witness is computed.
 const ROUND_LIMIT: usize = 10_000;
 
 type Result<T> = std::result::Result<T, Obstacle>;
 
-/// Checks that a task refines its files. The witness over-approximates their reachable states.
+/// Checks that a ground task is faithful to its PDDL files. `witness` is an over-approximation of
+/// the reachable states, which is checked, too. `stop` returns `true` to cancel the check.
 pub fn faithful(
     domain: &Domain,
     problem: &Problem,
@@ -93,11 +96,11 @@ pub fn faithful(
     }
 }
 
-/// Computes the witness for a ground task.
+/// Computes the witness (an over-approximation of the reachable states) for a ground task, as JSON.
 ///
 /// # Errors
-/// The verdict that [`faithful`] would return: the task is malformed, or a construct is not
-/// supported.
+/// The verdict that [`faithful`] would return: the task is malformed, a construct is not supported,
+/// or the computation was stopped.
 pub fn witness(
     domain: &Domain,
     problem: &Problem,
@@ -125,15 +128,15 @@ fn read(task: &str) -> Result<Model> {
     Ok(model)
 }
 
-/// An action with the objects of its arguments.
+/// A ground action: an action schema with the objects of its arguments.
 struct Instance {
     action: usize,
     arguments: Vec<u32>,
-    /// Atoms that its condition requires.
+    /// The atoms of changing predicates that the condition requires.
     requires: Vec<Key>,
 }
 
-/// The files, with the correspondence of their atoms and fluents to the task.
+/// The PDDL files, with the correspondence of their atoms and fluents to the task.
 struct Files<'f> {
     domain: &'f Domain,
     world: World<'f>,
@@ -171,8 +174,8 @@ impl<'f> Files<'f> {
         if (self.stop)() { Err(Cause::Stopped) } else { Ok(()) }
     }
 
-    /// Cases in which an instance may be executable in a state that satisfies the invariant. An empty
-    /// result proves that it is executable in no such state.
+    /// Returns the cases in which an instance may be executable in a state that satisfies the
+    /// invariant. An empty list proves that the instance is executable in no such state.
     fn cases(&self, instance: &Instance, invariant: &Invariant, axioms: &Axioms) -> Result<Vec<Case>> {
         self.stopped()?;
         if instance.requires.iter().any(|key| !invariant.may_hold(key)) {
@@ -190,13 +193,13 @@ impl<'f> Files<'f> {
         let untimed = self.world.timeline.is_empty();
         let plain: Vec<bool> = self.domain.actions.iter().map(|action| untimed && is_plain(action)).collect();
         let waits = action::waits(&self.world.timeline, &self.names.structure)?;
-        // An instance of a plain action has constant effects and is visited until it is reachable
-        // once.
+        // A plain action has constant effects, so its instances are visited only until they are
+        // reachable.
         let mut open: Vec<&Instance> = self.instances.iter().collect();
         for _ in 0..ROUND_LIMIT {
             let axioms = derived::axioms(&self.world, &widening.invariant, &self.names.linked, self.stop)?;
-            // The facts about derived atoms hold for the invariant at the start of the round
-            // only.
+            // The facts about derived atoms are computed for the invariant at the start of the
+            // round, so this invariant is used during the round.
             let frozen = (self.world.derived().next().is_some()).then(|| widening.invariant.clone());
             let (mut news, mut next) = (false, Vec::new());
             for case in &waits {
@@ -222,7 +225,8 @@ impl<'f> Files<'f> {
         Err(invariant::too_many_rounds(ROUND_LIMIT).into())
     }
 
-    /// Computes mutex groups for the variables that are not exclusive by themselves.
+    /// Searches for additional mutex groups, for the variables whose own atoms are not preserved as
+    /// a group.
     fn exclusive(&self, invariant: &Invariant, axioms: &Axioms) -> Result<Vec<Group>> {
         let atoms = |variable| self.names.atoms(variable).map(|(_, key)| key.clone()).collect();
         let variables: Vec<Group> = self.model.basic_variables().map(atoms).collect();
@@ -244,7 +248,7 @@ impl<'f> Files<'f> {
         Ok(exclusive::search(&self.world, &may_hold, broken, &moves, self.stop))
     }
 
-    /// Visits the effects of each case of each instance on groups.
+    /// Calls `visit` with the effect of each case of each instance on mutex groups.
     fn each_move(&self, invariant: &Invariant, axioms: &Axioms, visit: &mut dyn FnMut(Move)) -> Result<()> {
         let structure = &self.names.structure;
         let waits = action::waits(&self.world.timeline, structure)?;
@@ -293,7 +297,7 @@ impl<'f> Files<'f> {
         Ok(Faithful::Yes { instances, idle, timed })
     }
 
-    /// A number of which the times of events and all durations are multiples.
+    /// Returns a number of which the times of events and all durations are multiples.
     fn unit(&self, invariant: &Invariant, axioms: &Axioms) -> Result<BigRational> {
         let mut durations = BTreeSet::new();
         if !self.world.timeline.is_empty() {
@@ -337,7 +341,7 @@ fn is_plain(action: &Action) -> bool {
     }
 }
 
-/// The atoms of changing predicates in the top-level conjunction of an instance's condition.
+/// Returns the atoms of changing predicates that are conjuncts of an instance's (start) condition.
 fn requires(world: &World<'_>, action: &Action, arguments: &[u32]) -> std::result::Result<Vec<Key>, Cause> {
     let mut atoms = Vec::new();
     match &action.body {

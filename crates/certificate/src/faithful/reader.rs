@@ -1,5 +1,6 @@
-//! Evaluates conditions and expressions of the files for one instance, simplified by static facts
-//! and by the witness.
+//! Evaluates conditions and expressions of the PDDL files for an action instance. The results are
+//! simplified by static facts and by the witness, i.e. the over-approximation of the reachable
+//! states.
 
 use std::collections::BTreeMap;
 
@@ -18,30 +19,30 @@ use crate::faithful::verdict::Cause;
 use crate::faithful::world::World;
 use pddl::ast::{Arithmetic, Atom, Comparison, Condition, Expression, Name, Term, TypedName};
 
-/// Upper limit on the parts of the conditions of one instance.
+/// Upper limit on the number of parts in the conditions of an instance.
 const SIZE_LIMIT: usize = 200_000;
-/// Upper limit on the parts that are evaluated for one instance, counting repeated evaluation
-/// (see [`Reader::unfold`]).
+/// Upper limit on the number of parts that are evaluated for an instance, counting repeated
+/// evaluations (see [`Reader::unfold`]).
 const WORK_LIMIT: usize = 16 * SIZE_LIMIT;
-/// Upper limit on the variables of one quantifier or of the head of a rule.
+/// Upper limit on the number of variables of a quantifier or of the head of a rule.
 const VARIABLE_LIMIT: usize = 10_000;
-/// Upper limit on the nesting of conditions while derived atoms are recursively replaced by their
-/// rules. It bounds the call stack. Atoms at a deeper nesting are evaluated one at a time, with an
-/// explicit stack (see [`Reader::unfold`]).
+/// Upper limit on the nesting of conditions up to which derived atoms are recursively replaced by
+/// their rules. The limit bounds the call stack. Atoms at a deeper nesting are evaluated
+/// separately, with an explicit stack (see [`Reader::unfold`]).
 const UNFOLDING_LIMIT: usize = 100;
 
-/// The key of `total-time` in metrics.
+/// Key of the fluent `total-time`, which only metrics contain.
 pub(super) const TOTAL_TIME: Key = (u32::MAX, SmallVec::new_const());
 
-/// The start effects of a durative action.
+/// The truth values and fluents that the start effects of a durative action have changed.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Applied {
     pub(super) truths: BTreeMap<Key, bool>,
     pub(super) changes: BTreeMap<Key, Linear>,
 }
 
-/// The bound variables of a quantifier: for each its remaining candidates, and the object of a
-/// shadowed outer variable.
+/// The stack of bound variables of a quantifier. For each variable, its remaining candidates and
+/// the object of the outer variable that it shadows.
 type Levels = Vec<(std::vec::IntoIter<u32>, Option<u32>)>;
 
 pub(super) struct Reader<'r> {
@@ -50,31 +51,32 @@ pub(super) struct Reader<'r> {
     pub(super) axioms: &'r Axioms,
     pub(super) binding: FxHashMap<&'r Name, u32>,
     pub(super) applied: Applied,
-    /// The duration of the instance.
+    /// The range of durations of the instance; `None` for an instantaneous action.
     pub(super) length: Option<Length>,
     pub(super) is_metric: bool,
-    /// `true` inside `when`, where an undefined comparison has no agreed meaning.
+    /// Whether the condition of a conditional effect (`when`) is evaluated. An undefined comparison
+    /// there is not supported.
     pub(super) in_when: bool,
-    /// `true` if derived atoms are not replaced by their rules.
+    /// Whether derived atoms are kept instead of being replaced by their rules.
     pub(super) opaque: bool,
     unfolding: Unfolding,
-    /// The nesting of the current condition.
+    /// The nesting depth of the current condition.
     depth: usize,
     size: usize,
     work: usize,
 }
 
-/// Derived atoms that are being replaced by their rules.
+/// The state of replacing derived atoms by their rules.
 #[derive(Default)]
 struct Unfolding {
     /// The derived atoms whose rules are being evaluated, outermost first.
     path: Vec<Key>,
-    /// The nesting at which the outermost derived atom is evaluated.
+    /// The nesting depth at which the outermost derived atom is evaluated.
     base: usize,
-    /// An atom nested deeper than [`UNFOLDING_LIMIT`]. It is evaluated on its own before the
-    /// evaluation is repeated.
+    /// An atom nested deeper than [`UNFOLDING_LIMIT`]. Its condition is computed separately, before
+    /// the evaluation that found the atom is repeated.
     pending: Option<Key>,
-    /// Conditions of former pending atoms, whose evaluation is complete.
+    /// The computed conditions of atoms that were pending before.
     known: FxHashMap<Key, Formula>,
 }
 
@@ -97,8 +99,8 @@ impl<'r> Reader<'r> {
         }
     }
 
-    /// Returns a condition (or its negation) after the start effects, in terms of the state
-    /// before them.
+    /// Returns a condition (or its negation, if `holds` is `false`), evaluated after the start
+    /// effects, as a formula over the state before the start effects.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "conditions nest no deeper than what is read recursively"
@@ -155,7 +157,7 @@ impl<'r> Reader<'r> {
         all: bool,
     ) -> Result<Formula, Cause> {
         let mut formulas = Vec::new();
-        // Parts without derived atoms come first: they may decide the junction without any
+        // Parts without derived atoms are evaluated first: they may decide the junction without
         // unfolding.
         let (later, sooner): (Vec<_>, Vec<_>) = parts.partition(|(part, _)| self.is_derived(part));
         for (part, holds) in sooner.into_iter().chain(later) {
@@ -198,8 +200,8 @@ impl<'r> Reader<'r> {
         Ok(Formula::junction(formulas, all))
     }
 
-    /// Calls `visit` with every binding of the variables `bound` until it returns `false`.
-    /// Bindings that make `within` false may be skipped.
+    /// Calls `visit` with every binding of the variables `bound` until `visit` returns `false`.
+    /// Bindings for which `within` is false may be skipped. Returns `false` if `visit` did.
     pub(super) fn each(
         &mut self,
         bound: &'r [TypedName],
@@ -228,8 +230,8 @@ impl<'r> Reader<'r> {
         }
     }
 
-    /// Advances the innermost variable that has another candidate. Returns `false` if no variable
-    /// has one.
+    /// Binds the innermost variable that has another candidate to this candidate. Returns `false`
+    /// if no variable has another candidate.
     #[expect(clippy::arithmetic_side_effects, reason = "an entry for each of the first variables")]
     fn next_binding(&mut self, bound: &'r [TypedName], open: &mut Levels) -> bool {
         while !open.is_empty() {
@@ -286,8 +288,8 @@ impl<'r> Reader<'r> {
         Ok(if holds { formula } else { formula.negated() })
     }
 
-    /// Returns `true` if a derived predicate depends on start effects, so that the witness does
-    /// not apply to it.
+    /// Returns `true` if a derived predicate depends on start effects. The facts of the witness
+    /// then do not apply to it.
     pub(super) fn is_touched(&self, symbol: u32) -> bool {
         let touched = self.applied.truths.keys().chain(self.applied.changes.keys());
         self.axioms.depends(symbol, touched.map(|key| key.0))
@@ -295,8 +297,8 @@ impl<'r> Reader<'r> {
 
     /// Returns the condition under which a derived atom holds.
     ///
-    /// Rules are unfolded recursively up to a limit on the nesting. An atom below the limit
-    /// aborts the evaluation; its own condition is computed first, and then the evaluation is
+    /// Rules are unfolded recursively up to a limit on the nesting. An atom beyond the limit aborts
+    /// the evaluation. The condition of this atom is computed first, and then the evaluation is
     /// repeated.
     pub(super) fn unfold(&mut self, key: &Key) -> Result<Formula, Cause> {
         if let Some(known) = self.unfolding.known.get(key).cloned() {
@@ -311,7 +313,7 @@ impl<'r> Reader<'r> {
         }
         if self.depth.saturating_sub(self.unfolding.base) > UNFOLDING_LIMIT {
             self.unfolding.pending = Some(key.clone());
-            // Aborts the evaluation, which `unfold_from` repeats.
+            // This error aborts the evaluation, and `unfold_from` repeats it.
             return Err(Cause::Stopped);
         }
         let outer = std::mem::take(&mut self.binding);
@@ -326,8 +328,7 @@ impl<'r> Reader<'r> {
         self.unfolding.base = base;
         let mut open = vec![key.clone()];
         let formula = loop {
-            // `open` is an explicit stack, because recursion would be as deep as the rules are
-            // chained.
+            // `open` is an explicit stack; recursion would be as deep as the chain of rules.
             let Some(own) = open.last().cloned() else { break Err(Cause::Stopped) };
             (self.depth, self.size) = (base, size);
             self.unfolding.path.clear();
@@ -360,7 +361,7 @@ impl<'r> Reader<'r> {
         ))
     }
 
-    /// The disjunction of the conditions of an atom's rules.
+    /// Returns the disjunction of the conditions of all rules for a derived atom.
     fn body(&mut self, key: &Key) -> Result<Formula, Cause> {
         self.unfolding.path.push(key.clone());
         let mut bodies = Vec::new();
@@ -379,7 +380,7 @@ impl<'r> Reader<'r> {
         Ok(Formula::junction(bodies, false))
     }
 
-    /// Returns `None` if a side is undefined.
+    /// Returns the condition of a comparison, or `None` if one side is undefined.
     fn compare(
         &mut self,
         operator: Comparison,
@@ -426,7 +427,7 @@ impl<'r> Reader<'r> {
         Ok(Some(self.invariant.fluent(key)))
     }
 
-    /// The value of an expression after the start effects; `None` if it is undefined.
+    /// Returns the value of an expression after the start effects, or `None` if it is undefined.
     pub(super) fn expression(&mut self, expression: &'r Expression) -> Result<Option<Linear>, Cause> {
         Ok(match expression {
             Expression::Number(number, _) => Some(Linear::constant(number.clone())),
@@ -452,7 +453,8 @@ impl<'r> Reader<'r> {
     }
 }
 
-/// The formula of a basic atom in the state before.
+/// Returns the condition that a basic (not derived) atom has the given truth value, simplified by
+/// static facts and the witness.
 pub(super) fn atom(world: &World<'_>, invariant: &Invariant, key: Key, holds: bool) -> Formula {
     if !world.changes(key.0) {
         return Formula::truth(world.holds_initially(&key) == holds);

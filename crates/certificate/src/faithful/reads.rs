@@ -1,7 +1,7 @@
-//! The read set of a happening, as the definition of interference requires it: every atom and
-//! fluent in its conditions, its duration, the conditions of its effects and their right-hand
-//! sides, whether or not it affects the outcome. A quantifier reads all its instances; a derived
-//! predicate reads all predicates and functions that it depends on.
+//! The atoms and fluents that a happening reads, as the definition of interference requires. They
+//! are all atoms and fluents in conditions, durations, conditions of effects and right-hand sides
+//! of effects, whether or not they affect the outcome. A quantifier reads all its instances. A
+//! derived predicate reads all predicates and functions on which it depends.
 
 use rustc_hash::FxHashMap;
 
@@ -11,7 +11,7 @@ use crate::faithful::timeline::Event;
 use crate::faithful::world::World;
 use pddl::ast::{Atom, Condition, Effect, Expression, Name, Term, TypedName};
 
-/// One happening of an instance.
+/// A happening of an action instance: its conditions, effects and duration constraints.
 pub(super) struct Reads<'r> {
     pub(super) world: &'r World<'r>,
     pub(super) axioms: &'r Axioms,
@@ -21,7 +21,7 @@ pub(super) struct Reads<'r> {
     pub(super) durations: Vec<&'r Expression>,
 }
 
-/// The ground atom or numeric fluent for which [`Reads`] decides whether the happening reads it.
+/// A ground atom or numeric fluent, to be searched for in a happening.
 #[derive(Clone, Copy)]
 enum ReadQuery<'w> {
     Atom(&'w Key),
@@ -29,7 +29,7 @@ enum ReadQuery<'w> {
 }
 
 impl Reads<'_> {
-    /// Returns `true` if the happening reads an atom that an event changes.
+    /// Returns `true` if the happening reads an atom that the event changes.
     pub(super) fn event(&self, event: &Event) -> bool {
         event.truths.keys().any(|key| self.atom(key))
     }
@@ -53,7 +53,7 @@ impl Reads<'_> {
 struct Search<'s> {
     reads: &'s Reads<'s>,
     wanted: ReadQuery<'s>,
-    /// The quantified variables in scope, innermost last.
+    /// The quantified variables in scope; the innermost comes last.
     scope: Vec<&'s TypedName>,
 }
 
@@ -108,7 +108,7 @@ impl<'s> Search<'s> {
         matches!(self.wanted, ReadQuery::Atom(_)) && self.is_instance(atom, key)
     }
 
-    /// Returns `true` if an atom or a fluent has the instance `key`.
+    /// Returns `true` if `key` is an instance of an atom or fluent with quantified variables.
     fn is_instance(&self, atom: &Atom, key: &Key) -> bool {
         let Reads { world, binding, .. } = self.reads;
         let mut chosen: FxHashMap<usize, u32> = FxHashMap::default();

@@ -1,20 +1,21 @@
-//! Ground atoms, indexed by predicate and by each of their arguments.
+//! Sets of ground atoms, indexed by predicate and by each argument.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::faithful::key::Key;
 
-/// A set of ground atoms.
+/// An indexed set of ground atoms.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Relation {
     atoms: FxHashSet<Key>,
     rows: FxHashMap<u32, Vec<Key>>,
-    /// For each predicate, position and object, the matching rows.
+    /// For each predicate, argument position and object, the indices of the matching atoms in
+    /// `rows`.
     rows_with: FxHashMap<(u32, usize, u32), Vec<usize>>,
 }
 
 impl Relation {
-    /// Adds an atom. Returns `true` if it is new.
+    /// Adds an atom. Returns `true` if the atom was not in the set.
     pub(super) fn insert(&mut self, key: Key) -> bool {
         if !self.atoms.insert(key.clone()) {
             return false;
@@ -35,7 +36,7 @@ impl Relation {
         self.atoms.len()
     }
 
-    /// Number of atoms of [`Relation::rows`].
+    /// Returns the number of atoms that [`Relation::rows`] yields.
     pub(super) fn count(&self, predicate: u32, place: Option<(usize, u32)>) -> usize {
         match place {
             None => self.rows.get(&predicate).map_or(0, Vec::len),
@@ -43,7 +44,8 @@ impl Relation {
         }
     }
 
-    /// The atoms of a predicate, optionally with an object at a position.
+    /// Iterates over the atoms of a predicate. `place` optionally restricts the argument at a
+    /// position to an object.
     pub(super) fn rows(&self, predicate: u32, place: Option<(usize, u32)>) -> impl Iterator<Item = &Key> {
         let rows = self.rows.get(&predicate).map_or(&[][..], Vec::as_slice);
         let (all, some) = match place {

@@ -1,15 +1,16 @@
-//! Timed initial literals under sequential execution of actions, by the definition
-//! (`validate/definition.md`).
+//! Timed initial literals when actions are executed one after another, by the definition in
+//! `validate/definition.md`.
 //!
-//! All literals of one time are one event. The events divide time into phases: phase i begins
-//! with event i (counted from 1), phase 0 with the plan. The effect of events on an action
-//! depends on the phases of its start and end, and on whether either coincides with an event: a
-//! *passage*. The plan may start the action at any time within a passage.
+//! All literals of the same time form an event. Events divide time into phases: phase 0 begins with
+//! the plan, and phase i with event i (counted from 1). The effect of events on an action depends
+//! on its *passage*, i.e. on the phases of its start and end, and on whether start or end coincides
+//! with an event. The plan may start the action at any time within a passage.
 //!
-//! The task has its own clock. The clock represents a plan time t if t is at or after the clock's
-//! *mark*, and after the mark if the clock is after it. The mark is the greatest multiple of a
-//! unit that the clock has reached. All times of events and all durations are multiples of the
-//! unit, so the clock may be ahead of t by less than a unit, which no action can observe.
+//! The task has its own clock. The *mark* of a clock value is the greatest multiple of a unit that
+//! is at most the value. The clock represents a plan time t if t is at or after the mark, or
+//! strictly after the mark if the clock value is greater than the mark. All times of events and all
+//! durations are multiples of the unit. Hence the clock may be ahead of t by less than a unit,
+//! which no action can observe.
 
 use std::collections::BTreeMap;
 
@@ -23,38 +24,40 @@ use crate::faithful::formula::Formula;
 use crate::faithful::key::{CLOCK, Key, PHASE, WAITED};
 use crate::faithful::linear::Linear;
 
-/// Truth values of atoms after an event.
+/// The truth values that an event assigns to atoms.
 pub(super) type Truths = BTreeMap<Key, bool>;
 
-/// All timed initial literals of one time.
+/// All timed initial literals with the same time.
 #[derive(Debug, Clone)]
 pub(super) struct Event {
     pub(super) time: BigRational,
     pub(super) truths: Truths,
 }
 
-/// An end of a time range, and `true` if it is excluded.
+/// An end of a time range; the flag is `true` if the end itself is excluded.
 type End = (BigRational, bool);
 
-/// The events, in order.
+/// The events in the order of their times.
 #[derive(Debug, Default)]
 pub(super) struct Timeline {
     pub(super) events: Vec<Event>,
-    /// Number of events at time 0.
+    /// Number of events at time 0 (0 or 1).
     pub(super) begun: usize,
 }
 
-/// The position of an action relative to the events.
+/// The position of an action relative to the events: the phases of its start (`from`) and its end
+/// (`to`).
 #[derive(Debug, Clone)]
 pub(super) struct Passage {
     from: usize,
     to: usize,
-    /// `true` if the action starts (or ends) exactly at the event that begins its phase.
+    /// Whether the action starts exactly at the event that begins phase `from`. The flag `at_end`
+    /// states this for the end and phase `to`.
     at_start: bool,
     at_end: bool,
-    /// The latest start; `None` if there is no limit.
+    /// The latest start time; `None` if there is no limit.
     latest: Option<End>,
-    /// The earliest end.
+    /// The earliest end time.
     pub(super) end: End,
 }
 
@@ -71,8 +74,7 @@ pub(super) fn clock() -> Key {
 }
 
 impl Timeline {
-    /// Adds a timed initial literal. A later literal about an atom and time replaces an earlier
-    /// one.
+    /// Adds a timed initial literal. It replaces an earlier literal with the same atom and time.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "phases are counted from 0, and each but the first one begins with an event"
@@ -98,12 +100,12 @@ impl Timeline {
         &self.events[number - 1].time
     }
 
-    /// The end of a phase; `None` for the last phase.
+    /// Returns the end time of a phase; `None` for the last phase.
     fn over(&self, phase: usize) -> Option<&BigRational> {
         self.events.get(phase).map(|event| &event.time)
     }
 
-    /// All possible passages of an action with this duration.
+    /// Returns all possible passages of an action with this duration.
     pub(super) fn passages(&self, duration: &BigRational) -> Vec<Passage> {
         if self.is_empty() {
             let end = (duration.clone(), false);
@@ -128,11 +130,11 @@ impl Timeline {
         (from, to): (usize, usize),
         (at_start, at_end): (bool, bool),
     ) -> Option<Passage> {
-        // Phase 0 begins with no event.
+        // No event begins phase 0.
         if at_start && from == 0 || at_end && to == 0 {
             return None;
         }
-        // The range of start times, restricted by the phases of the start and the end.
+        // The range of start times, as restricted by the phases of start and end.
         let mut range = Range { low: (BigRational::zero(), false), high: None };
         if from > 0 {
             range.begin(self.time(from), at_start);
@@ -147,7 +149,8 @@ impl Timeline {
         (!range.is_empty()).then_some(Passage { from, to, at_start, at_end, latest: range.high, end })
     }
 
-    /// A unit of which the times of events and the given durations are multiples.
+    /// Returns the greatest unit of the form 1/n of which the times of events and the given
+    /// durations are multiples.
     pub(super) fn unit<'d>(&'d self, durations: impl Iterator<Item = &'d BigRational>) -> BigRational {
         let times = self.events.iter().map(|event| &event.time);
         let common = times.chain(durations).fold(BigInt::one(), |common, time| common.lcm(time.denom()));
@@ -162,7 +165,8 @@ struct Range {
 }
 
 impl Range {
-    /// Restricts the range to times from `time` on, or exactly to `time`.
+    /// Restricts the range to times from `time` on, excluding `time`; if `at`, restricts it to
+    /// `time` alone.
     fn begin(&mut self, time: &BigRational, at: bool) {
         self.low = self.low.clone().max((time.clone(), !at));
         if at {
@@ -185,14 +189,14 @@ impl Range {
 }
 
 impl Passage {
-    /// The passage of waiting until the event that begins a phase.
+    /// Returns the passage of waiting until the event that begins a phase.
     pub(super) fn wait(phase: usize, time: &BigRational) -> Self {
         let end = (time.clone(), false);
         Self { from: phase, to: phase, at_start: false, at_end: false, latest: None, end }
     }
 
-    /// The condition on the state and the clock before an action with this passage: the phase
-    /// matches, and the clock is between 0 and the latest start.
+    /// Returns the condition on the state and the clock before an action with this passage: the
+    /// phase matches, and the clock is between 0 and the latest start time.
     pub(super) fn condition(&self, timeline: &Timeline) -> Formula {
         if timeline.is_empty() {
             return Formula::truth(true);
@@ -206,7 +210,7 @@ impl Passage {
         Formula::junction(conditions.into_iter().chain(limit), true)
     }
 
-    /// The event at the start of the action.
+    /// Returns the event at the start of the action, if there is one.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "phases are counted from 0, and each but the first one begins with an event"
@@ -215,7 +219,7 @@ impl Passage {
         self.at_start.then(|| &timeline.events[self.from - 1])
     }
 
-    /// The events strictly between start and end.
+    /// Returns the events strictly between start and end of the action.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "phases are counted from 0, and each but the first one begins with an event"
@@ -224,7 +228,8 @@ impl Passage {
         &timeline.events[self.from..self.to - usize::from(self.at_end && self.to > self.from)]
     }
 
-    /// The event at the end, if the action takes time.
+    /// Returns the event at the end of the action, if there is one and the start is in an earlier
+    /// phase.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "phases are counted from 0, and each but the first one begins with an event"
@@ -233,7 +238,7 @@ impl Passage {
         (self.at_end && self.to > self.from).then(|| &timeline.events[self.to - 1])
     }
 
-    /// The effects of a passage on the phase and on `waited`.
+    /// Returns the effects of a passage on the atoms of the phase and on the atom `waited`.
     pub(super) fn truths(&self, timeline: &Timeline) -> Truths {
         if timeline.is_empty() {
             return Truths::new();
@@ -244,7 +249,7 @@ impl Passage {
     }
 }
 
-/// Returns `true` if a clock value represents every time from an end on.
+/// Returns `true` if the clock value `set` represents every time from the given end on.
 pub(super) fn stands_for(set: &BigRational, (end, left_out): &End, unit: &BigRational) -> bool {
     let mark = (set / unit).floor() * unit;
     if set.is_negative() {
@@ -261,7 +266,7 @@ mod tests {
         BigRational::new(count.into(), 4.into())
     }
 
-    /// Every start time lies in exactly the one passage that the definition requires.
+    /// Every start time lies in exactly one passage, which is the one that the definition requires.
     #[test]
     fn passages_partition_the_start_times() {
         for (events, duration) in [

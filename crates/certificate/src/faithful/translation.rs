@@ -1,5 +1,5 @@
-//! Expresses the task in terms of the files: variables, numbers, conditions and rules as formulas
-//! over atoms and fluents.
+//! Expresses the task in terms of the PDDL files: translates its variables, numbers, conditions and
+//! rules to formulas over atoms and fluents.
 
 use std::collections::BTreeMap;
 
@@ -15,27 +15,28 @@ use crate::faithful::verdict::{Cause, Difference, Obstacle};
 use crate::faithful::world::World;
 use crate::model::{self, Condition, Fact, Literal, Model};
 
-/// Upper limit on the parts of one condition of the task after translation.
+/// Upper limit on the number of parts of a condition of the task after translation.
 const SIZE_LIMIT: usize = 200_000;
 
-/// Upper limit on the total parts of all translated conditions.
+/// Upper limit on the total number of parts of all translated conditions.
 const TOTAL_LIMIT: usize = 16 * SIZE_LIMIT;
 
 type Result<T> = std::result::Result<T, Obstacle>;
 
-/// The atoms and fluents that the names of the task denote.
+/// The correspondence between the facts and numbers of the task and the atoms and fluents of the
+/// PDDL files.
 pub(super) struct Names {
-    /// By variable and value; `None` for the last value of a variable and for names that the
-    /// files do not have.
+    /// For each variable and value, the atom; `None` for the last value of a variable and for atoms
+    /// that the PDDL files do not contain.
     keys: Vec<Vec<Option<Key>>>,
     facts: FxHashMap<Key, Fact>,
-    /// For each number of the task, its fluent.
+    /// For each number of the task, the fluent.
     pub(super) fluents: Vec<Key>,
     pub(super) numbers: FxHashMap<Key, u32>,
     pub(super) structure: Structure,
-    /// Derived atoms that are variables of the task.
+    /// The derived atoms that are variables of the task.
     pub(super) linked: FxHashSet<Key>,
-    /// The layer of the axioms that computes a derived variable.
+    /// For each derived variable, the axiom layer that computes its value.
     layers: FxHashMap<u32, usize>,
 }
 
@@ -98,8 +99,8 @@ impl Names {
         Ok(names)
     }
 
-    /// Checks that the axioms are stratified: a rule reads derived variables of lower layers, or
-    /// positively of its own layer.
+    /// Checks that the axioms are stratified: each rule reads only derived variables of lower
+    /// layers, or of its own layer if they are not negated.
     fn layers(&mut self, model: &Model) -> Result<()> {
         for (layer, rules) in model.axioms.iter().enumerate() {
             for (head, _) in &rules.rules {
@@ -131,25 +132,25 @@ impl Names {
         self.keys[fact.0 as usize][fact.1 as usize].as_ref()
     }
 
-    /// The atoms that are values of a variable.
+    /// Iterates over the values of a variable that are atoms of the PDDL files: value and atom.
     pub(super) fn atoms(&self, variable: u32) -> impl Iterator<Item = (u32, &Key)> {
         (0..).zip(&self.keys[variable as usize]).filter_map(|(value, key)| Some((value, key.as_ref()?)))
     }
 }
 
-/// The conditions of a task in terms of atoms and fluents.
+/// The task, with its conditions expressed as formulas over atoms and fluents of the PDDL files.
 pub(super) struct Translation<'t> {
     pub(super) world: &'t World<'t>,
     pub(super) model: &'t Model,
     pub(super) names: &'t Names,
     pub(super) invariant: &'t Invariant,
     pub(super) axioms: &'t Axioms,
-    /// The atoms of each variable that may hold, with their values.
+    /// For each variable, its values whose atoms may hold: value and atom.
     possible: Vec<Vec<(u32, &'t Key)>>,
-    /// The formulas of derived variables that are not atoms of the files, or whose value is
-    /// known.
+    /// For derived variables that are not linked to a derived atom: the formula that replaces the
+    /// variable.
     unfolded: BTreeMap<u32, Formula>,
-    /// The bodies of the rules of each derived variable.
+    /// For each derived variable, the bodies of its rules.
     bodies: FxHashMap<u32, Vec<&'t Condition>>,
 }
 
@@ -177,7 +178,7 @@ impl<'t> Translation<'t> {
         Ok(translation)
     }
 
-    /// The atoms of a variable that may hold, with their values.
+    /// Iterates over the values of a variable whose atoms may hold: value and atom.
     pub(super) fn possible(&self, variable: u32) -> impl Iterator<Item = (u32, &'t Key)> {
         self.possible[variable as usize].iter().copied()
     }
@@ -192,10 +193,11 @@ impl<'t> Translation<'t> {
             && !self.unfolded.contains_key(&variable)
     }
 
-    /// Replaces a derived variable by its rules, after the variables that they read.
+    /// Computes the formula that replaces a derived variable, after those of the variables that its
+    /// rules read.
     fn unfold(&mut self, variable: u32, total: &mut usize) -> Result<()> {
         let mut above = FxHashSet::default();
-        // An explicit depth-first search: each variable, and `true` once its dependencies are
+        // The stack of a depth-first search: each variable, and `true` once its dependencies are
         // finished.
         let mut open = vec![(variable, false)];
         while let Some((variable, is_ready)) = open.pop() {
@@ -216,7 +218,7 @@ impl<'t> Translation<'t> {
         Ok(())
     }
 
-    /// The variables that the rules of a derived variable read.
+    /// Returns the variables that the rules of a derived variable read.
     fn read_by(&self, variable: u32) -> impl Iterator<Item = u32> {
         self.bodies(variable).flat_map(|body| {
             let clauses = body.clauses.iter().flatten().map(|((variable, _), _)| *variable);
@@ -248,7 +250,7 @@ impl<'t> Translation<'t> {
         self.bodies.get(&variable).into_iter().flatten().copied()
     }
 
-    /// The condition under which the rules of the task derive the atom of a variable.
+    /// Returns the condition under which the rules of the task derive a variable.
     pub(super) fn rules(&self, variable: u32) -> Formula {
         Formula::junction(self.bodies(variable).map(|body| self.condition(body, &[], &[])), false)
     }
@@ -278,7 +280,8 @@ impl<'t> Translation<'t> {
         Formula::junction(literals.iter().map(|literal| self.literal(literal)), all)
     }
 
-    /// Translates a condition for a choice of designs.
+    /// Translates a condition of the task, given a choice of designs. `sizes` are the numbers of
+    /// designs of the slots.
     pub(super) fn condition(&self, condition: &Condition, choice: &[u32], sizes: &[usize]) -> Formula {
         let facts = condition.facts.iter().map(|fact| self.fact(*fact));
         let clauses = condition.clauses.iter().map(|clause| self.literals(clause, false));
@@ -289,7 +292,7 @@ impl<'t> Translation<'t> {
         Formula::junction(facts.chain(clauses).chain(comparisons), true)
     }
 
-    /// Translates a linear expression over numbers to one over fluents.
+    /// Translates a linear expression over numbers of the task to a linear expression over fluents.
     fn linear(&self, linear: &model::Linear, choice: &[u32], sizes: &[usize]) -> Linear {
         let scale = self.model.number_scale.to_rational();
         let mut sum = Linear::constant(self.model.quantity(&linear.quantity, choice, sizes).to_rational());
@@ -300,7 +303,7 @@ impl<'t> Translation<'t> {
         sum
     }
 
-    /// The new value of a fluent when its number gets the value of `linear`.
+    /// Returns the new value of a fluent if the corresponding number of the task becomes `linear`.
     pub(super) fn value(&self, linear: &model::Linear, choice: &[u32], sizes: &[usize]) -> Linear {
         let value = self.linear(linear, choice, sizes).times(&self.model.number_scale.to_rational().recip());
         self.invariant.settled(&value)

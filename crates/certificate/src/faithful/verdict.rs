@@ -1,30 +1,31 @@
-//! Outcomes of the grounding check, and the reasons for rejecting a certificate.
+//! Outcomes of checking a ground task against its PDDL files, and reasons for rejecting it.
 
 use thiserror::Error;
 
-/// Outcome of the grounding check.
+/// Outcome of checking a ground task against its PDDL files.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Faithful {
-    /// The task refines the files.
+    /// The task is faithful: it permits every plan of the PDDL files, at no more cost.
     Yes {
-        /// Number of action instances that the witness does not rule out.
+        /// Number of action instances that may be executable in a state of the witness.
         instances: usize,
         /// Number of instances among them that do not change the task state.
         idle: usize,
-        /// `true` if plans are measured by duration, because there is no metric.
+        /// Whether plans are measured by duration, because the problem has no metric.
         timed: bool,
     },
-    /// The first difference.
+    /// The task is not faithful; the first difference found.
     No(Difference),
-    /// The check cannot decide.
+    /// The check cannot decide whether the task is faithful.
     Undecided(Cause),
 }
 
-/// A difference between the task or the witness and the files.
+/// A difference that refutes the task or the witness (the over-approximation of the reachable
+/// states).
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum Difference {
-    /// The task is not well-formed.
+    /// The task is malformed.
     #[error("it is not a task: {reason}")]
     Form {
         /// Description of the error.
@@ -33,30 +34,30 @@ pub enum Difference {
     /// The initial states differ.
     #[error("{what} is another one at first")]
     Initial {
-        /// A variable, a number, or the metric.
+        /// Description of the variable, number, or metric.
         what: String,
     },
-    /// The goal of the files does not imply the goal of the task.
+    /// The goal of the PDDL files does not imply the goal of the task.
     #[error("the goal of the files can hold where that of the task does not")]
     Goal,
-    /// An instance of an action can be executed, but no operator has its arguments.
+    /// An action instance can be executed, but no operator has its action and arguments.
     #[error("{instance}: no operator stands for it")]
     NoOperatorFor {
         /// The action with its arguments.
         instance: String,
     },
-    /// Every matching operator requires a condition that the instance does not require.
+    /// Every operator with these arguments requires a condition that the instance does not imply.
     #[error("{instance}: the operator requires more")]
     WrongCondition {
         /// The action with its arguments.
         instance: String,
     },
-    /// The operator has a different effect on a variable or a number.
+    /// The operator changes a variable or number differently than the instance.
     #[error("{instance}: the operator makes something else of {what}")]
     WrongEffect {
         /// The action with its arguments.
         instance: String,
-        /// The values of the variable, or the number.
+        /// The values of the variable, or the name of the number.
         what: String,
     },
     /// The operator costs more than the instance.
@@ -67,19 +68,19 @@ pub enum Difference {
         /// Cost of the instance, in units of the metric.
         cost: String,
     },
-    /// The rules of a derived atom are not equivalent.
+    /// The rules of the task and of the PDDL files for a derived atom are not equivalent.
     #[error("the rules of {atom} are others")]
     WrongRules {
         /// The derived atom.
         atom: String,
     },
-    /// The witness does not contain the initial state, or an instance leaves it.
+    /// The witness does not contain the initial state, or an instance leads out of it.
     #[error("the witness leaves out what can become of {what}")]
     Witness {
-        /// An atom or a number.
+        /// The atom or number that is outside the witness.
         what: String,
     },
-    /// A mutex group of the witness is not proved.
+    /// A mutex group of the witness is not proved to have at most one true atom.
     #[error("nothing shows that at most one of {atoms} holds, as the witness has it")]
     Exclusive {
         /// The atoms of the group.
@@ -97,21 +98,21 @@ pub enum Difference {
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum Cause {
-    /// The files or the task contain a construct that is not supported.
+    /// The PDDL files or the task contain an unsupported construct.
     #[error("the comparison of the task with the files does not cover {construct}")]
     Unsupported {
-        /// The construct.
+        /// Description of the construct.
         construct: String,
     },
-    /// A limit on the size is exceeded.
+    /// A limit on sizes is exceeded.
     #[error("the comparison of the task with the files ends at {limit} {what}")]
     TooMany {
-        /// The kind of the counted items.
+        /// Description of the counted items.
         what: String,
-        /// The limit.
+        /// The upper limit on their number.
         limit: usize,
     },
-    /// An instance is not proved to keep the atoms of a variable exclusive.
+    /// After an instance, it is not proved that at most one atom of a variable holds.
     #[error(
         "cannot tell whether the ground task stands for the files: it takes at most one of {atoms} to hold, and neither \
          {instance} nor the witness by itself shows that this stays so; no difference was found"
@@ -133,7 +134,7 @@ impl Cause {
     }
 }
 
-/// The reason for ending the check early.
+/// The reason for ending the check before all instances are compared.
 #[derive(Debug)]
 pub(super) enum Obstacle {
     Differs(Difference),

@@ -1,5 +1,5 @@
-//! The static context of the files: objects, initial state, static facts, and rules of derived
-//! predicates.
+//! The static context given by the PDDL files: objects, initial state, static facts, timed events,
+//! and rules of derived predicates.
 
 use num_rational::BigRational;
 use num_traits::Zero;
@@ -18,19 +18,19 @@ pub(super) struct World<'w> {
     types: TypeHierarchy,
     symbols: FxHashMap<Name, u32>,
     names: Vec<Name>,
-    /// Objects with their types; an object may be declared several times.
+    /// The objects with their types; an object may be declared with several types.
     objects: Vec<(u32, Vec<&'w TypeExpression>)>,
     by_name: FxHashMap<u32, usize>,
     facts: FxHashSet<Key>,
-    /// The facts of each predicate, and for each predicate, position and object the matching
-    /// rows.
+    /// The arguments of the initial facts of each predicate. For each predicate, argument position
+    /// and object, `rows_with` contains the indices of the matching rows.
     rows: FxHashMap<u32, Vec<Vec<u32>>>,
     rows_with: FxHashMap<(u32, usize, u32), Vec<usize>>,
     values: FxHashMap<Key, BigRational>,
-    /// Predicates and functions that an action changes.
+    /// The predicates and functions that an action or a timed event changes.
     changing: FxHashSet<u32>,
     pub(super) timeline: Timeline,
-    /// The rules of derived predicates.
+    /// For each derived predicate, its rules.
     rules: FxHashMap<u32, Vec<&'w Derived>>,
 }
 
@@ -150,7 +150,7 @@ impl<'w> World<'w> {
         Ok(())
     }
 
-    /// Applies the events at time 0 to the initial state.
+    /// Applies the events at time 0 to the initial state, and adds the initial phase and clock.
     fn begin(&mut self) {
         if self.timeline.is_empty() {
             return;
@@ -173,7 +173,8 @@ impl<'w> World<'w> {
         self.symbols.get(name).copied().ok_or_else(|| undeclared(name))
     }
 
-    /// The object that a term denotes.
+    /// Returns the object that a term denotes. Fails if a variable is unbound or a constant is
+    /// undeclared.
     pub(super) fn object(&self, term: &Term, binding: &FxHashMap<&Name, u32>) -> Result<u32, Cause> {
         self.bound(term, binding).ok_or_else(|| match term {
             Term::Variable(identifier) => Cause::unsupported(format!("{}, which is free", identifier.name)),
@@ -181,7 +182,8 @@ impl<'w> World<'w> {
         })
     }
 
-    /// The object that a term denotes, if it is bound.
+    /// Returns the object that a term denotes, or `None` if a variable is unbound or a constant is
+    /// undeclared.
     pub(super) fn bound(&self, term: &Term, binding: &FxHashMap<&Name, u32>) -> Option<u32> {
         match term {
             Term::Variable(identifier) => binding.get(&identifier.name).copied(),
@@ -194,7 +196,7 @@ impl<'w> World<'w> {
         Ok((self.symbol(&atom.predicate.name)?, objects.collect::<Result<_, _>>()?))
     }
 
-    /// The text of an atom or fluent, in lower case.
+    /// Formats an atom or fluent in PDDL syntax, in lower case.
     pub(super) fn show(&self, key: &Key) -> String {
         match (key.0, &key.1[..]) {
             (PHASE, [number]) => return format!("(the phase phase {number})"),
@@ -211,8 +213,8 @@ impl<'w> World<'w> {
         self.names.get(symbol as usize).map_or("?", Name::as_str)
     }
 
-    /// Parses the text of an atom or fluent, including those of the timeline. Returns `None` if a
-    /// symbol is unknown.
+    /// Parses an atom or fluent, including the phase, clock and `waited` of the timeline. Returns
+    /// `None` if a symbol is unknown.
     pub(super) fn written(&self, text: &str) -> Option<Key> {
         let phases = 0..=self.timeline.events.len();
         let timeline_keys = phases.map(timeline::phase).chain([timeline::waited(), timeline::clock()]);
@@ -228,12 +230,13 @@ impl<'w> World<'w> {
         Some((words.next()??, words.collect::<Option<_>>()?))
     }
 
-    /// Returns `true` if actions or events change a symbol. Derived predicates do not count.
+    /// Returns `true` if actions or timed events change a predicate or function. Returns `false`
+    /// for derived predicates.
     pub(super) fn changes(&self, symbol: u32) -> bool {
         self.changing.contains(&symbol)
     }
 
-    /// The rules of a derived predicate.
+    /// Returns the rules of a derived predicate, or `None` if the predicate is not derived.
     pub(super) fn rules(&self, symbol: u32) -> Option<&[&'w Derived]> {
         self.rules.get(&symbol).map(Vec::as_slice)
     }
@@ -273,7 +276,7 @@ impl<'w> World<'w> {
         objects.filter(|object| self.is_of(*object, wanted)).collect()
     }
 
-    /// Number of facts of [`World::rows`].
+    /// Returns the number of facts that [`World::rows`] returns.
     pub(super) fn count(&self, predicate: u32, place: Option<(usize, u32)>) -> usize {
         match place {
             None => self.rows.get(&predicate).map_or(0, Vec::len),
@@ -281,7 +284,8 @@ impl<'w> World<'w> {
         }
     }
 
-    /// The facts of a predicate, optionally with an object at a position.
+    /// Returns the arguments of the initial facts of a predicate. `place` optionally restricts the
+    /// argument at a position to an object.
     pub(super) fn rows(&self, predicate: u32, place: Option<(usize, u32)>) -> Vec<&Vec<u32>> {
         let Some(rows) = self.rows.get(&predicate) else { return Vec::new() };
         match place {

@@ -4,10 +4,10 @@ use num_rational::BigRational;
 
 use crate::number::{Number, enclosing};
 
-/// A number with guaranteed bounds.
+/// A computed value with a lower and an upper bound on the true value.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Quantity {
-    /// The best approximation of the value.
+    /// Approximation of the true value.
     pub value: f64,
     /// Lower bound on the true value.
     pub lower: f64,
@@ -20,14 +20,14 @@ pub struct Quantity {
 /// Required width of the bounds on a value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Precision {
-    /// Upper limit on the width, relative to the value.
+    /// Upper limit on the difference of the bounds, divided by the absolute value.
     Relative(f64),
-    /// Upper limit on the width.
+    /// Upper limit on the difference of the bounds.
     Absolute(f64),
 }
 
 impl Precision {
-    /// Returns `true` if the bounds on a value are narrow enough.
+    /// Returns `true` if the bounds of `quantity` satisfy this precision, or if its value is exact.
     pub fn holds(self, quantity: &Quantity) -> bool {
         let width = quantity.upper - quantity.lower;
         match self {
@@ -39,7 +39,7 @@ impl Precision {
     }
 }
 
-/// The value of a property.
+/// The value of a numeric property: a number, infinity, or undefined.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Answer {
     /// A number.
@@ -50,26 +50,28 @@ pub enum Answer {
     Undefined,
 }
 
-/// The answer to a property.
+/// The result of checking a property.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outcome {
-    /// A value.
+    /// The value of a numeric property.
     Value(Answer),
-    /// A truth value, with the compared value if the property has a single one.
+    /// The truth value of a Boolean property, with the value compared with its bound if there is a
+    /// single one.
     Truth(bool, Option<Answer>),
-    /// The enclosure of the value does not decide the comparison.
+    /// The bounds on the value enclose the threshold of the comparison, so the truth value is
+    /// unknown.
     Undecided(Answer),
     /// The least and the greatest value, over several initial states or by a filter.
     Range(Answer, Answer),
-    /// Some states with their values.
+    /// The states selected by a filter, with their values.
     States(Vec<Listed>),
-    /// The vertices of a Pareto front.
+    /// The vertices of a Pareto front, each with the values of both objectives.
     Front(Vec<[Answer; 2]>),
     /// The optimum of one objective under a bound on another.
     Constrained {
-        /// Over randomised policies.
+        /// The optimum over randomised policies.
         randomised: Answer,
-        /// Over deterministic policies.
+        /// The best value found over deterministic policies; undefined if no policy was found.
         deterministic: Answer,
         /// `true` if the deterministic value is proved optimal.
         proved: bool,
@@ -77,7 +79,7 @@ pub enum Outcome {
 }
 
 impl Outcome {
-    /// Returns `true` if the bounds on all values are narrow enough.
+    /// Returns `true` if the bounds on all values of this outcome satisfy `precision`.
     pub fn is_within(&self, precision: Precision) -> bool {
         let fits = |answer: &Answer| answer.quantity().is_none_or(|quantity| precision.holds(quantity));
         match self {
@@ -92,14 +94,14 @@ impl Outcome {
     }
 }
 
-/// A state with its value.
+/// A state selected by a filter, with its value.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Listed {
-    /// The values of the variables, in their order.
+    /// The values of the variables of the state, in the order of the variables in the model.
     pub values: Vec<i64>,
-    /// The truth value of a Boolean property.
+    /// The truth value in this state if the property is Boolean.
     pub truth: Option<bool>,
-    /// The value of a numeric property.
+    /// The value in this state if the property is numeric.
     pub answer: Option<Answer>,
 }
 
@@ -117,7 +119,7 @@ impl Answer {
         Self::Finite(Quantity { value, lower: lower.max(0.0), upper, exact: None })
     }
 
-    /// Creates an answer from a rounded number and its bounds.
+    /// Creates an answer from a rounded number and its lower and upper bound.
     pub fn between(value: f64, [lower, upper]: [f64; 2]) -> Self {
         Self::Finite(Quantity { value, lower, upper, exact: None })
     }
@@ -128,7 +130,7 @@ impl Answer {
         Self::Finite(Quantity { value: Number::to_f64(&exact), lower, upper, exact: Some(exact) })
     }
 
-    /// The complementary probability.
+    /// Returns the complementary probability (1 minus the value), with the bounds exchanged.
     #[must_use]
     pub fn complement(self) -> Self {
         match self {
@@ -158,7 +160,7 @@ impl Answer {
         }
     }
 
-    /// The number, if the answer is one.
+    /// Returns the number with its bounds, or `None` if the answer is infinite or undefined.
     pub fn quantity(&self) -> Option<&Quantity> {
         match self {
             Self::Finite(quantity) => Some(quantity),

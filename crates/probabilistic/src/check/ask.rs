@@ -1,13 +1,13 @@
-//! The result type of checks: an error, or an exceeded budget of exact arithmetic.
+//! The result type of checks, with the two reasons for stopping without a result.
 
 use crate::error::{Diagnostic, Error, Place};
 
 /// The reason for ending a computation without a result.
 #[derive(Debug)]
 pub enum Stop {
-    /// An error in the input, or an exceeded limit.
+    /// The input is invalid, or a limit is exceeded.
     Wrong(Error),
-    /// Exact arithmetic exceeds its budget.
+    /// Exact arithmetic exceeds its budget, so the caller continues in floating-point arithmetic.
     TooMuchWork,
 }
 
@@ -17,20 +17,20 @@ impl From<Error> for Stop {
     }
 }
 
-/// The result of a part of a check.
+/// The result of a step of a check; an error is the reason for stopping.
 pub type Checked<T> = Result<T, Stop>;
 
-/// Converts `None`, the result of exact arithmetic that exceeded its budget, to an error.
+/// Converts `None`, which reports an exceeded budget of exact arithmetic, to [`Stop::TooMuchWork`].
 pub fn within_budget<T>(result: Option<T>) -> Checked<T> {
     result.ok_or(Stop::TooMuchWork)
 }
 
-/// An error in a property.
+/// Creates an error with a code and a text at a place in a property.
 pub fn property_error(code: &'static str, place: Place, text: &str) -> Error {
     Error::Property(Diagnostic::new(code, place, text).into())
 }
 
-/// An error in a property at an unknown place.
+/// Creates an error in a property, placed at line 1, column 1 because the real place is unknown.
 pub fn refusal(code: &'static str, text: &str) -> Stop {
     Stop::Wrong(property_error(code, Place { line: 1, column: 1 }, text))
 }

@@ -1,9 +1,11 @@
-//! Cost-bounded reachability probabilities.
+//! Probabilities of reaching a goal while an accumulated reward stays within a bound.
 //!
-//! Rewards are integers. For each budget from 0 on, choices without reward stay within the
-//! budget, and choices with a reward lead to values of a smaller budget, which are already known
-//! (Hartmanns, Junges, Katoen and Quatmann, "Multi-Cost Bounded Reachability in MDP", TACAS
-//! 2018).
+//! All rewards are nonnegative integers. The equations are solved for each budget (remaining
+//! reward) from 0 to the bound. Choices without reward keep the budget. Choices with a reward lead
+//! to values of a smaller budget, which are already computed.
+//!
+//! Reference: Hartmanns, Junges, Katoen and Quatmann, "Multi-Cost Bounded Reachability in MDP",
+//! TACAS 2018.
 
 use fixedbitset::FixedBitSet;
 use num_traits::{Signed, ToPrimitive};
@@ -18,12 +20,14 @@ use crate::number::{Number, count};
 use crate::prism::ast::Steps;
 use crate::solve::{Direction, Problem, Work, solve_within};
 
-/// Upper limit on the budget.
+/// Upper limit (exclusive) on the bound of an accumulated reward.
 const MAX_BUDGET: usize = 100_000;
 
 impl<N: Number> Query<'_, N> {
-    /// The probabilities of reaching the terminal states of a problem while a reward stays within
-    /// a bound.
+    /// Computes for each state the probability of reaching a terminal state of `problem` while the
+    /// reward structure `name` accumulates at most the bound in `steps`.
+    ///
+    /// Only upper bounds are supported, and no given policy.
     pub fn until_within_reward(
         &self,
         problem: Problem<'_, N>,
@@ -53,13 +57,14 @@ impl<N: Number> Query<'_, N> {
         let layers = Layers::new(self.mdp(), problem, &earned)?;
         let n = self.mdp().states();
         let greatest = earned.iter().max().copied().unwrap_or(0);
-        // The values of the last budgets, as far back as a choice can refer.
+        // The values for the last `greatest` budgets: a choice refers to at most this many budgets
+        // back.
         let mut previous: Vec<Vec<N>> = Vec::new();
         let mut vector = Vector::exactly(vec![N::zero(); n], Span::Probability);
         let mut error = 0.0_f64;
         let sweep = Sweep::new(&layers, problem, &earned);
         for budget in 0..=budgets {
-            // The oldest vector is reused: no choice refers to its budget.
+            // The oldest vector is reused because no choice refers to its budget anymore.
             let mut values = if previous.len() > greatest { previous.remove(0) } else { vec![N::zero(); n] };
             if let Some(sweep) = &sweep {
                 within_budget(sweep.layer(&mut values, &previous, budget, &mut self.work.borrow_mut()))?;
@@ -103,7 +108,8 @@ impl<N: Number> Query<'_, N> {
     }
 }
 
-/// Converts rewards to integers, or returns an error.
+/// Converts rewards to nonnegative integers. Returns an error if a reward is fractional or
+/// negative.
 fn whole_rewards<N: Number>(rewards: &[N]) -> Checked<Vec<usize>> {
     let whole = |reward: &N| {
         let value = reward.to_f64();
@@ -115,28 +121,30 @@ fn whole_rewards<N: Number>(rewards: &[N]) -> Checked<Vec<usize>> {
         .ok_or_else(|| refusal("Q403", "a bound on a reward is handled where all rewards are whole numbers"))
 }
 
-/// The process of one budget, in which choices with a reward end.
+/// The process for a single budget: each choice with a reward leads to a terminal state of its own.
 struct Layers<N> {
     mdp: Mdp<N>,
-    /// The choices with a reward; each leads to an additional state.
+    /// The choices with a reward. The choice at index `i` leads to the additional state `n + i`,
+    /// where `n` is the number of original states.
     paid: Vec<usize>,
     ends: FixedBitSet,
     blocked: FixedBitSet,
 }
 
-/// The equations of a budget if choices without reward form no cycle: a topological order of the
-/// states.
+/// Computes the values of a budget in one backward pass. This requires that choices without reward
+/// form no cycle; the states are then ordered topologically.
 struct Sweep<'a, N> {
     problem: Problem<'a, N>,
     earned: &'a [usize],
-    /// The nonterminal states, successors without reward first.
+    /// The nonterminal states in topological order: successors by choices without reward come
+    /// first.
     order: Vec<u32>,
-    /// Upper limit on the rounding error of one budget.
+    /// Upper limit on the rounding error that a single budget adds.
     error: f64,
 }
 
 impl<'a, N: Number> Sweep<'a, N> {
-    /// Returns `None` if choices without reward form a cycle.
+    /// Returns `None` if choices without reward form a cycle (other than pure self-loops).
     fn new(layers: &Layers<N>, problem: Problem<'a, N>, earned: &'a [usize]) -> Option<Self> {
         let mdp = problem.mdp;
         let n = mdp.states();
@@ -154,7 +162,8 @@ impl<'a, N: Number> Sweep<'a, N> {
             for choice in problem.choices(state as usize) {
                 let targets = mdp.targets(choice);
                 widest = widest.max(targets.len());
-                // The value of such a choice would depend on itself.
+                // With a choice without reward to itself and other states, the value would depend
+                // on itself.
                 if earned[choice] == 0
                     && targets.contains(&state)
                     && targets.iter().any(|target| *target != state)
@@ -177,8 +186,8 @@ impl<'a, N: Number> Sweep<'a, N> {
         Some(Self { problem, earned, order, error })
     }
 
-    /// Computes the values of a budget from those of smaller budgets. Returns `None` if exact
-    /// arithmetic exceeds its budget.
+    /// Computes the values for `budget` in place from the values for smaller budgets in `previous`.
+    /// Returns `None` if exact arithmetic exceeds its budget of work.
     fn layer(&self, values: &mut [N], previous: &[Vec<N>], budget: usize, work: &mut Work) -> Option<()> {
         let mdp = self.problem.mdp;
         for (state, value) in values.iter_mut().enumerate() {

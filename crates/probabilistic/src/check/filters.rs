@@ -1,4 +1,4 @@
-//! Evaluates filters, which aggregate the values of several states.
+//! Evaluates filters, which aggregate the values of a property over a set of states.
 
 use fixedbitset::FixedBitSet;
 use num_bigint::BigInt;
@@ -11,7 +11,7 @@ use crate::check::vector::Vector;
 use crate::number::{Number, count};
 use crate::prism::ast::{Expr, Filter, Type};
 
-/// Result of a filter.
+/// The result of a filter.
 #[derive(Debug, Clone)]
 pub enum Filtered {
     /// A number.
@@ -24,14 +24,15 @@ pub enum Filtered {
     States(Vec<Listed>),
 }
 
-/// The filtered values.
+/// The values of the filtered property in all states.
 enum Values<N> {
     Numbers(Vector<N>),
     Truth(FixedBitSet),
 }
 
 impl<N: Number> Query<'_, N> {
-    /// Evaluates a filter.
+    /// Evaluates `filter` for the property `inner` over the states that satisfy `states`, or over
+    /// all states if `states` is `None`.
     pub fn filtered(&self, filter: Filter, inner: &Expr, states: Option<&Expr>) -> Checked<Filtered> {
         let chosen = states.map_or_else(|| Ok(self.every()), |states| self.truth(states))?;
         let values = match self.kind_of(inner)? {
@@ -99,7 +100,7 @@ impl<N: Number> Query<'_, N> {
         })
     }
 
-    /// The values of the variables of a state.
+    /// Returns the values of the model's variables in `state`.
     fn values_of(&self, state: usize) -> Vec<i64> {
         let mut values = Vec::new();
         self.program.unpack(&self.explored.states[state], &mut values);
@@ -131,8 +132,8 @@ fn only(chosen: &FixedBitSet) -> Checked<usize> {
     }
 }
 
-/// The least or greatest value over a set of states. Its bounds enclose the true extreme,
-/// whichever state attains it.
+/// Returns the least value over the states in `chosen`, or the greatest if `greatest`. The bounds
+/// enclose the true extreme even if the bounds of several states overlap.
 pub fn extreme<N: Number>(vector: &Vector<N>, chosen: &FixedBitSet, greatest: bool) -> Answer {
     let mut best: Option<Quantity> = None;
     for state in chosen.ones() {
@@ -160,7 +161,7 @@ pub fn extreme<N: Number>(vector: &Vector<N>, chosen: &FixedBitSet, greatest: bo
     best.map_or(Answer::Infinite, Answer::Finite)
 }
 
-/// Returns `true` if a value can be the extreme one according to the bounds.
+/// Returns `true` if the bounds on `answer` permit that it equals the extreme value `best`.
 fn can_be(answer: &Answer, best: &Answer) -> bool {
     match (answer, best) {
         (Answer::Finite(a), Answer::Finite(b)) => match (&a.exact, &b.exact) {

@@ -1,8 +1,8 @@
 //! Infinite-horizon properties: Büchi objectives, total rewards, and long-run averages.
 //!
-//! With probability 1 a path eventually stays in an end component (de Alfaro, "Formal
-//! Verification of Probabilistic Systems", 1997), and a policy can visit all states of an end
-//! component infinitely often.
+//! With probability 1 a path eventually stays in an end component (de Alfaro, "Formal Verification
+//! of Probabilistic Systems", 1997). In an end component a policy can visit all states infinitely
+//! often.
 
 use fixedbitset::FixedBitSet;
 
@@ -18,11 +18,11 @@ use crate::solve::{Direction, NONE, Problem, solve_within};
 
 /// The maximal end components of a process.
 struct Ends {
-    /// For each state the number of its end component, or [`NONE`].
+    /// For each state the index of its end component, or [`NONE`] outside all end components.
     block: Vec<u32>,
     /// Number of end components.
     count: usize,
-    /// The choices that stay in their end component.
+    /// The choices whose targets all lie in the end component of their state.
     alive: FixedBitSet,
 }
 
@@ -34,7 +34,8 @@ impl<N: Number> Query<'_, N> {
         }
     }
 
-    /// The probabilities of visiting some states infinitely often.
+    /// Computes for each state the optimal probability of visiting a state of `goal` infinitely
+    /// often.
     pub fn repeatedly(&self, direction: Direction, goal: &FixedBitSet) -> Checked<Valued<N>> {
         self.no_given_policy()?;
         let mut good = FixedBitSet::with_capacity(self.mdp().states());
@@ -50,7 +51,8 @@ impl<N: Number> Query<'_, N> {
                 }
                 self.solved(self.problem(Direction::Max, None, &good)).map(without_policy)
             }
-            // The complement: the probability of eventually avoiding the goal forever.
+            // The minimum is the complement of the greatest probability of eventually avoiding the
+            // goal forever.
             Direction::Min => {
                 let ends = end_components(self.mdp(), &inverse(goal.clone()));
                 for (state, block) in ends.block.iter().enumerate() {
@@ -62,11 +64,12 @@ impl<N: Number> Query<'_, N> {
         }
     }
 
-    /// Expected total rewards.
+    /// Computes for each state the optimal expected total reward over an infinite path.
     pub fn total(&self, direction: Direction, rewards: &[N]) -> Checked<Valued<N>> {
         self.no_given_policy()?;
         if direction == Direction::Min || self.program.kind == ModelKind::Dtmc {
-            // A total is finite only if rewards are eventually 0 forever.
+            // A total is finite only if rewards are eventually 0 forever. The goal is to reach the
+            // states from which a policy can achieve this.
             let free = self.free_forever(rewards);
             return self.solved(self.problem(Direction::Min, Some(rewards), &free)).map(without_policy);
         }
@@ -77,7 +80,7 @@ impl<N: Number> Query<'_, N> {
             let pays = mdp.choices(state).any(|c| ends.alive.contains(c) && !rewards[c].is_zero());
             infinite.set(state, pays);
         }
-        // A state that can reach an infinite value has one itself.
+        // A state that can reach a state of infinite value has an infinite value, too.
         reach_back(mdp, &mut infinite);
         let merged = EcQuotient::new(mdp, &ends, rewards, &infinite)?;
         let problem = Problem::new(&merged.mdp, Direction::Max, Some(&merged.rewards), &merged.end);
@@ -94,7 +97,8 @@ impl<N: Number> Query<'_, N> {
         Ok(Vector { values, errors, infinite, span: Span::Positive }.into())
     }
 
-    /// The states from which a policy can avoid all rewards forever (a greatest fixpoint).
+    /// Returns the states from which a policy can avoid all nonzero rewards forever (a greatest
+    /// fixpoint).
     fn free_forever(&self, rewards: &[N]) -> FixedBitSet {
         let mdp = self.mdp();
         let mut free = self.every();
@@ -115,11 +119,12 @@ impl<N: Number> Query<'_, N> {
         }
     }
 
-    /// The long-run average reward per step of a Markov chain.
+    /// Computes for each state of a Markov chain the long-run average reward per step.
     ///
-    /// One state is chosen in each bottom component. The average is the quotient of the expected
-    /// reward and the expected number of steps between two visits of that state (renewal
-    /// theorem). The probability of each component is a reachability probability.
+    /// In each bottom strongly connected component, one state is chosen. The average in a component
+    /// is the expected reward between two visits of the chosen state, divided by the expected
+    /// number of steps between these visits (renewal theorem). A state's value is the average of
+    /// the components, weighted by the probability of reaching each one.
     pub fn long_run(&self, rewards: &[N]) -> Checked<Valued<N>> {
         self.no_given_policy()?;
         let mdp = self.mdp();
@@ -171,7 +176,7 @@ fn without_policy<N>(values: Valued<N>) -> Valued<N> {
     Valued { policy: None, ..values }
 }
 
-/// Extends a set by all states that can reach it.
+/// Extends `set` by all states from which a state of `set` is reachable.
 fn reach_back<N: Number>(mdp: &Mdp<N>, set: &mut FixedBitSet) {
     loop {
         let reaches =
@@ -184,8 +189,8 @@ fn reach_back<N: Number>(mdp: &Mdp<N>, set: &mut FixedBitSet) {
     }
 }
 
-/// The maximal end components within some states, by repeated decomposition into strongly
-/// connected components.
+/// Computes the maximal end components within the states `inside`, by repeated decomposition into
+/// strongly connected components.
 fn end_components<N: Number>(mdp: &Mdp<N>, inside: &FixedBitSet) -> Ends {
     let n = mdp.states();
     let within = |choice: usize| mdp.targets(choice).iter().all(|target| inside.contains(*target as usize));
@@ -238,19 +243,20 @@ fn end_components<N: Number>(mdp: &Mdp<N>, inside: &FixedBitSet) -> Ends {
     Ends { block, count, alive }
 }
 
-/// The end-component quotient: each end component becomes one state with an additional choice to
-/// stop.
+/// The end-component quotient of an MDP, without the states of infinite value. Each end component
+/// becomes one state with an additional choice to stop.
 struct EcQuotient<N> {
     mdp: Mdp<N>,
     rewards: Vec<N>,
-    /// For each state of the other process its number here.
+    /// For each original state its index in the quotient, or [`NONE`] for a state of infinite
+    /// value.
     place: Vec<u32>,
-    /// The state in which the process stops.
+    /// The singleton set of the state in which the process stops.
     end: FixedBitSet,
 }
 
 impl<N: Number> EcQuotient<N> {
-    /// Computes the quotient without the states of infinite value.
+    /// Computes the quotient, omitting the states in `infinite`.
     fn new(mdp: &Mdp<N>, ends: &Ends, rewards: &[N], infinite: &FixedBitSet) -> Checked<Self> {
         let mut place = vec![NONE; mdp.states()];
         let mut members: Vec<Vec<usize>> = Vec::new();

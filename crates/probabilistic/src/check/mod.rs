@@ -1,4 +1,5 @@
-//! Checks a property of a model. Small models are explored in exact rationals, others in doubles.
+//! Checks properties of a model. Small models are solved in exact rationals, larger ones in doubles
+//! with guaranteed bounds.
 
 mod answer;
 mod ask;
@@ -38,40 +39,42 @@ pub use answer::{Answer, Listed, Outcome, Precision, Quantity};
 pub use options::{Exactness, Options};
 pub use table::{PolicyTable, Row};
 
-/// Upper limit on the transitions of a model that is explored in rationals by default.
+/// Upper limit on the number of transitions up to which a model is explored in rationals by
+/// default.
 const MAX_EXACT_TRANSITIONS: usize = 150_000;
 
-/// The default budget of exact arithmetic for a model, in work units of about 1 ns.
+/// Returns the default budget of exact arithmetic for a model with this number of transitions, in
+/// work units of about 1 ns.
 fn budget(transitions: usize) -> u64 {
     let transitions = u64::try_from(transitions).unwrap_or(u64::MAX);
     transitions.saturating_mul(500).max(3_000_000)
 }
 
-/// The answer to a property, with statistics.
+/// The result of checking a property, with statistics.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Report {
-    /// The answer.
+    /// The result of the property.
     pub outcome: Outcome,
-    /// The variables: name, and `true` for a Boolean variable.
+    /// The variables of the model: each with its name, and `true` for a Boolean variable.
     pub variables: Vec<(String, bool)>,
-    /// Number of states.
+    /// Number of reachable states.
     pub states: usize,
-    /// Number of choices in all states.
+    /// Number of choices, summed over all states.
     pub choices: usize,
     /// Number of transitions.
     pub transitions: usize,
-    /// Number of states without a choice, which got a self-loop.
+    /// Number of states without an enabled choice; each of them got a self-loop.
     pub deadlocks: usize,
-    /// The policy, if it was requested and exists.
+    /// The policy that attains the result, if it was requested and exists.
     pub policy: Option<PolicyTable>,
-    /// Exploration time.
+    /// Time for exploring the model.
     pub build: Duration,
-    /// Solution time.
+    /// Time for solving the property.
     pub solve: Duration,
 }
 
-/// Checks a property.
+/// Checks a property of a model.
 ///
 /// ```
 /// use metaplan_probabilistic::check::{Answer, Options, Outcome, check};
@@ -93,11 +96,11 @@ pub fn check(model: &Model, property: &Property, options: &Options<'_>) -> Resul
     reports.into_iter().next().unwrap_or_else(|| Err(Error::Property(Vec::new().into())))
 }
 
-/// Checks several properties of a model, which is explored once.
+/// Checks several properties of a model. The model is explored only once.
 ///
 /// # Errors
 /// An error in the model, the constants or the policy, or an exceeded limit. An error in a single
-/// property is returned in the place of its report.
+/// property is returned instead of the report for that property.
 pub fn check_all<'p>(
     model: &Model,
     properties: impl IntoIterator<Item = &'p Property>,
@@ -124,7 +127,8 @@ pub fn check_all<'p>(
     }
     required.sort_unstable();
     required.dedup();
-    // Several properties may need states beyond the end of a single one.
+    // With several properties, one property may need states beyond the point where another is
+    // decided.
     let end = match &properties[..] {
         [Ok(only)] => end_of(only, &program.names, options),
         _ => None,
@@ -154,14 +158,14 @@ pub fn check_all<'p>(
     Ok(reports)
 }
 
-/// A condition after which a property is decided, so that exploration can stop there. Returns
-/// `None` if the decision depends on more than the state, or if a policy is requested or given,
-/// which continues after it.
+/// Returns a state condition at which the property is decided, so that exploration can stop there.
+/// Returns `None` if a state does not decide the property, or if a policy is requested or given,
+/// because a policy continues after such a state.
 fn end_of(property: &Property, names: &Names, options: &Options<'_>) -> Option<Expr> {
     if options.policy || options.evaluate.is_some() || options.secondary.is_some() {
         return None;
     }
-    // Before a lower step bound, reaching the goal does not decide the property.
+    // Before a lower bound on the number of steps, reaching the goal does not decide the property.
     let lasts = |steps: &Option<Box<Steps>>| steps.as_ref().is_none_or(|steps| steps.least.is_none());
     let not = |inner: &Expr| Expr { kind: ExprKind::Not(Box::new(inner.clone())), place: inner.place };
     let end = match property {
@@ -183,7 +187,8 @@ fn join(model: &Model, declarations: &Declarations) -> Model {
     joined
 }
 
-/// Attributes an error to the model or, if the model alone is correct, to the declarations.
+/// Attributes an error in `joined` to the model if `model` alone is invalid, otherwise to the
+/// declarations of the property file.
 fn blame(error: Error, model: &Model, joined: &Model, settings: &Settings) -> Error {
     let Error::Model(problems) = error else { return error };
     let declared = joined.constants.len() > model.constants.len() || joined.labels.len() > model.labels.len();
@@ -202,7 +207,7 @@ fn blame(error: Error, model: &Model, joined: &Model, settings: &Settings) -> Er
     }
 }
 
-/// An explored model, in exact arithmetic, in doubles, or both.
+/// A model explored in exact arithmetic, in doubles, or in both.
 struct Processes {
     exact: Option<Explored<Packed, Fraction>>,
     doubles: Option<Explored<Packed, f64>>,
@@ -211,8 +216,8 @@ struct Processes {
 }
 
 impl Processes {
-    /// Explores in rationals while the model is small, and continues in doubles unless exact
-    /// values are requested.
+    /// Explores in rationals up to [`MAX_EXACT_TRANSITIONS`] transitions and continues in doubles
+    /// if the model is larger. With [`Exactness::Always`], only rationals are used.
     fn explore(
         program: &Program<f64>,
         exact: Option<&Program<Fraction>>,
@@ -251,8 +256,8 @@ impl Processes {
         Ok(Self { exact: None, doubles: Some(doubles), budget: 0 })
     }
 
-    /// Frees the state index, which only policy evaluation needs, so that the solver has more
-    /// memory.
+    /// Frees the index from states to state numbers, which only the evaluation of a given policy
+    /// needs. The solver can then use this memory.
     fn forget_numbers(&mut self) {
         self.exact.iter_mut().for_each(|explored| explored.states.forget_numbers());
         self.doubles.iter_mut().for_each(|explored| explored.states.forget_numbers());
@@ -320,8 +325,8 @@ fn report<N: Number>(
     }
 }
 
-/// The numbers of the reward structures that a property and the tie-breaking of its policy
-/// require.
+/// Returns the indices of the reward structures that the property and the tie-breaking of its
+/// policy require.
 fn required_rewards(
     names: &[String],
     property: &Property,
@@ -351,7 +356,8 @@ fn required_rewards(
     Ok(required)
 }
 
-/// The decisions of a policy in each state that it can reach.
+/// Lists the choice of a policy in each state that is reachable from the initial state under the
+/// policy.
 fn policy_table<N: Number>(
     program: &Program<N>,
     explored: &Explored<Packed, N>,

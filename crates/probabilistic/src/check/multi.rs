@@ -10,13 +10,14 @@ use crate::prism::ast::{BinaryOp, Expr, ExprKind, Path, Property, RewardPath};
 use crate::solve::Direction;
 
 impl<N: Number> Query<'_, N> {
-    /// Returns the Pareto front, or the optimum of one objective under a bound on the other.
+    /// Computes the Pareto front of two objectives, or the optimum of the unbounded objective if
+    /// the other has a bound.
     pub fn multi(&self, parts: &[Property]) -> Checked<Outcome> {
         let place = Place { line: 1, column: 1 };
         let [first, second] = parts else {
             return Err(property_error("Q403", place, "`multi` is handled with two objectives").into());
         };
-        // A bounded objective becomes the second one.
+        // If one objective has a bound, it is placed second.
         let (first, second, swapped) =
             if bound_of(first).is_some() { (second, first, true) } else { (first, second, false) };
         if bound_of(first).is_some() {
@@ -114,7 +115,7 @@ fn constrained<N: Number>(
     }
 }
 
-/// Returns `true` if a reward property accumulates until a set of states is reached.
+/// Returns `true` if the reward is accumulated until a set of states is reached (`F`).
 fn reaches(path: &RewardPath) -> bool {
     matches!(path, RewardPath::Reach(_))
 }

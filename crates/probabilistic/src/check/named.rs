@@ -7,13 +7,13 @@ use crate::error::{Diagnostic, Error, Place};
 use crate::prism::ast::{Expr, ExprKind, Model, Path, Property, RewardPath};
 use crate::property::Declarations;
 
-/// Upper limit on the number of replaced references in a property.
+/// Upper limit on the number of references replaced in one property.
 const MAX_REFERENCES: usize = 1000;
 
-/// Returns a property without references to named properties.
+/// Returns the property with each reference to a named property replaced by its definition.
 ///
 /// # Errors
-/// A circular reference, or too many references.
+/// A circular reference, or more than [`MAX_REFERENCES`] references.
 pub fn expand_references<'p>(
     property: &'p Property,
     model: &Model,
@@ -31,7 +31,7 @@ pub fn expand_references<'p>(
 struct Expansion<'a> {
     model: &'a Model,
     declarations: &'a Declarations,
-    /// The names that are being expanded, outermost first.
+    /// The names of the properties whose definitions are being expanded, outermost first.
     within: Vec<String>,
     /// Number of expanded references.
     expanded_count: usize,
@@ -93,7 +93,8 @@ impl Expansion<'_> {
         })
     }
 
-    /// The definition of a named property; `None` if the name is a label.
+    /// Returns the expanded definition of a named property. Returns `None` if the name is a label
+    /// or unknown, or if an error was recorded.
     fn named(&mut self, name: &str, place: Place) -> Option<ExprKind> {
         let is_label = BUILT_IN.contains(&name) || self.model.labels.iter().any(|label| label.name == name);
         if is_label || self.problem.is_some() {

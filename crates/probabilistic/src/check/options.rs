@@ -6,15 +6,15 @@ use crate::explore::Bounds;
 use crate::prism::Settings;
 use crate::property::Declarations;
 
-/// Choice of exact or floating-point arithmetic.
+/// Choice between exact and floating-point arithmetic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Exactness {
-    /// Exact while that is cheap; guaranteed bounds otherwise.
+    /// Exact arithmetic within a budget; beyond the budget, doubles with guaranteed bounds.
     #[default]
     Auto,
-    /// Always exact.
+    /// Exact arithmetic without a budget.
     Always,
-    /// Never exact.
+    /// Doubles with guaranteed bounds only.
     Never,
 }
 
@@ -22,22 +22,24 @@ pub enum Exactness {
 #[derive(Clone, Default)]
 #[non_exhaustive]
 pub struct Options<'a> {
-    /// Values of constants.
+    /// Values of the constants that the model leaves undefined, by name.
     pub settings: Settings,
-    /// Limits of exploration.
+    /// Limits of the exploration, such as the number of states.
     pub bounds: Bounds<'a>,
     /// Choice of arithmetic.
     pub exactness: Exactness,
-    /// The reward that breaks ties between policies; the number of steps if `None`.
+    /// Name of the reward structure that breaks ties between optimal policies; `None` breaks ties
+    /// by the number of steps.
     pub secondary: Option<String>,
-    /// `true` if a policy is requested.
+    /// Whether the policy is reported, too.
     pub policy: bool,
-    /// A policy to evaluate instead of an optimal one.
+    /// A given policy to evaluate; if `None`, an optimal policy is computed.
     pub evaluate: Option<PolicyTable>,
-    /// Required width of bounds. If the bounds in doubles are wider, the model is solved in
-    /// rationals unless that was excluded.
+    /// Required width of the bounds on values. If the bounds computed in doubles are wider, the
+    /// model is solved again in rationals, unless `exactness` is [`Exactness::Never`].
     pub precision: Option<Precision>,
-    /// Constants and labels in addition to those of the model.
+    /// Constants, labels and named properties of a property file, in addition to those of the
+    /// model.
     pub declarations: Declarations,
 }
 
@@ -48,43 +50,44 @@ impl<'a> Options<'a> {
         Self { settings, ..self }
     }
 
-    /// Sets the limits of exploration.
+    /// Sets the limits of the exploration.
     #[must_use]
     pub fn with_bounds(self, bounds: Bounds<'a>) -> Self {
         Self { bounds, ..self }
     }
 
-    /// Sets the choice of arithmetic.
+    /// Sets the choice between exact and floating-point arithmetic.
     #[must_use]
     pub fn with_exactness(self, exactness: Exactness) -> Self {
         Self { exactness, ..self }
     }
 
-    /// Sets the reward that breaks ties between policies; `None` for the number of steps.
+    /// Sets the reward structure that breaks ties between optimal policies; `None` selects the
+    /// number of steps.
     #[must_use]
     pub fn with_secondary(self, reward: impl Into<Option<String>>) -> Self {
         Self { secondary: reward.into(), ..self }
     }
 
-    /// Requests a policy.
+    /// Sets whether the policy is reported, too.
     #[must_use]
     pub fn with_policy(self, policy: bool) -> Self {
         Self { policy, ..self }
     }
 
-    /// Sets a policy to evaluate; `None` for an optimal one.
+    /// Sets a given policy to evaluate; with `None`, an optimal policy is computed.
     #[must_use]
     pub fn with_evaluation(self, policy: impl Into<Option<PolicyTable>>) -> Self {
         Self { evaluate: policy.into(), ..self }
     }
 
-    /// Sets the required width of bounds; `None` for no requirement.
+    /// Sets the required width of the bounds on values; `None` for no requirement.
     #[must_use]
     pub fn with_precision(self, precision: impl Into<Option<Precision>>) -> Self {
         Self { precision: precision.into(), ..self }
     }
 
-    /// Sets the constants and labels in addition to those of the model.
+    /// Sets the constants, labels and named properties of a property file.
     #[must_use]
     pub fn with_declarations(self, declarations: Declarations) -> Self {
         Self { declarations, ..self }

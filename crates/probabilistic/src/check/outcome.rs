@@ -1,4 +1,5 @@
-//! Evaluates a property on an explored model, in one kind of number.
+//! Evaluates a property on an explored model. The code is generic in the number type: exact
+//! rationals or doubles.
 
 use fixedbitset::FixedBitSet;
 use num_rational::BigRational;
@@ -15,7 +16,7 @@ use crate::number::Number;
 use crate::prism::ast::{BinaryOp, Filter, ModelKind, Property, Question, Type};
 use crate::solve::Direction;
 
-/// An outcome and a policy that attains it.
+/// An outcome, and for each state the choice of a policy that attains it, if a policy exists.
 pub type Attained = (Outcome, Option<Vec<u32>>);
 
 impl<N: Number> Query<'_, N> {
@@ -60,7 +61,7 @@ impl<N: Number> Query<'_, N> {
         }
     }
 
-    /// The values of an operator in all states.
+    /// Computes the value of a `P`, `R` or `S` operator in all states.
     fn valued(&self, property: &Property) -> Checked<Valued<N>> {
         match property {
             Property::Probability(question, path) => self.path(self.direction(question)?, path),
@@ -83,7 +84,7 @@ impl<N: Number> Query<'_, N> {
         }
     }
 
-    /// The values of a nested property.
+    /// Computes the value of a nested numeric property in all states.
     pub fn property_numbers(&self, property: &Property) -> Checked<Vector<N>> {
         match property {
             Property::Expression(inner) => self.numbers(inner),
@@ -113,7 +114,7 @@ impl<N: Number> Query<'_, N> {
         vector
     }
 
-    /// The states in which a nested property holds.
+    /// Returns the states in which a nested Boolean property holds.
     pub fn property_truth(&self, property: &Property) -> Checked<FixedBitSet> {
         let n = self.mdp().states();
         match property {
@@ -147,7 +148,8 @@ impl<N: Number> Query<'_, N> {
         }
     }
 
-    /// The optimisation direction: as requested, or the worst case of a bound over all policies.
+    /// Returns the optimisation direction: the requested one, or for a bound the direction of the
+    /// worst case, since the bound must hold for all policies.
     fn direction(&self, question: &Question) -> Checked<Direction> {
         match (question.direction, &question.bound) {
             (Some(direction), _) => Ok(direction),
@@ -180,7 +182,8 @@ impl<N: Number> Query<'_, N> {
         })
     }
 
-    /// The value in the initial state, or the range of values over several initial states.
+    /// Returns the value in the initial state, or the least and greatest value if there are several
+    /// initial states.
     fn of_starts(&self, vector: &Vector<N>) -> Outcome {
         if self.explored.starts == 1 {
             return Outcome::Value(vector.answer(0));
@@ -192,8 +195,8 @@ impl<N: Number> Query<'_, N> {
     }
 }
 
-/// Returns whether the value of a state satisfies a bound; `None` if its enclosure does not
-/// decide.
+/// Returns `Some(true)` if the value of `state` satisfies the comparison with `bound`,
+/// `Some(false)` if not, and `None` if the bounds on the value do not decide.
 fn holds<N: Number>(vector: &Vector<N>, state: usize, op: BinaryOp, bound: &BigRational) -> Option<bool> {
     match vector.ends(state) {
         None => Some(compare(op, std::cmp::Ordering::Greater)),

@@ -1,4 +1,4 @@
-//! Computes the values of path formulas and of rewards in all states.
+//! Computes the values of path formulas and of reward formulas in all states.
 
 use fixedbitset::FixedBitSet;
 use num_traits::ToPrimitive;
@@ -12,10 +12,10 @@ use crate::policy::with_secondary;
 use crate::prism::ast::{ModelKind, Path, RewardPath, StepBound, Steps};
 use crate::solve::{Direction, Problem, Solution, draft, solve_within};
 
-/// Upper limit on step bounds.
+/// Upper limit (exclusive) on the bound of a step-bounded operator.
 const MAX_STEPS: u32 = 1_000_000_000;
 
-/// Values, and a policy that attains them if a memoryless one exists.
+/// Values in all states, with a policy that attains them, if a memoryless policy does.
 #[derive(Debug)]
 pub struct Valued<N> {
     pub vector: Vector<N>,
@@ -28,7 +28,7 @@ impl<N> From<Vector<N>> for Valued<N> {
     }
 }
 
-/// A step interval; `most` is `None` without an upper bound.
+/// The bounds on the number of steps, inclusive; `most` is `None` without an upper bound.
 #[derive(Debug, Clone, Copy)]
 pub struct Range {
     pub least: u32,
@@ -40,7 +40,7 @@ pub fn opposite(direction: Direction) -> Direction {
 }
 
 impl<N: Number> Query<'_, N> {
-    /// The minimal or maximal probabilities of a path formula.
+    /// Computes for each state the minimal or maximal probability of a path formula.
     pub fn path(&self, direction: Direction, path: &Path) -> Checked<Valued<N>> {
         let n = self.mdp().states();
         match path {
@@ -57,12 +57,13 @@ impl<N: Number> Query<'_, N> {
             }
             Path::Globally(goal, steps) => {
                 let every_state = self.every();
-                // The complement: a bad state is reached.
+                // The complement of "always `goal`": a state outside `goal` is reached.
                 let bad = inverse(self.truth(goal)?);
                 Ok(complement(self.until(opposite(direction), &every_state, &bad, steps.as_deref())?))
             }
             Path::WeakUntil(left, right, steps) => {
-                // The complement: `left` without `right` holds until neither of them holds.
+                // The complement: a state in which neither formula holds is reached through states
+                // with `left` but without `right`.
                 let (left, right) = (self.truth(left)?, inverse(self.truth(right)?));
                 let (mut keep, mut bad) = (left.clone(), inverse(left));
                 keep.intersect_with(&right);
@@ -83,7 +84,8 @@ impl<N: Number> Query<'_, N> {
         }
     }
 
-    /// The probabilities of reaching `right` through states of `left`, within the step bounds.
+    /// Computes for each state the probability of reaching `right` through states of `left`, within
+    /// the bounds on steps or on an accumulated reward.
     fn until(
         &self,
         direction: Direction,
@@ -111,7 +113,7 @@ impl<N: Number> Query<'_, N> {
         if least == 0 {
             return Ok(then.into());
         }
-        // Before the lower step bound, `left` must hold, regardless of `right`.
+        // Until the lower bound on the number of steps, `left` must hold, regardless of `right`.
         let (no_states, outside) = (FixedBitSet::with_capacity(left.len()), inverse(left.clone()));
         let before = Problem { blocked: Some(&outside), ..self.problem(direction, None, &no_states) };
         let errors = then.errors;
@@ -123,13 +125,13 @@ impl<N: Number> Query<'_, N> {
         let mut vector = Vector::stepped(stepped, Span::Probability);
         let first = errors.iter().fold(0.0_f64, |most, error| most.max(*error));
         for (error, value) in vector.errors.iter_mut().zip(&vector.values) {
-            // The first step also rounds.
+            // The first step, whose error is not yet counted, rounds, too.
             *error += first + 64.0 * f64::EPSILON * value.to_f64();
         }
         Ok(vector.into())
     }
 
-    /// The step interval of a bounded operator.
+    /// Returns the least and greatest number of steps of a step-bounded operator.
     fn span(&self, steps: &Steps) -> Checked<Range> {
         let least = match &steps.least {
             None => 0,
@@ -144,12 +146,12 @@ impl<N: Number> Query<'_, N> {
         Ok(Range { least, most: Some(most) })
     }
 
-    /// The value of an upper step bound.
+    /// Returns the greatest integer that an upper step bound admits.
     fn at_most(&self, bound: &StepBound) -> Checked<u32> {
         self.limit(bound, 0_i8.saturating_sub(i8::from(bound.strict)))
     }
 
-    /// The value of a step bound plus `offset`.
+    /// Evaluates a step bound and adds `offset`, which is 1 or -1 for a strict bound.
     fn limit(&self, bound: &StepBound, offset: i8) -> Checked<u32> {
         // `validate` has checked that the bound is an integer.
         let limit = self.constant(&bound.limit)?.to_integer() + offset;
@@ -159,7 +161,7 @@ impl<N: Number> Query<'_, N> {
         })?)
     }
 
-    /// Expected rewards of a reward formula.
+    /// Computes for each state the minimal or maximal expected reward of a reward formula.
     pub fn reward(&self, direction: Direction, name: Option<&str>, path: &RewardPath) -> Checked<Valued<N>> {
         let n = self.mdp().states();
         let no_states = FixedBitSet::with_capacity(n);
@@ -188,7 +190,8 @@ impl<N: Number> Query<'_, N> {
         }
     }
 
-    /// The optimal values after `steps` steps, or those of the given policy.
+    /// Returns the optimal values after exactly `steps` steps, starting from `values`. If a policy
+    /// is given, only its choices are considered.
     fn stepped(&self, problem: Problem<'_, N>, values: Vec<N>, steps: u32) -> Checked<steps::Stepped<N>> {
         let problem = Problem { allowed: self.evaluated.as_ref(), ..problem };
         within_budget(steps::apply(problem, values, steps, &mut self.work.borrow_mut()))
@@ -203,7 +206,8 @@ impl<N: Number> Query<'_, N> {
         Problem::new(self.mdp(), direction, rewards, terminal)
     }
 
-    /// Solves a problem or evaluates the given policy, and breaks ties between optimal choices.
+    /// Computes the optimal values, or the values of the given policy if there is one. If the
+    /// policy is reported, ties between optimal choices are broken by the secondary reward.
     pub fn solved(&self, problem: Problem<'_, N>) -> Checked<Valued<N>> {
         let span = if problem.rewards.is_none() { Span::Probability } else { Span::Positive };
         let problem = Problem { allowed: self.evaluated.as_ref(), ..problem };
@@ -223,8 +227,8 @@ impl<N: Number> Query<'_, N> {
         Ok(Valued { vector: Vector::solved(solution, span), policy: Some(policy) })
     }
 
-    /// Solves a problem. In exact arithmetic, policy iteration starts from an optimal policy in
-    /// doubles.
+    /// Solves a problem; returns `None` if exact arithmetic exceeds its budget. In exact
+    /// arithmetic, policy iteration starts from an optimal policy computed in doubles.
     fn solve_hinted(&self, problem: Problem<'_, N>) -> Option<Solution<N>> {
         let doubles = self.doubles.as_ref().filter(|_| problem.allowed.is_none());
         let hint = doubles.and_then(|mdp| {
@@ -237,7 +241,8 @@ impl<N: Number> Query<'_, N> {
     }
 }
 
-/// The complementary probabilities; an optimal policy for one objective is optimal for the other.
+/// Converts probabilities to the complementary ones. The policy stays: minimising an event
+/// maximises its complement.
 fn complement<N: Number>(values: Valued<N>) -> Valued<N> {
     Valued { vector: values.vector.complement(), policy: values.policy }
 }

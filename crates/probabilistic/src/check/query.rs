@@ -1,4 +1,4 @@
-//! The context of a query: an explored model, options and work budget.
+//! The context for evaluating a property: the explored model, the options and the work budget.
 
 use std::cell::RefCell;
 
@@ -15,22 +15,23 @@ use crate::policy::choices_of;
 use crate::prism::{Packed, Program};
 use crate::solve::Work;
 
-/// The context of a query.
+/// The context for evaluating properties on an explored model in number type `N`.
 pub struct Query<'a, N> {
     pub program: &'a Program<N>,
     pub explored: &'a Explored<Packed, N>,
     pub options: &'a Options<'a>,
-    /// The numbers of the computed reward structures.
+    /// The indices of the reward structures for which rewards were computed during exploration.
     pub computed_rewards: &'a [usize],
-    /// The process in doubles, for computing an initial policy.
+    /// The same process in doubles, from which an initial policy for exact policy iteration is
+    /// computed.
     pub doubles: Option<Mdp<f64>>,
-    /// The remaining budget of exact arithmetic.
+    /// The remaining work budget of exact arithmetic.
     pub work: RefCell<Work>,
-    /// The choices of the evaluated policy.
+    /// The choices of a given policy, if a policy is evaluated instead of optimised.
     pub evaluated: Option<FixedBitSet>,
 }
 
-/// Returns the number of a reward structure.
+/// Returns the index of the reward structure `name`, or of the first structure if `name` is `None`.
 pub fn structure(names: &[String], name: Option<&str>) -> Result<usize, Error> {
     let number = match name {
         None => (!names.is_empty()).then_some(0),
@@ -46,10 +47,10 @@ pub fn structure(names: &[String], name: Option<&str>) -> Result<usize, Error> {
 }
 
 impl<'a, N: Number> Query<'a, N> {
-    /// Creates a query with a budget of exact arithmetic.
+    /// Creates a query with a work budget for exact arithmetic.
     ///
     /// # Errors
-    /// The policy to evaluate belongs to another model.
+    /// The given policy in `options` belongs to another model.
     pub fn new(
         program: &'a Program<N>,
         explored: &'a Explored<Packed, N>,
@@ -73,7 +74,7 @@ impl<'a, N: Number> Query<'a, N> {
         &self.explored.mdp
     }
 
-    /// The rewards of a structure, for each choice.
+    /// Returns the rewards of a structure by choice: state reward plus transition reward.
     pub fn rewards(&self, name: Option<&str>) -> Result<&[N], Error> {
         let number = structure(&self.program.reward_names, name)?;
         let at = self.computed_rewards.iter().position(|computed| *computed == number);
@@ -81,7 +82,7 @@ impl<'a, N: Number> Query<'a, N> {
         Ok(&self.explored.rewards[at])
     }
 
-    /// The state rewards of a structure, without transition rewards.
+    /// Returns the state rewards of a structure by state, without the transition rewards.
     pub fn state_rewards(&self, name: Option<&str>) -> Checked<Vec<N>> {
         let number = structure(&self.program.reward_names, name)?;
         let mut values = Vec::new();

@@ -1,4 +1,4 @@
-//! Evaluates state formulas and numeric expressions with nested properties.
+//! Evaluates state formulas and numeric expressions, in which properties can be nested.
 
 use fixedbitset::FixedBitSet;
 use num_rational::BigRational;
@@ -12,10 +12,11 @@ use crate::number::{Number, enclosing};
 use crate::prism::ast::{BinaryOp, Expr, ExprKind, Property, Type};
 use crate::prism::{Code, Names};
 
-/// Prefix of the names of precomputed state sets; no name in a text has it.
+/// Prefix of the variable names of precomputed state sets. A parsed name never contains this
+/// character.
 const PREFIX: &str = "#";
 
-/// Returns `true` if the value of a property is a number.
+/// Returns `true` if the value of a property is a number, not a truth value.
 pub fn is_number(property: &Property) -> bool {
     use crate::prism::ast::Filter;
     match property {
@@ -49,15 +50,16 @@ fn is_comparison(op: BinaryOp) -> bool {
     !op.is_arithmetic() && !matches!(op, BinaryOp::And | BinaryOp::Or | BinaryOp::Implies | BinaryOp::Iff)
 }
 
-/// The predefined labels.
+/// The predefined labels of the PRISM language.
 pub const BUILT_IN: [&str; 2] = ["init", "deadlock"];
 
-/// Returns `true` if a label is predefined and not declared.
+/// Returns `true` if a label is predefined and no declaration with this name replaces it.
 pub fn is_built_in(label: &str, names: &Names) -> bool {
     BUILT_IN.contains(&label) && names.label(label).is_none()
 }
 
-/// Replaces nested properties by constants of their type, for type checking.
+/// Replaces nested properties and predefined labels by constants of the right type, for type
+/// checking.
 pub fn with_placeholders(expression: &Expr, names: &Names) -> Expr {
     expression.rewrite(&mut |part| match &part.kind {
         ExprKind::Property(property) if is_number(property) => {
@@ -69,7 +71,7 @@ pub fn with_placeholders(expression: &Expr, names: &Names) -> Expr {
             Some(Expr { kind: ExprKind::Bool(true), place: part.place })
         }
         ExprKind::Label(label) => {
-            // Labels of a property file may use predefined labels.
+            // Declared labels of a property file may refer to predefined labels.
             let inner = names.label(label).filter(|inner| mentions_built_in(inner, names))?;
             Some(with_placeholders(inner, names))
         }
@@ -77,7 +79,8 @@ pub fn with_placeholders(expression: &Expr, names: &Names) -> Expr {
     })
 }
 
-/// Returns `true` if an expression depends only on the values of variables.
+/// Returns `true` if an expression depends only on the values of variables, i.e. contains no
+/// property and no predefined label.
 pub fn is_of_states(expression: &Expr, names: &Names) -> bool {
     let mut depends_on_variables_only = true;
     let _ = expression.rewrite(&mut |part| {
@@ -106,21 +109,21 @@ fn mentions_built_in(expression: &Expr, names: &Names) -> bool {
 }
 
 impl<N: Number> Query<'_, N> {
-    /// The type of an expression with nested properties.
+    /// Returns the type of an expression that may contain properties.
     pub fn kind_of(&self, expression: &Expr) -> Checked<Type> {
         let names = &self.program.names;
         let compiled = names.clone().compile(&with_placeholders(expression, names));
         compiled.map(|(_, kind)| kind).map_err(|problem| Stop::Wrong(Error::Property(problem.into())))
     }
 
-    /// The set of all states.
+    /// Returns the set of all states.
     pub fn every(&self) -> FixedBitSet {
         let mut states = FixedBitSet::with_capacity(self.mdp().states());
         states.insert_range(..);
         states
     }
 
-    /// The set of states in which an expression holds.
+    /// Returns the set of states in which a Boolean expression holds.
     pub fn truth(&self, expression: &Expr) -> Checked<FixedBitSet> {
         let (code, sets) = self.prepared(expression, Type::Bool)?;
         let n = self.mdp().states();
@@ -136,7 +139,8 @@ impl<N: Number> Query<'_, N> {
         Ok(satisfying)
     }
 
-    /// Compiles an expression. Also returns the state sets of its additional variables.
+    /// Compiles an expression. Nested properties become additional Boolean variables; also returns
+    /// the set of states in which each of these variables is true.
     fn prepared(&self, expression: &Expr, kind: Type) -> Checked<(Code, Vec<FixedBitSet>)> {
         let mut sets = Vec::new();
         let mut stopped = None;
@@ -160,7 +164,8 @@ impl<N: Number> Query<'_, N> {
         Ok((code, sets))
     }
 
-    /// Replaces subexpressions that are not expressions of the model by names of state sets.
+    /// Replaces nested properties, predefined labels and comparisons of property values by Boolean
+    /// variables. For each variable, the set of states in which it is true is appended to `sets`.
     fn with_sets(&self, expression: &Expr, sets: &mut Vec<FixedBitSet>, stopped: &mut Option<Stop>) -> Expr {
         expression.rewrite(&mut |part| {
             let set = match &part.kind {
@@ -205,7 +210,7 @@ impl<N: Number> Query<'_, N> {
         labelled
     }
 
-    /// The states in which a comparison of numbers holds.
+    /// Returns the states in which a comparison of two numeric expressions with properties holds.
     fn compared(&self, op: BinaryOp, left: &Expr, right: &Expr) -> Checked<FixedBitSet> {
         let (left, right) = (self.numbers(left)?, self.numbers(right)?);
         let mut satisfying = FixedBitSet::with_capacity(self.mdp().states());
@@ -213,8 +218,8 @@ impl<N: Number> Query<'_, N> {
             let order = |a: &BigRational, b: &BigRational| compare(op, a.cmp(b));
             let holds = match (left.ends(state), right.ends(state)) {
                 (Some((a, b)), Some((c, d))) => {
-                    // Decided if all corners of the two enclosures agree; equality also requires
-                    // points or disjoint enclosures.
+                    // A comparison is decided if all corners of the two intervals agree. For
+                    // equality, the intervals must also be points or disjoint.
                     let corners = [order(&a, &c), order(&a, &d), order(&b, &c), order(&b, &d)];
                     let equal = matches!(op, BinaryOp::Equal | BinaryOp::NotEqual) && (a != b || c != d);
                     let apart = b < c || d < a;
@@ -230,7 +235,7 @@ impl<N: Number> Query<'_, N> {
         Ok(satisfying)
     }
 
-    /// The values of an expression in all states.
+    /// Computes the value of a numeric expression in all states.
     pub fn numbers(&self, expression: &Expr) -> Checked<Vector<N>> {
         match &expression.kind {
             ExprKind::Property(property) if is_number(property) => self.property_numbers(property),
@@ -270,7 +275,7 @@ impl<N: Number> Query<'_, N> {
         Ok(vector)
     }
 
-    /// The value of an expression without variables.
+    /// Evaluates an expression without variables.
     pub fn constant(&self, expression: &Expr) -> Checked<BigRational> {
         let mut names = self.program.names.clone();
         let code = names.constant(expression, Type::Double);
@@ -298,7 +303,8 @@ pub fn compare(op: BinaryOp, order: std::cmp::Ordering) -> bool {
     }
 }
 
-/// Combines values state by state. The errors include those of the operands and of the operation.
+/// Combines two vectors state by state with an arithmetic operator. The resulting errors include
+/// the errors of the operands and the rounding of the operation.
 fn joined<N: Number>(op: BinaryOp, left: &Vector<N>, right: &Vector<N>, at: &Expr) -> Checked<Vector<N>> {
     let fault = |text: &str| Stop::Wrong(property_error("Q303", at.place, text));
     let mut vector = Vector::exactly(Vec::with_capacity(left.values.len()), Span::Any);

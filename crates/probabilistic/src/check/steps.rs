@@ -1,24 +1,24 @@
-//! Step-bounded values by value iteration: repeated application of the Bellman operator.
+//! Step-bounded values by value iteration, i.e. repeated application of the Bellman operator.
 
 use crate::number::{Number, count};
 use crate::solve::{Direction, Problem, Work};
 
-/// Underflow threshold: products of positive doubles below it lose precision. It bounds the
-/// resulting absolute error.
+/// Underflow threshold: positive products below this value lose relative precision. It also bounds
+/// the absolute error that such a loss causes.
 const UNDERFLOW_THRESHOLD: f64 = 1e-280;
 
-/// Values after a bounded number of steps.
+/// Values after a bounded number of steps, with bounds on their rounding errors.
 pub struct Stepped<N> {
     /// The value of each state.
     pub values: Vec<N>,
-    /// Upper limit on the relative error of each value.
+    /// Upper limit on the rounding error of each value, relative to the value.
     pub relative: f64,
-    /// `true` if a product was below the underflow threshold.
+    /// Whether a value was below the underflow threshold, so that an absolute error is added.
     pub lost: bool,
 }
 
 impl<N: Number> Stepped<N> {
-    /// Upper limit on the absolute error of the value of a state.
+    /// Returns an upper limit on the absolute error of the value of a state.
     pub fn error(&self, state: usize) -> f64 {
         let value = self.values[state].to_f64();
         value * self.relative + if self.lost { UNDERFLOW_THRESHOLD } else { 0.0 }
@@ -70,7 +70,7 @@ pub fn apply<N: Number>(
             break;
         }
     }
-    // Values may become stationary by rounding, so the error counts all steps.
+    // Values may become stationary only by rounding, so the error bound counts all steps.
     let relative = if N::EXACT { 0.0 } else { f64::from(steps) * (count(widest) + 4.0) * f64::EPSILON };
     Some(Stepped { values, relative, lost })
 }

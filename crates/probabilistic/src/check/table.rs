@@ -1,4 +1,4 @@
-//! Policies as tables over the values of variables, for JSON files.
+//! Policies as tables over the values of variables, and their JSON format.
 
 use serde_json::{Map, Value, json};
 
@@ -9,33 +9,33 @@ use crate::number::Number;
 use crate::prism::{Packed, Program};
 use crate::solve::NONE;
 
-/// The decisions of a policy in each state that it can reach.
+/// A memoryless deterministic policy: its choice in each state that is reachable under the policy.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PolicyTable {
-    /// The variables: name, and `true` for a Boolean variable.
+    /// The variables in the order of the values in each row: name, and `true` for a Boolean
+    /// variable.
     pub variables: Vec<(String, bool)>,
-    /// The states.
+    /// One row for each state with a choice.
     pub rows: Vec<Row>,
 }
 
-/// The decision of a policy in one state.
+/// The choice of a policy in one state.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Row {
-    /// The values of the variables.
+    /// The values of the variables in this state, in the order of [`PolicyTable::variables`].
     pub values: Vec<i64>,
-    /// The action; empty for a command without one.
+    /// The action of the choice; empty for a command without an action.
     pub action: String,
-    /// The position of the choice among the choices of the state, from 0, in the order of the
-    /// commands.
+    /// Position of the choice among the choices of the state, from 0, in the order of the commands.
     pub choice: usize,
 }
 
-/// Prefixes an error with the position of a state, from 1.
+/// Prefixes an error description with the position of a table row, counted from 1.
 fn numbered(number: usize, description: &str) -> String {
     format!("state {}: {description}", number.saturating_add(1))
 }
 
-/// Name and version of the format.
+/// Name and version of the JSON format.
 const FORMAT: &str = "metaplan-policy/1";
 
 impl PolicyTable {
@@ -51,7 +51,7 @@ impl PolicyTable {
         json!({ "format": FORMAT, "states": self.rows.iter().map(row).collect::<Vec<_>>() })
     }
 
-    /// Parses JSON.
+    /// Parses a table in the JSON format of [`Self::to_json`].
     ///
     /// # Errors
     /// The first violation of the format.
@@ -89,11 +89,12 @@ impl PolicyTable {
         Ok(table)
     }
 
-    /// Returns the choice of each state in an explored model; [`NONE`] for states without an
-    /// entry.
+    /// Returns for each state of an explored model the index of the policy's choice, or [`NONE`]
+    /// for a state without a row.
     ///
     /// # Errors
-    /// The table belongs to another model.
+    /// The table does not match the model: an unknown variable, an unreached state, or a different
+    /// choice.
     pub fn choices<N: Number>(
         &self,
         program: &Program<N>,

@@ -11,14 +11,14 @@ struct Validation {
     problems: Vec<Diagnostic>,
 }
 
-/// Reports unknown names and type errors.
+/// Checks the names and types in a property. Returns all errors.
 pub fn validate<N: Number>(program: &Program<N>, property: &Property) -> Result<(), Error> {
     let mut validation = Validation { names: program.names.clone(), problems: Vec::new() };
     validation.property(property);
     if validation.problems.is_empty() { Ok(()) } else { Err(Error::Property(validation.problems.into())) }
 }
 
-/// Collects the properties that are nested in an expression.
+/// Appends the properties nested in an expression to `nested`; does not descend into them.
 pub fn properties_in<'a>(expression: &'a Expr, nested: &mut Vec<&'a Property>) {
     match &expression.kind {
         ExprKind::Property(property) => nested.push(property),
@@ -41,7 +41,7 @@ pub fn properties_in<'a>(expression: &'a Expr, nested: &mut Vec<&'a Property>) {
     }
 }
 
-/// The state expressions of a property.
+/// Returns the state expressions of a property, such as the goal of `F` or the states of a filter.
 pub fn expressions_of(property: &Property) -> Vec<&Expr> {
     match property {
         Property::Probability(_, path) => of_path(path),
@@ -67,7 +67,7 @@ fn of_path(path: &Path) -> Vec<&Expr> {
     }
 }
 
-/// The step bounds of a path formula, if it has any.
+/// Returns the bounds on steps or rewards of a path formula, if there are any.
 pub fn steps_of(path: &Path) -> Option<&Steps> {
     match path {
         Path::Not(inner) => steps_of(inner),

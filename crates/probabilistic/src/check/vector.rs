@@ -8,7 +8,7 @@ use crate::check::steps::Stepped;
 use crate::number::{Number, enclosing};
 use crate::solve::Solution;
 
-/// The range of values.
+/// The range in which values lie.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Span {
     /// From 0 to 1.
@@ -22,7 +22,7 @@ pub enum Span {
 /// The values of a property in all states.
 #[derive(Debug, Clone)]
 pub struct Vector<N> {
-    /// The value of each state; 0 if it is infinite.
+    /// The value of each state; 0 for a state in `infinite`.
     pub values: Vec<N>,
     /// Upper limit on the absolute error of each value; empty if arithmetic is exact.
     pub errors: Vec<f64>,
@@ -33,25 +33,25 @@ pub struct Vector<N> {
 }
 
 impl<N: Number> Vector<N> {
-    /// Creates values without error.
+    /// Creates a vector of error-free, finite values.
     pub fn exactly(values: Vec<N>, span: Span) -> Self {
         let errors = if N::EXACT { Vec::new() } else { vec![0.0; values.len()] };
         Self { infinite: FixedBitSet::with_capacity(values.len()), values, errors, span }
     }
 
-    /// The indicator function of a set of states.
+    /// Creates the indicator function of a set: 1 for each state in `set`, 0 for the others.
     pub fn indicator(set: &FixedBitSet, states: usize) -> Self {
         let values = (0..states).map(|state| if set.contains(state) { N::one() } else { N::zero() });
         Self::exactly(values.collect(), Span::Probability)
     }
 
-    /// Converts a solution.
+    /// Converts the solution of an optimisation problem to a vector.
     pub fn solved(solution: Solution<N>, span: Span) -> Self {
         let Solution { values, errors, infinite, .. } = solution;
         Self { values, errors, infinite, span }
     }
 
-    /// Converts step-bounded values.
+    /// Converts step-bounded values to a vector.
     pub fn stepped(source: Stepped<N>, span: Span) -> Self {
         let states = source.values.len();
         let errors =
@@ -59,12 +59,12 @@ impl<N: Number> Vector<N> {
         Self { values: source.values, errors, infinite: FixedBitSet::with_capacity(states), span }
     }
 
-    /// Upper limit on the absolute error of the value of a state.
+    /// Returns an upper limit on the absolute error of the value of a state.
     pub fn error(&self, state: usize) -> f64 {
         self.errors.get(state).copied().unwrap_or(0.0)
     }
 
-    /// The complementary probabilities.
+    /// Replaces each probability by 1 minus the probability.
     #[must_use]
     pub fn complement(mut self) -> Self {
         for (state, value) in self.values.iter_mut().enumerate() {
@@ -74,13 +74,13 @@ impl<N: Number> Vector<N> {
             {
                 *error += f64::EPSILON;
             }
-            // Rounding can raise a probability above 1.
+            // A probability above 1 by rounding would become a negative value.
             *value = if complement < N::zero() { N::zero() } else { complement };
         }
         self
     }
 
-    /// The value of a state with its bounds.
+    /// Returns the value of a state with its lower and upper bound.
     pub fn answer(&self, state: usize) -> Answer {
         if self.infinite.contains(state) {
             return Answer::Infinite;
@@ -104,20 +104,21 @@ impl<N: Number> Vector<N> {
         Answer::Finite(Quantity { value, lower, upper, exact: None })
     }
 
-    /// The ends of the enclosure of the value of a state; `None` if it is infinite.
+    /// Returns the lower and upper bound on the value of a state; `None` if the value is infinite.
     pub fn ends(&self, state: usize) -> Option<(BigRational, BigRational)> {
         match self.answer(state) {
             Answer::Finite(Quantity { exact: Some(exact), .. }) => Some((exact.clone(), exact)),
             Answer::Finite(quantity) => Some((
                 BigRational::from_float(quantity.lower)?,
-                // An unbounded value is greater than all numbers that it is compared with.
+                // An infinite upper bound becomes the greatest double, which exceeds all numbers in
+                // comparisons.
                 BigRational::from_float(quantity.upper).or_else(|| BigRational::from_float(f64::MAX))?,
             )),
             _ => None,
         }
     }
 
-    /// A constant vector.
+    /// Creates a vector with the same value in all states.
     pub fn everywhere(value: &BigRational, states: usize) -> Self {
         let rounded = N::from_rational(value);
         let (lower, upper) = enclosing(value);

@@ -1,4 +1,4 @@
-//! Syntax tree of PRISM models (Markov chains and decision processes) and properties.
+//! Syntax tree of PRISM models (Markov chains and Markov decision processes) and of properties.
 
 use num_rational::BigRational;
 
@@ -8,34 +8,34 @@ use crate::solve::Direction;
 /// An expression with its position.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Expr {
-    /// The kind and operands.
+    /// The kind of expression, with its operands.
     pub kind: ExprKind,
-    /// Start of the expression; line 0 for expressions that were not parsed.
+    /// Position where the expression starts; line 0 if the expression was not parsed.
     pub place: Place,
 }
 
 /// The kinds of expressions.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ExprKind {
-    /// `true`, `false`.
+    /// A Boolean literal: `true` or `false`.
     Bool(bool),
-    /// An integer.
+    /// An integer literal.
     Int(i64),
-    /// A number with a decimal point or an exponent.
+    /// A number literal with a decimal point or an exponent.
     Number(BigRational),
-    /// A constant, formula or variable.
+    /// The name of a constant, formula or variable.
     Name(String),
-    /// A label; in properties only.
+    /// The name of a label; in properties only.
     Label(String),
-    /// `!`.
+    /// `!`: negation.
     Not(Box<Expr>),
-    /// `-`.
+    /// `-`: unary minus.
     Negative(Box<Expr>),
-    /// A binary operation.
+    /// A binary operator with its left and right operand.
     Binary(BinaryOp, Box<Expr>, Box<Expr>),
     /// `condition ? then : otherwise`.
     If(Box<Expr>, Box<Expr>, Box<Expr>),
-    /// A function call.
+    /// A function with its arguments.
     Call(Function, Vec<Expr>),
     /// The value or truth value of a property; in properties only.
     Property(Box<Property>),
@@ -46,24 +46,25 @@ pub enum ExprKind {
 /// A property.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Property {
-    /// `P`: a probability.
+    /// `P`: the probability of a path formula.
     Probability(Question, Path),
-    /// `R`: an expected reward, with the name of its structure if there is one.
+    /// `R`: an expected reward. The optional text is the name of the reward structure; the first structure is the
+    /// default.
     Reward(Question, Option<String>, RewardPath),
-    /// `S`: the long-run fraction of time in some states.
+    /// `S`: the long-run fraction of time spent in the states that satisfy the expression.
     SteadyState(Question, Expr),
-    /// `multi`: several objectives.
+    /// `multi`: several objectives, which are optimised together.
     Multi(Vec<Self>),
-    /// An aggregate of the values of a property over some states, or over all states.
+    /// `filter`: an aggregate of the values of the first expression. The second expression selects the states; all
+    /// states are selected if it is absent.
     Filter(Filter, Expr, Option<Expr>),
-    /// A numeric or Boolean expression over properties and states.
+    /// A numeric or Boolean expression over state variables and nested properties.
     Expression(Expr),
-    /// A property that is not supported, with the reason; other properties of its file can be
-    /// checked.
+    /// An unsupported property, with the reason. The other properties of its file can still be checked.
     Refused(Diagnostic),
 }
 
-/// The aggregation of a filter.
+/// The aggregate function of a filter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[allow(missing_docs, reason = "the names are those of the operators")]
 pub enum Filter {
@@ -74,97 +75,98 @@ pub enum Filter {
     Count,
     ForAll,
     Exists,
-    /// The value in the first state, ordered by the values of the variables.
+    /// The value in the first of the selected states, ordered by the values of the variables.
     First,
-    /// The value in the only state.
+    /// The value in the only selected state.
     State,
-    /// The least and the greatest value.
+    /// The least and the greatest value over the selected states.
     Range,
-    /// The states with their values, except those with value zero or false.
+    /// The selected states with their values, without states of value zero or false.
     Print,
-    /// The states with their values.
+    /// All selected states with their values.
     PrintAll,
-    /// The states with the least value.
+    /// The selected states that have the least value.
     ArgMin,
-    /// The states with the greatest value.
+    /// The selected states that have the greatest value.
     ArgMax,
 }
 
-/// A query for a value, or a comparison of the value with a bound.
+/// The query of an operator: either for its value, or for the comparison of the value with a bound.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Question {
-    /// Minimum or maximum; `None` if the model has only one policy or the bound determines it.
+    /// The queried optimum: minimum or maximum over all policies. `None` if the model has only one policy, or if the
+    /// bound determines the direction.
     pub direction: Option<Direction>,
-    /// The bound; `None` to query the value.
+    /// Comparison operator and bound; `None` to query the value.
     pub bound: Option<(BinaryOp, Expr)>,
 }
 
-/// Path formulas.
+/// A path formula.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Path {
-    /// A condition on the first state.
+    /// The first state of the path satisfies the expression.
     State(Expr),
-    /// Negation.
+    /// The path does not satisfy the inner formula.
     Not(Box<Self>),
-    /// `X`: in the next state.
+    /// `X`: the second state of the path satisfies the expression.
     Next(Expr),
-    /// `U`, and `F` with `true` on the left: the right operand eventually holds (within the
-    /// bounds), and the left one until then.
+    /// `U`, and `F` with `true` as left operand: the right operand eventually holds within the bounds, and the left
+    /// operand holds until then.
     Until(Expr, Expr, Option<Box<Steps>>),
-    /// `G`: always (within the bounds).
+    /// `G`: the expression always holds, or within the bounds if there are any.
     Globally(Expr, Option<Box<Steps>>),
-    /// `W`: `U`, or the left operand always holds.
+    /// `W`: `U` holds, or the left operand always holds.
     WeakUntil(Expr, Expr, Option<Box<Steps>>),
-    /// `R`: the right operand holds up to and including the first state of the left one, or
-    /// always.
+    /// `R`: the right operand always holds, or up to and including the first state in which the left operand holds.
     Release(Expr, Expr, Option<Box<Steps>>),
-    /// `G F`: infinitely often.
+    /// `G F`: the expression holds infinitely often.
     Repeatedly(Expr),
-    /// `F G`: eventually always.
+    /// `F G`: the expression eventually holds forever.
     Persistently(Expr),
 }
 
-/// Bounds on the number of steps or on an accumulated reward.
+/// Bounds of a temporal operator, on the number of steps or on an accumulated reward.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Steps {
     /// The lower bound.
     pub least: Option<StepBound>,
     /// The upper bound.
     pub most: Option<StepBound>,
-    /// The bounded reward, with its name if it has one; `None` if steps are bounded.
+    /// The reward structure if a reward is bounded, with its name if it is given; `None` if the number of steps is
+    /// bounded.
     pub reward: Option<Option<String>>,
 }
 
-/// A bound on the number of steps.
+/// A bound on the number of steps or on an accumulated reward.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StepBound {
-    /// The limit.
+    /// The expression of the limit.
     pub limit: Expr,
-    /// `true` if the limit itself is excluded.
+    /// Whether the limit itself is excluded (`<` or `>`).
     pub strict: bool,
 }
 
-/// The accumulation of a reward.
+/// The accumulation of rewards along a path.
 #[derive(Debug, Clone, PartialEq)]
 pub enum RewardPath {
-    /// `F`: until a state is reached.
+    /// `F`: summed until a state that satisfies the expression is reached.
     Reach(Expr),
-    /// `C<=k`: over k steps.
+    /// `C<=k`: summed over the first k steps.
     Steps(StepBound),
-    /// `C`: over the infinite path.
+    /// `C`: summed over the infinite path.
     Total,
-    /// `I=k`: the state reward after k steps.
+    /// `I=k`: the state reward after exactly k steps.
     Instant(Expr),
-    /// `S`: the long-run average per step.
+    /// `S`: the long-run average reward per step.
     LongRun,
 }
 
-/// A temporal operator with its operands; the left operand of unary operators is `true`.
+/// A temporal operator with its operands. The left operand of a unary operator is `true`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Temporal {
-    /// The letter of the operator.
+    /// The letter of the operator: `X`, `F`, `G`, `U`, `W` or `R`.
     pub letter: char,
-    /// The bounds.
+    /// The bounds on steps or reward, if there are any.
     pub steps: Option<Box<Steps>>,
     /// The left operand.
     pub left: Expr,
@@ -172,7 +174,7 @@ pub struct Temporal {
     pub right: Expr,
 }
 
-/// Binary operators.
+/// A binary operator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[allow(missing_docs, reason = "the names are those of the operations")]
 pub enum BinaryOp {
@@ -193,12 +195,12 @@ pub enum BinaryOp {
 }
 
 impl BinaryOp {
-    /// Returns `true` for operators on numbers with a numeric result.
+    /// Returns `true` if the operands and the result of the operator are numbers.
     pub fn is_arithmetic(self) -> bool {
         matches!(self, Self::Plus | Self::Minus | Self::Times | Self::Divide)
     }
 
-    /// The symbol and the precedence.
+    /// Returns the symbol and the precedence; operators with a greater precedence bind more tightly.
     pub fn sign(self) -> (&'static str, u8) {
         match self {
             Self::Iff => ("<=>", 2),
@@ -218,7 +220,7 @@ impl BinaryOp {
         }
     }
 
-    /// All operators.
+    /// All binary operators.
     pub const ALL: [Self; 14] = [
         Self::Iff,
         Self::Implies,
@@ -237,7 +239,7 @@ impl BinaryOp {
     ];
 }
 
-/// Functions.
+/// A built-in function.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[allow(missing_docs, reason = "the names are those of the functions")]
 pub enum Function {
@@ -252,7 +254,7 @@ pub enum Function {
 }
 
 impl Function {
-    /// All functions with their names.
+    /// All built-in functions with their names.
     pub const ALL: [(&'static str, Self); 8] = [
         ("min", Self::Min),
         ("max", Self::Max),
@@ -264,13 +266,13 @@ impl Function {
         ("log", Self::Log),
     ];
 
-    /// The name.
+    /// Returns the name in the PRISM language.
     pub fn name(self) -> &'static str {
         Self::ALL.iter().find(|(_, function)| *function == self).map_or("", |(name, _)| name)
     }
 }
 
-/// Types of constants and expressions.
+/// The type of a constant or an expression.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[allow(missing_docs, reason = "the names are those of the types")]
 pub enum Type {
@@ -280,7 +282,7 @@ pub enum Type {
 }
 
 impl Type {
-    /// The keyword.
+    /// Returns the keyword of the type in the PRISM language.
     pub fn name(self) -> &'static str {
         match self {
             Self::Bool => "bool",
@@ -299,14 +301,14 @@ pub enum ModelKind {
     Dtmc,
 }
 
-/// A constant; without a value it is undefined and set by the user.
+/// The declaration of a constant. The user must set the value of an undefined constant.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Constant {
     /// The name.
     pub name: String,
     /// The type.
     pub kind: Type,
-    /// The value.
+    /// The expression of the value; `None` for an undefined constant.
     pub value: Option<Expr>,
     /// Position of the name.
     pub place: Place,
@@ -317,53 +319,53 @@ pub struct Constant {
 pub struct Named {
     /// The name.
     pub name: String,
-    /// The expression.
+    /// The expression that defines the formula or label.
     pub expression: Expr,
     /// Position of the name.
     pub place: Place,
 }
 
-/// A variable.
+/// The declaration of a variable.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Variable {
     /// The name.
     pub name: String,
     /// Least and greatest value; `None` for Boolean variables.
     pub range: Option<(Expr, Expr)>,
-    /// The initial value; by default false or the least value.
+    /// The initial value; the default is `false` or the least value.
     pub initial: Option<Expr>,
     /// Position of the name.
     pub place: Place,
 }
 
-/// A probabilistic alternative of a command.
+/// A probabilistic alternative of a command, with its assignments.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Update {
-    /// The probability; `None` for 1.
+    /// The probability of the alternative; `None` for 1.
     pub probability: Option<Expr>,
-    /// Variables and their new values.
+    /// The assignments: variable, new value, and position of the assignment.
     pub assignments: Vec<(String, Expr, Place)>,
 }
 
-/// A guarded command.
+/// A guarded command of a module.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Command {
-    /// The action on which modules synchronise.
+    /// The action on which modules synchronise; `None` for a command without an action.
     pub action: Option<String>,
-    /// The guard.
+    /// The condition under which the command is enabled.
     pub guard: Expr,
-    /// The alternatives.
+    /// The probabilistic alternatives.
     pub updates: Vec<Update>,
     /// Start of the command.
     pub place: Place,
 }
 
-/// A module.
+/// A module: local variables and commands.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Module {
     /// The name.
     pub name: String,
-    /// The variables.
+    /// The local variables of the module.
     pub variables: Vec<Variable>,
     /// The commands.
     pub commands: Vec<Command>,
@@ -371,37 +373,37 @@ pub struct Module {
     pub place: Place,
 }
 
-/// A reward item of states or transitions.
+/// An item of a reward structure, for states or for transitions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RewardItem {
-    /// `None` for a state reward; else the action of the transitions, `None` for commands without
-    /// an action.
+    /// `None` for a state reward. For a transition reward, the action of the rewarded commands, which is `None` for
+    /// commands without an action.
     pub action: Option<Option<String>>,
-    /// The guard.
+    /// The condition under which the reward is earned.
     pub guard: Expr,
-    /// The reward.
+    /// The expression of the reward.
     pub reward: Expr,
     /// Start of the item.
     pub place: Place,
 }
 
-/// A reward structure.
+/// A reward structure: a sum of guarded rewards.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rewards {
-    /// The name, possibly empty.
+    /// The name of the structure, possibly empty.
     pub name: String,
-    /// The items, whose rewards are added.
+    /// The items; the rewards of all items whose guards hold are added.
     pub items: Vec<RewardItem>,
     /// Start of the structure.
     pub place: Place,
 }
 
-/// A model.
+/// The syntax tree of a PRISM model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Model {
     /// The kind of process.
     pub kind: ModelKind,
-    /// The leading comment, possibly empty.
+    /// The comment at the start of the file, possibly empty.
     pub remark: String,
     /// The constants.
     pub constants: Vec<Constant>,
@@ -415,7 +417,7 @@ pub struct Model {
     pub rewards: Vec<Rewards>,
     /// The labels.
     pub labels: Vec<Named>,
-    /// `init … endinit`: the condition on initial states.
+    /// `init … endinit`: the condition that holds in the initial states; `None` without this declaration.
     pub initial: Option<Expr>,
 }
 
@@ -425,28 +427,29 @@ impl Expr {
         Self { kind, place: Place::default() }
     }
 
-    /// Creates a name.
+    /// Creates an expression that is a name.
     pub fn name(name: &str) -> Self {
         Self::new(ExprKind::Name(name.to_owned()))
     }
 
-    /// Creates an integer.
+    /// Creates an integer literal.
     pub fn int(value: i64) -> Self {
         Self::new(ExprKind::Int(value))
     }
 
-    /// Creates a truth value.
+    /// Creates a Boolean literal.
     pub fn bool(value: bool) -> Self {
         Self::new(ExprKind::Bool(value))
     }
 
-    /// Creates a binary operation.
+    /// Creates a binary operation with `self` as its left operand.
     #[must_use]
     pub fn op(self, op: BinaryOp, other: Self) -> Self {
         Self::new(ExprKind::Binary(op, Box::new(self), Box::new(other)))
     }
 
-    /// Collects the names in the expression.
+    /// Appends the names of constants, formulas and variables in the expression, each with its position. Does not
+    /// descend into properties.
     pub fn names<'a>(&'a self, occurrences: &mut Vec<(&'a str, Place)>) {
         match &self.kind {
             ExprKind::Name(name) => occurrences.push((name, self.place)),
@@ -470,7 +473,8 @@ impl Expr {
         }
     }
 
-    /// Returns the expression with names replaced by `with`; `None` keeps a name.
+    /// Returns the expression with each name replaced by `with(name)`. A name for which `with` returns `None` is
+    /// kept.
     #[must_use]
     pub fn replace(&self, with: &dyn Fn(&str) -> Option<Self>) -> Self {
         self.rewrite(&mut |part| match &part.kind {
@@ -479,8 +483,8 @@ impl Expr {
         })
     }
 
-    /// Returns the expression with subexpressions replaced by `with`, outermost first; `None`
-    /// descends.
+    /// Returns the expression with subexpressions replaced by `with`, outermost first. Where `with` returns `None`,
+    /// its operands are rewritten. Does not descend into properties.
     #[must_use]
     pub fn rewrite(&self, with: &mut dyn FnMut(&Self) -> Option<Self>) -> Self {
         if let Some(replacement) = with(self) {

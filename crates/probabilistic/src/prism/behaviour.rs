@@ -1,7 +1,8 @@
-//! Caches the enabled commands of a module by the values of the variables that they read.
+//! Caches the enabled commands of a module by the values of the variables that these commands read.
 //!
-//! Modules have few local states, which recur in many states of the model. The commands of each
-//! local state are evaluated once and stored as edits of the words of a packed state.
+//! A module has few local states, and each occurs in many states of the model. The commands of a local state are
+//! evaluated once. Their effects are stored as edits of the words of a packed state. The evaluated commands of a
+//! local state are its behaviour.
 
 use std::collections::BTreeSet;
 
@@ -14,38 +15,40 @@ use crate::prism::model::{Group, Program};
 use crate::prism::run::{Values, enabled};
 use crate::prism::state::{Edit, Packed};
 
-/// Upper limit on the number of actions: a behaviour stores its disabled actions in a `u128`.
+/// Upper limit on the number of actions, because a behaviour stores its disabled actions in a `u128`.
 pub const MAX_ACTIONS: usize = 128;
-/// Upper limits on the cached behaviours and edits of each module. Further behaviours are computed on every request.
+/// Upper limits on the number of cached behaviours and of cached edits of each module. Further behaviours are
+/// computed on every request.
 const CACHE_LIMITS: [usize; 2] = [1 << 16, 1 << 20];
-/// Cache entry of a behaviour whose evaluation has failed.
+/// Cache entry of a local state in which the evaluation of a command fails.
 const FAILED: u32 = u32::MAX - 1;
 
-/// A module: its commands by action, and its cached behaviours.
+/// A module: its actions and its cached behaviours, i.e. the evaluated commands of local states.
 #[derive(Debug)]
 pub struct Module<N> {
-    /// The actions of the module and the position of its command group in `Program::synchronised`: action, position.
+    /// The actions of the module. The second number is the position of the module's command group in
+    /// `Program::synchronised` for this action.
     pub actions: Vec<(usize, usize)>,
     numbers: Option<Numbers>,
     /// For each behaviour, the disabled actions as a bit set.
     prevented: Vec<u128>,
-    /// For each behaviour, the start of its commands without action, then the start of its
-    /// commands for each action, and the end.
+    /// For each behaviour: the start of its commands without action, the start of its commands for each action, and
+    /// the end of its commands.
     slots: Vec<u32>,
-    /// The end of the updates of each command.
+    /// For each command, the end of its updates in `updates`.
     commands: Vec<u32>,
-    /// The probability of each possible update and the end of its edits.
+    /// For each update, its probability (not 0) and the end of its edits in `edits`.
     updates: Vec<(N, u32)>,
     edits: Vec<Edit>,
-    /// Cached lengths of the lists: behaviours, commands, updates, edits.
+    /// Lengths of the cached parts of the lists: behaviours, commands, updates, edits.
     cached_lengths: [usize; 4],
 }
 
-/// A command of a behaviour, by number.
+/// Index of an evaluated command.
 pub type Chosen = u32;
 
 impl<N: Number> Module<N> {
-    /// Creates a module of a program.
+    /// Creates the cache for the module with this index; no behaviour is cached yet.
     pub fn new(program: &Program<N>, number: usize) -> Self {
         let mut actions = Vec::new();
         for (action, groups) in program.synchronised.iter().enumerate() {
@@ -70,7 +73,8 @@ impl<N: Number> Module<N> {
         }
     }
 
-    /// Returns the behaviour in a state, or `None` if its evaluation fails. It is valid until the next call.
+    /// Returns the index of the behaviour in a state, or `None` if the evaluation of a command fails. The index is
+    /// valid until the next call.
     pub fn behaviour(
         &mut self,
         program: &Program<N>,
@@ -83,7 +87,7 @@ impl<N: Number> Module<N> {
         }
         // An uncached behaviour of the previous call lies behind the cached ones.
         self.discard_uncached();
-        // With a full cache, the behaviour is still written, but not registered: the next call discards it.
+        // With a full cache, the behaviour is written but not registered, so the next call discards it.
         let is_full = self.numbers.is_none()
             || self.cached_lengths[0] >= CACHE_LIMITS[0]
             || self.cached_lengths[3] >= CACHE_LIMITS[1];
@@ -104,7 +108,7 @@ impl<N: Number> Module<N> {
         [self.prevented.len(), self.commands.len(), self.updates.len(), self.edits.len()]
     }
 
-    /// Removes the entries behind the cached ones.
+    /// Removes the entries that are behind the cached entries.
     fn discard_uncached(&mut self) {
         let [behaviours, commands, updates, edits] = self.cached_lengths;
         self.prevented.truncate(behaviours);
@@ -114,7 +118,7 @@ impl<N: Number> Module<N> {
         self.edits.truncate(edits);
     }
 
-    /// Number of entries of a behaviour in `slots`.
+    /// Returns the number of entries of each behaviour in `slots`.
     fn width(&self) -> usize {
         self.actions.len().saturating_add(2)
     }
@@ -169,17 +173,17 @@ impl<N: Number> Module<N> {
         Ok(())
     }
 
-    /// The disabled actions of a behaviour, as a bit set.
+    /// Returns the disabled actions in a behaviour, as a bit set.
     pub fn prevented(&self, behaviour: usize) -> u128 {
         self.prevented[behaviour]
     }
 
-    /// The commands of a behaviour without action.
+    /// Returns the enabled commands without action in a behaviour.
     pub fn free(&self, behaviour: usize) -> std::ops::Range<Chosen> {
         self.slot(behaviour, 0)
     }
 
-    /// The commands of a behaviour for one of the module's actions, by position.
+    /// Returns the enabled commands of a behaviour for one action, given by its position in the module's `actions`.
     pub fn acting(&self, behaviour: usize, at: usize) -> std::ops::Range<Chosen> {
         self.slot(behaviour, at.saturating_add(1))
     }
@@ -189,7 +193,7 @@ impl<N: Number> Module<N> {
         self.slots[at]..self.slots[at.saturating_add(1)]
     }
 
-    /// The updates of a command: probabilities and edits.
+    /// Iterates over the updates of a command: probability and edits of the state.
     pub fn updates(&self, command: Chosen) -> impl ExactSizeIterator<Item = (&N, &[Edit])> {
         let range = self.range(command);
         // Only ends are stored: a command begins at the end of its predecessor.
@@ -201,7 +205,7 @@ impl<N: Number> Module<N> {
         })
     }
 
-    /// Total number of updates of consecutive commands.
+    /// Returns the total number of updates of consecutive commands.
     pub fn count(&self, commands: std::ops::Range<Chosen>) -> usize {
         commands.map(|command| self.range(command).len()).sum()
     }

@@ -1,4 +1,4 @@
-//! Compiles declarations, commands and rewards of the syntax tree.
+//! Compiles declarations, commands and rewards of the syntax tree to programs.
 
 use num_traits::Signed;
 
@@ -10,7 +10,7 @@ use crate::prism::command::{Command, RewardItem, Update, Variable, probabilities
 use crate::prism::compile::Names;
 use crate::prism::guard::Guard;
 
-/// Evaluates the range and the initial value of a variable.
+/// Resolves the declaration of a variable by evaluating its range and its initial value.
 pub fn declare(names: &mut Names, variable: &ast::Variable) -> Result<Variable, Diagnostic> {
     let whole = |names: &mut Names, expression: &ast::Expr, kind| match names.constant(expression, kind)? {
         Code::Whole(value) => Ok(value),
@@ -37,7 +37,7 @@ pub fn declare(names: &mut Names, variable: &ast::Variable) -> Result<Variable, 
     Ok(Variable { name: variable.name.clone(), is_bool, least, greatest, initial })
 }
 
-/// Compiles a command. `writable` returns `true` for the variables that the command may assign.
+/// Compiles a command. `writable` returns `true` if the command may assign the variable with this name.
 pub fn compile_command<N: Number>(
     command: &ast::Command,
     names: &mut Names,

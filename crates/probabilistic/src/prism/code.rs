@@ -1,4 +1,4 @@
-//! Typed expressions over resolved names, and their evaluation.
+//! Typed expressions with resolved names, and their evaluation.
 //!
 //! Arithmetic is exact, so that `1 - 0.7 - 0.3` is zero even if the model is solved in doubles.
 
@@ -9,18 +9,18 @@ use num_traits::{ToPrimitive, Zero};
 use crate::number::Number;
 use crate::prism::ast::{BinaryOp, Function, Type};
 
-/// An expression over the values of the variables; truth values are 0 and 1.
+/// A compiled expression over the values of the variables. Truth values are represented as 0 and 1.
 #[derive(Debug, Clone)]
 pub enum Code {
-    /// An integer or a truth value.
+    /// An integer literal or a truth value.
     Whole(i64),
-    /// Any other number.
+    /// A number literal that is not an integer literal.
     Number(BigRational),
-    /// A variable.
+    /// The index of a variable.
     Variable(u32),
-    /// `!`.
+    /// `!`: negation.
     Not(Box<Self>),
-    /// `-`.
+    /// `-`: unary minus, with the type of the result.
     Negative(Box<Self>, Type),
     /// Conjunction.
     All(Vec<Self>),
@@ -28,29 +28,29 @@ pub enum Code {
     Any(Vec<Self>),
     /// Equivalence.
     Iff(Box<Self>, Box<Self>),
-    /// A comparison, with the common type of its operands.
+    /// A comparison of two operands, with their common type.
     Compare(BinaryOp, Type, Box<Self>, Box<Self>),
-    /// Arithmetic, with the type of the result.
+    /// An arithmetic operation, with the type of its result.
     Arithmetic(BinaryOp, Type, Box<Self>, Box<Self>),
     /// `condition ? then : otherwise`.
     If(Box<Self>, Box<Self>, Box<Self>),
-    /// A function call, with the type of the result.
+    /// A function call, with the type of its result.
     Call(Function, Type, Vec<Self>),
 }
 
-/// The reason why an evaluation has no result.
+/// The reason why an expression cannot be evaluated.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Fault(pub &'static str);
 
 type Result<T> = std::result::Result<T, Fault>;
 
-/// Upper limit on the size of the operands of one operation, in bits, both together.
+/// Upper limit on the total size of both operands of an arithmetic operation, in bits.
 const MAX_OPERAND_BITS: u64 = 100_000;
 
 const OVERFLOW: Fault = Fault("an integer grows out of its range");
 
 impl Code {
-    /// Returns the truth value.
+    /// Evaluates a Boolean expression; `values` are the values of the variables.
     pub fn holds(&self, values: &[i64]) -> Result<bool> {
         Ok(match self {
             Self::Whole(value) => *value != 0,
@@ -90,7 +90,7 @@ impl Code {
         })
     }
 
-    /// Returns the value of an integer or Boolean expression.
+    /// Evaluates an integer or Boolean expression; `values` are the values of the variables.
     pub fn whole(&self, values: &[i64]) -> Result<i64> {
         Ok(match self {
             Self::Whole(value) => *value,
@@ -118,7 +118,7 @@ impl Code {
         })
     }
 
-    /// Returns the value as an exact number.
+    /// Evaluates a numeric expression exactly; `values` are the values of the variables.
     pub fn number(&self, values: &[i64]) -> Result<BigRational> {
         Ok(match self {
             Self::Number(value) => value.clone(),
@@ -148,14 +148,14 @@ impl Code {
         })
     }
 
-    /// Returns the number of the greatest variable plus one, or 0 if no variable occurs.
+    /// Returns the index of the greatest variable in the expression plus one, or 0 without a variable.
     pub fn variables_below(&self) -> u32 {
         let mut below = 0;
         self.each_variable(&mut |variable| below = below.max(variable.saturating_add(1)));
         below
     }
 
-    /// Returns `true` if no variable occurs.
+    /// Returns `true` if the expression contains no variable.
     pub fn is_constant(&self) -> bool {
         self.variables_below() == 0
     }
@@ -191,7 +191,8 @@ pub fn from_whole(value: i64) -> BigRational {
     BigRational::from(BigInt::from(value))
 }
 
-/// Converts a probability or reward to the number type of the solver.
+/// Converts a probability or reward to the number type of the solver. Fails if doubles cannot represent its
+/// magnitude.
 pub fn rounded<N: Number>(value: &BigRational) -> Result<N> {
     crate::number::rounded(value).ok_or(Fault("a number that is too large or too small for doubles"))
 }
@@ -274,7 +275,8 @@ fn number_call(function: Function, arguments: &[Code], values: &[i64]) -> Result
             let (base, exponent) = (number(0)?, number(1)?);
             let whole = exponent.is_integer().then(|| exponent.to_i32()).flatten();
             match whole {
-                // Beyond the size limit, the power is approximated like one with a fractional exponent.
+                // Above the size limit, the power is approximated in doubles, as a power with a fractional exponent
+                // is.
                 Some(whole) if whole < 0 && Zero::is_zero(&base) => Err(Fault("a division by zero")),
                 Some(whole)
                     if base.size().saturating_mul(whole.unsigned_abs().into()) <= MAX_OPERAND_BITS =>
@@ -291,7 +293,7 @@ fn number_call(function: Function, arguments: &[Code], values: &[i64]) -> Result
     }
 }
 
-/// Converts an approximated power or logarithm back to a rational.
+/// Converts a power or logarithm that was approximated in doubles to a rational.
 fn irrational(value: f64) -> Result<BigRational> {
     BigRational::from_float(value).ok_or(Fault("a number that is not finite"))
 }

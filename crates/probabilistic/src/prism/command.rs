@@ -1,4 +1,4 @@
-//! Variables, commands and rewards of a program, with names resolved.
+//! Variables, commands and reward items of a program, with resolved names.
 
 use std::borrow::Cow;
 
@@ -10,15 +10,16 @@ use crate::number::Number;
 use crate::prism::code::{Code, Fault, rounded};
 use crate::prism::guard::Guard;
 
-/// Tolerance for the sum of the probabilities of a command, as in PRISM. Sums within it are scaled to 1.
+/// Upper limit on the deviation of the sum of a command's probabilities from 1, as in PRISM. Probabilities within the
+/// limit are scaled to the sum 1.
 const SUM_TOLERANCE: f64 = 1e-5;
 
-/// A variable with its range evaluated.
+/// A variable with evaluated range and initial value.
 #[derive(Debug, Clone)]
 pub struct Variable {
     /// The name.
     pub name: String,
-    /// `true` for Boolean variables; their range is 0 to 1.
+    /// Whether the variable is Boolean; its range is then 0 to 1.
     pub is_bool: bool,
     pub least: i64,
     pub greatest: i64,
@@ -35,13 +36,13 @@ pub struct Update {
 pub struct Command<N> {
     pub guard: Guard,
     pub updates: Vec<Update>,
-    /// The probabilities of the updates, if they are constants that sum to 1.
+    /// The probabilities of the updates, if all of them are constants that sum to 1.
     pub certain: Option<Vec<N>>,
     pub place: Place,
 }
 
 impl<N: Number> Command<N> {
-    /// Calls `visit` with each variable that the enabledness or the effect of the command depends on.
+    /// Calls `visit` with each occurrence of a variable in the guard, the probabilities and the assigned values.
     pub fn each_variable(&self, visit: &mut impl FnMut(u32)) {
         self.guard.each_variable(visit);
         for update in &self.updates {
@@ -50,7 +51,7 @@ impl<N: Number> Command<N> {
         }
     }
 
-    /// Returns the probabilities of the updates in a state.
+    /// Returns the probabilities of the updates in a state, given by the values of the variables.
     pub fn probabilities(&self, values: &[i64]) -> Result<Cow<'_, [N]>, Error> {
         Ok(match &self.certain {
             Some(certain) => Cow::Borrowed(certain),
@@ -63,20 +64,21 @@ impl<N: Number> Command<N> {
 pub struct RewardItem<N> {
     pub guard: Guard,
     pub reward: Code,
-    /// The reward, if it is a valid constant.
+    /// The reward, if it is a constant and not negative.
     pub certain: Option<N>,
     pub place: Place,
 }
 
 impl<N> RewardItem<N> {
-    /// Calls `visit` with each variable that the reward depends on.
+    /// Calls `visit` with each occurrence of a variable in the guard and the reward.
     pub fn each_variable(&self, visit: &mut impl FnMut(u32)) {
         self.guard.each_variable(visit);
         self.reward.each_variable(visit);
     }
 }
 
-/// Evaluates the probabilities of the updates of a command and scales them to the sum 1.
+/// Evaluates the probabilities of a command's updates in a state and scales them to the sum 1. Fails if a probability
+/// is negative or the sum is not close to 1.
 pub fn probabilities<N: Number>(
     updates: &[Update],
     values: &[i64],

@@ -1,4 +1,4 @@
-//! Compiles expressions of the syntax tree: resolves names, infers types, evaluates constants.
+//! Compiles expressions of the syntax tree: resolves names, infers types, and evaluates constants.
 
 use std::collections::BTreeMap;
 
@@ -17,37 +17,37 @@ use crate::prism::lexer::{Kind, tokens};
 enum Meaning {
     Constant(Code, Type),
     Variable(u32, Type),
-    /// Index of the formula.
+    /// The index of the formula.
     Formula(usize),
 }
 
-/// All names of a model, with the values of its constants.
+/// The declared names of a model, with the values of its constants.
 #[derive(Debug, Clone)]
 pub struct Names {
     meanings: FxHashMap<String, Meaning>,
     formulas: Vec<Expr>,
     labels: FxHashMap<String, Expr>,
-    /// Formulas and labels that are being expanded, outermost first.
+    /// The formulas and labels whose definitions are being expanded, outermost first.
     open: Vec<String>,
     /// Nesting depth of the current expression, with formulas expanded.
     depth: usize,
-    /// Number of subexpressions compiled: of the current expression, and of all expressions.
+    /// Number of compiled subexpressions: of the current top-level expression, and of all expressions.
     parts: [usize; 2],
 }
 
 /// Upper limit on the nesting depth of an expression, with formulas expanded.
 const MAX_DEPTH: usize = 250;
-/// Upper limits on the number of subexpressions: of one expression, and of all expressions.
+/// Upper limits on the number of subexpressions: in one top-level expression, and in all expressions together.
 const MAX_PARTS: [usize; 2] = [200_000, 5_000_000];
 
-/// Values of constants set by the user, by name, as text.
+/// The constants set by the user: values as text, by name.
 pub type Settings = BTreeMap<String, String>;
 
 impl Names {
-    /// Declares constants, formulas and labels. Variables are added with [`Names::variable`].
+    /// Declares the constants, formulas and labels of a model. Variables are added with [`Names::variable`].
     ///
     /// # Errors
-    /// Constants without value, values of another type, names declared twice.
+    /// A constant without a value, a value of another type, a circular definition, or a name declared twice.
     pub fn new(model: &Model, settings: &Settings) -> Result<Self, Error> {
         let mut names = Self {
             meanings: FxHashMap::default(),
@@ -149,7 +149,7 @@ impl Names {
         }
     }
 
-    /// Adds a variable.
+    /// Declares a variable. If the name is declared already, an error is appended to `problems`.
     pub fn variable(
         &mut self,
         name: &str,
@@ -161,7 +161,7 @@ impl Names {
         self.declare(name, Meaning::Variable(number, kind), place, problems);
     }
 
-    /// The number and type of a variable.
+    /// Returns the index and type of a variable, or `None` if the name is no variable.
     pub fn find_variable(&self, name: &str) -> Option<(u32, Type)> {
         match self.meanings.get(name)? {
             Meaning::Variable(number, kind) => Some((*number, *kind)),
@@ -169,19 +169,19 @@ impl Names {
         }
     }
 
-    /// Returns the expression of a label.
+    /// Returns the expression that defines a label.
     pub fn label(&self, name: &str) -> Option<&Expr> {
         self.labels.get(name)
     }
 
-    /// The names of all labels, sorted.
+    /// Returns the names of all declared labels, sorted.
     pub fn labels(&self) -> Vec<&str> {
         let mut labels: Vec<_> = self.labels.keys().map(String::as_str).collect();
         labels.sort_unstable();
         labels
     }
 
-    /// Evaluates an expression without variables.
+    /// Compiles an expression without variables and evaluates it to a literal of type `kind`.
     pub fn constant(&mut self, value: &Expr, kind: Type) -> Result<Code, Diagnostic> {
         let code = self.typed(value, kind)?;
         if !code.is_constant() {
@@ -190,7 +190,7 @@ impl Names {
         fold(&code, kind).map_err(|Fault(text)| Diagnostic::new("Q303", value.place, text))
     }
 
-    /// Compiles an expression of the given type. Integers are accepted as `double`.
+    /// Compiles an expression that must have the given type. Integers are accepted as `double`.
     pub fn typed(&mut self, expression: &Expr, expected: Type) -> Result<Code, Diagnostic> {
         let (code, actual) = self.compile(expression)?;
         if actual == expected || expected == Type::Double && actual == Type::Int {
@@ -200,13 +200,13 @@ impl Names {
         Err(Diagnostic::new("Q203", expression.place, text))
     }
 
-    /// Compiles an expression and infers its type.
+    /// Compiles an expression and returns it with its inferred type.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "depth and parts are refused as soon as they pass their limits, and each leaves the depth that it entered"
     )]
     pub fn compile(&mut self, expression: &Expr) -> Result<(Code, Type), Diagnostic> {
-        // A top-level expression: the count of its parts starts at 0.
+        // For a top-level expression, the number of subexpressions starts at 0.
         if self.depth == 0 {
             self.parts[0] = 0;
         }
@@ -393,7 +393,7 @@ fn duplicate(description: &str, place: Place) -> Diagnostic {
     Diagnostic::new("Q206", place, format!("the {description} is given a second time here"))
 }
 
-/// Appends the operands of a chain of one operator, in their order.
+/// Appends the operands of a chain of the operator `op` from left to right.
 fn flatten<'a>(op: BinaryOp, expression: &'a Expr, parts: &mut Vec<&'a Expr>) {
     let mut stack = Vec::from([expression]);
     while let Some(next) = stack.pop() {
@@ -428,7 +428,7 @@ fn fold(code: &Code, kind: Type) -> Result<Code, Fault> {
     }
 }
 
-/// Parses the value of a constant that the user sets: a decimal, or an expression without names.
+/// Parses the value that the user set for a constant: a decimal, or an expression without names.
 fn setting_code(text: &str, kind: Type, name: &str) -> Result<Code, Error> {
     let invalid =
         || Error::Constant(format!("`{text}` is not a value of type `{}` for `{name}`", kind.name()));

@@ -8,12 +8,13 @@ use crate::prism::reserved::is_keyword;
 
 /// Upper limit on the nesting depth of an expression.
 const MAX_DEPTH: usize = 200;
-/// Upper limits on the number of operators in an expression: arithmetic and implication, and all others.
+/// Upper limits on the number of operators in an expression: of arithmetic operators and implications, and of all
+/// others.
 const MAX_OPERATORS: [usize; 2] = [500, 20_000];
-/// Upper limit on the number of operators of either kind in an expression of a property.
+/// Upper limit on the number of operators of each kind in an expression of a property.
 const MAX_PROPERTY_OPERATORS: usize = 2_000;
 
-/// A position in a list of tokens.
+/// A parser state: a position in a list of tokens, with counters for the size limits.
 #[derive(Debug)]
 pub struct Cursor<'a> {
     tokens: &'a [Token],
@@ -25,16 +26,18 @@ pub struct Cursor<'a> {
     property_syntax: Option<PropertySyntax>,
 }
 
-/// Parsers of the syntax that expressions of properties have in addition to those of models.
+/// Parsers for the syntax that is allowed in expressions of properties, but not in those of models.
 #[derive(Debug, Clone, Copy)]
 pub struct PropertySyntax {
-    /// Parses an expression that begins with an operator of properties, or returns `None` if the next token is another one.
+    /// Parses an expression that begins with a property operator. Returns `None` if the next token is not such an
+    /// operator.
     pub parse_prefix: fn(&mut Cursor<'_>) -> Read<Option<ExprKind>>,
-    /// Parses an infix operator of properties, given its left operand. Returns the operand if no such operator follows.
+    /// Parses an infix operator of properties, given its left operand. Returns the operand unchanged if no such
+    /// operator follows.
     pub parse_infix: fn(&mut Cursor<'_>, Expr) -> Read<Expr>,
 }
 
-/// Result of a parsing function.
+/// The result of a parsing function: a syntax element or a syntax error.
 pub type Read<T> = Result<T, Diagnostic>;
 
 impl<'a> Cursor<'a> {
@@ -43,7 +46,7 @@ impl<'a> Cursor<'a> {
         Self { tokens, at: 0, depth: 0, operators: [0; 2], property_syntax: None }
     }
 
-    /// Creates a cursor that accepts expressions of properties.
+    /// Creates a cursor that also accepts the syntax of property expressions.
     pub fn for_properties(tokens: &'a [Token], property_syntax: PropertySyntax) -> Self {
         Self { property_syntax: Some(property_syntax), ..Self::new(tokens) }
     }
@@ -64,12 +67,12 @@ impl<'a> Cursor<'a> {
         self.depth = 0;
     }
 
-    /// Returns the next token.
+    /// Returns the next token without consuming it.
     pub fn peek(&self) -> &'a Kind {
         &self.tokens[self.at].kind
     }
 
-    /// Returns the token `offset` positions after the next one; the end beyond the last token.
+    /// Returns the token `offset` positions after the next one, or [`Kind::End`] beyond the last token.
     pub fn peek_at(&self, offset: usize) -> &'a Kind {
         self.tokens.get(self.at.saturating_add(offset)).map_or(&Kind::End, |token| &token.kind)
     }
@@ -79,7 +82,7 @@ impl<'a> Cursor<'a> {
         self.tokens[self.at].place
     }
 
-    /// Consumes a token, except the end.
+    /// Consumes the next token, unless it is the last one.
     pub fn advance(&mut self) {
         let next = self.at.saturating_add(1);
         if next < self.tokens.len() {
@@ -87,17 +90,17 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// Returns `true` if the next token is the given sign.
+    /// Returns `true` if the next token is the symbol `sign`.
     pub fn is(&self, sign: &str) -> bool {
         matches!(self.peek(), Kind::Sign(found) if *found == sign)
     }
 
-    /// Returns `true` if the next token is the given word.
+    /// Returns `true` if the next token is the identifier or keyword `word`.
     pub fn is_word(&self, word: &str) -> bool {
         matches!(self.peek(), Kind::Name(found) if found == word)
     }
 
-    /// Consumes a sign if it is next; returns `true` if it was.
+    /// Consumes the next token if it is the symbol `sign`. Returns `true` if it was consumed.
     pub fn take(&mut self, sign: &str) -> bool {
         let is_next = self.is(sign);
         if is_next {
@@ -106,7 +109,7 @@ impl<'a> Cursor<'a> {
         is_next
     }
 
-    /// Consumes a word if it is next; returns `true` if it was.
+    /// Consumes the next token if it is the identifier or keyword `word`. Returns `true` if it was consumed.
     pub fn take_word(&mut self, word: &str) -> bool {
         let is_next = self.is_word(word);
         if is_next {
@@ -115,7 +118,7 @@ impl<'a> Cursor<'a> {
         is_next
     }
 
-    /// Creates the error that the described token is expected next.
+    /// Creates a syntax error at the next token: the described element is expected there.
     pub fn expected(&self, description: &str) -> Diagnostic {
         Diagnostic::new(
             "Q102",
@@ -124,17 +127,18 @@ impl<'a> Cursor<'a> {
         )
     }
 
-    /// Consumes a sign; an error if it is not next.
+    /// Consumes the symbol `sign`. Returns an error if the next token is another one.
     pub fn need(&mut self, sign: &str) -> Read<()> {
         if self.take(sign) { Ok(()) } else { Err(self.expected(&format!("`{sign}`"))) }
     }
 
-    /// Consumes a word; an error if it is not next.
+    /// Consumes the identifier or keyword `word`. Returns an error if the next token is another one.
     pub fn need_word(&mut self, word: &str) -> Read<()> {
         if self.take_word(word) { Ok(()) } else { Err(self.expected(&format!("`{word}`"))) }
     }
 
-    /// Consumes a name; an error if a name is not next. Keywords are not names.
+    /// Consumes an identifier that is not a keyword, and returns it with its position. Otherwise returns an error
+    /// with `description`, which says what is expected.
     pub fn name(&mut self, description: &str) -> Read<(String, Place)> {
         let place = self.place();
         match self.peek() {
@@ -154,7 +158,7 @@ impl<'a> Cursor<'a> {
     /// Parses an expression.
     ///
     /// # Errors
-    /// The first syntax error, or an expression beyond the limits.
+    /// The first syntax error, or an expression beyond the limits on nesting and operators.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "refused as soon as it passes its limit, and each leaves the depth that it entered"
@@ -182,7 +186,7 @@ impl<'a> Cursor<'a> {
         Ok(result)
     }
 
-    /// Returns the binary operator at the next token, with its precedence.
+    /// Returns the binary operator at the next token with its precedence, or `None`.
     fn operator(&self) -> Option<(BinaryOp, u8)> {
         let Kind::Sign(sign) = self.peek() else { return None };
         // `=?` ends a property operator. The `?` of a conditional expression follows an operand, never `=`.
@@ -193,7 +197,7 @@ impl<'a> Cursor<'a> {
         Some((op, op.sign().1))
     }
 
-    /// Parses a chain of binary operators of at least the given precedence.
+    /// Parses a chain of binary operators whose precedences are at least `least`.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "refused as soon as it passes its limit; strengths are below 20"
@@ -289,7 +293,7 @@ impl<'a> Cursor<'a> {
         Ok(Expr { kind, place })
     }
 
-    /// Parses the old form `func(min, a, b)`.
+    /// Parses a function call in the old syntax `func(min, a, b)`.
     fn function_by_word(&mut self) -> Read<Expr> {
         let place = self.place();
         self.advance();

@@ -1,20 +1,21 @@
-//! Guards of commands, split into fast tests of single variables and a remainder.
+//! Guards of commands: conjunctions, split into fast tests of single variables and other conjuncts.
 
 use crate::prism::ast::{BinaryOp, Type};
 use crate::prism::code::{Code, Fault};
 
-/// A condition in conjunctive form.
+/// A condition as a conjunction of tests and other expressions.
 #[derive(Debug, Clone)]
 pub struct Guard {
-    /// The longest prefix of conjuncts that are tests. Tests always have a value.
+    /// The longest prefix of conjuncts that are range tests. Evaluating a test cannot fail.
     tests: Vec<Test>,
-    /// The conjuncts after the tests, in the order of the text: a conjunct can prevent a failing evaluation of a later one.
+    /// The conjuncts after the tests, in the order of the text. A false conjunct prevents the evaluation of later
+    /// conjuncts, which might fail.
     remainder: Vec<Code>,
-    /// Variables that a conjunct fixes to one value, with that value.
+    /// The variables that a conjunct fixes to a single value: variable index and value.
     fixed: Vec<(u32, i64)>,
 }
 
-/// A test of whether a variable lies inside or outside a range.
+/// A test that a variable lies inside a range, or outside of it if `inside` is `false`.
 #[derive(Debug, Clone, Copy)]
 struct Test {
     variable: u32,
@@ -24,7 +25,7 @@ struct Test {
 }
 
 impl Guard {
-    /// Splits a condition into conjuncts.
+    /// Splits a condition into its conjuncts.
     pub fn new(code: Code) -> Self {
         let mut parts = Vec::new();
         flatten(code, &mut parts);
@@ -34,18 +35,18 @@ impl Guard {
         Self { remainder: parts.split_off(tests.len()), tests, fixed }
     }
 
-    /// Returns the variables that a conjunct fixes to one value, with that value.
+    /// Returns the variables that a conjunct fixes to a single value: variable index and value.
     pub fn fixed(&self) -> &[(u32, i64)] {
         &self.fixed
     }
 
-    /// Calls `visit` with each occurrence of a variable.
+    /// Calls `visit` with the variable of each occurrence in the guard.
     pub fn each_variable(&self, visit: &mut impl FnMut(u32)) {
         self.tests.iter().for_each(|test| visit(test.variable));
         self.remainder.iter().for_each(|part| part.each_variable(visit));
     }
 
-    /// Returns the truth value.
+    /// Returns `true` if the guard holds for the values of the variables. Fails if a conjunct cannot be evaluated.
     pub fn holds(&self, values: &[i64]) -> Result<bool, Fault> {
         for test in &self.tests {
             let value = values[test.variable as usize];
@@ -62,7 +63,7 @@ impl Guard {
     }
 }
 
-/// Appends the conjuncts of a condition.
+/// Appends the conjuncts of a condition to `parts`.
 fn flatten(code: Code, parts: &mut Vec<Code>) {
     match code {
         Code::All(inner) => inner.into_iter().for_each(|part| flatten(part, parts)),
@@ -70,7 +71,7 @@ fn flatten(code: Code, parts: &mut Vec<Code>) {
     }
 }
 
-/// Returns the test that is equivalent to an expression, if there is one.
+/// Returns the range test that is equivalent to an expression, or `None`.
 fn test(code: &Code) -> Option<Test> {
     // A Boolean variable holds if it is not 0.
     let flag = |variable: u32, inside| Test { variable, least: 0, greatest: 0, inside };
@@ -100,7 +101,7 @@ fn compared(variable: u32, op: BinaryOp, value: i64) -> Test {
     }
 }
 
-/// Returns the comparison that is equivalent after exchanging its operands.
+/// Returns the comparison operator that is equivalent to `op` after an exchange of the operands.
 fn mirrored(op: BinaryOp) -> BinaryOp {
     match op {
         BinaryOp::Less => BinaryOp::Greater,

@@ -7,18 +7,18 @@ use crate::error::{Diagnostic, Place};
 pub enum Kind {
     /// A name or a keyword.
     Name(String),
-    /// A number as it is written.
+    /// A number, as it is written in the text.
     Number(String),
-    /// Text in quotation marks, without them.
+    /// A text in quotation marks, stored without the quotation marks.
     Quoted(String),
-    /// A sign.
+    /// An operator or a punctuation mark.
     Sign(&'static str),
     /// The end of the text.
     End,
 }
 
 impl Kind {
-    /// Returns the description for messages.
+    /// Returns a description of the token for error messages.
     pub fn describe(&self) -> String {
         match self {
             Self::Name(name) | Self::Number(name) => format!("`{name}`"),
@@ -29,7 +29,7 @@ impl Kind {
     }
 }
 
-/// A token and its position.
+/// A token with its position in the text.
 #[derive(Debug, Clone)]
 pub struct Token {
     /// The kind.
@@ -38,16 +38,16 @@ pub struct Token {
     pub place: Place,
 }
 
-/// All signs. A sign comes before its prefixes, because the first match is taken.
+/// All operators and punctuation marks. An entry precedes its prefixes, because the first match is used.
 const SIGNS: [&str; 30] = [
     "<=>", "->", "=>", "<=", ">=", "!=", "..", "(", ")", "[", "]", "{", "}", "<", ">", "=", "+", "-", "*",
     "/", "!", "&", "|", "?", ":", ";", ",", "'", ".", "^",
 ];
 
-/// Splits a text into tokens. The last token is [`Kind::End`].
+/// Splits a PRISM text into tokens; skips white space and comments. The last token is [`Kind::End`].
 ///
 /// # Errors
-/// Characters that begin no token, and unterminated quotation marks; all of them are reported.
+/// All characters that begin no token, and all quotation marks that are not closed on their line.
 #[expect(clippy::arithmetic_side_effects, reason = "lines and columns of a text in memory")]
 pub fn tokens(text: &str) -> Result<Vec<Token>, Vec<Diagnostic>> {
     let (mut tokens, mut problems) = (Vec::new(), Vec::new());
@@ -84,7 +84,7 @@ pub fn tokens(text: &str) -> Result<Vec<Token>, Vec<Diagnostic>> {
     if problems.is_empty() { Ok(tokens) } else { Err(problems) }
 }
 
-/// Returns the first token of a nonempty text, and its length in bytes.
+/// Returns the first token of a nonempty text, with its length in bytes.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "positions in a text in memory, which are at most its length"
@@ -102,11 +102,11 @@ fn token(text: &str) -> Result<(Kind, usize), String> {
             from + text[from..].find(|c: char| !c.is_ascii_digit()).unwrap_or(text.len() - from)
         };
         let mut end = digits(0);
-        // A point belongs to a number only before a digit, so that `0..3` is a range.
+        // A point belongs to a number only before a digit, because `0..3` is a range.
         if text[end..].starts_with('.') && digit_follows(end + 1) {
             end = digits(end + 1);
         }
-        // Without digits, `e` begins a name.
+        // An `e` without digits after it begins a name.
         if text[end..].starts_with(['e', 'E']) {
             let sign = usize::from(text[end + 1..].starts_with(['+', '-']));
             if digit_follows(end + 1 + sign) {

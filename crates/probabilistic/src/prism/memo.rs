@@ -1,4 +1,4 @@
-//! Caches values that depend on a few variables of the state.
+//! Caches values that depend on a few variables of a state only.
 
 use std::collections::BTreeSet;
 
@@ -6,10 +6,11 @@ use rustc_hash::FxHashMap;
 
 use crate::prism::state::{Key, Layout, Packed};
 
-/// Keys of at most this number of bits index a table. The operating system provides its memory on first access.
+/// Upper limit on the bits of a key that indexes a table; longer keys use a hash map. The operating system provides
+/// the table's memory on first access.
 const MAX_TABLE_BITS: u32 = 20;
 
-/// A map from the values of some variables to numbers.
+/// A map from the values of selected variables in a state to numbers.
 #[derive(Debug)]
 pub struct Numbers {
     key: Key,
@@ -18,7 +19,7 @@ pub struct Numbers {
 
 #[derive(Debug)]
 enum Entries {
-    /// For each key, its number plus one, or 0 if it has none.
+    /// For each key, the stored number plus one; 0 if no number is stored.
     Table(Vec<u32>),
     Hash(FxHashMap<u64, u32>),
 }
@@ -35,7 +36,7 @@ impl Numbers {
         Some(Self { key, entries })
     }
 
-    /// Returns the number that is stored for the values in a state.
+    /// Returns the number stored for the variables' values in `state`, or `None`.
     pub fn get(&self, state: &Packed) -> Option<u32> {
         let key = self.key.of(state);
         match &self.entries {
@@ -44,7 +45,7 @@ impl Numbers {
         }
     }
 
-    /// Stores a number, which must be less than `u32::MAX`.
+    /// Stores a number for the variables' values in `state`. The number must be less than `u32::MAX`.
     pub fn note(&mut self, state: &Packed, number: u32) {
         let key = self.key.of(state);
         match &mut self.entries {
@@ -60,10 +61,11 @@ impl Numbers {
     }
 }
 
-/// Cache of a function of some variables.
+/// A cache for a function whose value depends only on selected variables of a state.
 #[derive(Debug)]
 pub struct Memo<T> {
-    /// `None` if the values of the variables need more than 64 bits; then nothing is cached.
+    /// Maps the variables' values to positions in `values`. `None` if the variables need more than 64 bits; then
+    /// nothing is cached.
     numbers: Option<Numbers>,
     values: Vec<T>,
 }
@@ -77,14 +79,14 @@ impl<T> Memo<T> {
         Self { numbers: Numbers::new(layout, variables), values: Vec::new() }
     }
 
-    /// Returns the value in a state; calls `find` if it is not cached. `None` if `find` fails.
+    /// Returns the cached value for `state`, or computes it with `find`. Returns `None` if `find` does.
     pub fn get(&mut self, state: &Packed, find: impl FnOnce() -> Option<T>) -> Option<&T> {
         if let Some(number) = self.numbers.as_ref().and_then(|numbers| numbers.get(state)) {
             return self.values.get(number as usize);
         }
         let value = find()?;
         let limit = if self.numbers.is_some() { MAX_VALUES } else { 0 };
-        // Removes the uncached value of the previous call.
+        // Removes an uncached value that the previous call has returned.
         self.values.truncate(limit);
         self.values.push(value);
         let number = self.values.len().saturating_sub(1);

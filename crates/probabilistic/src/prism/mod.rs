@@ -1,8 +1,9 @@
-//! The PRISM language: text to a model, a model to successors of states, and back to text.
+//! The PRISM language: parses a text to a model, computes successors of states, and writes a model as text.
 //!
-//! The fragment of Markov chains and decision processes of the manual (prismmodelchecker.org/manual/ThePRISMLanguage):
-//! modules with variables of finite range, renamed modules, synchronisation on actions, constants, formulas, rewards,
-//! labels. Anything else is refused with its place.
+//! Supported are Markov chains and Markov decision processes of the PRISM manual
+//! (prismmodelchecker.org/manual/ThePRISMLanguage): modules with variables of finite range, renamed modules,
+//! synchronisation on actions, constants, formulas, rewards, and labels. Any other construct is an error with its
+//! position.
 
 pub mod ast;
 mod behaviour;

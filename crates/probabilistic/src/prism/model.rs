@@ -1,7 +1,8 @@
 //! Compiles a model to an executable program: resolves names and evaluates constants.
 //!
-//! Commands whose guards fix one variable (`l=5 & …`) are indexed by its value, and so are the actions of such
-//! commands. The cost of a state therefore does not grow with the number of commands for other states.
+//! If guards fix a variable (`l=5 & …`), the commands are indexed by the value of this variable. For each value, the
+//! program also stores the actions that may be enabled. The cost of expanding a state therefore does not grow with
+//! the number of commands for other values.
 
 use std::cmp::Reverse;
 
@@ -18,20 +19,21 @@ use crate::prism::compile::{Names, Settings};
 use crate::prism::starts::starts;
 use crate::prism::state::{Layout, Packed, Valuation, above_least};
 
-/// Action number of commands without an action.
+/// The action number of commands without an action.
 pub const UNNAMED: u32 = u32::MAX - 1;
 
-/// The commands of one module with one action.
+/// The commands of a module that have the same action, or no action.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Group<N> {
-    /// The number of the module.
+    /// The index of the module.
     pub module: usize,
     pub commands: Vec<Command<N>>,
-    /// Index of the commands: a variable, its least value, and the candidate commands for each value.
+    /// Index of the commands by the value of a variable: the variable, its least value, and the candidate commands
+    /// for each value.
     pub index: Option<(u32, i64, Vec<Vec<u32>>)>,
 }
 
-/// For each value of a variable, the actions that may be enabled, as a bit set.
+/// For each value of a variable from `least` on, the actions that may be enabled, as a bit set.
 #[derive(Debug, Clone)]
 pub(super) struct Mask {
     pub variable: u32,
@@ -42,46 +44,48 @@ pub(super) struct Mask {
 /// A reward structure.
 #[derive(Debug, Clone)]
 pub(super) struct Structure<N> {
-    /// Items of states.
+    /// The items of state rewards.
     pub states: Vec<RewardItem<N>>,
-    /// Items of choices without an action.
+    /// The items for commands without an action.
     pub unnamed: Vec<RewardItem<N>>,
-    /// Items of choices, by action.
+    /// For each action, the items for commands with this action.
     pub actions: Vec<Vec<RewardItem<N>>>,
 }
 
-/// An executable model.
+/// An executable model: compiled commands and rewards of a PRISM model.
 #[derive(Debug, Clone)]
 pub struct Program<N> {
     /// The kind of process.
     pub kind: ModelKind,
-    /// The variables, global ones first.
+    /// The variables; the global variables come first.
     pub variables: Vec<Variable>,
-    /// The names of the actions.
+    /// The names of the actions, indexed by action number.
     pub actions: Vec<String>,
-    /// The names of the reward structures.
+    /// The names of the reward structures, indexed by structure.
     pub reward_names: Vec<String>,
     pub(crate) names: Names,
     pub(super) layout: Layout,
-    /// For each action, the modules that synchronise on it, with their commands.
+    /// For each action, the command groups of the modules that synchronise on the action.
     pub(super) synchronised: Vec<Vec<Group<N>>>,
     /// For each module, the commands without an action.
     pub(super) free: Vec<Group<N>>,
     pub(super) masks: Vec<Mask>,
     pub(super) rewards: Vec<Structure<N>>,
-    /// Numbers of the reward structures that are computed.
+    /// The indices of the reward structures whose rewards are computed for each choice.
     pub(super) computed_rewards: Vec<usize>,
     /// The initial states.
     pub(super) starts: Vec<Packed>,
-    /// States in which this condition holds are made absorbing.
+    /// Condition under which a state is made absorbing instead of being expanded.
     pub(super) stop: Option<Code>,
 }
 
 impl<N: Number> Program<N> {
-    /// Resolves names and evaluates constants. No rewards are computed; see [`Self::with_rewards`].
+    /// Resolves the names and evaluates the constants of a model. No rewards are computed until
+    /// [`Self::with_rewards`] selects them.
     ///
     /// # Errors
-    /// All errors in names and types; constants that are undefined or unknown.
+    /// All errors in names and types; undefined constants without a value in `settings`, and unknown constants in
+    /// `settings`.
     pub fn new(model: &Model, settings: &Settings) -> Result<Self, Error> {
         let mut names = Names::new(model, settings)?;
         let mut problems = Vec::new();
@@ -113,7 +117,7 @@ impl<N: Number> Program<N> {
                 Err(problem) => problems.push(problem),
             }
         }
-        // Further errors would be consequences of missing variables.
+        // Without the missing variables, further errors would be misleading.
         if !problems.is_empty() {
             return Err(Error::Model(problems.into()));
         }
@@ -181,32 +185,33 @@ impl<N: Number> Program<N> {
         Ok(initial_states)
     }
 
-    /// Selects the reward structures that are computed, by number.
+    /// Selects the reward structures, by index, whose rewards are computed for each choice.
     #[must_use]
     pub fn with_rewards(mut self, computed_rewards: &[usize]) -> Self {
         self.computed_rewards = computed_rewards.to_vec();
         self
     }
 
-    /// Makes the states in which a condition holds absorbing, because the query does not depend on their successors.
-    /// A condition that does not compile is ignored.
+    /// Makes the states that satisfy a condition absorbing. The caller guarantees that the checked property does not
+    /// depend on their successors. A condition that does not compile is ignored.
     #[must_use]
     pub(crate) fn stopping(mut self, condition: Option<&Expr>) -> Self {
         self.stop = condition.and_then(|condition| self.names.clone().typed(condition, Type::Bool).ok());
         self
     }
 
-    /// Returns the name of an action; empty for commands without an action.
+    /// Returns the name of an action; the empty string for a command without an action.
     pub fn action_name(&self, action: u32) -> &str {
         self.actions.get(action as usize).map_or("", String::as_str)
     }
 
-    /// Writes the values of the variables in a state to a buffer.
+    /// Writes the values of the variables in a packed state to `values`.
     pub fn unpack(&self, state: &Packed, values: &mut Valuation) {
         self.layout.unpack(state, values);
     }
 
-    /// Returns the state with the given values, or `None` if a value is outside its range.
+    /// Packs the values of the variables into a state. Returns `None` if a value is outside the range of its
+    /// variable.
     pub fn pack(&self, values: &[i64]) -> Option<Packed> {
         let fits = values.len() == self.variables.len()
             && self.variables.iter().zip(values).all(|(v, value)| (v.least..=v.greatest).contains(value));
@@ -227,7 +232,8 @@ impl<N: Number> Program<N> {
         for command in &module.commands {
             let writable = |name: &str| {
                 let is_local = module.variables.iter().any(|variable| variable.name == name);
-                // Commands with an action cannot write global variables: synchronised modules could write different values.
+                // Commands with an action cannot write global variables: synchronised modules could write different
+                // values.
                 is_local
                     || command.action.is_none() && model.globals.iter().any(|variable| variable.name == name)
             };
@@ -252,7 +258,7 @@ impl<N: Number> Program<N> {
         self.free.push(free);
     }
 
-    /// Indexes each group by the variable that most of its guards fix.
+    /// Indexes each group of commands by the variable that most of its guards fix.
     fn index(&mut self) {
         let variables = &self.variables;
         for group in self.synchronised.iter_mut().flatten().chain(&mut self.free) {
@@ -264,12 +270,12 @@ impl<N: Number> Program<N> {
                     .filter(|fixed| fixed.iter().any(|(fixed_variable, _)| *fixed_variable == variable))
                     .count()
             };
-            // Of equally frequent variables, the first one is taken, for reproducible results.
+            // Among equally frequent variables, the first is chosen, for reproducible results.
             let best =
                 (0..dense(variables.len())).max_by_key(|variable| (count(*variable), Reverse(*variable)));
             let Some(best) = best.filter(|best| count(*best) > 0) else { continue };
             let Variable { least, greatest, .. } = variables[best as usize];
-            // The table must not be much larger than the list of commands.
+            // The size of the table is limited in proportion to the number of commands.
             let limit = group.commands.len().saturating_mul(10).saturating_add(1000);
             let Ok(above) = usize::try_from(greatest.abs_diff(least)) else { continue };
             if above > limit {
@@ -283,7 +289,7 @@ impl<N: Number> Program<N> {
                             list.push(dense(number));
                         }
                     }
-                    // A command that does not fix the variable is a candidate for each value.
+                    // A command that does not fix the variable is a candidate for every value.
                     None => table.iter_mut().for_each(|list| list.push(dense(number))),
                 }
             }
@@ -292,7 +298,7 @@ impl<N: Number> Program<N> {
         self.mask();
     }
 
-    /// Computes the actions that each value of an indexed variable leaves possible.
+    /// Computes, for each value of an indexed variable, the actions that may be enabled.
     fn mask(&mut self) {
         let words = self.actions.len().div_ceil(64);
         let mut masks: Vec<Mask> = Vec::new();

@@ -1,4 +1,4 @@
-//! Parses models.
+//! Parses PRISM models.
 
 use crate::error::{Diagnostic, Error, Place};
 use crate::prism::ast::{
@@ -8,7 +8,7 @@ use crate::prism::expression::{Cursor, Read};
 use crate::prism::lexer::{Kind, tokens};
 use crate::prism::rename;
 
-/// Parses a model.
+/// Parses a PRISM model.
 ///
 /// ```
 /// use metaplan_probabilistic::prism;
@@ -40,7 +40,7 @@ pub fn parse(text: &str) -> Result<Model, Error> {
         if let Err(problem) = part(&mut cursor, &mut model, &mut kind, &mut problems) {
             problems.push(problem);
             skip(&mut cursor);
-            // An error at a keyword consumes nothing; without progress, the loop would not end.
+            // An error at a keyword consumes no token, so one is skipped to make progress.
             if cursor.position() == before {
                 cursor.advance();
             }
@@ -53,7 +53,7 @@ pub fn parse(text: &str) -> Result<Model, Error> {
     if problems.is_empty() { Ok(model) } else { Err(Error::Model(problems.into())) }
 }
 
-/// Recovers from an error: skips to the end of a declaration, or to a keyword that begins one.
+/// Recovers from an error: skips tokens up to the end of the declaration, or to a keyword that begins a declaration.
 fn skip(cursor: &mut Cursor<'_>) {
     cursor.reset();
     loop {
@@ -132,7 +132,7 @@ fn constant(cursor: &mut Cursor<'_>, model: &mut Model) -> Read<()> {
     Ok(())
 }
 
-/// Parses `const type name = value;`.
+/// Parses the declaration of a constant, `const type name = value;`. Type and value are optional.
 pub fn constant_declaration(cursor: &mut Cursor<'_>) -> Read<Constant> {
     cursor.advance();
     let kind = match cursor.peek() {
@@ -161,7 +161,7 @@ fn named(cursor: &mut Cursor<'_>, model: &mut Model) -> Read<()> {
     Ok(())
 }
 
-/// Parses `label "name" = expression;` or `formula name = expression;`.
+/// Parses a named expression: `label "name" = expression;` or `formula name = expression;`.
 pub fn named_expression(cursor: &mut Cursor<'_>) -> Read<Named> {
     let is_label = cursor.is_word("label");
     cursor.advance();
@@ -244,7 +244,7 @@ fn module(cursor: &mut Cursor<'_>, model: &mut Model, problems: &mut Vec<Diagnos
     Ok(())
 }
 
-/// Parses a variable or a command.
+/// Parses a variable or a command and adds it to the module.
 fn member(cursor: &mut Cursor<'_>, module: &mut Module) -> Read<()> {
     if cursor.is("[") {
         module.commands.push(command(cursor)?);
@@ -287,7 +287,7 @@ fn command(cursor: &mut Cursor<'_>) -> Read<Command> {
     Ok(Command { action, guard, updates, place })
 }
 
-/// Returns `true` if an update without a probability follows: `true`, or `(name'=`.
+/// Returns `true` if an update without a probability follows, i.e. the next tokens are `true;` or `(name'`.
 fn starts_assignments(cursor: &Cursor<'_>) -> bool {
     let is_true = cursor.is_word("true") && matches!(cursor.peek_at(1), Kind::Sign(";"));
     is_true || cursor.is("(") && matches!(cursor.peek_at(2), Kind::Sign("'"))

@@ -1,7 +1,7 @@
-//! Generates successors from cached behaviours of the modules.
+//! Generates successors from cached behaviours, i.e. from the evaluated commands of the local states of modules.
 //!
-//! Results and their order are those of [`Program`]. States in which an evaluation fails are delegated to the program,
-//! which reports the error.
+//! The choices and their order are the same as those of [`Program`]. If an evaluation fails in a state, the state is
+//! delegated to the program, which reports the error.
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -22,14 +22,14 @@ use crate::prism::model::{Program, UNNAMED};
 use crate::prism::run::{MAX_COMBINED, Sums, Values};
 use crate::prism::state::Packed;
 
-/// A program with a cache of the behaviours of its modules.
+/// A program that caches the evaluated commands of its modules by local state.
 pub struct Remembered<'a, N> {
     program: &'a Program<N>,
-    /// `None` if a cache would not pay; then the program computes all successors.
+    /// The caches. `None` if caching would save nothing; the program then computes all successors.
     memory: Option<RefCell<Memory<N>>>,
 }
 
-/// The caches and working memory.
+/// The caches and the buffers.
 struct Memory<N> {
     team: Team<N>,
     stops: Memo<bool>,
@@ -38,38 +38,39 @@ struct Memory<N> {
     combiner: Combiner<N>,
 }
 
-/// The modules and their behaviours in the current state.
+/// The modules, with their behaviours (evaluated commands) in the current state.
 struct Team<N> {
     modules: Vec<Module<N>>,
-    /// For each action, its modules with the position of the action in each.
+    /// For each action, the modules that synchronise on it: module index, and position of the action in the module's
+    /// list.
     actions: Vec<Vec<(usize, usize)>>,
-    /// The current behaviour of each module.
+    /// For each module, the index of its behaviour in the current state.
     behaviours: Vec<usize>,
-    /// The actions that some module disables, as a bit set.
+    /// The actions that are disabled by at least one module in the current state, as a bit set.
     prevented: u128,
 }
 
-/// Caches of the rewards of choices: without an action, and by action.
+/// Caches of the rewards of choices, for commands without an action and for each action.
 struct Rewards<N> {
     unnamed: Memo<Sums<N>>,
     named: Vec<Memo<Sums<N>>>,
 }
 
-/// Buffers for the combination of updates of several modules: partial successors with their probabilities.
+/// Buffers for combining the updates of several modules: partial successors with their probabilities.
 struct Combiner<N> {
     open: Vec<(Packed, N)>,
     next: Vec<(Packed, N)>,
 }
 
-/// A module and its enabled commands, one of which is executed.
+/// The index of a module and the range of its enabled commands, one of which is executed.
 type Part = (usize, std::ops::Range<Chosen>);
-/// The modules that synchronise on an action.
+/// The modules that synchronise on an action, with their enabled commands.
 type Parts = SmallVec<[Part; 8]>;
 
 impl<'a, N: Number> Remembered<'a, N> {
-    /// Creates an empty cache.
+    /// Creates a generator with an empty cache.
     pub fn new(program: &'a Program<N>) -> Self {
-        // A single module has as many behaviours as the model has states, so that caching them saves nothing.
+        // A model with a single module has as many local states as states, so caching saves nothing.
         let pays = program.free.len() > 1 && program.actions.len() <= MAX_ACTIONS;
         Self { program, memory: pays.then(|| RefCell::new(Memory::new(program))) }
     }
@@ -128,7 +129,7 @@ impl<N: Number> Memory<N> {
         }
     }
 
-    /// Adds the choices of a state. Returns `None` if an evaluation fails.
+    /// Adds the choices of a state. Returns `None` if an evaluation fails; some choices may have been added.
     fn successors(
         &mut self,
         program: &Program<N>,
@@ -150,7 +151,7 @@ impl<N: Number> Memory<N> {
         }
     }
 
-    /// Adds all choices of a state of a decision process.
+    /// Adds all choices of a state of a Markov decision process. Returns `None` if an evaluation fails.
     fn choices(
         &mut self,
         program: &Program<N>,
@@ -170,7 +171,8 @@ impl<N: Number> Memory<N> {
         })
     }
 
-    /// Adds the one choice of a state of a Markov chain: a uniform distribution over the enabled commands.
+    /// Adds the only choice of a state of a Markov chain: a uniform distribution over the combinations of enabled
+    /// commands. Returns `None` if an evaluation fails.
     fn step(&mut self, program: &Program<N>, state: &Packed, choices: &mut Choices<Packed, N>) -> Option<()> {
         let Self { team, state_sums, action_sums_cache, combiner, .. } = self;
         let (mut combinations, mut last_action) = (0_usize, UNNAMED);
@@ -219,7 +221,7 @@ impl<N: Number> Team<N> {
         Self { behaviours: vec![0; modules.len()], modules, actions, prevented: 0 }
     }
 
-    /// Looks up the behaviours of all modules in a state. Returns `None` if an evaluation fails.
+    /// Looks up the behaviour of each module in a state. Returns `None` if an evaluation fails.
     fn load_state(
         &mut self,
         program: &Program<N>,
@@ -234,7 +236,8 @@ impl<N: Number> Team<N> {
         Some(())
     }
 
-    /// Calls `visit` with each enabled action and the participating modules. Returns `None` as soon as `visit` does.
+    /// Calls `visit` with each enabled action and the participating modules with their commands. Returns `None` as
+    /// soon as `visit` does.
     fn each_action(&self, mut visit: impl FnMut(u32, &[Part]) -> Option<()>) -> Option<()> {
         for (number, module) in self.modules.iter().enumerate() {
             let commands = module.free(self.behaviours[number]);
@@ -258,8 +261,8 @@ impl<N: Number> Team<N> {
         Some(())
     }
 
-    /// Calls `visit` with each combination of one command per module; the command of the first module varies fastest.
-    /// Returns `None` if there are too many successors.
+    /// Calls `visit` with each combination of one command per module. The command of the first module varies fastest.
+    /// Returns `None` if the combinations have more than [`MAX_COMBINED`] successors.
     fn each_combination(&self, parts: &[Part], mut visit: impl FnMut(&[Chosen])) -> Option<()> {
         if let [(_, commands)] = parts {
             commands.clone().for_each(|command| visit(&[command]));
@@ -286,7 +289,8 @@ impl<N: Number> Team<N> {
 }
 
 impl<N: Number> Combiner<N> {
-    /// Calls `to` with each successor of a combination of commands; the update of the last module varies fastest.
+    /// Calls `to` with each successor of one command per module, and its probability. The update of the last module
+    /// varies fastest.
     fn combine(
         &mut self,
         team: &Team<N>,
@@ -308,7 +312,7 @@ impl<N: Number> Combiner<N> {
         self.open.push((state.clone(), N::one()));
         for at in 0..chosen.len() {
             let mut updates = updates(at);
-            // A single update is applied in place.
+            // A single update is applied to all partial successors in place.
             if updates.len() == 1
                 && let Some((probability, edits)) = updates.next()
             {
@@ -332,7 +336,8 @@ impl<N: Number> Combiner<N> {
     }
 }
 
-/// Multiplies two probabilities. Most are 1, and multiplying rationals is expensive.
+/// Multiplies two probabilities. The multiplication is skipped for 1, because most probabilities are 1 and rational
+/// multiplication is expensive.
 fn product<N: Number>(left: &N, right: &N) -> N {
     match (left.is_unit(), right.is_unit()) {
         (true, _) => right.clone(),
@@ -351,14 +356,14 @@ impl<N: Number> Rewards<N> {
         }
     }
 
-    /// Returns the rewards of an action in a state, or `None` if their evaluation fails.
+    /// Returns the rewards of an action in a state, by computed structure. Returns `None` if an evaluation fails.
     fn get(&mut self, program: &Program<N>, action: u32, state: &Packed) -> Option<&Sums<N>> {
         let memo = self.named.get_mut(action as usize).unwrap_or(&mut self.unnamed);
         memo.get(state, || program.action_rewards(action, &program.values_of(state)).ok())
     }
 }
 
-/// Creates a cache of the sums of some reward items of each computed structure.
+/// Creates a cache of reward sums. For each computed reward structure, `items` returns the items that are summed.
 fn sums<'a, N: Number>(
     program: &'a Program<N>,
     items: impl Fn(&usize) -> &'a Vec<RewardItem<N>>,

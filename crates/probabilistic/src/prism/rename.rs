@@ -1,9 +1,10 @@
-//! Expands renamed modules: `module B = A [x=y] endmodule`.
+//! Expands renamed modules (`module B = A [x=y] endmodule`).
 
 use crate::error::Place;
 use crate::prism::ast::{Command, Expr, ExprKind, Module, Named, Update, Variable};
 
-/// Copies a module under other names. Formulas are expanded first, because the names in them are replaced as well.
+/// Copies a module under a new name and replaces the names in `pairs` (old, new). Formulas are expanded first,
+/// because names inside them are replaced, too.
 pub fn module(
     original: &Module,
     name: &str,
@@ -45,7 +46,8 @@ pub fn module(
     }
 }
 
-/// Expands the formulas in an expression. `depth` ends the recursion for formulas that contain themselves.
+/// Expands the formulas in an expression up to a nesting depth. The depth limit ends the recursion of circular
+/// formulas.
 fn expand_formulas(expression: &Expr, formulas: &[Named], depth: usize) -> Expr {
     let Some(depth) = depth.checked_sub(1) else { return expression.clone() };
     expression.replace(&|name| {

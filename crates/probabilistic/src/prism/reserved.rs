@@ -1,6 +1,6 @@
 //! Reserved words of the PRISM language.
 
-/// Keywords of PRISM, and words that only Storm reserves.
+/// Reserved words of PRISM and of the model checker Storm.
 const RESERVED: [&str; 50] = [
     "A",
     "bool",
@@ -54,19 +54,20 @@ const RESERVED: [&str; 50] = [
     "true",
 ];
 
-/// Further reserved words.
+/// Further reserved words, some of Storm or of PRISM extensions.
 const MORE_RESERVED: [&str; 10] =
     ["R", "S", "stochastic", "system", "U", "W", "smg", "ma", "player", "endplayer"];
 
-/// Function names. PRISM accepts them as names if no parenthesis follows; other tools do not always.
+/// Names of functions. PRISM accepts them as identifiers if no parenthesis follows; other tools may not.
 const FUNCTIONS: [&str; 6] = ["floor", "ceil", "round", "pow", "mod", "log"];
 
-/// Returns `true` if a word cannot be a name.
+/// Returns `true` if a word is reserved, i.e. cannot be an identifier.
 pub fn is_keyword(word: &str) -> bool {
     RESERVED.contains(&word) || MORE_RESERVED.contains(&word)
 }
 
-/// Returns `true` if a word should not be a name in a model that is written for other tools.
+/// Returns `true` if a word should not be an identifier in a model for other tools: a reserved word or a function
+/// name.
 pub fn is_reserved(word: &str) -> bool {
     is_keyword(word) || FUNCTIONS.contains(&word)
 }

@@ -1,6 +1,6 @@
-//! Computes the choices of a state.
+//! Computes the choices of a state from the commands of a program.
 //!
-//! Most commands do not synchronise and have constant probabilities: their successors are written directly as packed
+//! Most commands do not synchronise and have constant probabilities; their successors are written directly as packed
 //! states. Only synchronised commands and Markov chains need combinations of commands.
 
 use num_bigint::BigInt;
@@ -18,29 +18,31 @@ use crate::prism::command::{Command, RewardItem, Variable};
 use crate::prism::model::{Group, Program, UNNAMED};
 use crate::prism::state::{Packed, above_least};
 
-/// Values of the variables in one state.
+/// The values of the variables in a state.
 pub(super) type Values = SmallVec<[i64; 16]>;
-/// The rewards of a choice, by structure.
+/// The rewards of a state or choice, by computed structure.
 pub(super) type Sums<N> = SmallVec<[N; 4]>;
 
-/// Upper limit on the successors of the combined commands of one action in one state.
+/// Upper limit on the number of successors of the synchronised commands of an action in one state.
 pub(super) const MAX_COMBINED: usize = 1_000_000;
 
-/// The enabled commands of the modules that synchronise on an action. One command of each module is executed.
+/// The enabled commands of the modules that synchronise on an action. A joint step executes one command of each
+/// module.
 struct JointStep<N> {
     action: u32,
-    /// Start of the commands of each module.
+    /// For each module, the start of its commands in `commands`.
     modules: SmallVec<[u32; 4]>,
-    /// End of the updates of each command.
+    /// For each command, the end of its updates in `updates`.
     commands: SmallVec<[u32; 8]>,
-    /// Probability of each update with a nonzero probability, and the end of its changes.
+    /// For each update, its probability (not 0) and the end of its assignments in `changes`.
     updates: SmallVec<[(N, u32); 8]>,
-    /// Variables and their new values.
+    /// The assignments: variable and new value.
     changes: SmallVec<[(u32, i64); 16]>,
 }
 
 impl<N: Number> Program<N> {
-    /// Collects the enabled commands of synchronising modules. Returns `false` if a module has none.
+    /// Collects the enabled commands of the synchronising modules in `joint`. Returns `false` if a module has no
+    /// enabled command.
     fn synchronise(
         &self,
         joint: &mut JointStep<N>,
@@ -68,7 +70,7 @@ impl<N: Number> Program<N> {
             let mut ends = 0_usize;
             for at in joint.of(module) {
                 ends = ends.saturating_add(outcomes.saturating_mul(joint.updates_of(at).len()));
-                // A single module has no combinations.
+                // With a single module, nothing is combined, so there is no limit.
                 if ends > MAX_COMBINED && module > 0 {
                     let text =
                         format!("more than {MAX_COMBINED} ways in which modules move together in a state");
@@ -80,7 +82,7 @@ impl<N: Number> Program<N> {
         Ok(true)
     }
 
-    /// Appends the updates of a command in a state.
+    /// Appends the updates of a command, evaluated in a state, to `joint`.
     fn effects(&self, joint: &mut JointStep<N>, command: &Command<N>, values: &[i64]) -> Result<(), Error> {
         for (update, probability) in command.updates.iter().zip(&*command.probabilities(values)?) {
             if probability.is_zero() {
@@ -95,7 +97,7 @@ impl<N: Number> Program<N> {
         Ok(())
     }
 
-    /// Evaluates an assignment. The value must be in the range of the variable.
+    /// Evaluates the value of an assignment. A value outside the range of the variable is an error.
     pub(super) fn assigned(
         &self,
         variable: u32,
@@ -112,7 +114,7 @@ impl<N: Number> Program<N> {
         Err(Diagnostic::new("Q305", place, text).into())
     }
 
-    /// Calls `to` with each successor of a combination of one command per module.
+    /// Calls `to` with each successor of the commands `chosen` (one per module), and its probability.
     fn expand(&self, state: &Packed, joint: &JointStep<N>, chosen: &[usize], mut to: impl FnMut(Packed, N)) {
         let updates = |module: usize| joint.updates_of(chosen[module]);
         let mut at: SmallVec<[usize; 8]> = (0..chosen.len()).map(|module| updates(module).start).collect();
@@ -161,7 +163,7 @@ impl<N> JointStep<N> {
         }
     }
 
-    /// Clears the lists for another action.
+    /// Clears the lists and starts a joint step of another action.
     fn begin(&mut self, action: u32) {
         self.action = action;
         self.modules.clear();
@@ -170,24 +172,24 @@ impl<N> JointStep<N> {
         self.changes.clear();
     }
 
-    /// Returns the positions of the commands of a module.
+    /// Returns the positions of a module's commands in `commands`.
     fn of(&self, module: usize) -> std::ops::Range<usize> {
         let end = self.modules.get(module.saturating_add(1)).map_or(self.commands.len(), |end| *end as usize);
         self.modules[module] as usize..end
     }
 
-    /// Returns the positions of the updates of a command.
+    /// Returns the positions of a command's updates in `updates`.
     fn updates_of(&self, command: usize) -> std::ops::Range<usize> {
         let begin = command.checked_sub(1).map_or(0, |before| self.commands[before]);
         begin as usize..self.commands[command] as usize
     }
 
-    /// Number of combinations of one command per module.
+    /// Returns the number of combinations of one command per module.
     fn combinations(&self) -> usize {
         (0..self.modules.len()).map(|module| self.of(module).len()).product()
     }
 
-    /// Calls `visit` with each combination of one command per module.
+    /// Calls `visit` with each combination of one command per module, as positions in `commands`.
     fn each<E>(&self, mut visit: impl FnMut(&[usize]) -> Result<(), E>) -> Result<(), E> {
         let mut at: SmallVec<[usize; 8]> = self.modules.iter().map(|begin| *begin as usize).collect();
         loop {
@@ -206,7 +208,7 @@ impl<N> JointStep<N> {
     }
 }
 
-/// Returns the enabled commands of a group, in the order of the model.
+/// Returns the commands of a group that are enabled in a state, in the order of the model.
 pub(super) fn enabled<'a, N: Number>(
     group: &'a Group<N>,
     values: &'a [i64],
@@ -232,7 +234,7 @@ impl<N: Number> Program<N> {
         self.layout.values(state).collect()
     }
 
-    /// Returns the state reward of a structure, by its number.
+    /// Returns the state reward of the structure with this index.
     pub(crate) fn state_reward(&self, structure: usize, values: &[i64]) -> Result<N, Error> {
         sum(&self.rewards[structure].states, values)
     }
@@ -249,7 +251,7 @@ impl<N: Number> Program<N> {
         self.computed_rewards.iter().map(|structure| sum(items(structure), values)).collect()
     }
 
-    /// Returns the actions that no single variable rules out.
+    /// Returns the actions that are not excluded by the value of any single variable.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "words hold 64 actions, and there are as many words as the actions need; bits is not 0 where its last one is taken"
@@ -270,7 +272,7 @@ impl<N: Number> Program<N> {
         })
     }
 
-    /// Adds the successors of a command that does not synchronise.
+    /// Adds the transitions of a command that does not synchronise to the current choice.
     fn single_command(
         &self,
         command: &Command<N>,
@@ -291,7 +293,7 @@ impl<N: Number> Program<N> {
         Ok(())
     }
 
-    /// Adds all choices of a state of a decision process.
+    /// Adds all choices of a state of a Markov decision process.
     fn choices(
         &self,
         state: &Packed,
@@ -335,7 +337,8 @@ impl<N: Number> Program<N> {
         Ok(())
     }
 
-    /// Adds the one choice of a state of a Markov chain: a uniform distribution over the enabled commands.
+    /// Adds the only choice of a state of a Markov chain: a uniform distribution over the combinations of enabled
+    /// commands.
     fn step(&self, state: &Packed, values: &Values, choices: &mut Choices<Packed, N>) -> Result<(), Error> {
         let mut joint_steps: SmallVec<[JointStep<N>; 1]> = SmallVec::new();
         let mut collect = |action: u32, groups: &[Group<N>]| {
@@ -399,7 +402,7 @@ impl<N: Number> Generator<N> for Program<N> {
 
     fn successors(&self, state: &Packed, choices: &mut Choices<Packed, N>) -> Result<(), Error> {
         let values = self.values_of(state);
-        // A state in which the condition has no value is expanded.
+        // A state in which the condition cannot be evaluated is expanded.
         if self.stop.as_ref().is_some_and(|stop| stop.holds(&values).unwrap_or(false)) {
             choices.to(state.clone(), N::one());
             choices.end(UNNAMED, self.computed_rewards.iter().map(|_| N::zero()));

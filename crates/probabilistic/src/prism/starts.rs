@@ -5,12 +5,12 @@ use crate::prism::code::{Code, Fault};
 use crate::prism::command::Variable;
 use crate::prism::state::{Layout, Packed, Valuation};
 
-/// Upper limit on the number of values that are tried.
+/// Upper limit on the number of tried assignments of a value to a variable.
 const MAX_TRIED: usize = 50_000_000;
 
-/// Returns the states that satisfy a condition, in lexicographic order of the values of the variables.
+/// Returns the states that satisfy `condition`, in lexicographic order of the values of the variables.
 ///
-/// Backtracking over the variables: a conjunct is evaluated as soon as all of its variables have values.
+/// The search backtracks over the variables. A conjunct is evaluated as soon as all of its variables have values.
 pub fn starts(
     condition: Code,
     place: Place,
@@ -38,7 +38,8 @@ pub fn starts(
     if !holds(&ready[0], &values)? {
         return Ok(states);
     }
-    // The variables before `at` satisfy their conjuncts; the current value of the variable `at` is to be tried.
+    // Invariant: the variables before `at` satisfy all conjuncts over them; the current value of variable `at` is
+    // tried next.
     loop {
         tried_values = tried_values.saturating_add(1);
         if tried_values > MAX_TRIED {

@@ -1,23 +1,23 @@
-//! Bit-packed states.
+//! Bit-packed states of PRISM models.
 
 use std::collections::BTreeSet;
 use std::hash::{Hash, Hasher};
 
 use crate::mdp::dense;
 
-/// A state: the values of the variables, each in the number of bits that its range requires.
+/// A state of a model: the values of the variables, each stored in the number of bits that its range requires.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Packed(Words);
 
-// Exploration spends its time on copying, comparing and hashing states. Two words are stored inline and copied
-// without a branch on their number.
+// Exploration mostly copies, compares and hashes states. Small states are therefore stored inline in two words, and
+// are copied without a branch on the number of words.
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Words {
     Inline([u64; INLINE_WORDS]),
     Boxed(Box<[u64]>),
 }
 
-/// Number of words that are stored without an allocation.
+/// Number of words that are stored inline, without an allocation.
 const INLINE_WORDS: usize = 2;
 
 impl Default for Words {
@@ -52,7 +52,7 @@ impl Hash for Packed {
     }
 }
 
-/// A change of one word of a state: clears some bits, then sets some.
+/// A change of one word of a packed state: first clears bits, then sets bits.
 #[derive(Debug, Clone, Copy)]
 pub struct Edit {
     word: u32,
@@ -61,12 +61,12 @@ pub struct Edit {
 }
 
 impl Edit {
-    /// Returns `true` if both edits change the same word.
+    /// Returns `true` if both edits change the same word and can thus be joined.
     pub const fn joins(&self, other: &Self) -> bool {
         self.word == other.word
     }
 
-    /// Appends a later edit of the same word.
+    /// Extends this edit so that it has the effect of itself followed by `after`, an edit of the same word.
     pub const fn join(&mut self, after: &Self) {
         self.clear |= after.clear;
         self.set = self.set & !after.clear | after.set;
@@ -74,7 +74,7 @@ impl Edit {
 }
 
 impl Packed {
-    /// Applies edits.
+    /// Applies edits in their order.
     pub fn edit(&mut self, edits: &[Edit]) {
         let words = self.words_mut();
         for Edit { word, clear, set } in edits {
@@ -84,26 +84,26 @@ impl Packed {
     }
 }
 
-/// The positions of some variables whose values together fit in 64 bits.
+/// A selection of variables whose values are concatenated to a number of at most 64 bits.
 #[derive(Debug, Clone, Default)]
 pub struct Key {
     pieces: Vec<Piece>,
-    /// Number of bits of all values.
+    /// Number of bits of all selected variables together.
     pub bits: u32,
 }
 
-/// Contiguous bits of a word.
+/// Contiguous bits of a word of a packed state that are copied to a key.
 #[derive(Debug, Clone, Copy)]
 struct Piece {
     word: u32,
     shift: u32,
     mask: u64,
-    /// Position of the bits in the key.
+    /// Position of the lowest bit in the key.
     at: u32,
 }
 
 impl Key {
-    /// Concatenates the values of the variables to a number.
+    /// Concatenates the values of the selected variables to a number.
     pub fn of(&self, packed: &Packed) -> u64 {
         let words = packed.words();
         self.pieces.iter().fold(0, |number, piece| {
@@ -112,29 +112,30 @@ impl Key {
     }
 }
 
-/// Values of the variables; truth values are 0 and 1.
+/// The values of all variables of a model; truth values are 0 and 1.
 pub type Valuation = Vec<i64>;
 
-/// Distance of a value from the least value of its range; `usize::MAX`, which is no valid index, if the value is less.
+/// Returns the distance of a value from the least value of its range, as an index. If the value is less, returns
+/// `usize::MAX`, which is no valid index.
 pub fn above_least(value: i64, least: i64) -> usize {
     if value < least { usize::MAX } else { usize::try_from(value.abs_diff(least)).unwrap_or(usize::MAX) }
 }
 
-/// The position of each variable in a packed state.
+/// The bit positions of all variables in packed states.
 #[derive(Debug, Clone, Default)]
 pub struct Layout {
     fields: Vec<Field>,
     words: usize,
     /// Number of used bits in the last word.
     used: u32,
-    /// The variables, by descending size of their ranges.
+    /// The indices of the variables, by descending size of their ranges.
     order: Vec<u32>,
 }
 
 #[derive(Debug, Clone, Copy)]
 struct Field {
     least: i64,
-    /// Greatest value minus least value.
+    /// Size of the range: greatest value minus least value.
     greatest: u64,
     word: u32,
     shift: u32,
@@ -142,7 +143,7 @@ struct Field {
 }
 
 impl Layout {
-    /// Adds a variable with its range.
+    /// Appends a variable with the range `least..=greatest`.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "used is at most 64 and so is bits; words counts variables"
@@ -150,13 +151,13 @@ impl Layout {
     pub fn push(&mut self, least: i64, greatest: i64) {
         let size = greatest.abs_diff(least);
         let bits = size.checked_ilog2().map_or(0, |log| log + 1);
-        // A value never crosses the boundary of a word.
+        // The bits of a variable never cross the boundary of a word.
         if self.words == 0 || self.used + bits > 64 {
             self.words += 1;
             self.used = 0;
         }
         let mask = if bits == 64 { u64::MAX } else { (1 << bits) - 1 };
-        // A variable of one value takes no bits; its shift must stay below the word's size.
+        // A variable with a single value has no bits, but its shift must still be less than 64.
         let shift = if bits == 0 { 0 } else { self.used };
         self.fields.push(Field { least, greatest: size, word: dense(self.words - 1), shift, mask });
         self.used += bits;
@@ -164,7 +165,7 @@ impl Layout {
         self.order.sort_by_key(|number| std::cmp::Reverse(self.fields[*number as usize].greatest));
     }
 
-    /// Packs values; each must be in its range.
+    /// Packs the values of all variables into a state. Each value must be in the range of its variable.
     pub fn pack(&self, values: &[i64]) -> Packed {
         let mut packed = Packed::new(self.words);
         let words = packed.words_mut();
@@ -174,35 +175,35 @@ impl Layout {
         packed
     }
 
-    /// Returns the values of all variables.
+    /// Returns the values of all variables in a state.
     pub fn values(&self, packed: &Packed) -> impl Iterator<Item = i64> {
         self.fields.iter().map(|field| field.least.wrapping_add_unsigned(field.raw(packed)))
     }
 
-    /// Writes the values of all variables to a buffer.
+    /// Replaces the contents of `values` by the values of all variables in a state.
     pub fn unpack(&self, packed: &Packed, values: &mut Valuation) {
         values.clear();
         values.extend(self.values(packed));
     }
 
-    /// Sets one variable.
+    /// Sets the value of one variable in a state.
     pub fn set(&self, packed: &mut Packed, variable: u32, value: i64) {
         packed.edit(&[self.edit(variable, value)]);
     }
 
-    /// Returns the edit that sets one variable.
+    /// Returns the edit that sets one variable to a value.
     pub fn edit(&self, variable: u32, value: i64) -> Edit {
         let field = &self.fields[variable as usize];
         let set = value.abs_diff(field.least) << field.shift;
         Edit { word: field.word, clear: field.mask << field.shift, set }
     }
 
-    /// Returns the key of some variables, or `None` if their values together need more than 64 bits.
+    /// Returns the key that concatenates the values of these variables, or `None` if they need more than 64 bits.
     pub fn key(&self, variables: &BTreeSet<u32>) -> Option<Key> {
         let mut key = Key::default();
         for field in variables.iter().map(|variable| &self.fields[*variable as usize]) {
             let bits = field.mask.count_ones();
-            // Adjacent variables of one word are read together.
+            // Adjacent variables in the same word are copied together.
             if let Some(last) = key.pieces.last_mut()
                 && last.word == field.word
                 && last.shift.saturating_add(last.mask.count_ones()) == field.shift
@@ -217,13 +218,13 @@ impl Layout {
         (key.bits <= 64).then_some(key)
     }
 
-    /// Number of combinations of values, or `None` if it exceeds `usize`.
+    /// Returns the number of combinations of values of all variables, or `None` if it exceeds `usize`.
     pub fn codes(&self) -> Option<usize> {
         self.fields.iter().try_fold(1_usize, |product, field| product.checked_mul(field.size()?))
     }
 
-    /// Number of a state in mixed radix; the variable with the greatest range is the most significant digit.
-    /// Meaningless if [`Self::codes`] is `None`.
+    /// Returns the index of a state among all combinations of values (mixed radix). The variable with the greatest
+    /// range is the most significant digit. The result is meaningless if [`Self::codes`] returns `None`.
     pub fn code(&self, packed: &Packed) -> usize {
         self.order.iter().fold(0, |code, number| {
             let field = &self.fields[*number as usize];
@@ -238,7 +239,7 @@ impl Field {
         packed.words()[self.word as usize] >> self.shift & self.mask
     }
 
-    /// Number of values in the range.
+    /// Returns the number of values in the range, or `None` if it exceeds `usize`.
     fn size(&self) -> Option<usize> {
         usize::try_from(self.greatest).ok()?.checked_add(1)
     }

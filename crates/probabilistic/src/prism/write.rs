@@ -1,4 +1,4 @@
-//! Writes models in the PRISM language.
+//! Formats models as text in the PRISM language.
 
 use std::fmt::Write as _;
 
@@ -9,7 +9,7 @@ use num_traits::{One, Signed};
 use crate::prism::ast::{Expr, ExprKind, Model, ModelKind, Variable};
 use crate::prism::reserved::is_reserved;
 
-/// Formats a model as text that PRISM and Storm can read.
+/// Formats a model as text that PRISM and Storm can parse.
 pub fn write(model: &Model) -> String {
     let mut text = String::new();
     for line in model.remark.lines() {
@@ -94,12 +94,12 @@ pub fn expression(expression: &Expr) -> String {
     operand(expression, 0)
 }
 
-/// Formats an expression as an operand of an operator with the given precedence.
+/// Formats an expression as an operand; adds parentheses if its precedence is below `least`.
 #[expect(clippy::arithmetic_side_effects, reason = "strengths are below 20")]
 fn operand(expression: &Expr, least: u8) -> String {
     let (text, strength) = match &expression.kind {
         ExprKind::Bool(value) => (value.to_string(), 20),
-        // A negative number binds like a unary minus.
+        // A negative number has the precedence of a unary minus.
         ExprKind::Int(value) => (value.to_string(), if *value < 0 { 11 } else { 20 }),
         ExprKind::Number(value) => decimal(value),
         ExprKind::Name(name) => (name.clone(), 20),
@@ -126,7 +126,8 @@ fn operand(expression: &Expr, least: u8) -> String {
     if strength < least { format!("({text})") } else { text }
 }
 
-/// Formats a rational as a decimal if it has at most 30 places, else as a fraction. Also returns the precedence of the text.
+/// Formats a rational as a decimal if that needs at most 30 decimal places, otherwise as a fraction. Also returns the
+/// precedence of the text.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "at most 30 places, and digits are padded to more than there are places"
@@ -147,7 +148,8 @@ pub(crate) fn decimal(value: &BigRational) -> (String, u8) {
     (format!("{}/{}", value.numer(), value.denom()), 10)
 }
 
-/// Converts any name to a name that PRISM accepts: other characters become `_`, and `_` is added to reserved words.
+/// Converts any name to an identifier that PRISM accepts: invalid characters become `_`, and `_` is appended to
+/// reserved words. Different names can yield the same identifier.
 pub fn identifier(name: &str) -> String {
     let mut text: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
     if text.is_empty() || text.starts_with(|c: char| c.is_ascii_digit()) {

@@ -1,4 +1,4 @@
-//! Parses files of properties with their declarations.
+//! Parses property files: properties, and declarations that the properties use.
 
 use crate::error::{Error, Place};
 use crate::prism::ast::{Constant, Named, Property};
@@ -7,40 +7,42 @@ use crate::prism::lexer::{Kind, tokens};
 use crate::prism::{constant_declaration, named_expression};
 use crate::property::grammar::{PROPERTY_SYNTAX, property};
 
-/// A file of properties: its declarations, and its properties in order.
+/// The contents of a property file.
 #[derive(Debug, Clone, Default)]
 pub struct File {
-    /// Constants, labels and named properties.
+    /// The declared constants, labels and named properties.
     pub declarations: Declarations,
-    /// The properties.
+    /// The properties to check, in the order of the file.
     pub properties: Vec<Listed>,
 }
 
-/// Declarations of a property file, which its properties can use in addition to those of the model.
+/// The declarations of a property file. Its properties can use them in addition to the declarations
+/// of the model.
 #[derive(Debug, Clone, Default)]
 pub struct Declarations {
-    /// Constants, possibly undefined.
+    /// The constants; the user must set the values of undefined constants.
     pub constants: Vec<Constant>,
     /// Labels.
     pub labels: Vec<Named>,
-    /// Named properties, which other properties can use: `1 - "hit"`. A label with the same name takes precedence.
+    /// The named properties, which other properties can refer to by name, as in `1 - "hit"`. A
+    /// label with the same name takes precedence.
     pub properties: Vec<(String, Property)>,
 }
 
-/// A property of a file.
+/// A property in a property file.
 #[derive(Debug, Clone)]
 pub struct Listed {
-    /// The name, if it has one.
+    /// The name of the property, or `None` for an unnamed property.
     pub name: Option<String>,
-    /// The property.
+    /// The parsed property.
     pub property: Property,
-    /// The text, without the name.
+    /// The source text of the property, without its name.
     pub text: String,
-    /// Position of the property.
+    /// Position of the property in the file, after its name.
     pub place: Place,
 }
 
-/// Parses a file of properties, constants and labels.
+/// Parses a property file, which contains properties, constants and labels.
 ///
 /// # Errors
 /// All syntax errors; after an error, parsing continues after the next `;`. A property of an unsupported kind is not an
@@ -83,7 +85,7 @@ fn entry(cursor: &mut Cursor<'_>, text: &str, file: &mut File) -> Read<()> {
     let begin = position(text, place);
     let start = cursor.position();
     let property = match property(cursor) {
-        // An unsupported property is skipped, so that the others can be checked.
+        // An unsupported property is skipped, so that the other properties can still be checked.
         Err(problem) if problem.code == "Q403" => {
             cursor.back_to(start);
             skip_property(cursor);
@@ -92,7 +94,7 @@ fn entry(cursor: &mut Cursor<'_>, text: &str, file: &mut File) -> Read<()> {
         read => read?,
     };
     let end = if *cursor.peek() == Kind::End { text.len() } else { position(text, cursor.place()) };
-    // A comment between this property and the next one is not part of it.
+    // A comment after the property is not part of its source text.
     let source = text[begin..end].split("//").next().unwrap_or("").trim().to_owned();
     if let Some(name) = &name {
         file.declarations.properties.push((name.clone(), property.clone()));
@@ -101,7 +103,7 @@ fn entry(cursor: &mut Cursor<'_>, text: &str, file: &mut File) -> Read<()> {
     Ok(())
 }
 
-/// Skips an unsupported property: to `;`, or to a closing bracket after which a new property begins.
+/// Skips an unsupported property, up to `;` or to a closing bracket that a new property follows.
 fn skip_property(cursor: &mut Cursor<'_>) {
     let mut open = 0_usize;
     loop {
@@ -120,7 +122,7 @@ fn skip_property(cursor: &mut Cursor<'_>) {
     }
 }
 
-/// Converts a position to a byte offset.
+/// Converts a position (line and column) in a text to a byte offset.
 fn position(text: &str, place: Place) -> usize {
     let lines = text.split_inclusive('\n').take(place.line.saturating_sub(1));
     let before = lines.map(str::len).fold(0, usize::saturating_add);

@@ -1,4 +1,4 @@
-//! Parses properties.
+//! Grammar of properties: converts tokens to the syntax tree.
 
 use crate::error::{Diagnostic, Error, Place};
 use crate::prism::ast::{
@@ -8,13 +8,13 @@ use crate::prism::expression::{Cursor, PropertySyntax, Read};
 use crate::prism::lexer::{Kind, tokens};
 use crate::solve::Direction;
 
-/// The description of a property in messages.
+/// Description of a property, for error messages.
 const PROPERTY: &str = "a property (`Pmax=? [ F … ]`, `R{\"name\"}min=? [ F … ]`)";
 
-/// Parsers of the syntax of properties.
+/// The parsers that extend expressions by the syntax of properties.
 pub const PROPERTY_SYNTAX: PropertySyntax = PropertySyntax { parse_prefix, parse_infix };
 
-/// The filters by name; the last one is an alias.
+/// The names of the filters; the last entry is an alias.
 const FILTERS: [(&str, Filter); 15] = [
     ("min", Filter::Min),
     ("max", Filter::Max),
@@ -33,7 +33,7 @@ const FILTERS: [(&str, Filter); 15] = [
     ("average", Filter::Average),
 ];
 
-/// Parses a property.
+/// Parses a single property, which must be the whole text.
 ///
 /// # Errors
 /// The first syntax error, or the first unsupported construct.
@@ -51,7 +51,7 @@ pub fn parse(text: &str) -> Result<Property, Error> {
     result.map_err(|problem| Error::Property(problem.into()))
 }
 
-/// Parses a property up to the first token that does not belong to it.
+/// Parses a property and stops at the first token that does not belong to the property.
 pub fn property(cursor: &mut Cursor<'_>) -> Read<Property> {
     if !matches!(
         cursor.peek(),
@@ -60,7 +60,8 @@ pub fn property(cursor: &mut Cursor<'_>) -> Read<Property> {
         return Err(cursor.expected(PROPERTY));
     }
     let mut expression = cursor.expression()?;
-    // In a file, the next property may begin with `R`. No complete property is an operand of the operator `R`.
+    // In a file, the next property may begin with `R`. A complete property is never an operand of
+    // the temporal operator `R`.
     if !cursor.is_word("R") {
         expression = parse_infix(cursor, expression)?;
     }
@@ -75,7 +76,7 @@ pub fn property(cursor: &mut Cursor<'_>) -> Read<Property> {
     })
 }
 
-/// Parses a property or a unary temporal operator.
+/// Parses a property or a unary temporal operator. Returns `None` if the next token begins neither.
 fn parse_prefix(cursor: &mut Cursor<'_>) -> Read<Option<ExprKind>> {
     let Kind::Name(word) = cursor.peek() else { return Ok(None) };
     let place = cursor.place();
@@ -109,7 +110,8 @@ fn parse_prefix(cursor: &mut Cursor<'_>) -> Read<Option<ExprKind>> {
     Ok(Some(ExprKind::Property(Box::new(property))))
 }
 
-/// Parses a binary temporal operator after its left operand.
+/// Parses a binary temporal operator (`U`, `W` or `R`) after its left operand. Returns the operand
+/// unchanged if none follows.
 fn parse_infix(cursor: &mut Cursor<'_>, left: Expr) -> Read<Expr> {
     let letter = match cursor.peek() {
         Kind::Name(word) if word == "U" => 'U',
@@ -150,7 +152,7 @@ fn probability(cursor: &mut Cursor<'_>, suffix: &str) -> Read<Property> {
     filtered(cursor, Property::Probability(question, path), place)
 }
 
-/// Parses the reward structure of a query, `{"name"}`, if there is one.
+/// Parses the optional name of the reward structure, `{"name"}`.
 fn reward_name(cursor: &mut Cursor<'_>) -> Read<Option<String>> {
     if !cursor.take("{") {
         return Ok(None);
@@ -174,7 +176,8 @@ fn reward(cursor: &mut Cursor<'_>, suffix: &str) -> Read<Property> {
     filtered(cursor, Property::Reward(question, name, path), place)
 }
 
-/// Parses the end of an operator: `]`, or the old form with a filter, `{states}{min}]`.
+/// Parses the end of a `P`, `R` or `S` operator: `]`, or the deprecated syntax of a filter,
+/// `{states}{min}]`.
 fn filtered(cursor: &mut Cursor<'_>, property: Property, place: Place) -> Read<Property> {
     if !cursor.take("{") {
         cursor.need("]")?;
@@ -249,7 +252,8 @@ fn question(cursor: &mut Cursor<'_>, suffix: &str) -> Read<Question> {
     Ok(Question { direction, bound: None })
 }
 
-/// Parses the bounds of a temporal operator, if there are any.
+/// Parses the optional bounds of a temporal operator on steps (`<=10`, `[2,5]`) or on a reward
+/// (`^{rew{"name"}<=10}`).
 fn steps(cursor: &mut Cursor<'_>) -> Read<Option<Steps>> {
     if cursor.take("^") {
         cursor.need("{")?;
@@ -291,13 +295,13 @@ fn one_sided(cursor: &mut Cursor<'_>, limit: impl Fn(&mut Cursor<'_>) -> Read<Ex
     Ok(None)
 }
 
-/// Parses a bound that ends at a bracket: any expression.
+/// Parses the limit of a reward bound: any expression, because a bracket ends it.
 fn any_number(cursor: &mut Cursor<'_>) -> Read<Expr> {
     cursor.expression()
 }
 
-/// Parses a bound on the number of steps, as in `F<=10 "goal"`. It ends before the state formula: a number or a name,
-/// or any expression in parentheses.
+/// Parses the limit of a step bound, as in `F<=10 "goal"`. Because a state formula follows
+/// directly, the limit is a number, a name, or an expression in parentheses.
 fn number_of_steps(cursor: &mut Cursor<'_>) -> Read<Expr> {
     let place = cursor.place();
     match cursor.peek() {
@@ -317,7 +321,8 @@ fn number_of_steps(cursor: &mut Cursor<'_>) -> Read<Expr> {
     }
 }
 
-/// Converts an expression to a path formula that needs no automaton.
+/// Converts an expression with temporal operators to a path formula. Returns an error for LTL
+/// formulas that would need an automaton.
 fn path(formula: Expr) -> Read<Path> {
     let place = formula.place;
     if !has_temporal(&formula) {
@@ -342,7 +347,7 @@ fn path(formula: Expr) -> Read<Path> {
     }
 }
 
-/// Converts `G F`, `F G`, and two equal operators.
+/// Converts nested unary operators: `G F`, `F G`, `F F` and `G G`. Other combinations are an error.
 fn nested(letter: char, steps: Option<&Steps>, right: Expr, place: Place) -> Read<Path> {
     let ExprKind::Temporal(inner) = right.kind else { return Err(ltl(place)) };
     if steps.is_some() || inner.steps.is_some() || has_temporal(&inner.right) {
@@ -363,7 +368,7 @@ fn ltl(place: Place) -> Diagnostic {
     Diagnostic::new("Q403", place, text)
 }
 
-/// Returns `true` if an expression contains a temporal operator outside the properties in it.
+/// Returns `true` if an expression contains a temporal operator outside of nested properties.
 fn has_temporal(expression: &Expr) -> bool {
     match &expression.kind {
         ExprKind::Temporal(_) => true,

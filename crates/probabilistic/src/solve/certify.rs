@@ -1,10 +1,13 @@
-//! Bounds the error of the values that policy iteration has found.
+//! Bounds the error of the values computed by policy iteration, for components of an MDP in
+//! doubles.
 //!
-//! Let w be the expected number of steps under the almost optimal policies. If no equation increases v + δw (greatest
-//! value) or decreases v − δw (least value), it bounds the value from that side, because repeated application only
-//! improves it (the inductive argument of Hartmanns and Kaminski, Optimistic Value Iteration, CAV 2020). From the other
-//! side, the policy itself is a bound, and the same δw covers it. All checks include rounding errors. If they fail, the
-//! error is infinite.
+//! Let v be the computed values, w the greatest expected numbers of steps under almost optimal
+//! policies, and δ a small number. For maximisation, v + δw is an upper bound on the true values if
+//! no equation increases it, because repeated application then only decreases it. For minimisation,
+//! v − δw is a lower bound if no equation decreases it. This is the inductive argument of Hartmanns
+//! and Kaminski, Optimistic Value Iteration, CAV 2020. The computed policy itself proves the bound
+//! on the other side, and its error is also at most δw. All checks include rounding errors. If a
+//! check fails, the error is infinite.
 
 use crate::mdp::dense;
 use crate::number::{Number, count};
@@ -13,18 +16,20 @@ use crate::solve::problem::Direction;
 use crate::solve::quotient::Quotient;
 use crate::solve::work::Work;
 
-/// Upper limit on the rounds of policy iteration that compute the greatest expected number of steps.
+/// Upper limit on the rounds of policy iteration that maximise the expected number of steps.
 const MAX_ROUNDS: usize = 200;
 
-/// Upper limit on the sweeps that improve the policy in one round.
+/// Upper limit on the number of sweeps that improve the policy in each round.
 const SWEEPS: usize = 10;
 
-/// Relative error of evaluating a row that was built from at most `widest` transitions.
+/// Upper limit on the relative rounding error of evaluating a row that was built from at most
+/// `widest` transitions.
 pub fn rounding(widest: usize) -> f64 {
     (64.0 + 3.0 * count(widest)) * f64::EPSILON
 }
 
-/// Bounds the absolute error of each block, apart from errors outside the component.
+/// Returns an upper bound on the absolute error of the value of each block (merged end component).
+/// Errors in the values of successors outside the component are not included.
 pub fn certify<N: Number>(
     quotient: &Quotient<N>,
     policy: &[u32],
@@ -37,20 +42,23 @@ pub fn certify<N: Number>(
         (0..quotient.choices.len()).map(|row| quotient.rows.apply(row, values).to_f64()).collect();
     let relative = rounding(quotient.widest);
     let row_error = |row: usize| relative * rows[row];
-    // Loss of a row against the computed value of its block; negative if rounding makes the row better.
+    // Amount by which a row is worse than the computed value of its block; negative if rounding
+    // makes the row better.
     let loss = |block: usize, row: usize| match direction {
         Direction::Min => rows[row] - v[block],
         Direction::Max => v[block] - rows[row],
     };
     if blocks == 1 {
-        // With one block, each row has its own value. A row that is better by less than rounding may not have been selected.
+        // With a single block, each row has its own value. Policy iteration may have ignored a row
+        // that is better by less than rounding.
         let (better, rounding) = (0..rows.len()).fold((0.0_f64, 0.0_f64), |(better, rounding), row| {
             let near = loss(0, row) <= v[0];
             (better.max(-loss(0, row)), if near { rounding.max(row_error(row)) } else { rounding })
         });
         return vec![better + rounding];
     }
-    // A smaller threshold gives a smaller w, but leaves less slack for the rows beyond it.
+    // A smaller threshold gives a smaller w, but leaves less slack for the rows that exceed the
+    // threshold.
     for threshold in [1e-8, 1e-12] {
         let is_near = |block: usize, row: usize| {
             loss(block, row) <= threshold * v[block].max(1e-12) || policy[block] as usize == row
@@ -69,7 +77,7 @@ pub fn certify<N: Number>(
                 }
             }
         }
-        // The check needs a margin over the least δ that covers the rounding errors.
+        // The check needs a margin above the least δ that covers the rounding errors.
         delta *= 2.0;
         let holds = (0..blocks).all(|block| {
             quotient.range(block).all(|row| {
@@ -86,14 +94,16 @@ pub fn certify<N: Number>(
     vec![f64::INFINITY; blocks]
 }
 
-/// Expected number of steps after a row, given those from the blocks.
+/// Returns the expected number of steps after taking a row; `steps` contains the expected number
+/// from each block.
 fn steps_after<N: Number>(quotient: &Quotient<N>, row: usize, steps: &[f64]) -> f64 {
     let range = quotient.rows.range(row);
     let transitions = quotient.rows.columns[range.clone()].iter().zip(&quotient.rows.probabilities[range]);
     transitions.map(|(column, probability)| probability.to_f64() * steps[*column as usize]).sum()
 }
 
-/// Greatest expected number of steps with rows that are near the best ones.
+/// Returns the greatest expected number of steps from each block, over policies that use only the
+/// rows in `near`. Returns `None` if it is infinite or not found within the limits.
 fn greatest_steps<N: Number>(quotient: &Quotient<N>, policy: &[u32], near: &[bool]) -> Option<Vec<f64>> {
     let rows = &quotient.rows;
     let mut policy = policy.to_vec();
@@ -118,7 +128,8 @@ fn greatest_steps<N: Number>(quotient: &Quotient<N>, policy: &[u32], near: &[boo
     None
 }
 
-/// Switches to rows with more steps, and writes their steps. Returns `true` if a row was switched.
+/// Switches each block to a row with a greater expected number of steps, and updates `steps`.
+/// Returns `true` if a row was switched.
 fn lengthen<N: Number>(quotient: &Quotient<N>, near: &[bool], policy: &mut [u32], steps: &mut [f64]) -> bool {
     let mut changed = false;
     for (block, chosen) in policy.iter_mut().enumerate() {

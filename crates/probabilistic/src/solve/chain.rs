@@ -1,15 +1,18 @@
-//! Solves a Markov chain with costs directly: the expected cost from each state.
+//! Solves a Markov chain with costs directly: computes the expected cost from each state.
 //!
-//! x(i) = c(i) + Σ p(i,j) x(j). Components are solved in reverse topological order; inside a component, states are
-//! eliminated one after another. The pivot 1 − p(i,i) is computed as the sum of the probabilities of leaving the state
-//! (Grassmann, Taksar and Heyman, Operations Research 33(5), 1985), so nothing is ever subtracted: in doubles, each
-//! result has a small *relative* error, however small the probability of leaving the chain.
+//! The equations are x(i) = c(i) + Σ p(i,j) x(j). Strongly connected components are solved in
+//! reverse topological order. Inside a component, states are eliminated one after another. The
+//! pivot 1 − p(i,i) is computed as the sum of the probabilities of leaving the state (Grassmann,
+//! Taksar and Heyman, Operations Research 33(5), 1985). Hence nothing is subtracted, and each
+//! result in doubles has a small *relative* error, however small the probability of leaving the
+//! chain.
 //!
-//! The bound on this error follows from two facts. An elimination step computes each remaining entry by a few sums,
-//! products and quotients of positive numbers, so that it is the exact step from entries that are perturbed by a factor
-//! near 1. And a value is a quotient of two polynomials with positive coefficients whose degree is the number of remaining
-//! states (the matrix-tree theorem; O'Cinneide, Numerische Mathematik 73, 1996). Each perturbation therefore occurs at
-//! most once per state in the numerator and once in the denominator.
+//! The bound on this error follows from two facts. First, an elimination step computes each
+//! remaining entry by a few sums, products and quotients of positive numbers. It therefore equals
+//! the exact step from entries that are perturbed by a factor near 1. Second, a value is a quotient
+//! of two polynomials with positive coefficients, whose degree is the number of remaining states
+//! (the matrix-tree theorem; O'Cinneide, Numerische Mathematik 73, 1996). Each perturbation
+//! therefore occurs at most once per state in the numerator, and once in the denominator.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -19,21 +22,22 @@ use crate::mdp::dense;
 use crate::number::{Number, count};
 use crate::solve::work::Work;
 
-/// Marks the absence of a row, choice or state.
+/// Marker for the absence of a row, choice or state.
 pub const NONE: u32 = u32::MAX;
 
-/// Rows of a chain: transitions inside the component, cost, and probability of leaving the component.
+/// The equations of a component as sparse rows: transitions inside the component, cost, and
+/// probability of leaving the component.
 #[derive(Debug, Clone, Default)]
 pub struct Rows<N> {
-    /// Start of each row in `columns`, and the end.
+    /// Start of each row in `columns`, followed by the length of `columns`.
     pub first: Vec<u32>,
-    /// Targets of the transitions.
+    /// Target states of the transitions.
     pub columns: Vec<u32>,
-    /// Probabilities of the transitions.
+    /// Probabilities of the transitions, parallel to `columns`.
     pub probabilities: Vec<N>,
-    /// Cost of each row, including the values of successors outside the component.
+    /// Cost of each row, plus the expected value of its successors outside the component.
     pub constants: Vec<N>,
-    /// Probability of leaving the component.
+    /// Probability of leaving the component, for each row.
     pub leaving: Vec<N>,
 }
 
@@ -52,12 +56,12 @@ impl<N: Number> Rows<N> {
         }
     }
 
-    /// Number of rows.
+    /// Returns the number of rows.
     pub fn len(&self) -> usize {
         self.constants.len()
     }
 
-    /// Returns the positions of the entries of a row.
+    /// Returns the positions of a row's entries in `columns` and `probabilities`.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "the start of the next one is there, because the end is listed, too"
@@ -66,16 +70,17 @@ impl<N: Number> Rows<N> {
         self.first[row] as usize..self.first[row + 1] as usize
     }
 
-    /// Ends the current row.
+    /// Ends the current row and sets its constant and its probability of leaving the component.
     pub fn end(&mut self, constant: N, leaving: N) {
         self.first.push(dense(self.columns.len()));
         self.constants.push(constant);
         self.leaving.push(leaving);
     }
 
-    /// Moves a row with the given entries to position `to`, which is at or before its own, and divides the loop at column
-    /// `loop_column` out. Returns `false` and writes nothing if the row is never left. Later rows keep their ends, but not
-    /// their starts.
+    /// Moves a row to position `to`, which is not after `row`, and eliminates its self-loop.
+    /// Entries in column `loop_column` are the loop; the other entries are divided by the
+    /// probability of not looping. Returns `false` without an effect if that probability is 0.
+    /// Later rows keep their ends, but not their starts.
     pub fn move_without_loop(
         &mut self,
         row: usize,
@@ -110,7 +115,7 @@ impl<N: Number> Rows<N> {
         true
     }
 
-    /// Removes all rows from position `rows` on.
+    /// Removes all rows from index `rows` on.
     pub fn truncate(&mut self, rows: usize) {
         let end = self.first[rows] as usize;
         self.first.truncate(rows.saturating_add(1));
@@ -120,7 +125,7 @@ impl<N: Number> Rows<N> {
         self.leaving.truncate(rows);
     }
 
-    /// Evaluates a row: constant + Σ probability · value.
+    /// Evaluates the right-hand side of a row's equation: constant + Σ probability · value.
     pub fn apply(&self, row: usize, values: &[N]) -> N {
         self.range(row).fold(self.constants[row].clone(), |sum, at| {
             sum.plus(&self.probabilities[at].times(&values[self.columns[at] as usize]))
@@ -128,29 +133,29 @@ impl<N: Number> Rows<N> {
     }
 }
 
-/// Upper limit on the entries that elimination in doubles touches. Chains with a two-dimensional structure have much
-/// fill-in and are better iterated.
+/// Upper limit on the number of entries that elimination in doubles visits. Chains with a
+/// two-dimensional structure have much fill-in and are solved faster by iteration.
 const MAX_ELIMINATION: u64 = 300_000_000;
 
-/// Values of a chain.
+/// The solution of a Markov chain.
 pub struct Solved<N> {
-    /// Value of each state.
+    /// Value (expected cost) of each state.
     pub values: Vec<N>,
-    /// Bound on the relative error of each value, given rows whose entries are rounded once or twice. Infinite if a product
-    /// has underflowed, 0 in exact arithmetic.
+    /// Upper bound on the relative error of each value, if the entries of the rows were rounded at
+    /// most twice. Infinite if a product has underflowed; 0 in exact arithmetic.
     pub relative: Vec<f64>,
 }
 
-/// A product of doubles below this value may have lost digits by underflow.
+/// Products of doubles below this value may have lost digits by underflow.
 const UNDERFLOW_LIMIT: f64 = 1e-290;
 
-/// A Markov chain: the rows that a policy selects.
+/// A Markov chain: a policy selects one row for each state.
 pub struct Chain<'a, N> {
-    /// All rows.
+    /// The rows of all states.
     pub rows: &'a Rows<N>,
-    /// Row of each state, or [`NONE`] if the state has no successors and no cost.
+    /// The row of each state, or [`NONE`] if the state has no successors and no cost.
     pub policy: &'a [u32],
-    /// If set, the cost of every row, in place of its constant.
+    /// If set, the cost of every row, instead of the constants of the rows.
     pub costs: Option<N>,
 }
 
@@ -186,7 +191,8 @@ impl<N: Number> Chain<'_, N> {
         }
     }
 
-    /// Solves the chain. Returns `None` if a state is never left, or if elimination exceeds its limit.
+    /// Solves the chain. Returns `None` if a state is never left, or if a limit on the work is
+    /// exceeded.
     pub fn solve(&self, work: &mut Work) -> Option<Solved<N>> {
         let order = components(self.policy.len(), |state| self.targets(state as usize));
         let mut values = vec![N::zero(); self.policy.len()];
@@ -216,19 +222,21 @@ impl<N: Number> Chain<'_, N> {
         Some(Solved { values, relative })
     }
 
-    /// Greatest relative error of the successors of a component.
+    /// Returns the greatest relative error among the successors of a component.
     fn worst_outside(&self, component: &[u32], relative: &[f64]) -> f64 {
         let targets = component.iter().flat_map(|state| self.targets(*state as usize));
         targets.fold(0.0, |worst, target| worst.max(relative[*target as usize]))
     }
 }
 
-/// Bound on the relative error of eliminating `states` states in rows of at most `widest` entries.
+/// Upper bound on the relative error after eliminating `states` states in rows of at most `widest`
+/// entries.
 ///
-/// With m remaining states, an elimination step perturbs each entry by a factor of 1 ± (w + 4)u, and a value contains 2m
-/// such factors. All steps together are below n(n + 1)(w + 4)u. The rounding of the initial entries and the back
-/// substitution add less than 4n(w + 4)u. The unit roundoff u is half of the epsilon, so that the result is twice as large
-/// as required.
+/// Let n be the number of states, w the number of entries, and u the unit roundoff. With m
+/// remaining states, an elimination step perturbs each entry by a factor of 1 ± (w + 4)u, and a
+/// value contains 2m such factors. All steps together contribute less than n(n + 1)(w + 4)u. The
+/// rounding of the initial entries and the back substitution add less than 4n(w + 4)u. The result
+/// uses the machine epsilon, which is 2u, and is thus twice as large as required.
 fn rounding<N: Number>(states: usize, widest: usize) -> f64 {
     let n = count(states) + 4.0;
     if N::EXACT { 0.0 } else { n * n * (count(widest) + 8.0) * f64::EPSILON }
@@ -236,21 +244,22 @@ fn rounding<N: Number>(states: usize, widest: usize) -> f64 {
 
 /// A row of the component under elimination.
 struct Row<N> {
-    /// Sorted by column, which is a local state number.
+    /// The entries, sorted by column. Columns are local state numbers in the component.
     entries: Vec<(u32, N)>,
     constant: N,
     leaving: N,
 }
 
-/// The quantities that determine the error of an elimination.
+/// The quantities that determine the rounding error of an elimination.
 struct Precision {
-    /// The greatest number of entries of a row.
+    /// The greatest number of entries in any row.
     widest: usize,
-    /// `true` if a product has underflowed.
+    /// Whether a product has underflowed.
     lost: bool,
 }
 
-/// Solves a component by elimination.
+/// Solves the equations of a component by elimination and writes the values of its states. Returns
+/// `None` if a state is never left, or if a limit on the work is exceeded.
 fn eliminate<N: Number>(
     chain: &Chain<'_, N>,
     component: &[u32],
@@ -275,7 +284,7 @@ fn eliminate<N: Number>(
                 row.leaving = row.leaving.plus(probability);
             }
         }
-        // Sorted rows allow binary search for a column.
+        // Sorted rows permit binary search for a column.
         row.entries.sort_unstable_by_key(|(column, _)| *column);
         rows.push(row);
     }
@@ -287,7 +296,8 @@ fn eliminate<N: Number>(
         (0..dense(rows.len())).map(|state| Reverse((fill(&rows, &users, state), state))).collect();
     while let Some(Reverse((cost, pivot))) = queue.pop() {
         let p = pivot as usize;
-        // The queued cost is outdated if other eliminations have changed the row or its users.
+        // The queued cost is outdated if other eliminations have changed the row or the rows that
+        // use it.
         users[p].retain(|user| !done[*user as usize]);
         let current_cost = fill(&rows, &users, pivot);
         if current_cost > cost {
@@ -297,7 +307,8 @@ fn eliminate<N: Number>(
         order.push(pivot);
         done[p] = true;
         normalise(&mut rows[p], pivot, budget)?;
-        // The row is moved out, because the rows of its users change while it is read.
+        // The row is moved out of the list, because the rows that use it are changed while it is
+        // read.
         let row = std::mem::replace(
             &mut rows[p],
             Row { entries: Vec::new(), constant: N::zero(), leaving: N::zero() },
@@ -316,7 +327,8 @@ fn eliminate<N: Number>(
         }
     }
     budget.touch(work);
-    // Back substitution: the remaining entries of a row refer to states that were eliminated later.
+    // Back substitution: the remaining entries of a row refer only to states that were eliminated
+    // later.
     for pivot in order.iter().rev() {
         let p = *pivot as usize;
         let row = &rows[p];
@@ -329,13 +341,14 @@ fn eliminate<N: Number>(
     Some(Precision { widest, lost })
 }
 
-/// Number of entries that the elimination of a state touches (Markowitz, Management Science 3(3), 1957). States with the
-/// fewest are eliminated first.
+/// Returns the number of entries that the elimination of a state visits (Markowitz, Management
+/// Science 3(3), 1957). States with the fewest entries are eliminated first.
 fn fill<N>(rows: &[Row<N>], users: &[Vec<u32>], state: u32) -> usize {
     rows[state as usize].entries.len().saturating_mul(users[state as usize].len())
 }
 
-/// Divides the loop of a row out.
+/// Eliminates the self-loop of a row by dividing its other entries by their sum. Returns `None` if
+/// the row only loops, or if exact arithmetic exceeds its budget.
 fn normalise<N: Number>(row: &mut Row<N>, diagonal: u32, budget: &mut Work) -> Option<()> {
     let Ok(at) = row.entries.binary_search_by_key(&diagonal, |(column, _)| *column) else { return Some(()) };
     row.entries.remove(at);
@@ -353,7 +366,8 @@ fn normalise<N: Number>(row: &mut Row<N>, diagonal: u32, budget: &mut Work) -> O
     Some(())
 }
 
-/// Substitutes the row of an eliminated state in the row of `user`. Returns `true` if a product has underflowed.
+/// Substitutes the row of an eliminated state `pivot` into `target`, the row of state `user`.
+/// Returns `true` if a product has underflowed, and `None` if exact arithmetic exceeds its budget.
 fn substitute<N: Number>(
     target: &mut Row<N>,
     pivot: u32,

@@ -1,4 +1,4 @@
-//! Solves a component with cycles: merges end components, then iterates policies.
+//! Solves a component with cycles: merges its end components, then applies policy iteration.
 
 use std::cmp::Reverse;
 use std::collections::VecDeque;
@@ -15,7 +15,7 @@ use crate::solve::quotient::Quotient;
 use crate::solve::users::Users;
 
 impl<N: Number> Run<'_, N> {
-    /// Solves a component of more than one state. Returns `None` if exact arithmetic exceeds its budget.
+    /// Solves a component of several states. Returns `None` if exact arithmetic exceeds its budget.
     pub fn component(&mut self, component: &[u32], local: &mut Local<N>) -> Option<()> {
         let outcome = self.solve_component(component, local);
         for state in component {
@@ -25,7 +25,8 @@ impl<N: Number> Run<'_, N> {
     }
 
     fn solve_component(&mut self, component: &[u32], local: &mut Local<N>) -> Option<()> {
-        // States discovered at about the same time become adjacent; those discovered last, usually near an exit, come first.
+        // The exploration numbers neighbouring states similarly. States discovered last, which
+        // usually are near an exit, come first.
         let mut component = component.to_vec();
         component.sort_unstable_by_key(|state| Reverse(*state));
         self.cut(&component, local, |_, _| true);
@@ -55,7 +56,7 @@ impl<N: Number> Run<'_, N> {
             return Some(());
         }
         let must_be_sure = self.problem.rewards.is_some() && self.problem.direction == Direction::Min;
-        // Without excluded choices or states, the extraction above is reused.
+        // If no choices and states are excluded, the component that was extracted above is reused.
         if must_be_sure || unsolved.len() < states {
             self.cut(&unsolved, local, |run, choice| {
                 let targets = run.problem.mdp.targets(choice);
@@ -66,7 +67,8 @@ impl<N: Number> Run<'_, N> {
         self.values(local)
     }
 
-    /// Returns the sure states of the component.
+    /// Returns for each state of the component whether it is sure, i.e. reaches a terminal state
+    /// with probability 1 (under some or all policies, see `sure_by_choice`).
     fn sure_members(&mut self, local: &Local<N>) -> Vec<bool> {
         let outside_sure = |choice: usize| {
             self.problem.mdp.targets(local.choices[choice] as usize).iter().all(|target| {
@@ -76,7 +78,8 @@ impl<N: Number> Run<'_, N> {
         if self.sure_by_choice() {
             return attractor(local, outside_sure).0;
         }
-        // A state is not sure if a policy can stay in an end component, leave for a state that is not sure, or reach such a state.
+        // A state is not sure if a policy can stay in an end component, or can reach a state that
+        // is not sure.
         let ends = end_components(local, |_| true);
         let mut unsure = ends.inside;
         let owners = local.owners();
@@ -96,7 +99,8 @@ impl<N: Number> Run<'_, N> {
         unsure.into_iter().map(|unsure| !unsure).collect()
     }
 
-    /// Computes a policy for the states that reach a terminal state with probability 1.
+    /// Computes a policy for the sure states, under which they reach a terminal state with
+    /// probability 1.
     fn reach_surely(&mut self, local: &mut Local<N>, members: &[bool]) {
         let sure = component_part(&local.states, members, true, true);
         if sure.is_empty() {
@@ -113,7 +117,8 @@ impl<N: Number> Run<'_, N> {
         }
     }
 
-    /// Extracts states from the process. Afterwards, `position` contains their local numbers.
+    /// Extracts states with the choices that `keep` accepts from the process to `local`.
+    /// Afterwards, `position` contains the local numbers of these states.
     fn cut(&mut self, states: &[u32], local: &mut Local<N>, keep: impl Fn(&Self, usize) -> bool) {
         for state in &local.states {
             self.position[*state as usize] = NONE;
@@ -152,12 +157,14 @@ impl<N: Number> Run<'_, N> {
         }
     }
 
-    /// Computes the values and the policy of the extracted states.
+    /// Computes the values and the policy of the states in `local`. Returns `None` if exact
+    /// arithmetic exceeds its budget.
     fn values(&mut self, local: &mut Local<N>) -> Option<()> {
         let costs = self.problem.rewards.is_some();
         let mut ends = end_components(local, |choice| !costs || !local.paid[choice]);
         if !costs && self.problem.direction == Direction::Min && ends.inside.contains(&true) {
-            // Staying in an end component has probability 0, the least possible value.
+            // Staying in an end component reaches the goal with probability 0, the least possible
+            // value.
             let mut remaining = Vec::new();
             for (number, state) in local.states.iter().enumerate() {
                 if ends.inside[number] {
@@ -207,7 +214,7 @@ impl<N: Number> Run<'_, N> {
         Some(())
     }
 
-    /// Greatest error of a successor outside the component.
+    /// Returns the greatest error of the value of a successor outside the component.
     fn outside_error(&self, local: &Local<N>) -> f64 {
         if N::EXACT {
             return 0.0;
@@ -218,14 +225,15 @@ impl<N: Number> Run<'_, N> {
             .fold(0.0, |error, target| error.max(self.solution.errors[*target as usize]))
     }
 
-    /// Marks the values as unknown.
+    /// Marks the values of the component as unknown by infinite errors.
     fn mark_unknown(&mut self, local: &Local<N>) {
         for state in &local.states {
             self.solution.errors[*state as usize] = f64::INFINITY;
         }
     }
 
-    /// Returns the initial policy: the hint if it covers all blocks, else a policy that leaves the component surely.
+    /// Returns the initial policy: the hint if it selects a row for every block that has rows, otherwise a policy
+    /// that leaves the component with probability 1.
     fn start(&self, local: &Local<N>, quotient: &Quotient<N>) -> Vec<u32> {
         let mut policy = vec![NONE; quotient.blocks()];
         if let Some(hint) = self.hint {
@@ -272,7 +280,8 @@ impl<N: Number> Run<'_, N> {
     }
 }
 
-/// Extends the policy to the other states of an end component: they move towards the state that leaves it.
+/// Extends the policy `chosen` to the other states of the end components: they move towards a state
+/// that leaves the end component. `queue` contains the states with a choice.
 fn route_to_exits<N: Number>(
     local: &Local<N>,
     ends: &EndComponents,
@@ -293,19 +302,21 @@ fn route_to_exits<N: Number>(
     }
 }
 
-/// Returns the sure states if `only_sure`; else the unsure states, or with `include_sure` all states.
+/// Selects states by whether they are sure (`members`). Returns the sure states if `only_sure`;
+/// otherwise all states if `include_sure`, or else the states that are not sure.
 fn component_part(states: &[u32], members: &[bool], include_sure: bool, only_sure: bool) -> Vec<u32> {
     let is_selected = |sure: bool| if only_sure { sure } else { include_sure || !sure };
     states.iter().zip(members).filter(|(_, sure)| is_selected(**sure)).map(|(state, _)| *state).collect()
 }
 
-/// Returns a choice that stays in the end component of a state.
+/// Returns a choice that stays in the end component of a state, or [`NONE`] outside end components.
 fn stay<N: Number>(local: &Local<N>, ends: &EndComponents, state: usize) -> u32 {
     let mut choices = local.range(state);
     choices.find(|choice| ends.alive[*choice]).map_or(NONE, |choice| local.choices[choice])
 }
 
-/// Builds the equations with each state as its own block. Moves the rows out of `local`, and divides their loops out.
+/// Builds the equations of a component without end components: each state is its own block. The
+/// rows are moved out of `local`, and their self-loops are eliminated.
 fn unmerged<N: Number>(local: &mut Local<N>) -> Quotient<N> {
     let mut rows = std::mem::replace(&mut local.rows, Rows::new());
     let (mut first, mut choices, mut begin) = (vec![0], Vec::with_capacity(local.choices.len()), 0);
@@ -323,7 +334,7 @@ fn unmerged<N: Number>(local: &mut Local<N>) -> Quotient<N> {
     Quotient { first, rows, choices, widest: local.widest }
 }
 
-/// Sorts the states by block. Returns the start of each block, and the states.
+/// Sorts the states by block. Returns the start of each block in the sorted list, and the list.
 fn members(ends: &EndComponents) -> (Vec<u32>, Vec<u32>) {
     let mut starts = vec![0_u32; ends.blocks.saturating_add(1)];
     for block in &ends.block {
@@ -344,7 +355,7 @@ fn members(ends: &EndComponents) -> (Vec<u32>, Vec<u32>) {
     (starts, members)
 }
 
-/// Builds the equations of the blocks.
+/// Builds the equations of a component whose end components are merged into blocks.
 fn quotient<N: Number>(local: &mut Local<N>, ends: &EndComponents) -> Quotient<N> {
     if !ends.inside.contains(&true) {
         return unmerged(local);

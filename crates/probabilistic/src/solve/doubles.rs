@@ -1,4 +1,5 @@
-//! Bounds the result of policy iteration in doubles, by the first method whose bounds are tight.
+//! Bounds the values that policy iteration has computed in doubles. Several methods are tried until
+//! the bounds are tight.
 
 use num_rational::BigRational;
 
@@ -11,16 +12,19 @@ use crate::solve::problem::Direction;
 use crate::solve::quotient::Quotient;
 use crate::solve::work::{TIGHT, Work};
 
-/// Limits of the solution in rationals if the bounds in doubles are insufficient: work units, and number of blocks.
+/// Limits for solving in rationals if the bounds in doubles are insufficient: work units, and
+/// number of blocks.
 const RATIONAL_LIMITS: (u64, usize) = (1_000_000_000, 3000);
-/// Work limit of the solution in rationals if the bounds in doubles are sufficient for most purposes.
+/// Work limit for solving in rationals if the bounds in doubles are sufficient for most purposes.
 const IMPROVEMENT_LIMIT: u64 = 100_000_000;
 
-/// Bounds the values of all blocks. Returns `None` if no method finds bounds.
+/// Computes bounds on the values of all blocks (merged end components). Returns `None` if no method
+/// finds bounds.
 ///
-/// The elimination of a chain has a small relative error by itself. With choices, a certificate bounds the error. A
-/// process with a tiny probability of leaving has no certificate in doubles, and is solved in rationals. A component that
-/// elimination cannot solve is iterated from both sides.
+/// For a Markov chain, elimination has a small relative error. With choices, a certificate bounds
+/// the error. If the probability of leaving a component is tiny, no certificate exists in doubles,
+/// and the component is solved in rationals. If elimination is too expensive, interval iteration
+/// computes bounds from both sides.
 pub fn enclosed<N: Number>(
     quotient: &Quotient<N>,
     iterated: Option<Iterated<N>>,
@@ -31,7 +35,7 @@ pub fn enclosed<N: Number>(
     let Some(mut iterated) = iterated else { return interval::enclose(quotient, direction, tight) };
     let is_chain = (0..quotient.blocks()).all(|block| quotient.range(block).len() <= 1);
     if !is_chain {
-        // These errors refer to the values of this policy, which may not be optimal.
+        // These errors refer to the values of the computed policy, which may not be optimal.
         iterated.relative = Vec::new();
     }
     if quotient.blocks() > RATIONAL_LIMITS.1 && !is_level(quotient, &iterated.values, tight) {
@@ -61,7 +65,7 @@ pub fn enclosed<N: Number>(
     if is_good {
         return Some(rounded);
     }
-    // Wide bounds are improved if that is cheap, or if tighter ones were requested.
+    // Wide bounds are improved if that is cheap, or if narrower bounds were requested.
     let is_usual = tight >= TIGHT && rounded.errors.iter().all(|error| error.is_finite());
     let limit = if is_usual { IMPROVEMENT_LIMIT } else { RATIONAL_LIMITS.0 };
     let exact = (quotient.blocks() <= RATIONAL_LIMITS.1)
@@ -76,7 +80,8 @@ pub fn enclosed<N: Number>(
         .or(Some(rounded))
 }
 
-/// Returns `true` if a uniform error of all blocks, as in a certificate, can be tight for the least value.
+/// Returns `true` if a uniform error of all blocks, as in a certificate, can be tight even for the
+/// least value.
 fn is_level<N: Number>(quotient: &Quotient<N>, values: &[N], tight: f64) -> bool {
     let values = values.iter().map(Number::to_f64).filter(|value| *value > 0.0);
     let (least, greatest) = values
@@ -88,8 +93,10 @@ fn is_tight<N: Number>(values: &[N], errors: &[f64], tight: f64) -> bool {
     values.iter().zip(errors).all(|(value, error)| value.is_zero() || *error <= tight * 0.5 * value.to_f64())
 }
 
-/// Solves the rounded rows exactly. Each entry of a row has a few rounding errors. A value has as many for each block, in
-/// the numerator and in the denominator (see `chain`), under every policy and therefore under the optimal one.
+/// Solves the rounded equations exactly in rationals. The error bound accounts for the earlier
+/// rounding of the entries: a value contains a few rounding errors per block, in its numerator and
+/// in its denominator (see `chain`). This holds under every policy and therefore under the optimal
+/// one.
 fn in_rationals<N: Number>(
     quotient: &Quotient<N>,
     policy: &[u32],

@@ -1,10 +1,14 @@
-//! Interval iteration: bounds for components that are too large for elimination.
+//! Interval iteration: bounds the values of components that are too large for elimination.
 //!
-//! The lower bound is iterated from zero. Its values are then increased a little, and if no equation raises any of them
-//! further, they are upper bounds, because end components are merged (optimistic value iteration: Hartmanns and
-//! Kaminski, CAV 2020; see also Haddad and Monmege, TCS 735, 2018). Each evaluation of an equation is rounded towards its
-//! side, so that every value is a bound at any time, in any order of the equations. Each equation uses the values that
-//! were updated in the same sweep (Gauss-Seidel), and the blocks nearest to an exit come first.
+//! The lower bound is iterated from zero. Its values are then increased a little. If no equation
+//! raises these values further, they are upper bounds, because end components are merged
+//! (optimistic value iteration: Hartmanns and Kaminski, CAV 2020; see also Haddad and Monmege, TCS
+//! 735, 2018).
+//!
+//! Each evaluation of an equation is rounded down for the lower and up for the upper bound.
+//! Therefore every value is a bound at any time, in any order of the equations. Each sweep uses the
+//! values that it has already updated (Gauss-Seidel), and starts with the blocks nearest to an
+//! exit.
 
 use std::collections::VecDeque;
 
@@ -15,24 +19,25 @@ use crate::solve::problem::Direction;
 use crate::solve::quotient::Quotient;
 use crate::solve::users::{Users, owners};
 
-/// A policy, with values and their error bounds.
+/// An almost optimal policy, with the values of the blocks and bounds on their errors.
 pub struct Enclosed<N> {
     pub policy: Vec<u32>,
     pub values: Vec<N>,
-    /// Empty in exact arithmetic.
+    /// Upper bound on the absolute error of each value; empty in exact arithmetic.
     pub errors: Vec<f64>,
 }
 
-/// Upper limit on the number of evaluated transitions.
+/// Upper limit on the number of transitions evaluated for one component.
 const MAX_WORK: u64 = 30_000_000_000;
-/// Sweeps of a candidate upper bound before the lower bound is refined.
+/// Number of sweeps for a candidate upper bound; after them, the lower bound is refined.
 const UPPER_SWEEPS: usize = 40;
-/// Distance of the initial bounds from approximate values, as a share of the required width.
+/// Distance of the initial bounds from approximate values, as a fraction of the required width.
 const INITIAL_SHARE: f64 = 0.45;
-/// Sweeps over the rows of one policy between two sweeps over all rows.
+/// Number of sweeps with the rows of a fixed policy between two sweeps over all rows.
 const POLICY_SWEEPS: usize = 25;
 
-/// Bounds the values of all blocks to `width`, relative to the value. Returns `None` if the work limit is exceeded.
+/// Computes bounds on the values of all blocks with a width of at most `width` times the value.
+/// Returns `None` if the work limit is exceeded.
 pub fn enclose<N: Number>(quotient: &Quotient<N>, direction: Direction, width: f64) -> Option<Enclosed<N>> {
     let sorted = Sorted::new(quotient);
     let rows = sorted.rows(quotient, direction);
@@ -40,7 +45,8 @@ pub fn enclose<N: Number>(quotient: &Quotient<N>, direction: Direction, width: f
     Some(rows.enclosed(quotient, &lower, &upper))
 }
 
-/// Bounds the values of all blocks, starting from approximate values. Returns `None` if these are not close enough.
+/// Computes bounds on the values of all blocks around approximate values `near`. Returns `None` if
+/// the approximate values are not close enough.
 pub fn around<N: Number>(
     quotient: &Quotient<N>,
     near: &[N],
@@ -52,24 +58,25 @@ pub fn around<N: Number>(
     Some(rows.enclosed(quotient, &lower, &upper))
 }
 
-/// The rows in the order of the sweeps.
+/// The equations in the order in which sweeps evaluate them.
 struct Rows<'a, N> {
     direction: Direction,
-    /// Block at each position of the order, and number of each row in the quotient; `None` for the order of the quotient.
+    /// The block at each position of the order, and the number of each row in the quotient. `None`
+    /// if the order is that of the quotient.
     sorted: Option<(&'a [u32], &'a [u32])>,
-    /// First row of each position, and the end.
+    /// The first row of each position, followed by the number of rows.
     blocks: &'a [u32],
-    /// First transition of each row, and the end.
+    /// The first transition of each row, followed by the number of transitions.
     first: &'a [u32],
-    /// Positions of the target blocks.
+    /// The position of the target block of each transition.
     columns: &'a [u32],
     probabilities: &'a [N],
     constants: &'a [N],
-    /// Relative error of evaluating one row.
+    /// Relative error of evaluating a row.
     rounding: f64,
 }
 
-/// A copy of the rows, sorted by the distance of their blocks from an exit.
+/// A copy of the equations, sorted by the distance of their blocks from an exit of the component.
 struct Sorted<N> {
     order: Vec<u32>,
     blocks: Vec<u32>,
@@ -131,7 +138,8 @@ fn rounding<N: Number>(quotient: &Quotient<N>) -> f64 {
 }
 
 impl<'a, N: Number> Rows<'a, N> {
-    /// The rows in the order of the quotient: states discovered last come first, and these are mostly left soonest.
+    /// Uses the equations in the order of the quotient. States discovered last come first there;
+    /// they are usually closest to an exit.
     fn of(quotient: &'a Quotient<N>, direction: Direction) -> Self {
         Self {
             direction,
@@ -166,7 +174,8 @@ impl<'a, N: Number> Rows<'a, N> {
         })
     }
 
-    /// Returns the best row of a position with its value; [`NONE`] and 0 for a block that is never left.
+    /// Returns the best row of the block at a position, with its value. Returns [`NONE`] and 0 for
+    /// a block without rows, which is never left.
     #[expect(clippy::arithmetic_side_effects, reason = "the end is listed, too")]
     fn best(&self, position: usize, values: &[f64]) -> (u32, f64) {
         let mut best = (NONE, 0.0);
@@ -183,7 +192,8 @@ impl<'a, N: Number> Rows<'a, N> {
         best
     }
 
-    /// Bounds around approximate values; both bounds are checked with the inductive argument.
+    /// Computes lower and upper bounds around approximate values `near`. Returns `None` unless the
+    /// inductive argument proves both bounds and the width is sufficient.
     fn around(&self, near: &[N], width: f64) -> Option<(Vec<f64>, Vec<f64>)> {
         let scaled = |scale: f64| -> Vec<f64> {
             (0..self.positions()).map(|position| near[self.block(position)].to_f64() * scale).collect()
@@ -199,7 +209,8 @@ impl<'a, N: Number> Rows<'a, N> {
         (holds && within).then_some((lower, upper))
     }
 
-    /// Bounds by iteration from zero.
+    /// Computes lower and upper bounds by iteration from zero. Returns `None` if the work limit is
+    /// exceeded.
     fn iterated(&self, width: f64) -> Option<(Vec<f64>, Vec<f64>)> {
         let (down, up) = (1.0 - self.rounding, 1.0 + self.rounding);
         let sweep_work = self.columns.len().saturating_add(self.constants.len()) as u64;
@@ -210,7 +221,8 @@ impl<'a, N: Number> Rows<'a, N> {
             loop {
                 let mut change = self.sweep(&mut lower, &mut policy, down);
                 work = work.saturating_add(sweep_work);
-                // The values of any policy are lower bounds on the greatest values, and sweeps over one policy are cheaper.
+                // For maximisation, the values of any policy are lower bounds, and sweeps over a
+                // single policy are cheaper.
                 if self.direction == Direction::Max && change > threshold {
                     for _ in 0..POLICY_SWEEPS {
                         let (growth, evaluated) = self.follow(&mut lower, &policy, down);
@@ -220,7 +232,7 @@ impl<'a, N: Number> Rows<'a, N> {
                             break;
                         }
                     }
-                    // The next sweep over all rows may select other rows.
+                    // The next sweep over all rows may select other rows for the policy.
                     continue;
                 }
                 if change <= threshold || work >= MAX_WORK {
@@ -234,13 +246,16 @@ impl<'a, N: Number> Rows<'a, N> {
                     return Some((lower, upper));
                 }
             }
-            // The lower bound was not close enough for its increase to be an upper bound.
+            // The lower bound was not close enough to the value for its increase to be an upper
+            // bound.
             threshold *= 0.1;
         }
         None
     }
 
-    /// Updates all values and selects the rows that attain them. Returns the greatest relative growth.
+    /// Updates all values by their best rows, and stores these rows in `policy`. Results are
+    /// multiplied by `scale` to account for rounding. Returns the greatest relative growth of a
+    /// value.
     fn sweep(&self, values: &mut [f64], policy: &mut [u32], scale: f64) -> f64 {
         let mut change = 0.0_f64;
         for (position, chosen) in policy.iter_mut().enumerate() {
@@ -251,8 +266,9 @@ impl<'a, N: Number> Rows<'a, N> {
         change
     }
 
-    /// Updates all values with the rows of a policy. Returns the greatest relative growth, and the work, counted as two
-    /// transitions per row.
+    /// Updates all values by the rows of a fixed policy. Results are multiplied by `scale` to
+    /// account for rounding. Returns the greatest relative growth of a value, and the work (two
+    /// units per row).
     fn follow(&self, values: &mut [f64], policy: &[u32], scale: f64) -> (f64, u64) {
         let (mut change, mut work) = (0.0_f64, 0_u64);
         for (position, row) in policy.iter().enumerate().filter(|(_, row)| **row != NONE) {
@@ -263,8 +279,9 @@ impl<'a, N: Number> Rows<'a, N> {
         (change, work)
     }
 
-    /// Updates all values from above. Returns `true` if a value was raised. If none was, they are upper bounds: each equation
-    /// used values that are at least the final ones.
+    /// Updates all values of a candidate upper bound. Returns `true` if a value was raised. If no
+    /// value was raised, the values are upper bounds, because each equation used values that are at
+    /// least the final ones.
     fn raises(&self, values: &mut [f64], scale: f64) -> bool {
         let mut raised = false;
         for position in 0..values.len() {
@@ -275,9 +292,9 @@ impl<'a, N: Number> Rows<'a, N> {
         raised
     }
 
-    /// Updates all values from below. Returns `true` if a value was lowered. If none was, they are lower bounds: no equation
-    /// lowers them, and under the selected rows, which leave the component surely, they only grow towards the values of these
-    /// rows.
+    /// Updates all values of a candidate lower bound. Returns `true` if a value was lowered. If no
+    /// value was lowered, the values are lower bounds. The selected rows leave the component with
+    /// probability 1, and under these rows the values only grow towards the values of the policy.
     fn lowers(&self, values: &mut [f64], scale: f64) -> bool {
         let mut lowered = false;
         for position in 0..values.len() {
@@ -289,7 +306,7 @@ impl<'a, N: Number> Rows<'a, N> {
     }
 
     fn enclosed(&self, quotient: &Quotient<N>, lower: &[f64], upper: &[f64]) -> Enclosed<N> {
-        // The choices that maintain this bound have values within it.
+        // The choices that maintain this bound form a policy whose values are within the bounds.
         let maintained = if self.direction == Direction::Min { upper } else { lower };
         let blocks = quotient.blocks();
         let mut result = Enclosed {
@@ -309,15 +326,15 @@ impl<'a, N: Number> Rows<'a, N> {
     }
 }
 
-/// Writes a value. Returns its growth, relative to the new value.
+/// Replaces a value. Returns its growth relative to the new value, or 0 if it did not grow.
 fn grow(old: &mut f64, new: f64) -> f64 {
     let change = if new > *old { (new - *old) / new } else { 0.0 };
     *old = new;
     change
 }
 
-/// Orders the blocks by the number of rows on the shortest way out (breadth-first search). Blocks that are never left come
-/// last.
+/// Orders the blocks by the number of rows on a shortest path out of the component (breadth-first
+/// search). Blocks without such a path come last.
 fn order<N: Number>(quotient: &Quotient<N>) -> Vec<u32> {
     let blocks = quotient.blocks();
     let mut visited = vec![false; blocks];
@@ -350,7 +367,8 @@ mod tests {
     use crate::solve::chain;
     use crate::solve::work::Work;
 
-    /// A random walk on a square with two choices per place; each step leaves the square with probability 1/50.
+    /// A random walk on a square torus with two choices at each place. Each step leaves the square
+    /// with probability 1/50.
     fn square(side: u32) -> Quotient<f64> {
         let mut quotient =
             Quotient { first: vec![0], rows: chain::Rows::new(), choices: Vec::new(), widest: 4 };

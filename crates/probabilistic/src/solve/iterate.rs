@@ -1,4 +1,5 @@
-//! Policy iteration over the blocks of a component, with direct solution of each chain.
+//! Policy iteration over the blocks (merged end components) of a component. The Markov chain of
+//! each policy is solved directly.
 
 use std::collections::VecDeque;
 
@@ -11,24 +12,28 @@ use crate::solve::quotient::Quotient;
 use crate::solve::users::{Users, owners};
 use crate::solve::work::Work;
 
-/// Upper limit on the rounds of policy iteration. The certificate bounds the error of the policy that is reached by then.
+/// Upper limit on the number of rounds of policy iteration. If it is reached, the certificate
+/// bounds the error of the last policy.
 const MAX_ROUNDS: usize = 1000;
-/// Least and greatest number of sweeps between two solutions of the chain, in large components.
+/// Least and greatest number of improvement sweeps before the chain is solved again, in large
+/// components.
 const SWEEPS: (u64, u64) = (2, 40);
-/// Number of entries that a sweep evaluates in the time in which elimination touches one.
+/// Number of entries that a sweep evaluates in the time in which elimination processes one entry.
 const SWEEP_SPEED: u64 = 4;
-/// Number of blocks from which on several sweeps pay off.
+/// Number of blocks from which on several sweeps per round save time.
 const SWEEP_MIN_BLOCKS: usize = 200;
 
-/// A policy that no row clearly improves, with the values of its blocks.
+/// A policy that no row clearly improves, with the value of each block.
 pub struct Iterated<N> {
     pub policy: Vec<u32>,
     pub values: Vec<N>,
-    /// Bound on the relative error of each value of this policy.
+    /// Upper bound on the relative error of each value, with respect to the exact value of this
+    /// policy.
     pub relative: Vec<f64>,
 }
 
-/// Policy iteration from a proper policy. Returns `None` if the chain of a policy is too large to be solved, or if exact
+/// Performs policy iteration from the policy `start`, which must leave every block with probability
+/// 1. Returns `None` if the chain of a policy cannot be solved within the limits, or if exact
 /// arithmetic exceeds its budget.
 pub fn iterate<N: Number>(
     quotient: &Quotient<N>,
@@ -42,7 +47,8 @@ pub fn iterate<N: Number>(
     let large = !N::EXACT && quotient.blocks() >= SWEEP_MIN_BLOCKS;
     for _ in 0..MAX_ROUNDS {
         let mut improved = false;
-        // Sweeps pay off for as long as elimination takes. Without fill-in, that is short.
+        // Sweeps save time while they take no longer than elimination. Without fill-in, elimination
+        // is fast.
         let eliminated = work.touched().saturating_sub(touched).saturating_mul(SWEEP_SPEED);
         let sweeps =
             eliminated.checked_div(quotient.rows.columns.len() as u64).unwrap_or(0).clamp(SWEEPS.0, SWEEPS.1);
@@ -62,13 +68,14 @@ pub fn iterate<N: Number>(
     Some(Iterated { policy, values, relative })
 }
 
-/// Values of a policy.
+/// Computes the values of a policy.
 fn chain<N: Number>(quotient: &Quotient<N>, policy: &[u32], work: &mut Work) -> Option<Solved<N>> {
     Chain { rows: &quotient.rows, policy, costs: None }.solve(work)
 }
 
-/// Switches each block to its best row. With `sweep`, rows are evaluated with the updated values, otherwise with
-/// the old ones. Returns `true` if a row was switched.
+/// Switches each block to its best row. With `sweep`, rows are evaluated with the updated values,
+/// otherwise with the values before the call. Returns `true` if a row was switched, and `None` if
+/// exact arithmetic exceeds its budget.
 fn improve<N: Number>(
     quotient: &Quotient<N>,
     policy: &mut [u32],
@@ -86,7 +93,7 @@ fn improve<N: Number>(
             }
             let value = quotient.rows.apply(row, old.as_deref().unwrap_or(values));
             work.spend(&value, quotient.rows.range(row).len())?;
-            // Only clear improvements count, so that rounding cannot cause cycles of policies.
+            // Only clear improvements count, so rounding cannot cause a cycle of policies.
             let better = match direction {
                 Direction::Min => value.clearly_less(&values[block]),
                 Direction::Max => values[block].clearly_less(&value),
@@ -101,7 +108,8 @@ fn improve<N: Number>(
     Some(changed)
 }
 
-/// Returns a policy that leaves every block, by rows that approach the outside (breadth-first search).
+/// Returns a policy under which every block from which the component can be left reaches an exit with positive
+/// probability. Rows are chosen by breadth-first search backwards from the exits.
 pub fn leave<N: Number>(quotient: &Quotient<N>) -> Vec<u32> {
     let mut policy = vec![NONE; quotient.blocks()];
     let (owners, users) = (owners(&quotient.first), Users::new(&quotient.rows, quotient.blocks()));

@@ -1,4 +1,4 @@
-//! Extracts a strongly connected component of a process, and computes its end components.
+//! Extracts a strongly connected component of a process and computes its end components.
 
 use std::collections::VecDeque;
 
@@ -10,22 +10,23 @@ use crate::solve::users::{Users, owners};
 
 pub use crate::solve::chain::NONE;
 
-/// The choices of some states. Local numbers count these states and choices from 0.
+/// A set of extracted states with their choices. Local numbers count the states and choices of this
+/// set from 0.
 #[derive(Debug, Clone)]
 pub struct Local<N> {
-    /// Global numbers of the states.
+    /// The number of each local state in the process.
     pub states: Vec<u32>,
-    /// First local choice of each state, and the end.
+    /// First local choice of each state, followed by the number of choices.
     pub first: Vec<u32>,
-    /// Global numbers of the choices.
+    /// The number of each local choice in the process.
     pub choices: Vec<u32>,
-    /// One row per choice; columns are local states.
+    /// The equations, one row per choice; columns are local states.
     pub rows: Rows<N>,
-    /// `true` for choices with a positive reward.
+    /// For each choice, whether its reward is positive.
     pub paid: Vec<bool>,
-    /// Greatest number of transitions of a choice, inside and outside.
+    /// Greatest number of transitions of a choice, including those that leave the set.
     pub widest: usize,
-    /// `true` if a product is so small that doubles lose digits.
+    /// Whether a product was so small that doubles lose digits.
     pub tiny: bool,
 }
 
@@ -43,7 +44,7 @@ impl<N: Number> Local<N> {
         }
     }
 
-    /// Removes the contents, but keeps the memory.
+    /// Removes the contents, but keeps the allocated memory.
     pub fn clear(&mut self) {
         self.states.clear();
         self.first.truncate(1);
@@ -66,33 +67,36 @@ impl<N: Number> Local<N> {
         self.first[state] as usize..self.first[state + 1] as usize
     }
 
-    /// Returns `true` if a choice stays in the component with probability 1.
+    /// Returns `true` if all successors of a choice are states of the set.
     pub fn is_closed(&self, choice: usize) -> bool {
         self.rows.leaving[choice].is_zero()
     }
 
-    /// Returns the local state of each choice.
+    /// Returns the local state to which each local choice belongs.
     pub fn owners(&self) -> Vec<u32> {
         owners(&self.first)
     }
 }
 
-/// The maximal end components of the eligible choices.
+/// The maximal end components that consist of eligible choices, and the partition of the states
+/// into blocks.
 #[derive(Debug, Clone)]
 pub struct EndComponents {
-    /// Block of each local state; a state outside end components is a block by itself.
+    /// Block of each local state. The states of an end component form a block; each other state is
+    /// a block by itself.
     pub block: Vec<u32>,
     /// Number of blocks.
     pub blocks: usize,
-    /// `true` for states in an end component.
+    /// For each local state, whether it belongs to an end component.
     pub inside: Vec<bool>,
-    /// `true` for choices of an end component.
+    /// For each local choice, whether it belongs to an end component.
     pub alive: Vec<bool>,
 }
 
-/// Computes the maximal end components of the closed choices that `eligible` accepts (de Alfaro 1997): decomposes the
-/// graph into components and removes the choices that leave one, until no choice is removed. Choices into dead ends are
-/// removed first; without end components, these are all choices.
+/// Computes the maximal end components of the closed choices that `eligible` accepts (de Alfaro 1997). The graph of
+/// these choices is decomposed into strongly connected components, and choices that leave their component are
+/// removed, until no choice is removed. Before that, choices into states without remaining choices are removed; if
+/// there are no end components, this removes all choices.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "the start of the next one is there, because the end is listed, too"
@@ -143,7 +147,7 @@ pub fn end_components<N: Number>(local: &Local<N>, eligible: impl Fn(usize) -> b
     }
 }
 
-/// Removes choices that lead to states without remaining choices.
+/// Removes choices that lead to states without remaining choices, repeatedly.
 fn remove_dead_ends<N: Number>(local: &Local<N>, alive: &mut [bool]) {
     let (owners, users) = (local.owners(), Users::new(&local.rows, local.states.len()));
     let mut remaining = vec![0_u32; local.states.len()];
@@ -166,7 +170,8 @@ fn remove_dead_ends<N: Number>(local: &Local<N>, alive: &mut [bool]) {
     }
 }
 
-/// Returns the whole component if it is one end component, the frequent case of free reconfiguration. At most 64 states.
+/// Returns a single end component if it covers all states, the frequent case of free
+/// reconfiguration. Otherwise, or for more than 64 states, returns `None`.
 fn whole<N: Number>(local: &Local<N>, alive: &[bool]) -> Option<EndComponents> {
     let n = local.states.len();
     if n > 64 {
@@ -182,7 +187,7 @@ fn whole<N: Number>(local: &Local<N>, alive: &[bool]) -> Option<EndComponents> {
         }
     }
     let all_states = (0..n).fold(0_u64, |all_states, state| all_states | 1 << state);
-    // Strongly connected: all states are reachable from state 0, forwards and backwards.
+    // Strong connectivity: all states are reachable from state 0, forwards and backwards.
     let covers = |edges: &[u64; 64]| {
         let (mut visited, mut open) = (1_u64, 1_u64);
         while open != 0 {
@@ -202,11 +207,11 @@ fn whole<N: Number>(local: &Local<N>, alive: &[bool]) -> Option<EndComponents> {
     })
 }
 
-/// Computes the states from which the component can be left with probability 1, and a policy that does so: the greatest
-/// set of states that have a choice that stays in the set or leaves the component, and from which leaving is reachable by
-/// such choices.
+/// Computes the states from which the component can be left with probability 1, and a policy that
+/// does so. The result is the greatest set with two properties: each of its states has a choice
+/// that stays in the set or leaves the component, and by such choices an exit is reachable.
 ///
-/// `fits` returns `true` for choices with acceptable successors outside.
+/// `fits` returns `true` for a choice whose successors outside the component are acceptable.
 pub fn attractor<N: Number>(local: &Local<N>, fits: impl Fn(usize) -> bool) -> (Vec<bool>, Vec<u32>) {
     let n = local.states.len();
     let owners = local.owners();

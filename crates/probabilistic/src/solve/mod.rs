@@ -1,12 +1,15 @@
-//! Solves a problem on a process: the value of each state with bounds, and an optimal policy.
+//! Solves a problem on a Markov decision process: computes the value of each state with bounds, and an optimal
+//! policy.
 //!
-//! The components of the graph are solved in reverse topological order, so that the values of an acyclic part (a
-//! battery that only falls) result from one exact sweep. Inside a component:
+//! The strongly connected components of the graph are solved in reverse topological order. The
+//! values of an acyclic part (e.g. a battery that is never recharged) therefore result from a
+//! single sweep. Inside a component:
 //!
-//! 1. Values 0, 1 and ∞ follow from the graph alone (Forejt et al., "Automated Verification Techniques for
-//!    Probabilistic Systems", SFM 2011, section 4).
-//! 2. End components are merged, so that the equations have a unique solution (Haddad and Monmege, TCS 735, 2018;
-//!    zero-reward end components: Bertsekas and Tsitsiklis, Math. OR 16(3), 1991).
+//! 1. Values 0, 1 and ∞ follow from the graph alone (Forejt et al., "Automated Verification
+//!    Techniques for Probabilistic Systems", SFM 2011, section 4).
+//! 2. End components are merged, so that the equations have a unique solution (Haddad and Monmege,
+//!    TCS 735, 2018; for zero-reward end components: Bertsekas and Tsitsiklis, Math. OR 16(3),
+//!    1991).
 //! 3. Policy iteration solves the Markov chain of each policy directly.
 //! 4. A certificate bounds the error of the result (`certify`).
 
@@ -35,17 +38,19 @@ pub use local::NONE;
 pub use problem::{Direction, Problem, Solution};
 pub(crate) use work::Work;
 
-/// Exact arithmetic exceeded its budget.
+/// Error: exact arithmetic exceeds its budget.
 struct TooMuchWork;
 
-/// Solves a problem. Returns `None` if exact arithmetic exceeds its budget.
+/// Solves a problem. Returns `None` if exact arithmetic exceeds its default budget.
 ///
-/// `hint` is an initial policy, for example the policy of a solution in doubles.
+/// `hint` is an initial policy for policy iteration, for example the policy of a solution in
+/// doubles.
 pub fn solve<N: Number>(problem: Problem<'_, N>, hint: Option<&[u32]>) -> Option<Solution<N>> {
     solve_within(problem, hint, &mut Work::new(work::DEFAULT_BUDGET))
 }
 
-/// Solves a problem within a budget of exact arithmetic. Returns `None` if the budget does not suffice.
+/// Solves a problem within the given budget of exact arithmetic. Returns `None` if the budget is
+/// exceeded.
 pub(crate) fn solve_within<N: Number>(
     problem: Problem<'_, N>,
     hint: Option<&[u32]>,
@@ -57,7 +62,7 @@ pub(crate) fn solve_within<N: Number>(
     outcome.map(|()| run.solution)
 }
 
-/// Returns a good policy, which is not necessarily optimal.
+/// Computes a good policy without bounding its error; the policy may not be optimal.
 pub(crate) fn draft<N: Number>(problem: Problem<'_, N>) -> Option<Vec<u32>> {
     let mut run = Run { draft: true, ..begin(problem, None) };
     run.solve_components()?;
@@ -87,7 +92,8 @@ fn begin<'a, N: Number>(problem: Problem<'a, N>, hint: Option<&'a [u32]>) -> Run
 }
 
 impl<N: Number> Run<'_, N> {
-    /// Solves all components, each after its successors.
+    /// Solves all components, each after its successors. Returns `None` if exact arithmetic exceeds
+    /// its budget.
     fn solve_components(&mut self) -> Option<()> {
         let (mut local, mut path_buffers) = (local::Local::new(), ways::PathBuffers::default());
         let problem = self.problem;
@@ -106,14 +112,15 @@ impl<N: Number> Run<'_, N> {
         visited.ok()
     }
 
-    /// Solves a terminal or blocked state.
+    /// Solves a terminal or blocked state: with rewards, the value of a blocked state is infinite.
     fn sink(&mut self, state: usize) {
         if self.problem.rewards.is_some() && !self.problem.terminal.contains(state) {
             self.solution.infinite.insert(state);
         }
     }
 
-    /// Solves a state that is a component by itself: apart from loops, all successors are solved.
+    /// Solves a state that is a component by itself. Apart from the state itself, all its
+    /// successors are solved already.
     fn single(&mut self, state: usize) {
         let (mut sure_choice, mut all_sure) = (NONE, true);
         for choice in self.problem.choices(state) {
@@ -122,7 +129,7 @@ impl<N: Number> Run<'_, N> {
                 leaves |= *target as usize != state;
                 *target as usize == state || self.solution.sure.contains(*target as usize)
             });
-            // A choice that only loops never reaches a terminal state.
+            // A choice that only loops does not reach a terminal state.
             match targets_sure && leaves {
                 true if sure_choice == NONE => sure_choice = dense(choice),
                 true => {}
@@ -160,7 +167,8 @@ impl<N: Number> Run<'_, N> {
         }
         if let Some((value, choice, spread)) = best {
             if !N::EXACT {
-                // Values are never negative. At 0, only the error of the selected choice counts.
+                // Values are never negative. If the value is 0, only the error of the selected
+                // choice counts.
                 self.solution.errors[state] = if value.is_zero() { spread } else { error };
             }
             self.solution.values[state] = value;
@@ -168,7 +176,9 @@ impl<N: Number> Run<'_, N> {
         }
     }
 
-    /// Evaluates a choice of a single state: value and error. Returns `None` for a choice that is never selected.
+    /// Returns the value and the error of a choice of a component with a single state. With
+    /// `must_be_sure`, returns `None` for a choice that does not surely lead to a terminal state;
+    /// with rewards, also for a choice that never leaves the state.
     fn single_choice(&mut self, state: usize, choice: usize, must_be_sure: bool) -> Option<(N, f64)> {
         let mdp = self.problem.mdp;
         let (mut sum, mut leaving, mut looping) = (self.problem.reward(choice), N::zero(), false);
@@ -192,22 +202,23 @@ impl<N: Number> Run<'_, N> {
                 tiny |= !value.is_zero();
                 whole &= is_whole(value.to_f64());
             }
-            // An exhausted budget is detected after the state.
+            // An exceeded budget is detected after the state.
             let _ = self.work.spend(&sum, 2);
         }
         if leaving.is_zero() {
-            // The state is never left. Without rewards this is allowed, and the value is 0.
+            // The state is never left. Without rewards this is permitted, and the value is 0.
             return self.problem.rewards.is_none().then(|| (N::zero(), 0.0));
         }
         if looping {
             sum = sum.over(&leaving);
             error /= leaving.to_f64();
         }
-        // The rounded probabilities may sum to slightly more than 1.
+        // The sum of rounded probabilities may be slightly more than 1.
         error *= 1.0 + terms * f64::EPSILON;
         error += if error > 0.0 || unsure { f64::MIN_POSITIVE } else { 0.0 };
         let size = sum.to_f64();
-        // A deterministic choice with an integral reward and an integral value is exact.
+        // A deterministic choice with an integral reward and an integral value causes no rounding
+        // error.
         if whole && error == 0.0 && terms < 7.0 && !looping && is_whole(size) {
             return Some((sum, 0.0));
         }

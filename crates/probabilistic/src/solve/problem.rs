@@ -1,4 +1,4 @@
-//! Problems, solutions, and the state of the solver.
+//! Problems, solutions, and the working state of the solver.
 
 use fixedbitset::FixedBitSet;
 
@@ -6,34 +6,37 @@ use crate::mdp::Mdp;
 use crate::number::{Number, enclosing};
 use crate::solve::work::Work;
 
-/// Direction of optimisation over all policies.
+/// The direction of optimisation over all policies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Direction {
-    /// The least value.
+    /// The least value over all policies.
     Min,
-    /// The greatest value.
+    /// The greatest value over all policies.
     Max,
 }
 
-/// A query on a process.
+/// An optimisation problem on a Markov decision process.
 ///
-/// Without rewards, the value of a state is the expected value of the first terminal state that is reached, or 0 on paths
-/// that reach none. With rewards, it is the expected sum of rewards until then, infinite if possibly none is reached.
+/// Without rewards, the value of a state is the expected value of the first terminal state on a path; a path without
+/// terminal states counts as 0. With rewards, the value is the expected sum of rewards until a terminal state. The
+/// sum is infinite if a terminal state is reached with a probability below 1.
 #[derive(Debug)]
 pub struct Problem<'a, N> {
-    /// The process.
+    /// The Markov decision process.
     pub mdp: &'a Mdp<N>,
     /// Direction of optimisation.
     pub direction: Direction,
-    /// Reward of each choice, at least 0.
+    /// Reward of each choice, at least 0; `None` for a problem without rewards.
     pub rewards: Option<&'a [N]>,
-    /// The terminal states.
+    /// The states in which a path ends.
     pub terminal: &'a FixedBitSet,
-    /// Value of each terminal state, by state. The default is 1 without rewards, and 0 with rewards.
+    /// The values of the terminal states, indexed by state. By default, they are 1 without rewards
+    /// and 0 with rewards.
     pub terminal_values: Option<&'a [N]>,
-    /// States that count as failures: nothing after them counts.
+    /// States in which a path ends as a failure. Their value is 0 without rewards, and infinite with rewards.
     pub blocked: Option<&'a FixedBitSet>,
-    /// The allowed choices; `None` allows all. Each nonterminal state needs an allowed choice.
+    /// The allowed choices; `None` allows all choices. Each nonterminal state needs an allowed
+    /// choice.
     pub allowed: Option<&'a FixedBitSet>,
 }
 
@@ -46,7 +49,8 @@ impl<N> Clone for Problem<'_, N> {
 impl<N> Copy for Problem<'_, N> {}
 
 impl<'a, N> Problem<'a, N> {
-    /// Creates a problem with default terminal values, in which all choices are allowed.
+    /// Creates a problem with default terminal values, without blocked states, and with all choices
+    /// allowed.
     pub const fn new(
         mdp: &'a Mdp<N>,
         direction: Direction,
@@ -79,25 +83,25 @@ impl<N: Number> Problem<'_, N> {
     }
 }
 
-/// The values of all states.
+/// The values of all states, and a policy that attains them.
 #[derive(Debug, Clone)]
 pub struct Solution<N> {
     /// Value of each state; 0 if the value is infinite.
     pub values: Vec<N>,
-    /// Bound on the absolute error of each value; empty in exact arithmetic.
+    /// Upper bound on the absolute error of each value; empty in exact arithmetic.
     pub errors: Vec<f64>,
     /// The states whose value is infinite.
     pub infinite: FixedBitSet,
-    /// The states from which a terminal state is reached with probability 1: under some policy for the greatest probability
-    /// and the least reward, under all policies otherwise.
+    /// The states from which a terminal state is reached with probability 1. For the greatest
+    /// probability and the least reward, some policy reaches it; otherwise, all policies do.
     pub sure: FixedBitSet,
-    /// Choice of each state, or [`NONE`](crate::solve::NONE) if the state needs no choice.
+    /// The choice of each state, or [`NONE`](crate::solve::NONE) if the state needs no choice.
     pub policy: Vec<u32>,
 }
 
 impl<N: Number> Solution<N> {
-    /// Bounds that enclose the true value of a state; the enclosing doubles in exact arithmetic. `None` if the value is
-    /// infinite.
+    /// Returns a lower and an upper bound on the value of a state, or `None` if the value is infinite. In exact
+    /// arithmetic, the bounds are the closest doubles that enclose the value.
     pub fn bounds(&self, state: usize) -> Option<(f64, f64)> {
         if self.infinite.contains(state) {
             return None;
@@ -111,30 +115,33 @@ impl<N: Number> Solution<N> {
     }
 }
 
-/// Products of positive doubles below this value lose digits. It is added to the error of values that depend on them.
+/// Products of positive doubles below this limit lose digits. The limit is added to the error of
+/// values that depend on such products.
 pub(super) const UNDERFLOW_BOUND: f64 = 1e-280;
 
-/// State of the solver, shared by all components.
+/// The working state of the solver while it solves the components one after another.
 pub(crate) struct Run<'a, N> {
     pub problem: Problem<'a, N>,
     pub solution: Solution<N>,
-    /// An initial policy.
+    /// An initial policy for policy iteration, if one is given.
     pub hint: Option<&'a [u32]>,
-    /// Number of each state in the current component, or `NONE`.
+    /// The local number of each state in the current component, or [`NONE`] outside the component.
     pub position: Vec<u32>,
-    /// Remaining budget of exact arithmetic.
+    /// The remaining budget of exact arithmetic.
     pub work: Work,
-    /// `true` if only a good policy is needed: nothing is certified.
+    /// Whether only a good policy is needed; errors are then not bounded.
     pub draft: bool,
 }
 
 impl<N: Number> Run<'_, N> {
-    /// Returns `true` if sure states are defined by the best policy, `false` if by all policies.
+    /// Returns `true` if a state counts as sure when some policy reaches a terminal state with probability 1, and
+    /// `false` when all policies must do so.
     pub fn sure_by_choice(&self) -> bool {
         self.problem.rewards.is_some() == (self.problem.direction == Direction::Min)
     }
 
-    /// Returns `true` if sure states have value 1 without further computation.
+    /// Returns `true` if the value of a sure state, i.e. one that reaches a terminal state with
+    /// probability 1, is always 1.
     pub fn sure_is_one(&self) -> bool {
         self.problem.rewards.is_none() && self.problem.terminal_values.is_none()
     }

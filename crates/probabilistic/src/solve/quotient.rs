@@ -1,22 +1,23 @@
-//! Equations of the blocks of a component with cycles.
+//! The equations of a component with merged end components.
 
 use crate::number::Number;
 use crate::solve::chain::Rows;
 
-/// A component with its end components merged into blocks.
+/// A component with its end components merged into blocks. Each other state is a block by itself.
 pub struct Quotient<N> {
-    /// First row of each block, and the end.
+    /// First row of each block, followed by the number of rows.
     pub first: Vec<u32>,
-    /// One row per choice that leaves its block; columns are blocks, and loops are divided out.
+    /// One row for each choice that leaves its block. Columns are blocks, and self-loops are
+    /// eliminated.
     pub rows: Rows<N>,
-    /// Local choice of each row.
+    /// The local choice from which each row was built.
     pub choices: Vec<u32>,
-    /// Greatest number of transitions that a row was built from.
+    /// Greatest number of transitions of a choice from which a row was built.
     pub widest: usize,
 }
 
 impl<N: Number> Quotient<N> {
-    /// Number of blocks.
+    /// Returns the number of blocks.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "the end is listed, too, so that the list is never empty"
@@ -25,7 +26,7 @@ impl<N: Number> Quotient<N> {
         self.first.len() - 1
     }
 
-    /// Returns the rows of a block.
+    /// Returns the range of the rows of a block.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "the start of the next one is there, because the end is listed, too"

@@ -1,17 +1,18 @@
-//! Index from columns to rows.
+//! Index from the columns of sparse rows to the rows.
 
 use crate::mdp::dense;
 use crate::solve::chain::Rows;
 
-/// For each column, the rows with an entry in it, in ascending order, once per entry.
+/// For each column, the rows with an entry in this column, in ascending order. A row is listed once
+/// per entry.
 pub struct Users {
-    /// Start of each column in `rows`, and the end.
+    /// Start of each column in `rows`, followed by the length of `rows`.
     starts: Vec<u32>,
     rows: Vec<u32>,
 }
 
 impl Users {
-    /// Creates the index for a number of columns.
+    /// Creates the index of `rows` for the columns `0..columns`.
     pub fn new<N>(rows: &Rows<N>, columns: usize) -> Self {
         let mut starts = vec![0_u32; columns.saturating_add(1)];
         for column in &rows.columns {
@@ -22,7 +23,8 @@ impl Users {
             end = end.saturating_add(*start);
             *start = end;
         }
-        // Rows are inserted from last to first, so that each start moves down to the first row of its column.
+        // Rows are inserted from last to first, so each start moves down to the first row of its
+        // column.
         let mut users = vec![0_u32; rows.columns.len()];
         for (row, window) in rows.first.windows(2).enumerate().rev() {
             for column in &rows.columns[window[0] as usize..window[1] as usize] {
@@ -41,7 +43,8 @@ impl Users {
     }
 }
 
-/// Returns the owner of each row. `first` contains the first row of each owner, and the end.
+/// Returns the owner of each row. `first` contains the first row of each owner, followed by the
+/// number of rows.
 pub fn owners(first: &[u32]) -> Vec<u32> {
     let rows = first.last().copied().unwrap_or(0);
     let mut owners = vec![0; rows as usize];

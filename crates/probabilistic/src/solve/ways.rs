@@ -1,31 +1,35 @@
-//! Solves small components by shortest paths: each choice leaves the component, or leads to one of its states.
+//! Solves components by shortest paths if each choice either leaves the component, or leads to a
+//! single other state and possibly loops.
 //!
-//! Reconfigurations that succeed, or that are repeated until they succeed, have this form, and they are nearly all of the
-//! components of a co-adaptation process. The best value spreads from the choices that leave (Dijkstra 1959). No equations
-//! have to be solved, and the only errors are those of a few sums.
+//! Reconfigurations that succeed, or that are repeated until they succeed, have this form. Nearly
+//! all components of a co-adaptation process consist of them. The best values are propagated from
+//! the choices that leave the component (Dijkstra 1959). No system of equations is solved, and the
+//! only rounding errors are those of a few sums.
 
 use crate::mdp::dense;
 use crate::number::{Number, count, is_whole};
 use crate::solve::local::NONE;
 use crate::solve::problem::{Direction, Run};
 
-/// Upper limit on the number of states; the next best state is found by linear search.
+/// Upper limit on the number of states of a component, because the best open state is found by
+/// linear search.
 const MAX_STATES: usize = 64;
 
-/// Buffers of the algorithm.
+/// The working memory of the shortest-path algorithm, reused for all components.
 #[derive(Debug)]
 pub struct PathBuffers<N> {
-    /// Best known value and its choice, for each state of the component.
+    /// For each state of the component, the best known value with its choice.
     best: Vec<Option<(N, u32)>>,
     settled: Vec<bool>,
     steps: Vec<Step<N>>,
-    /// Leaving choices: state, choice, and `true` if all successors are sure.
+    /// The choices that leave the component: local state, choice, and `true` if all successors
+    /// reach a terminal state with probability 1.
     exits: Vec<(u32, u32, bool)>,
-    /// Greatest error of the value of a leaving choice.
+    /// Greatest error of the value of a choice that leaves the component.
     error: f64,
-    /// Greatest error of a leaving choice of value 0.
+    /// Greatest error of a choice that leaves the component with value 0.
     zero_error: f64,
-    /// `true` if all terms are integers, so that sums are exact.
+    /// Whether all summands are small integers, so that sums are exact.
     whole: bool,
 }
 
@@ -35,7 +39,7 @@ struct Step<N> {
     to: u32,
     choice: u32,
     cost: N,
-    /// `true` if the cost was divided, and so possibly rounded.
+    /// Whether the cost was computed by a division, and is therefore possibly rounded.
     divided: bool,
 }
 
@@ -54,10 +58,11 @@ impl<N> Default for PathBuffers<N> {
 }
 
 impl<N: Number> Run<'_, N> {
-    /// Solves a component of this form. Returns `false` and does nothing if it has another form.
+    /// Solves a component by shortest paths. Returns `false` without an effect if a choice leaves
+    /// the component and also stays in it, or leads to several other states.
     pub fn shortest_paths(&mut self, component: &[u32], buffers: &mut PathBuffers<N>) -> bool {
         let by_choice = self.sure_by_choice();
-        // The allowed choices alone may not connect the component.
+        // With restricted choices, the component may not be connected by the allowed choices.
         if component.len() > MAX_STATES || !by_choice && self.problem.allowed.is_some() {
             return false;
         }
@@ -74,11 +79,12 @@ impl<N: Number> Run<'_, N> {
         match (self.problem.rewards.is_some(), by_choice) {
             (false, true) => self.greatest_probability(component, buffers),
             (true, true) => self.least_reward(component, buffers),
-            // Some policy never leaves the component, from each state.
+            // From each state, some policy never leaves the component.
             (true, false) => component.iter().for_each(|state| {
                 self.solution.infinite.insert(*state as usize);
             }),
-            // Staying in the component has probability 0, the least possible value.
+            // Staying in the component reaches the goal with probability 0, the least possible
+            // value.
             (false, false) => {
                 for step in &buffers.steps {
                     self.solution.policy[component[step.from as usize] as usize] = step.choice;
@@ -88,7 +94,8 @@ impl<N: Number> Run<'_, N> {
         true
     }
 
-    /// Classifies the choices. Returns `false` if one has another form.
+    /// Collects the steps and exits of the component in `buffers`. Returns `false` if a choice has
+    /// neither form.
     fn scan(&self, component: &[u32], buffers: &mut PathBuffers<N>) -> bool {
         buffers.steps.clear();
         buffers.exits.clear();
@@ -127,7 +134,8 @@ impl<N: Number> Run<'_, N> {
         true
     }
 
-    /// Expected cost of a step that is repeated until it succeeds; `true` if it was divided.
+    /// Returns the expected cost of a step that is repeated until it succeeds, and `true` if the
+    /// cost was computed by a division.
     fn step_cost(&self, state: u32, choice: usize) -> (N, bool) {
         let reward = self.problem.reward(choice);
         if reward.is_zero() || self.problem.mdp.targets(choice).len() == 1 {
@@ -159,7 +167,7 @@ impl<N: Number> Run<'_, N> {
                 return;
             }
             if is_one {
-                // The remaining states cannot reach a sure exit.
+                // The remaining states cannot reach an exit that is sure to reach a terminal state.
                 buffers.exits.retain(|(from, ..)| buffers.best[*from as usize].is_none());
                 buffers.steps.retain(|step| buffers.best[step.from as usize].is_none());
             }
@@ -183,7 +191,7 @@ impl<N: Number> Run<'_, N> {
         self.write(component, buffers);
     }
 
-    /// Evaluates the leaving choices.
+    /// Evaluates the choices that leave the component, and stores the best one of each state.
     fn leave(&mut self, component: &[u32], buffers: &mut PathBuffers<N>, must_be_sure: bool) {
         for (from, choice, _) in &buffers.exits {
             let state = component[*from as usize] as usize;
@@ -207,7 +215,7 @@ impl<N: Number> Run<'_, N> {
             let Some((value, choice)) = best else { continue };
             let state = *state as usize;
             if !N::EXACT {
-                // Each step of a path adds once, and may divide and round its cost.
+                // Each step of a path adds a cost, which may have been rounded by a division.
                 let sums = 3.0 * count(component.len()) * f64::EPSILON * value.to_f64();
                 let rounding = if buffers.whole { 0.0 } else { sums };
                 self.solution.errors[state] =
@@ -233,12 +241,13 @@ impl<N: Number> PathBuffers<N> {
         self.settled.clear();
         self.settled.resize(states, false);
         (self.error, self.zero_error) = (0.0, 0.0);
-        // A path has less than `MAX_STATES` steps, so that its sum remains an exact integer.
+        // A path has fewer than `MAX_STATES` steps, so the sum of its costs is an exact integer.
         let whole = |step: &Step<N>| !step.divided && is_whole(step.cost.to_f64() * count(MAX_STATES));
         self.whole = !N::EXACT && self.steps.iter().all(whole);
     }
 
-    /// Propagates the best values along the steps, best state first.
+    /// Propagates the best values backwards along the steps, from the state with the best value on
+    /// (Dijkstra).
     fn spread(&mut self, direction: Direction) {
         loop {
             let mut next: Option<(usize, &N)> = None;

@@ -1,40 +1,44 @@
-//! Budgets of exact arithmetic.
+//! The work budget of exact arithmetic.
 
 use crate::number::Number;
 
-/// Default budget of exact arithmetic, in units of about a nanosecond.
+/// Default budget of exact arithmetic, in work units of about 1 ns.
 pub const DEFAULT_BUDGET: u64 = 3_000_000_000;
 
-/// Default width of bounds in doubles, relative to the value.
+/// Default width of the bounds computed in doubles, relative to the value.
 pub const TIGHT: f64 = 1e-7;
 
-/// Remaining budget of exact arithmetic, and required width of bounds in doubles. Doubles cost nothing.
+/// The remaining work budget of exact arithmetic, and the required width of bounds in doubles.
+/// Arithmetic in doubles costs nothing.
 #[derive(Debug, Clone, Copy)]
 pub struct Work {
     remaining: u64,
-    /// Required width of bounds, relative to the value; tighter bounds are not computed.
+    /// Required width of bounds, relative to the value. Narrower bounds are not computed.
     pub tight: f64,
-    /// Remaining budget for components whose bounds in doubles are insufficient.
+    /// Remaining budget for solving components in rationals whose bounds in doubles are
+    /// insufficient.
     spare: u64,
-    /// Entries that elimination has touched, including elimination in doubles.
+    /// Number of entries that elimination has visited, including elimination in doubles.
     touched: u64,
 }
 
-/// Size of a fraction whose numerator and denominator usually fit into a word each, in bits.
+/// Size in bits up to which a fraction usually has a numerator and denominator of one word each.
 const SHORT_BITS: u64 = 126;
 
-/// Budget for components whose bounds in doubles are insufficient, all of them together.
+/// Total budget for solving components in rationals whose bounds in doubles are insufficient.
 const SPARE_BUDGET: u64 = 1_000_000_000;
 
 impl Work {
-    /// Creates a budget.
+    /// Creates a budget of `remaining` work units.
     pub const fn new(remaining: u64) -> Self {
         Self { remaining, tight: TIGHT, spare: SPARE_BUDGET, touched: 0 }
     }
 
-    /// Pays for operations whose results are about as long as `result`. Returns `None` if the budget is exhausted.
+    /// Subtracts the cost of operations whose results are about as long as `result`. Returns `None`
+    /// if the budget is exhausted.
     ///
-    /// Fractions are reduced, which takes quadratic time. The constant part is the cost of allocating long ones.
+    /// The cost is quadratic in the length because fractions are reduced. The constant part is the
+    /// cost of allocating long fractions.
     pub fn spend<N: Number>(&mut self, result: &N, operations: usize) -> Option<()> {
         if !N::EXACT {
             return Some(());
@@ -50,17 +54,18 @@ impl Work {
         if self.is_spent() { None } else { Some(()) }
     }
 
-    /// Adds to the number of entries that elimination has touched.
+    /// Adds to the number of entries that elimination has visited.
     pub const fn touch(&mut self, entries: u64) {
         self.touched = self.touched.saturating_add(entries);
     }
 
-    /// Number of entries that elimination has touched.
+    /// Returns the number of entries that elimination has visited.
     pub const fn touched(self) -> u64 {
         self.touched
     }
 
-    /// Runs an operation in rationals within a part of the spare budget, of at most `limit` units.
+    /// Runs `operation` with a separate budget, which is taken from the spare budget and is at most
+    /// `limit` work units.
     pub fn spared<T>(&mut self, limit: u64, operation: impl FnOnce(&mut Self) -> T) -> T {
         let granted = self.spare.min(limit);
         let mut work = Self::new(granted);

@@ -1,9 +1,10 @@
 //! Fuzzes a certificate directory: the bytes select a certificate and its mutations. The verifier
-//! must answer within a stack of 8 MB, the stack of the program, and within the memory limit
+//! must answer within a stack of 8 MB, as the program has, and within the memory limit
 //! `-rss_limit_mb`.
 //!
-//! The certificates are those of `crates/verify/tests/certificates` and of the folder named by
-//! `METAPLAN_CERTIFICATES`, which may contain missions with knowledge bases.
+//! The original certificates are in `crates/verify/tests/certificates` and in the folder named by
+//! the environment variable `METAPLAN_CERTIFICATES`. That folder may contain certificates of
+//! missions with knowledge bases.
 
 #![no_main]
 
@@ -18,7 +19,7 @@ use libfuzzer_sys::fuzz_target;
 use metaplan_verify::{Verifier, json};
 use mutate::{Draw, Files, certificates, mutate, write};
 
-/// The stack size of the verification, in bytes.
+/// The stack size for the verification, in bytes.
 const STACK: usize = 8 << 20;
 
 static CERTIFICATES: OnceLock<Vec<Files>> = OnceLock::new();

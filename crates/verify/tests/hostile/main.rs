@@ -1,6 +1,6 @@
 //! Verifies randomly mutated certificates. Mutations change bytes, words, lists and JSON values,
-//! mostly with a manifest that matches. The verifier must answer without a panic and within a
-//! small stack.
+//! and mostly update the manifest accordingly. The verifier must answer without a panic and within
+//! a small stack.
 
 #[allow(dead_code, reason = "shared with a fuzz target")]
 mod mutate;
@@ -11,10 +11,11 @@ use std::time::{Duration, Instant};
 use metaplan_verify::Verifier;
 use mutate::{Draw, Files, certificates, mutate, write};
 
-/// The stack size of a test thread, without optimisation; the program has four times as much.
+/// The stack size of a test thread, in bytes. The program has four times as much, although tests
+/// are not optimised.
 const STACK: usize = 2 << 20;
 
-/// Upper limit on the time for one certificate on a busy machine.
+/// Upper limit on the time for verifying one certificate on a busy machine.
 const TIME_LIMIT: Duration = Duration::from_secs(20);
 
 fn originals() -> Vec<Files> {
@@ -23,14 +24,15 @@ fn originals() -> Vec<Files> {
     certificates
 }
 
-/// Verifies a certificate in a separate thread. Returns `None` on a panic.
+/// Verifies a certificate in a separate thread. Returns `true` if it is verified, and `None` on a
+/// panic.
 fn verified(files: &Files) -> Option<bool> {
     let directory = tempfile::tempdir().expect("a directory");
     write(directory.path(), files);
     std::thread::scope(|scope| {
         let verify = || {
             let verification = Verifier::new(directory.path()).time_limit(Duration::from_secs(2)).verify();
-            // Formatting the answer must not panic either.
+            // Formatting the result must not panic either.
             assert!(verification.to_string().ends_with('\n'));
             verification.verified()
         };
@@ -39,8 +41,8 @@ fn verified(files: &Files) -> Option<bool> {
     })
 }
 
-/// Mutates each certificate with each seed and verifies it. Returns the number of verified
-/// mutants.
+/// Verifies a mutant of each certificate for each seed; the test fails on a panic. Returns the
+/// number of mutants that were verified.
 fn withstand(seeds: std::ops::Range<u64>) -> usize {
     let mut accepted = 0;
     for (certificate, files) in originals().iter().enumerate() {

@@ -6,17 +6,17 @@ use std::path::Path;
 use metaplan_verify::digest::digest;
 use serde_json::{Value, json};
 
-/// The files of a certificate by name.
+/// The files of a certificate: contents by name.
 pub type Files = BTreeMap<String, Vec<u8>>;
 
-/// Upper limit on the repetitions of a part of a file.
+/// Upper limit on the number of repetitions of a part of a file.
 const REPETITION_LIMIT: usize = 300;
 
-/// A source of decisions.
+/// A source of random decisions.
 pub enum Draw<'d> {
     /// Deterministic pseudo-random numbers (`SplitMix64`).
     Random(u64),
-    /// The bytes of a fuzzer, followed by zeros.
+    /// The bytes from a fuzzer, followed by zeros.
     Bytes(&'d [u8]),
 }
 
@@ -46,7 +46,7 @@ impl Draw<'_> {
     }
 }
 
-/// Reads all certificates of a folder.
+/// Reads all certificates in the subfolders of a folder.
 pub fn certificates(folder: &Path) -> Vec<Files> {
     let entries = |path: &Path| {
         let mut paths: Vec<_> =
@@ -60,8 +60,8 @@ pub fn certificates(folder: &Path) -> Vec<Files> {
     folders.map(|path| entries(&path).iter().map(read).collect()).collect()
 }
 
-/// Mutates a certificate in up to three places. In most cases the manifest is updated with the
-/// sizes and hashes of the mutated files.
+/// Mutates a certificate in up to three places. In most cases, the manifest is updated with the
+/// sizes and digests of the mutated files.
 pub fn mutate(files: &Files, draw: &mut Draw<'_>) -> Files {
     let mut files = files.clone();
     let names: Vec<String> = files.keys().cloned().collect();
@@ -86,7 +86,7 @@ pub fn mutate(files: &Files, draw: &mut Draw<'_>) -> Files {
     files
 }
 
-/// Updates the sizes and hashes of the manifest.
+/// Updates the sizes and digests in the manifest.
 fn mend(files: &mut Files) {
     let Ok(mut manifest) = serde_json::from_slice::<Value>(&files["manifest.json"]) else { return };
     let listed = manifest.get_mut("files").and_then(Value::as_array_mut);
@@ -112,7 +112,7 @@ fn bytes(old: &[u8], draw: &mut Draw<'_>) -> Vec<u8> {
     [&old[..start], &middle, &old[end..]].concat()
 }
 
-/// Replaces a word or number by another word of the text or by an extreme value.
+/// Replaces a word or number by another word of the text, or by an extreme value.
 fn tokens(text: &str, draw: &mut Draw<'_>) -> String {
     let is_part = |c: char| c.is_alphanumeric() || "_-.?:".contains(c);
     let starts = text.match_indices(is_part).filter(|(at, _)| !text[..*at].ends_with(is_part));
@@ -155,7 +155,8 @@ fn lists(text: &str, draw: &mut Draw<'_>) -> String {
         2 => other_list.to_owned(),
         3 => format!("(and {list} {other_list})"),
         4 => {
-            // The number of assignments grows exponentially with the nesting of quantifiers.
+            // The number of variable assignments grows exponentially with the nesting of
+            // quantifiers.
             let count = if opening.contains('?') { 1 + count % 4 } else { count };
             format!("{}{list}{}", opening.repeat(count), ")".repeat(count))
         }
@@ -226,7 +227,7 @@ fn collect(value: &Value, path: String, paths: &mut Vec<String>) {
     paths.push(path);
 }
 
-/// Writes a certificate into an empty directory.
+/// Writes the files of a certificate into an empty directory.
 pub fn write(directory: &Path, files: &Files) {
     for (name, text) in files {
         std::fs::write(directory.join(name), text).expect("a file");
