@@ -107,7 +107,7 @@ impl Kind {
     }
 }
 
-/// Returns `true` if a line is `key = ...` or `[table]`.
+/// Returns `true` if a line has the form `key = …` or `[table]`.
 fn is_toml(line: &str) -> bool {
     let is_key =
         |key: &str| !key.is_empty() && key.chars().all(|c| c.is_alphanumeric() || "_-.\"' ".contains(c));
