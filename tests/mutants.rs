@@ -222,7 +222,7 @@ fn compile_tests(home: &Path, tests: Tests) -> PathBuf {
     program.expect("a program")
 }
 
-/// Returns `true` if the tests of an oracle pass with one fault switched on; fault 0 is none.
+/// Returns `true` if the tests of an oracle pass with one fault switched on; fault 0 means no fault.
 fn passes(
     programs: &[(Tests, PathBuf)],
     home: &Path,

@@ -36,7 +36,7 @@ enum Part {
     Or(Vec<Part>),
     Holds(String, Vec<Argument>),
     Equal(Argument, Argument),
-    /// The variable is an object of one of these types. An empty list stands for all types.
+    /// The variable is an object of one of these types. An empty list means all types.
     HasType(String, Vec<String>),
     Exists(Box<Part>),
     Not(Box<Part>),

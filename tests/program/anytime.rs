@@ -1,4 +1,4 @@
-//! Tests of answers at a time limit and of alternative plans: they contain the results found so far, and no
+//! Tests of answers at a time limit and of alternative plans: they contain the results found by then, and no
 //! false claims.
 
 use std::path::{Path, PathBuf};

@@ -93,7 +93,7 @@ pub fn round_trip(places: u32) -> (String, String) {
     (domain.to_owned(), problem)
 }
 
-/// At the soft limit of processor time, the answer is the best plan found so far.
+/// At the soft limit of processor time, the answer is the best plan found by then.
 #[cfg(unix)]
 #[test]
 fn soft_cpu_limit_of_the_shell_is_respected() {

@@ -143,9 +143,9 @@ fn vent(random: &mut fastrand::Rng, (stages, length): (usize, i64), unit: Q) -> 
     actions
 }
 
-/// Maximum number of nodes of the oracle. `VENT_CAP` is the larger limit for tasks made by [`vent`], where
-/// many runs begin.
+/// Maximum number of nodes of the oracle.
 const CAP: usize = 3000;
+/// Maximum number of nodes of the oracle for tasks made by [`vent`], where many runs begin.
 const VENT_CAP: usize = 200_000;
 
 /// Returns a random task with durations in multiples of `unit`, and the maximum number of nodes of its

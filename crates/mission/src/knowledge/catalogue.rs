@@ -11,7 +11,7 @@ use ontology::tomasys::{Action, FunctionDesign, Individual, Measurement, View};
 use ontology::vocab::{local_name, pddl_tomasys, tomasys};
 use rules::{Delta, Engine, Fact, Literal, Symbol};
 
-/// Cached designs, actions and measured values, and the members of the classes queried so far.
+/// Cached designs, actions and measured values, and the members of already queried classes.
 #[derive(Debug, Clone)]
 pub struct Catalogue {
     designs: Vec<FunctionDesign>,

@@ -52,7 +52,7 @@ impl Step<'_> {
     }
 }
 
-/// Finds all schemas that fit the name and the objects of a step. `instances` is empty if there are none.
+/// Finds all schemas that fit the name and the objects of a step. `instances` is empty if no schema fits.
 pub(super) fn resolve<'p>(world: &World<'p>, number: usize, text: &'p PlanStep) -> Step<'p> {
     let objects: Option<Vec<Symbol>> = text.arguments.iter().map(|name| world.object(name)).collect();
     let schemas = world.domain.actions.iter().filter(|action| action.identifier.name == text.action);
