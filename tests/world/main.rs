@@ -11,7 +11,7 @@
 //!   in transit, no action moves without a design, with a design that the delivered reports forbid, or with another
 //!   design than the loop has requested. The robot does so for a bounded number of steps only.
 //! - (b) The believed configuration follows from the messages by the table of `docs/reference/events.md`. If
-//! no reconfiguration is pending, the believed configuration is the actual one.
+//!   no reconfiguration is pending, the believed configuration is the actual one.
 //! - (c) At the end, each effect was carried out, superseded, abandoned with a report, or belongs to an action that has
 //!   ended.
 //! - (d) At the end, the robot is at the goal, or the last decision is that no plan exists, and this is true.

@@ -22,9 +22,9 @@ pub struct Names {
 /// A single entry of `[bindings.names]` or `--name`.
 #[derive(Debug, Clone)]
 pub(crate) struct Naming {
-    /// The local name or IRI of an individual, or a pattern.
+    /// The local name or IRI of an individual, or a pattern with one `*`.
     pub(crate) individual: String,
-    /// The name of an object, or a pattern.
+    /// The name of an object, or a pattern with one `*`.
     pub(crate) object: String,
     place: Option<Place>,
 }

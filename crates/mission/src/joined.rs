@@ -212,8 +212,8 @@ impl Mission {
         Err(messages.into())
     }
 
-    /// Returns the predicates that the knowledge base adds to a domain in PLANTA's form. `None` for
-    /// other missions.
+    /// Returns the predicates that the knowledge base adds to a domain in PLANTA's form, which uses
+    /// undeclared names of the ontology. `None` for other missions.
     pub fn completed_predicates(&self) -> Option<&HashSet<Name>> {
         self.planta.as_ref().map(Planta::known)
     }

@@ -8,7 +8,8 @@ use crate::source::Source;
 use crate::validate::{Options, PlanText, Verdict, validate};
 
 /// Validator for plans of one domain and problem. The domain and the problem must have passed
-/// [`check`](crate::check()); [`read`](crate::read()) returns only checked ones.
+/// [`check`](crate::check()); [`read`](crate::read()) returns only checked domains
+/// and problems.
 ///
 /// ```
 /// use metaplan_pddl::{Source, Validator, read};

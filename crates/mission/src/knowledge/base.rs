@@ -44,7 +44,8 @@ pub struct Knowledge {
     /// Names of all documents, including imported ones.
     documents: Arc<[String]>,
     annotations: Arc<[(Iri, Annotation)]>,
-    /// Translated terminology, if the documents were read for a domain in PLANTA's form.
+    /// Translation of the ontology to PDDL, if the documents were read for a domain in PLANTA's
+    /// form, which uses undeclared names of the ontology.
     terms: Option<Arc<Terms>>,
     /// Assertions and axioms of the documents and rule files.
     documented: Arc<ontology::Stated>,
@@ -79,8 +80,9 @@ impl Knowledge {
         Self::of_stated(sources, Stated::read(sources, equality)?)
     }
 
-    /// Like [`Knowledge::read`], but for a given domain text. For a domain in PLANTA's form, keeps
-    /// the translated terminology and assumes unique names.
+    /// Like [`Knowledge::read`], but for a given domain text. If the domain is in PLANTA's form, that
+    /// is, uses undeclared names of the ontology, keeps the translation of the ontology to PDDL and
+    /// assumes unique names.
     ///
     /// # Errors
     /// All errors of the sources.
@@ -125,15 +127,15 @@ impl Knowledge {
         Ok(Self::of(runtime, 0, Vec::new(), sources, entities))
     }
 
-    /// Sets the translated terminology for a domain in PLANTA's form, and the asserted facts. Used
-    /// after [`Knowledge::closed`].
+    /// Sets the translation of the ontology to PDDL, for a domain in PLANTA's form, and the asserted
+    /// facts. Used after [`Knowledge::closed`].
     #[must_use]
     pub fn with_terms(self, terms: Option<Arc<Terms>>, stated: &[Fact]) -> Self {
         Self { terms, stated: Some(stated.into()), ..self }
     }
 
-    /// Returns the translated terminology, if the documents were read for a domain in PLANTA's
-    /// form.
+    /// Returns the translation of the ontology to PDDL, if the documents were read for a domain in
+    /// PLANTA's form.
     pub(crate) fn terms(&self) -> Option<&Arc<Terms>> {
         self.terms.as_ref()
     }

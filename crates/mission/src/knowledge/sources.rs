@@ -46,7 +46,7 @@ pub struct Stated {
     /// Number of rules, see [`crate::knowledge::Knowledge::rule_count`].
     pub rule_count: usize,
     pub(super) warnings: Vec<Message>,
-    /// Translated terminology, if the documents were read for a domain in PLANTA's form.
+    /// Translation of the ontology to PDDL, if the documents were read for a domain in PLANTA's form.
     pub terms: Option<Arc<Terms>>,
 }
 

@@ -33,9 +33,9 @@ use names::{EQUAL, LESS, NUMBER_TYPES, UNGROUND, UNREALISABLE};
 use syntax::{Fact as PddlFact, atom, object};
 pub use terms::Terms;
 
-/// Returns the translated terminology of an ontology if the domain is in PLANTA's form: it uses
+/// Returns the translation of an ontology to PDDL if the domain is in PLANTA's form: it uses
 /// undeclared predicates, and at least one of them is `inferred-…` or has the name of a class or
-/// property.
+/// property. Otherwise returns `None`.
 pub(crate) fn wanted(ontology: &Ontology, domain: &str) -> Option<Terms> {
     let source = Source::new("domain", domain);
     let missing = mentioned::undeclared(&pddl::parse_domain(&source).0?);
@@ -58,8 +58,8 @@ pub(crate) struct Planta {
 }
 
 impl Planta {
-    /// Completes a domain with the terminology of the knowledge base. Returns the translation
-    /// state, the completed domain, and warnings.
+    /// Completes a domain with types, constants, predicates and axioms from the knowledge base.
+    /// Returns the translation state, the completed domain, and warnings.
     pub(crate) fn new(
         terms: &Arc<Terms>,
         domain: &Domain,

@@ -16,7 +16,7 @@ use super::names::{self, Literals};
 use super::syntax::{atom, axiom, variable};
 use crate::message::Message;
 
-/// The translated terminology of an ontology.
+/// The terminology of an ontology, translated to PDDL.
 #[derive(Debug, Clone, Default)]
 pub struct Terms {
     /// Arity of each plain and each inferred predicate.
@@ -25,7 +25,7 @@ pub struct Terms {
     pub(super) symbols: BTreeMap<Iri, Name>,
     /// Plain predicates of functional data properties.
     pub(super) functional: BTreeSet<Name>,
-    /// Translated axioms and rules.
+    /// Derived predicates, translated from axioms and rules.
     pub(super) derived: Vec<Derived>,
     /// Constants for individuals and for values other than numbers, each with its type if it has
     /// one.

@@ -21,13 +21,13 @@ const UNDECLARED_CODES: [&str; 5] = ["P120", "P121", "P122", "P123", "P136"];
 /// `OWLToPDDL`.
 const MIN_TEMPLATE_PREDICATES: usize = 3;
 
-/// Checks a domain without a problem.
+/// Checks a domain without a problem. Returns errors and warnings.
 pub fn check_domain(domain: &Domain, source: &Source) -> Vec<Diagnostic> {
     let symbols = Symbols::of(domain, None);
     check_domain_with(domain, source, &symbols).0
 }
 
-/// Checks a domain and a problem against their sources. Messages about the domain come first.
+/// Checks a domain and a problem. Returns errors and warnings. Messages about the domain come first.
 pub fn check(
     domain: &Domain,
     domain_source: &Source,

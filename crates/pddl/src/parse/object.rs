@@ -7,7 +7,7 @@
 //! - An assignment adds the atom with the new value and deletes the atoms with all values. Additions override
 //!   deletions.
 //! - Conditions that an effect imposes on the state, such as the existence of a value, become conditions of
-//! its action.
+//!   its action.
 
 use crate::ast::{
     Atom, Condition, ConditionTime, Declaration, Domain, Effect, EffectTime, Identifier, InitialElement,

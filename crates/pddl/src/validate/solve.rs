@@ -9,7 +9,7 @@ use crate::ast::{Atom, Condition, Expression, Name, Term, TypedName};
 use super::evaluate::{Bindings, Evaluator, Undefined};
 use super::world::{Arguments, Symbol};
 
-/// Callback for each solution. It also receives the reason if the truth of the condition is undefined.
+/// Callback for each solution. The callback also receives the reason if the truth of the condition is undefined.
 /// Returns `false` to end the search.
 pub(super) type OnSolution<'f, 'p> = &'f mut dyn FnMut(&Bindings<'p>, Option<&Undefined>) -> bool;
 
