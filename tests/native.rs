@@ -1,5 +1,5 @@
 //! Tests of plain domains, whose actions get their designs from the knowledge base. The optimum must equal
-//! that of the explicit form.
+//! that of the explicit form, in which designs are parameters of actions.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

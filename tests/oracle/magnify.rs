@@ -17,7 +17,8 @@ use std::process::Command;
 const DIGITS: usize = 16;
 /// Number of generated missions.
 const MISSIONS: usize = 50;
-/// Variants: name, whether the factors in the domain are replaced, and the maximum slowdown (geometric mean).
+/// Variants: name, whether the factors in the domain (weights of the metric) are replaced as well, and the maximum
+/// slowdown (geometric mean).
 const KINDS: [(&str, bool, f64); 2] = [("decimals", false, 3.0), ("all", true, 3.0)];
 /// Exit status that is shown for a proved plan without a certificate.
 const NO_CERTIFICATE: i32 = 120;

@@ -40,7 +40,8 @@ fn renamed(entries: &str) -> tempfile::TempDir {
 
 const ENTRIES: &str = "\"kd_*\" = \"fd_*\"\n\"kf_*\" = \"f_*\"\n\"ka_*\" = \"a_*\"";
 
-/// Returns the output of the program with the names of the problem, without times and digests.
+/// Runs the program and returns its output without times and digests. Renamed designs, functions and actions get
+/// their names in the problem.
 fn output_in_problem_names(directory: &Path, arguments: &[&str], input: &str) -> String {
     let outcome = metaplan_in(directory, arguments, input);
     assert!(

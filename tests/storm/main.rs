@@ -1,5 +1,5 @@
-//! Comparison of the model checker with Storm: values on random models and on our mission, JANI files, and
-//! speed on co-adaptation models.
+//! Comparison of the model checker with Storm: values on random models and on the co-adaptation mission
+//! `camara_like`, JANI files, and speed.
 //!
 //! Setup: `python3 -m venv storm && storm/bin/pip install stormpy==2.0.0`. Run:
 //! `STORM_PYTHON=storm/bin/python cargo test --release --test storm -- --ignored --nocapture`. `SEED` and `MODELS` set the seed and the
@@ -89,7 +89,8 @@ fn storm(questions: &[Value]) -> Option<Vec<Value>> {
     )
 }
 
-/// Returns our value with its lower and upper bound; `None` if the value is infinite.
+/// Returns the value that Metaplan's model checker computes for a property, with its lower and upper bound. `None` if
+/// the value is infinite.
 fn ours(model: &Model, text: &str, exactness: Exactness) -> Option<(f64, f64, f64)> {
     let options = Options::default().with_exactness(exactness);
     let report = check(model, &property::parse(text).expect("a property"), &options).expect("an answer");
@@ -173,7 +174,7 @@ fn random_models() {
     assert_eq!(refused, 0);
 }
 
-/// A property of our mission, which is checked with larger numbers of battery levels.
+/// A property of the mission `camara_like`, which is checked with larger numbers of battery levels.
 struct Case {
     property: &'static str,
     reward: Option<&'static str>,
@@ -185,7 +186,8 @@ const CASES: [Case; 2] = [
     Case { property: "R{\"time\"}min=? [ F \"goal\" ]", reward: Some("time"), failures: false },
 ];
 
-/// Returns our mission with a battery capacity, optionally with the size of a battery level: `14000/20`.
+/// Returns the mission `camara_like` with another battery capacity, optionally with the size of a battery level:
+/// `14000/20`.
 fn larger(battery: &str, case: &Case) -> (Coadaptation, Risk) {
     let number = |text: &str| text.parse::<u32>().expect("a number");
     let (battery, unit) = battery.split_once('/').unwrap_or((battery, "1"));

@@ -41,8 +41,8 @@ pub struct Robot {
     pub place: String,
     /// Numbers of effects that were carried out, refused, or superseded before their arrival.
     pub processed: BTreeSet<u64>,
-    /// Reconfigurations that were refused since the last successful one. Contains also that one if it failed
-    /// after its acknowledgement.
+    /// Reconfigurations that were refused since the last successful one. The successful one is included
+    /// if it failed after its acknowledgement.
     pub refused: BTreeSet<u64>,
     /// Reconfigurations that were refused before the last successful one.
     refused_before: BTreeSet<u64>,
@@ -226,8 +226,8 @@ impl Robot {
         None
     }
 
-    /// Advances the action by one work step, or makes it fail with `fails`. Returns a report, if there is
-    /// one.
+    /// Advances the action by one work step, or makes it fail if `fails` is set. Returns a report, if
+    /// there is one.
     pub fn work(&mut self, fails: bool) -> Option<Value> {
         let action = self.action.as_mut().filter(|action| action.is_moving() || fails)?;
         action.done += 1;

@@ -14,7 +14,7 @@ use crate::{COMPONENTS, DESIGNS, FUNCTION};
 /// Simulated time of one step.
 const STEP: Duration = Duration::from_millis(500);
 
-/// Number of steps with faults, and number of fair steps after them.
+/// Number of steps with faults, and number of steps in the subsequent fair phase, which has no faults.
 const STEPS: (u64, u64) = (60, 300);
 
 /// Maximum number of logged messages in the report of a violation.
@@ -26,7 +26,7 @@ const BELATED: (u64, u64) = (45, 90);
 /// Number of loop steps after which a new snapshot is taken.
 const SNAPSHOT_EVERY: usize = 23;
 
-/// Maximum number of reactions without a deliberation.
+/// Maximum number of reactions of the loop before the next deliberation (planning).
 const MAX_UNDELIBERATED: u32 = 4;
 
 /// Fault rates of a schedule. Unless stated otherwise, each number is a percentage.
@@ -95,7 +95,7 @@ impl Faults {
         Self { late, observes, belated: share(8), forgets: random.bool(), ..self }
     }
 
-    /// Removes the kinds of faults that were introduced later.
+    /// Removes the kinds of faults that were introduced after the first seeds of violations had been recorded.
     pub fn of_earlier_kinds(self) -> Self {
         Self { late: 0, observes: 0, belated: 0, forgets: false, ..self }
     }

@@ -72,7 +72,8 @@ impl Builder<'_> {
         }
     }
 
-    /// Adds effects whose arguments are a design or a function to an action.
+    /// Adds effects that change or read facts and numbers of the first slot's design and function, with matching
+    /// conditions.
     pub fn touch(&mut self, action: &mut Action, slots: &[(Term, Term)], way: &[Term]) {
         let names = self.names;
         let (function, design) = slots[0];

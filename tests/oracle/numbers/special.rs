@@ -1,4 +1,4 @@
-//! Hand-made tasks with hundreds of designs, and with more designs than 16 bits can count.
+//! Hand-made tasks with hundreds of designs, and with more designs than fit into 16 bits.
 
 use std::time::Duration;
 

@@ -259,8 +259,8 @@ impl<'e, 'p> Execution<'e, 'p> {
         Ok(changes)
     }
 
-    /// Applies the changes of a happening to the state. Recomputes the derived facts if axioms read something
-    /// that changes.
+    /// Applies the changes of a happening to the state. Recomputes the derived facts if a changed fact or
+    /// function occurs in a condition of an axiom.
     pub(super) fn apply(
         &mut self,
         step: &Step<'p>,

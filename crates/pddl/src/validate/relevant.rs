@@ -1,8 +1,8 @@
 //! Reduces a problem to the facts and values that given actions can read.
 //!
 //! Executing an action interns and indexes the whole initial state. If no condition or effect is quantified
-//! over objects, an action reads only atoms about its own arguments and the constants of the domain. In a map
-//! of 100 arcs and 18 designs this is one value in a thousand.
+//! over objects, an action reads only atoms about its own arguments and the constants of the domain. On a map
+//! with 100 arcs and 18 designs, for example, an action reads one value in a thousand.
 
 use rustc_hash::FxHashSet;
 

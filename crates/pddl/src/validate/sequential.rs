@@ -53,7 +53,7 @@ pub(super) fn run<'e, 'p>(
     Ok(())
 }
 
-/// Executes the end of an action after the events (timed initial literals) before it. Checks the conditions
+/// Applies the events (timed initial literals) before the end of an action, then executes the end. Checks the conditions
 /// over all in each state in between.
 fn finish<'e, 'p>(
     execution: &mut Execution<'e, 'p>,
