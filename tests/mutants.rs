@@ -1,8 +1,10 @@
-//! Mutation tests: the oracles must detect faults of the planner, and the simulation of `tests/world` faults of the loop.
+//! Mutation tests. The oracles must detect faults of the planner, and the simulation in `tests/world` must
+//! detect faults of the MAPE-K loop.
 //!
-//! `tests/oracle/mutants.toml` and `tests/world/mutants.toml` list the faults. All are compiled into one copy of the workspace, each
-//! behind a switch, and the tests run once per fault with only this fault switched on. A fault that no oracle detects is a gap in the
-//! oracles, or not a fault. `MUTANTS` selects faults by their numbers.
+//! `tests/oracle/mutants.toml` and `tests/world/mutants.toml` list the faults. All faults are compiled into
+//! one copy of the workspace, each behind a switch, and the tests run once per fault with only this fault
+//! switched on. A fault that no oracle detects is a gap in the oracles, or not a fault. The environment
+//! variable `MUTANTS` selects faults by their numbers.
 
 #![expect(
     clippy::print_stdout,
@@ -39,10 +41,10 @@ const COPIED_PATHS: [&str; 16] = [
 /// Environment variable with the number of the active fault, counted from 1.
 const SWITCH: &str = "METAPLAN_MUTANT";
 
-/// File of a crate that gets the function for the switch.
+/// File of a crate to which the function that queries the switch is added.
 const LIBRARY: &str = "src/lib.rs";
 
-/// A test program.
+/// A test program that can detect faults.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Tests {
     /// `tests/oracle`.
@@ -55,10 +57,11 @@ enum Tests {
     World,
 }
 
-/// Tests that must detect faults: program, filter for test names, and number of tasks (0 for the default).
+/// Tests that must detect faults: program, filter for test names, and number of tasks (0 for the program's
+/// default).
 type Oracle = (Tests, &'static str, u32);
 
-/// Lists of faults, each with the tests that must detect them.
+/// Files with lists of faults, each with the tests that must detect these faults.
 const SUITES: [(&str, &[Oracle]); 2] = [
     ("tests/oracle/mutants.toml", &ORACLES),
     ("tests/world/mutants.toml", &[(Tests::World, "violates", 1_000)]),
@@ -92,7 +95,7 @@ struct Mutant {
     file: String,
     before: String,
     after: String,
-    /// The tests that must detect the fault.
+    /// Tests that must detect this fault.
     #[serde(skip)]
     oracles: &'static [Oracle],
 }
@@ -105,7 +108,7 @@ fn write(path: &Path, bytes: &[u8]) {
     }
 }
 
-/// Removes files that do not exist in the workspace any more.
+/// Removes files below `to` that no longer exist below `from`.
 fn prune(from: &Path, to: &Path) {
     if !from.exists() {
         let result = if to.is_dir() { std::fs::remove_dir_all(to) } else { std::fs::remove_file(to) };
@@ -118,7 +121,7 @@ fn prune(from: &Path, to: &Path) {
     }
 }
 
-/// Copies files and folders, except for the files with faults.
+/// Copies a file or folder, except for the files in `faulty_files`.
 fn copy(from: &Path, to: &Path, faulty_files: &BTreeMap<PathBuf, String>) {
     if from.is_dir() {
         for entry in std::fs::read_dir(from).expect("a directory") {
@@ -141,7 +144,8 @@ fn mutants() -> Vec<Mutant> {
     SUITES.iter().flat_map(read).collect()
 }
 
-/// Texts of the files with faults, relative to the workspace. Each fault is behind its switch.
+/// Returns the texts of the files with faults, by path relative to the workspace. Each fault is behind its
+/// switch.
 fn faulty_texts(mutants: &[Mutant]) -> BTreeMap<String, String> {
     let mut files: BTreeMap<String, String> = BTreeMap::new();
     for (mutant, number) in mutants.iter().zip(1..) {
@@ -163,7 +167,7 @@ fn original(file: &str) -> String {
     std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(file)).expect("a file")
 }
 
-/// Creates a copy of the workspace with all faults.
+/// Creates a copy of the workspace with all faults and returns its path.
 fn mutated(mutants: &[Mutant]) -> PathBuf {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let home = Path::new(env!("CARGO_TARGET_TMPDIR")).join("mutants");
@@ -218,7 +222,7 @@ fn compile_tests(home: &Path, tests: Tests) -> PathBuf {
     program.expect("a program")
 }
 
-/// Returns `true` if the tests pass with a fault switched on.
+/// Returns `true` if the tests of an oracle pass with one fault switched on; fault 0 means no fault.
 fn passes(
     programs: &[(Tests, PathBuf)],
     home: &Path,
@@ -251,7 +255,7 @@ fn faults_apply_to_the_current_sources() {
     assert!(faulty_texts(&mutants()).len() > 10);
 }
 
-/// Cargo rejects a workspace with missing members.
+/// All members must be copied, because cargo rejects a workspace with missing members.
 #[test]
 fn all_members_are_copied() {
     let manifest: toml::Table = original("Cargo.toml").parse().expect("TOML");

@@ -1,4 +1,5 @@
-//! Tests of plain domains, whose actions get their designs from the knowledge base: same optimum as the explicit form.
+//! Tests of plain domains, whose actions get their designs from the knowledge base. The optimum must equal
+//! that of the explicit form, in which designs are parameters of actions.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -14,7 +15,7 @@ use planner::{Config, Limits, Status, lexicographic};
 use rules::Limits as StepLimits;
 use testing::random::Random;
 
-/// Status and cost of an optimal plan, and the configuration of each step.
+/// Status and cost of an optimal plan, and the configuration (function and design) of each step.
 type Answer = (Status, Option<String>, Vec<Vec<(String, String)>>);
 
 fn answer(mission: &Mission) -> Answer {
@@ -28,7 +29,7 @@ fn answer(mission: &Mission) -> Answer {
     (solution.status, plan.as_ref().map(|plan| plan.cost.to_string()), configurations.collect())
 }
 
-/// A shipped mission in a situation.
+/// Reads a shipped mission and changes its state by `situation`.
 fn shipped(name: &str, situation: &dyn Fn(&mut Mission)) -> Mission {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("missions/{name}.toml"));
     let mut mission = Setup::read(&manifest).unwrap_or_else(|messages| panic!("{messages:#?}")).mission;
@@ -36,7 +37,8 @@ fn shipped(name: &str, situation: &dyn Fn(&mut Mission)) -> Mission {
     mission
 }
 
-/// Checks that both forms of a shipped mission have the same optimum with the same designs at each step.
+/// Checks that the explicit and the plain form of a shipped mission have the same optimum, with the same
+/// designs at each step.
 fn check(name: &str, situation: &dyn Fn(&mut Mission), expected: Option<&str>) {
     let explicit = answer(&shipped(name, situation));
     let native = answer(&shipped(&format!("{name}_plain"), situation));
@@ -73,7 +75,8 @@ fn plans_have_the_arguments_of_the_plain_domain() {
     assert!(shipped("ugv", &|_| {}).adaptation().is_none());
 }
 
-/// A random mission: a map with contexts, functions with designs, bounds, a battery, and costs of design changes.
+/// A random mission in both forms: a map with contexts, functions with designs, quality bounds, a battery,
+/// and costs of design changes.
 struct Generated {
     knowledge: String,
     explicit: String,
@@ -165,7 +168,8 @@ impl Generated {
     }
 }
 
-/// The domain with parameters for functions and designs. A change of designs is a separate action.
+/// Returns the explicit form of the domain: actions with parameters for functions and designs. A change of
+/// designs is a separate action.
 fn explicit(functions: usize, bound: i64, reconfiguration: bool) -> String {
     let each = |text: &dyn Fn(usize) -> String| (0..functions).map(text).collect::<Vec<_>>().join(" ");
     let sum = |attribute: &str| format!("(+ 0 {})", each(&|f| format!("({attribute} ?d{f})")));
@@ -211,7 +215,7 @@ fn explicit(functions: usize, bound: i64, reconfiguration: bool) -> String {
     )
 }
 
-/// The domain without designs.
+/// Returns the plain form of the domain, without designs.
 fn plain(reconfiguration: bool) -> String {
     let (function, effect) = if reconfiguration {
         ("(reconfiguration)", "(increase (total-cost) (reconfiguration))")

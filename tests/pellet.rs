@@ -1,4 +1,5 @@
-//! Comparison with Pellet, the reasoner of current TOMASys robots: one process per cycle, resident, and with large knowledge bases.
+//! Benchmark against Pellet, the reasoner of current TOMASys robots: one process per cycle, a resident
+//! process, and large knowledge bases.
 //!
 //! ```sh
 //! apt-get install openjdk-17-jdk-headless
@@ -37,14 +38,14 @@ struct Times {
     processor: f64,
 }
 
-/// Locations of Pellet, and of SUAVE and the generator of large knowledge bases.
+/// Locations of Pellet, of the files of SUAVE, and of the generator of large knowledge bases.
 struct Peer {
     class_path: String,
     shared: PathBuf,
 }
 
 impl Peer {
-    /// Prints a message and returns `None` if one of them is missing.
+    /// Finds Pellet and the shared files. Prints a message and returns `None` if something is missing.
     fn find() -> Option<Self> {
         let shared = Path::new(ROOT).join("../shared");
         let python = std::env::var("METAPLAN_PYTHON").unwrap_or_else(|_| "python3".to_owned());
@@ -59,7 +60,8 @@ impl Peer {
         Some(Self { class_path, shared })
     }
 
-    /// Command line with which owlready2 starts Pellet on an N-Triples document.
+    /// Returns the command line with which owlready2 starts Pellet on an N-Triples document. `class` is the
+    /// main class with its options.
     fn command<'a>(&'a self, class: &'a [&'a str], document: &'a str) -> Vec<&'a str> {
         let mut command = vec!["java", "-Xmx2000M", "-cp", &self.class_path];
         command.extend(class);
@@ -73,7 +75,7 @@ impl Peer {
     }
 }
 
-/// Median times of several runs of a command.
+/// Returns the median times of several runs of a command, including child processes.
 fn measure_command(command: &[&str], runs: usize) -> Times {
     let script = "TIMEFORMAT='%R %U %S'; time \"$@\" > /dev/null 2>&1 || echo failed >&2";
     let run = || {
@@ -96,8 +98,8 @@ fn median(mut values: Vec<f64>) -> f64 {
     values[values.len() / 2]
 }
 
-/// Times of a call in this process: the median wall time, and the mean processor time. Thread clocks have a coarse resolution, so single
-/// processor times are not meaningful.
+/// Returns the times of a call in this process: the median wall time, and the mean processor time. Thread
+/// clocks have a coarse resolution, so the processor time of a single call is not meaningful.
 fn measure_call(runs: usize, mut call: impl FnMut()) -> Times {
     let start_time = thread_processor_time();
     let times = (0..runs).map(|_| {
@@ -110,7 +112,7 @@ fn measure_call(runs: usize, mut call: impl FnMut()) -> Times {
     Times { wall, processor: start_time.zip(thread_processor_time()).map_or(wall, mean) }
 }
 
-/// Processor time of this thread in milliseconds, on systems that report it.
+/// Returns the processor time of this thread in milliseconds; `None` on systems that do not report it.
 fn thread_processor_time() -> Option<f64> {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
     Some(text.split_whitespace().next()?.parse::<f64>().ok()? / 1e6)

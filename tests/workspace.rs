@@ -1,6 +1,7 @@
-//! Test of the workspace members that `cargo test` in the root does not test, because they are not default members.
+//! Checks that each workspace member outside of the default members, which `cargo test` in the root skips,
+//! has a test command.
 //!
-//! The program prints one line with these members and their test commands.
+//! The program prints one line with these members and the commands that test them.
 
 #![expect(clippy::print_stdout, reason = "the line is the purpose of this program")]
 

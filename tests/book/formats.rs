@@ -6,11 +6,11 @@ use std::fmt::Write as _;
 use metaplan::schemas::{FORMATS, schema};
 use serde_json::{Map, Value};
 
-/// Tables for all formats of answers.
+/// Returns the tables of fields for all output formats.
 pub fn answers() -> String {
     let mut text = String::new();
     for (name, about, _) in FORMATS {
-        // Inputs and the lines of the loop have pages of their own.
+        // Inputs, and the events and answers of the MAPE-K loop, have pages of their own.
         if ["manifest", "study", "event", "answer"].contains(&name) {
             continue;
         }
@@ -41,12 +41,12 @@ pub fn answers() -> String {
     text
 }
 
-/// Table of all keys of a manifest.
+/// Returns the table of all keys of a manifest.
 pub fn manifest() -> String {
     keys("manifest")
 }
 
-/// Table of all keys of a study.
+/// Returns the table of all keys of a study.
 pub fn study() -> String {
     keys("study")
 }
@@ -67,16 +67,16 @@ struct Row {
     default: String,
 }
 
-/// The rows of a table, in the order of the schema.
+/// Builder of the rows of a table of fields, in the order of the schema.
 struct Table<'a> {
     definitions: &'a Value,
     format: &'a str,
-    /// Placeholder for fields with arbitrary names. Empty if such fields are not listed.
+    /// Placeholder for arbitrary field names in paths. Empty if such fields are not listed.
     any: &'a str,
     rows: Vec<Row>,
-    /// Paths that have a row.
+    /// Paths of fields that already have a row.
     seen: BTreeSet<String>,
-    /// Definitions whose fields are listed already, with their paths.
+    /// Names of definitions whose fields are already listed, each with its path.
     listed: Vec<(String, String)>,
 }
 
@@ -89,7 +89,7 @@ impl<'a> Table<'a> {
         table.rows
     }
 
-    /// Lists the fields of an object.
+    /// Adds a row for each field of an object at `path`.
     fn object(&mut self, schema: &Value, path: &str) {
         let required: Vec<&str> =
             schema["required"].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
@@ -104,7 +104,7 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// Adds rows for fields with a constant per variant, which determine the kind of an object.
+    /// Adds rows for tag fields, which have a different constant in each variant of an object.
     fn kinds(&mut self, schema: &Value, path: &str) {
         let variants = variants(schema);
         let first = variants.first().and_then(|first| first["properties"].as_object()).into_iter().flatten();
@@ -172,8 +172,8 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// Name and schema of the object that contains the fields of a value, found through references, lists and nullable types.
-    /// Extends the path accordingly.
+    /// Returns the name and the schema of the object that contains the fields of a value. References, lists
+    /// and nullable types are followed, and `path` is extended accordingly.
     fn inside(&self, field: &Value, path: &mut String) -> Option<(String, Value)> {
         let (mut name, mut schema) = (String::new(), field.clone());
         loop {
@@ -197,7 +197,7 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// The type of a value, in words.
+    /// Describes the type of a value in words.
     fn kind(&self, field: &Value) -> String {
         let mut kinds: Vec<String> = Vec::new();
         let mut add = |kind: String| {
@@ -265,7 +265,8 @@ fn has_properties(schema: &Value) -> bool {
     schema["properties"].as_object().is_some_and(|fields: &Map<String, Value>| !fields.is_empty())
 }
 
-/// Returns `true` if a value has fields of its own. Enumerations that also have object variants are described in their own row.
+/// Returns `true` if the fields of a value get rows of their own. Enumerations that also have object variants
+/// are described in one row.
 fn has_fields(schema: &Value) -> bool {
     if variants(schema).iter().any(|variant| variant["type"] == "string") {
         return false;

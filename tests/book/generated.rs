@@ -1,5 +1,5 @@
-//! Generated parts of the book, between `<!-- generated: NAME -->` and `<!-- end of NAME -->`. An outdated part fails the test.
-//! `METAPLAN_BLESS=1` rewrites it.
+//! Checks the generated parts of the book, between `<!-- generated: NAME -->` and `<!-- end of NAME -->`. An
+//! outdated part fails the test. `METAPLAN_BLESS=1` rewrites it.
 
 use std::fmt::Write as _;
 use std::sync::Mutex;
@@ -10,7 +10,7 @@ use metaplan::codes;
 use crate::common::{metaplan, root};
 use crate::{formats, help, is_blessing};
 
-/// Page, name of the part, and its generator.
+/// A generated part of the book: page, name of the part, and generator of its content.
 type Part = (&'static str, &'static str, fn() -> String);
 
 const PARTS: [Part; 8] = [
@@ -24,7 +24,7 @@ const PARTS: [Part; 8] = [
     ("docs/reference/tomasys.md", "values", || terms("owl:DatatypeProperty")),
 ];
 
-/// One test per part, and one for the picture of the tutorial.
+/// Returns one test per generated part, and one for the picture of the tutorial.
 pub fn trials() -> Vec<Trial> {
     let mut trials: Vec<Trial> = PARTS
         .into_iter()
@@ -59,7 +59,7 @@ fn check(page: &str, name: &str, content: &str) -> Result<(), Failed> {
     Err("out of date; METAPLAN_BLESS=1 rewrites it".into())
 }
 
-/// Compares the picture of the tutorial with the one that the program draws.
+/// Compares the picture of the tutorial with the output of `metaplan plan --svg`.
 fn check_picture() -> Result<(), Failed> {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("plan.svg").display().to_string();
@@ -76,12 +76,12 @@ fn check_picture() -> Result<(), Failed> {
     Err("out of date; METAPLAN_BLESS=1 redraws it".into())
 }
 
-/// Tables of all codes, by their first letter.
+/// Returns the tables of all message codes, one table per first letter.
 fn codes() -> String {
     let mut text = String::new();
     let mut letter = "";
     for code in codes::all() {
-        // The codes are sorted, so each letter begins one table.
+        // The codes are sorted, so each new letter begins a table.
         if code.code[..1] != *letter {
             letter = &code.code[..1];
             let _ = write!(
@@ -96,7 +96,7 @@ fn codes() -> String {
     text
 }
 
-/// Table of the terms of the TOMASys metamodel of a kind, with their descriptions from the metamodel.
+/// Returns the table of the classes or properties (`kind`) of the TOMASys metamodel, with their descriptions.
 fn terms(kind: &str) -> String {
     let metamodel = std::fs::read_to_string(root().join("ontology/kb/tomasys.ttl")).expect("the metamodel");
     let is_property = kind != "owl:Class";
@@ -144,7 +144,7 @@ fn classes(list: &str) -> String {
     names.collect::<Vec<_>>().join(", ")
 }
 
-/// Text of a range: classes, a datatype, or the values of an enumeration.
+/// Formats the range of a property: classes, a datatype, or the values of an enumeration.
 fn range(text: &str) -> String {
     let Some((_, values)) = text.split_once("owl:oneOf (") else { return classes(text) };
     let values = values.split(')').next().expect("a list").split_whitespace();

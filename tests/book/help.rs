@@ -1,19 +1,19 @@
-//! Generates the tables of commands from the program's help.
+//! Generates the tables of commands in the book from the program's help texts.
 
 use std::fmt::Write as _;
 
 use crate::common::metaplan;
 
-/// Options of all commands, which the page describes once.
+/// Options that all commands have. The page describes them only once.
 const COMMON: [&str; 4] = ["--format", "-q, --quiet", "-v, --verbose", "-h, --help"];
 
-/// An argument or option, with its description.
+/// An argument or option of a command (`head`), with its description.
 struct Entry {
     head: String,
     text: String,
 }
 
-/// Sections for all commands, with their arguments and options.
+/// Returns the sections for all commands, with tables of their arguments and options.
 pub fn commands() -> String {
     let mut text = String::new();
     for (name, _) in subcommands(&help(&[])) {
@@ -35,7 +35,7 @@ fn help(command: &[&str]) -> String {
     outcome.stdout
 }
 
-/// Names and descriptions of the commands in a help text, except `help`.
+/// Returns the names and descriptions of the commands in a help text, except `help`.
 fn subcommands(help: &str) -> Vec<(String, String)> {
     let Some((_, command_lines)) = help.split_once("\nCommands:\n") else { return Vec::new() };
     let lines = command_lines.lines().take_while(|line| !line.is_empty());
@@ -65,8 +65,9 @@ fn is_common(head: &str) -> bool {
     COMMON.iter().any(|common| head == *common || head.starts_with(&format!("{common} ")))
 }
 
-/// Arguments and options in a help text. An entry is indented by less than ten columns, its description by more. Paragraphs are wrapped; an
-/// empty line or a value of an enumeration begins a new paragraph.
+/// Parses the arguments and options in a help text. An entry is indented by less than ten columns, its
+/// description by more. Paragraphs are wrapped; an empty line or a value of an enumeration begins a new
+/// paragraph.
 fn entries(help: &str) -> Vec<Entry> {
     let mut entries: Vec<Entry> = Vec::new();
     let (mut is_list, mut begins_paragraph) = (false, true);

@@ -1,4 +1,5 @@
-//! Tests of README and book: every block of every page is run like a reader would run it, or compared with the file that it shows.
+//! Tests of the README and the book: every block of every page is run as a reader would run it, or compared
+//! with the file that it shows.
 //!
 //! Each page is one test. It runs in a shell in a fresh copy of the project, with `metaplan` and `metaplan-verify` in the path. By default
 //! these are the programs that cargo builds for the tests. With `METAPLAN_PROGRAMS=DIR`, `metaplan` is the program in that directory,
@@ -56,7 +57,8 @@ fn main() -> ExitCode {
     libtest_mimic::run(&arguments, trials).exit_code()
 }
 
-/// The README, the book, and the pages of other packages whose programs are built with these tests.
+/// Returns the paths of the README, the pages of the book, and the pages of other packages whose programs are
+/// built with these tests.
 fn pages() -> Vec<String> {
     let mut pages = vec!["README.md".to_owned(), "crates/verify/README.md".to_owned()];
     let mut folders = vec![PathBuf::from("docs")];
@@ -75,7 +77,7 @@ fn pages() -> Vec<String> {
     pages
 }
 
-/// Runs the pages of the book in order in one copy of the project, like a reader of the whole book.
+/// Runs all pages of the book in order in one copy of the project, as a reader of the whole book would.
 fn pages_in_one_clone() -> Result<(), Failed> {
     let summary = std::fs::read_to_string(root().join("docs/SUMMARY.md")).expect("the summary");
     let links = summary.lines().filter_map(|line| line.split_once("](")?.1.split_once(')'));
@@ -91,7 +93,7 @@ fn pages_in_one_clone() -> Result<(), Failed> {
     if faults.is_empty() { Ok(()) } else { Err(Failed::from(faults.join("\n"))) }
 }
 
-/// Returns `true` if `METAPLAN_BLESS` asks for pages to be rewritten.
+/// Returns `true` if `METAPLAN_BLESS` requests that pages be rewritten.
 fn is_blessing() -> bool {
     std::env::var_os("METAPLAN_BLESS").is_some()
 }
@@ -114,7 +116,8 @@ impl Page {
         self.blocks.iter().any(Block::has_commands)
     }
 
-    /// The test of this page. Its kind, which the runner prints, lists missing programs and fixtures.
+    /// Creates the test of this page. The kind of the test, which the runner prints, lists missing programs
+    /// and fixtures.
     fn trial(self) -> Trial {
         let mut missing: Vec<String> = self.blocks.iter().flat_map(Block::missing).collect();
         missing.sort();
@@ -147,7 +150,7 @@ impl Page {
         if faults.is_empty() { Ok(()) } else { Err(Failed::from(faults.join("\n"))) }
     }
 
-    /// Runs blocks in order in one session. Returns the differences from the page.
+    /// Runs blocks in order in one session. Returns the differences between their output and the page.
     fn run(&self, session: &Session, blocks: &[&Block]) -> Vec<String> {
         let mut blessed = self.text.clone();
         let mut faults = Vec::new();
@@ -165,7 +168,8 @@ impl Page {
         faults
     }
 
-    /// Returns `true` if a library includes this page, so that cargo runs its Rust blocks.
+    /// Returns `true` if the documentation of a library includes this page, so that cargo runs its Rust
+    /// blocks.
     fn is_doctest(&self) -> bool {
         let (library, page) = match self.path.strip_prefix("crates/verify/") {
             Some(page) => ("crates/verify/src/lib.rs", page),

@@ -6,7 +6,7 @@ use pulldown_cmark::{CodeBlockKind, Event, Options, Parser, Tag, TagEnd};
 
 use crate::common::root;
 
-/// Kind of a block, which determines the check.
+/// Kind of a block, which determines how the block is checked.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Kind {
     Console,
@@ -24,9 +24,9 @@ pub struct Block {
     pub line: usize,
     pub kind: Kind,
     pub text: String,
-    /// Programs and fixtures without which the block is not run.
+    /// Programs and fixtures that the block needs; without them the block is not run.
     pub needs: Vec<String>,
-    /// Seconds for which the standard input of the last command stays open.
+    /// Number of seconds for which the standard input of the last command stays open.
     pub input_ends_after: Option<u32>,
 }
 
@@ -40,16 +40,18 @@ impl Block {
         self.has_commands() && self.missing().next().is_none()
     }
 
-    /// Programs and fixtures that the block needs and this machine does not have.
+    /// Programs and fixtures that the block needs but this machine lacks.
     pub fn missing(&self) -> impl Iterator<Item = String> {
         self.needs.iter().filter(|name| !is_available(name)).cloned()
     }
 }
 
-/// Files that readers of a page have and this project must not ship. They are copied into the session's directory.
+/// Files that readers of a page have but this project must not ship. They are copied into the session's
+/// directory.
 pub struct Fixture {
     pub name: &'static str,
-    /// Source below the directory of shared data, and target in the session's directory.
+    /// Pairs of the source path below the directory of shared data and the target path in the session's
+    /// directory.
     pub files: [(&'static str, &'static str); 4],
 }
 
@@ -63,7 +65,7 @@ pub const FIXTURES: [Fixture; 1] = [Fixture {
     ],
 }];
 
-/// The directory of shared data, a sibling of the project's directory.
+/// Returns the directory of shared data, a sibling of the project's directory.
 pub fn shared() -> PathBuf {
     root().join("../shared")
 }
@@ -76,7 +78,7 @@ fn is_available(name: &str) -> bool {
     std::env::split_paths(&path).any(|folder| Path::new(&folder).join(name).is_file())
 }
 
-/// Returns `true` if `METAPLAN_BOOK_REQUIRES` lists this name.
+/// Returns `true` if `METAPLAN_BOOK_REQUIRES` lists this program or fixture.
 pub fn is_required(name: &str) -> bool {
     let required = std::env::var("METAPLAN_BOOK_REQUIRES").unwrap_or_default();
     required.split(',').any(|required| required.trim() == name)
@@ -105,7 +107,7 @@ pub fn blocks(page: &str) -> Vec<Block> {
     blocks
 }
 
-/// An empty block with this fence, after this comment.
+/// Creates an empty block at `line` from its fence and the comment before it.
 fn block(line: usize, fence: &str, comment: &str) -> Block {
     let mark = |name: &str| {
         let argument = comment.trim().strip_prefix("<!--")?.trim_start().strip_prefix(name)?;

@@ -1,6 +1,6 @@
-//! The shell in which the commands of a page are run.
-//! All commands of a page become one script. So directories, variables and the status of the last command carry over, as at a prompt.
-//! After each command the script prints a separator with the command's status.
+//! Runs the commands of a page in a shell. All commands of a page become one script, so directories,
+//! variables and the status of the last command carry over, as at a prompt. After each command the script
+//! prints a separator with the command's status.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -12,13 +12,13 @@ use tempfile::TempDir;
 use crate::common::{copy_folder, root, verifier, without_progress};
 use crate::page::{Block, FIXTURES, Kind, shared};
 
-/// A character that no program prints. The script prints it before and after each status.
+/// Character that no program prints. The script prints it before and after each status.
 const SEPARATOR: char = '\u{1e}';
 
 pub struct Session {
-    /// A copy of the project below a temporary directory.
+    /// Temporary directory that contains a copy of the project.
     directory: TempDir,
-    /// The variable `PATH`.
+    /// Value of the environment variable `PATH`.
     path: String,
 }
 
@@ -28,9 +28,9 @@ struct Step {
     shown: String,
 }
 
-/// A block after it was run.
+/// Result of running a block.
 pub struct Outcome {
-    /// The block with the output that its commands printed.
+    /// Text of the block with the actual output of its commands.
     pub text: String,
     pub faults: Vec<String>,
 }
@@ -96,7 +96,7 @@ impl Session {
         self.directory.path().join("metaplan")
     }
 
-    /// Output of a script.
+    /// Runs a script and returns its output.
     fn shell(&self, script: &str) -> String {
         let file = self.directory.path().join("script");
         std::fs::write(&file, script).expect("the script is written");
@@ -109,7 +109,8 @@ impl Session {
     }
 }
 
-/// Compares the results of a block's commands with the block. Takes one result per command from the iterator.
+/// Compares a block with the results of its commands. Takes one result, output and status, per command from
+/// the iterator.
 fn compare<'a>(block: &Block, steps: &[Step], results: &mut impl Iterator<Item = (&'a str, i32)>) -> Outcome {
     let (mut text, mut faults) = (String::new(), Vec::new());
     if steps.is_empty() {
@@ -143,7 +144,8 @@ fn compare<'a>(block: &Block, steps: &[Step], results: &mut impl Iterator<Item =
     Outcome { text, faults }
 }
 
-/// Copies the project's files as git would. Without git, copies the folders that the commands of pages use.
+/// Copies the files that git lists for the project. Without git, copies the folders that the commands of
+/// pages use.
 fn copy_project(directory: &TempDir) {
     let place = directory.path().join("metaplan");
     let mut git = Command::new("git");

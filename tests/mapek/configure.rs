@@ -1,4 +1,5 @@
-//! Selection of designs for objectives: compared with recorded choices of MROS, and in the keeper.
+//! Selection of designs for objectives, compared with recorded choices of MROS, and as part of the
+//! configuration loop ([`Keeper`]).
 
 #![allow(clippy::print_stdout)] // a skipped test says so
 
@@ -29,7 +30,8 @@ fn real(files: &[&str]) -> Knowledge {
     Knowledge::read(&Sources { documents, options, ..Sources::default() }).expect("readable")
 }
 
-/// Intended deviations from MROS's configuration: the run, its steps, and the reason.
+/// Intended deviations from MROS's configuration: name of the run, numbers of the deviating steps, and the
+/// reason.
 const DIFFERENCES: [(&str, &[usize], &str); 3] = [
     (
         "suave_cancel_ungrounded",
@@ -54,7 +56,7 @@ fn number(text: &str) -> Option<BigRational> {
     literal.as_rational()
 }
 
-/// Applies a recorded step, if a robot can report it.
+/// Applies a recorded step of a run. Skips steps that a robot cannot report.
 fn apply_step(configurator: &mut Configurator, step: &Value) {
     let text = |key: &str| step[key].as_str().unwrap_or_default();
     match (text("op"), text("message")) {
@@ -67,7 +69,7 @@ fn apply_step(configurator: &mut Configurator, step: &Value) {
                 requirements: nfrs.map(|(key, value)| (key.clone(), bound(value))).collect(),
                 always_improve: step["always_improve"] == true,
             };
-            // MROS keeps an objective of an unknown function, and never serves it.
+            // MROS keeps an objective of an unknown function but never serves the objective.
             let _ = configurator.pursue(&goal);
         }
         ("cancel", _) => configurator.give_up(text("id")).expect("known"),
@@ -95,7 +97,7 @@ fn apply_step(configurator: &mut Configurator, step: &Value) {
     }
 }
 
-/// Returns the design of each served objective.
+/// Returns the design of each served objective, by the name of the objective.
 fn served(configurator: &Configurator) -> BTreeMap<String, String> {
     let objectives = configurator.objectives().into_iter();
     let pair = |objective: ontology::runtime::Objective| {
@@ -152,7 +154,8 @@ fn choices_equal_those_of_mros_except_for_listed_differences() {
     assert_eq!(cycles, 80);
 }
 
-/// Two functions. Their best designs both use the arm, and together exceed the energy budget.
+/// Knowledge base with two functions. Their best designs both use the arm, and together exceed the energy
+/// budget.
 pub const ROBOT: &str = r"
 @prefix t: <http://metacontrol.org/tomasys#> .
 @prefix owl: <http://www.w3.org/2002/07/owl#> .
@@ -175,7 +178,7 @@ pub fn robot() -> Knowledge {
     robot_with("")
 }
 
-/// The robot with additional statements.
+/// Reads [`ROBOT`] with additional statements.
 pub fn robot_with(statements: &str) -> Knowledge {
     let directory = tempfile::tempdir().expect("a directory");
     let file = directory.path().join("robot.ttl");
@@ -215,7 +218,7 @@ fn deliver(keeper: &mut Keeper, line: &str) -> Vec<KeeperAnswer> {
     keeper.handle(&Observation::parse(line))
 }
 
-/// Requested reconfigurations: objective, previous design, new design.
+/// Returns the requested reconfigurations: objective, previous design, new design.
 fn reconfigurations(answers: &[KeeperAnswer]) -> Vec<(&str, Option<&str>, Option<&str>)> {
     let reconfigurations = answers.iter().filter_map(|answer| match answer {
         KeeperAnswer::Service(Service::Reconfigure { objective, from, to, .. }) => {
@@ -233,7 +236,8 @@ fn a_failed_design_is_replaced_and_requested_again_once_realisable() {
     let answers =
         deliver(&mut keeper, r#"{"event":"objective_added","objective":"o1","function":"f_look","seq":1}"#);
     assert_eq!(reconfigurations(&answers), [("o1", None, Some("fd_look_close"))]);
-    // After the refusal, the next best design is requested, and the best again once it is realisable.
+    // After the refusal, the second-best design is requested, and the best design again once it is
+    // realisable.
     let answers = deliver(&mut keeper, r#"{"event":"reconfiguration_failed","effect":1,"seq":2}"#);
     assert_eq!(reconfigurations(&answers), [("o1", None, Some("fd_look_far"))]);
     assert_eq!(reconfigurations(&deliver(&mut keeper, r#"{"event":"acknowledged","effect":2}"#)), []);
@@ -246,8 +250,8 @@ fn a_failed_design_is_replaced_and_requested_again_once_realisable() {
     let answers =
         deliver(&mut keeper, r#"{"event":"component_status","component":"c_arm","status":"FALSE"}"#);
     assert_eq!(reconfigurations(&answers), [("o1", Some("fd_look_close"), Some("fd_look_far"))]);
-    // Without the camera no design is available, and the current one stays. With the camera, the objective is served
-    // again.
+    // Without the camera no design is available, and the current design stays. Once the camera works, the
+    // objective is served again.
     let answers =
         deliver(&mut keeper, r#"{"event":"component_status","component":"c_camera","status":"FALSE"}"#);
     assert!(

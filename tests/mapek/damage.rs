@@ -1,10 +1,10 @@
-//! No observation is dropped, and damaged designs are not used: bursts of faults, also while an action is being
-//! cancelled or suspended.
+//! Tests with bursts of faults, also while an action is being cancelled or suspended: no observation is
+//! dropped, and damaged designs are not used.
 //!
-//! Oracle after each line, in any order of lines: (a) Available designs and objectives in error equal those of a fresh
-//! knowledge base that gets the last report of each component and attribute in another order. They also equal the
-//! definition of the shipped rules. (b) No design is requested, used or resumed that the fresh knowledge base makes
-//! unavailable.
+//! The oracle checks after each line, in any order of lines: (a) Available designs and objectives in error
+//! equal those of a fresh knowledge base that gets the last report of each component and attribute in another
+//! order. They also satisfy the definition of the shipped rules. (b) No design is requested, used or resumed
+//! that is unavailable in the fresh knowledge base.
 #![expect(clippy::print_stdout, reason = "figures are what the long test is for")]
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -28,8 +28,8 @@ struct LastReports {
 
 type Statuses = BTreeMap<String, Vec<String>>;
 
-/// Applies the last reports to a fresh knowledge base in random order. Returns available designs and objectives in
-/// error.
+/// Applies the last reports to a fresh knowledge base in random order. Returns the available designs, and the
+/// statuses of the objectives in error.
 fn fresh(
     place: &Place,
     last_reports: &LastReports,
@@ -71,7 +71,7 @@ fn fresh(
     )
 }
 
-/// Functions with their designs, as grounded in the knowledge base of the loop.
+/// Returns the functions that the loop's knowledge base grounds, each with its design.
 fn at_work(control: &Loop) -> Vec<(String, String)> {
     let knowledge = control.beliefs().mission().knowledge().expect("a knowledge base");
     let mut pairs = Vec::new();
@@ -84,8 +84,9 @@ fn at_work(control: &Loop) -> Vec<(String, String)> {
     pairs
 }
 
-/// Defects of a design by definition: whether it requires a component that has failed, directly or by dependency; and
-/// whether the last measurement violates a bound.
+/// Returns whether a design has failed by definition, as two flags. The first is `true` if the design
+/// requires a failed component, directly or by dependency. The second is `true` if the last measurement
+/// violates a bound.
 fn defects(place: &Place, last_reports: &LastReports, design: &str) -> (bool, bool) {
     let mut failed: BTreeSet<&str> = last_reports
         .components
@@ -130,7 +131,7 @@ impl<'a> Life<'a> {
         }
     }
 
-    /// One to five reports in one line.
+    /// Returns a line with one to five random reports.
     fn burst(&mut self) -> String {
         let count = if self.random.bool() { 1 } else { self.random.usize(2..=5) };
         let (mut components, mut measured) = (Vec::new(), Vec::new());
@@ -144,7 +145,7 @@ impl<'a> Life<'a> {
                 components.push((name.clone(), status));
             }
         }
-        // Of several values with one key, the first counts.
+        // Of several values for one key, the first one counts.
         for (name, status) in components.iter().rev() {
             self.last_reports.components.insert(name.clone(), status);
         }
@@ -235,7 +236,8 @@ impl<'a> Life<'a> {
     }
 }
 
-/// Runs `lives` robots for some lines each, distributed over all places. Returns the number of lines.
+/// Delivers a few random lines to each of `lives` robots, which are distributed over all missions, and checks
+/// the invariants. `missions` is the number of generated missions. Returns the number of lines.
 fn check(lives: u64, missions: u64) -> usize {
     let mut places = shipped();
     places.extend(suave());
@@ -267,7 +269,7 @@ fn kinect(status: &str) -> String {
     json!({ "event": "component_status", "component": "c_kinect", "status": status }).to_string()
 }
 
-/// Short texts of errors, contradictions and effects.
+/// Formats errors, contradictions and effects briefly.
 fn outcomes(answers: &[Answer]) -> Vec<String> {
     let word = |answer: &Answer| match answer {
         Answer::Error { code, .. } => Some(format!("error {code}")),
@@ -298,14 +300,14 @@ fn a_second_fault_during_a_cancellation_is_recorded() {
     let lidar = "move wp2 wp3 (f_localization = fd_amcl_lidar)";
     let answers = feed(&mut ugv, r#"{"event":"action_cancelled","action":2}"#);
     assert_eq!(outcomes(&answers), ["fd_amcl_lidar", lidar]);
-    // The Kinect works again, but the light still makes its designs unavailable.
+    // The Kinect works again, but the designs with the Kinect remain unavailable because of the light.
     assert_eq!(outcomes(&feed(&mut ugv, &kinect("OK"))), [""; 0]);
     let dim = r#"{"event":"measured","attribute":"ambient_light","value":0.3}"#;
     assert_eq!(outcomes(&feed(&mut ugv, dim)), ["fd_amcl_kinect"]);
 }
 
-/// A rule derives a failure that contradicts the component's own report. Both statements are kept, the failure counts,
-/// and the contradiction is reported.
+/// A rule infers a failure that contradicts the component's own report. Both statements are kept, the failure
+/// takes precedence, and the contradiction is reported.
 #[test]
 fn a_failure_that_contradicts_a_conclusion_is_recorded() {
     let place = (0..100).map(generated).find(|place| !place.depends.is_empty()).expect("a mission");

@@ -1,10 +1,10 @@
-//! Designs that a function refuses, and designs that were set externally.
+//! Tests of designs that a function refuses, and of designs that were set externally.
 
 use metaplan::mapek::{Answer, Command, Event, Loop};
 
 use crate::common::{control, feed};
 
-/// Function, previous and new design of each reconfiguration.
+/// Returns the function, the previous design and the new design of each reconfiguration.
 fn reconfigured(answers: &[Answer]) -> Vec<(String, Option<String>, String)> {
     let change = |answer: &Answer| match &answer.effect()?.command {
         Command::Reconfigure { function, from, to } => Some((function.clone(), from.clone(), to.clone())),
@@ -27,7 +27,7 @@ fn code(answers: &[Answer]) -> &str {
     code
 }
 
-/// Delivers an event as text, so that its syntax is tested, too.
+/// Delivers an event as text, so that its syntax is tested as well.
 fn deliver(control: &mut Loop, event: &Event) -> Vec<Answer> {
     feed(control, &event.to_json().to_string())
 }
@@ -52,7 +52,7 @@ fn a_refused_design_is_not_requested_until_it_is_realisable_again() {
     deliver(&mut control, &Event::Acknowledged { effect: 4 });
     let answers = deliver(&mut control, &Event::Design { design: design(), realisable: true });
     assert_eq!(reconfigured(&answers), pair(Some("fd_mrpt_kinect"), "fd_amcl_kinect"));
-    // The failure was handled before. Its repetition changes nothing.
+    // The failure has already been handled, so its repetition changes nothing.
     let repeated_answers = deliver(&mut control, &Event::ReconfigurationFailed { effect: effect(&first) });
     assert!(repeated_answers.is_empty(), "{repeated_answers:?}");
     let unknown = deliver(&mut control, &Event::ReconfigurationFailed { effect: 1000 });
@@ -72,7 +72,7 @@ fn an_observed_design_is_kept_unless_a_change_has_a_benefit() {
     let answers = observed(&mut control, Some("fd_mrpt_kinect"));
     assert_eq!(reconfigured(&answers), pair(Some("fd_mrpt_kinect"), "fd_amcl_kinect"), "{answers:?}");
     deliver(&mut control, &Event::Acknowledged { effect: effect(&answers) });
-    // The function has lost its design, which is requested again.
+    // The function has lost its design; the loop requests the design again.
     let answers = observed(&mut control, None);
     assert_eq!(reconfigured(&answers), pair(None, "fd_amcl_kinect"), "{answers:?}");
     // The observed design is the requested one.

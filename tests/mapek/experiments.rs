@@ -1,11 +1,11 @@
-//! The two experiments of the paper event by event, and other properties of the loop.
+//! Tests of the two experiments of the paper event by event, and of other properties of the loop.
 
 use metaplan::mapek::{Answer, Command, Loop};
 use serde_json::Value;
 
 use crate::common::{control, feed};
 
-/// Short text of an answer, without reasons; `None` for irrelevant answers.
+/// Formats an answer briefly, without reasons; `None` for irrelevant answers.
 fn words(answer: &Answer) -> Option<String> {
     Some(match answer {
         Answer::Inferred { designs, objectives } => {
@@ -39,7 +39,8 @@ fn words(answer: &Answer) -> Option<String> {
     })
 }
 
-/// Delivers lines and compares the answers to each.
+/// Delivers lines to a loop and compares the answers with the expected ones. The line `start` starts the
+/// loop.
 fn check(control: &mut Loop, script: &[(&str, &[&str])]) {
     for (line, expected) in script {
         let answers = if *line == "start" { control.start() } else { feed(control, line) };
@@ -85,8 +86,8 @@ fn the_kinect_fails_at_wp2() {
     check(
         &mut ugv,
         &[
-            // No other design is safe enough among the obstacles: the action is cancelled, and then route and design
-            // change.
+            // No other design is safe enough among the obstacles. The action is therefore cancelled, and then
+            // the route and the design change.
             (KINECT_FAILS, &[KINECT_LOST, "suspend 2", "cancel 2"]),
             (
                 r#"{"event":"action_cancelled","action":2}"#,
@@ -117,7 +118,8 @@ fn the_kinect_fails_on_the_way_to_wp2() {
     check(
         &mut ugv,
         &[(
-            // Another design is possible: the action continues with it at once, and then the remaining route changes.
+            // Another design is possible: the action continues with that design immediately, and then the
+            // remaining route changes.
             KINECT_FAILS,
             &[
                 KINECT_LOST,
@@ -184,7 +186,7 @@ fn the_battery_of_the_uuv_drops() {
     );
 }
 
-/// An action with full progress that has not ended continues.
+/// An action that has reported full progress but has not ended is not cancelled.
 #[test]
 fn an_action_with_full_progress_is_not_cancelled() {
     for (mission, change) in [
@@ -231,7 +233,7 @@ fn the_plan_survives_failures_of_unused_components() {
     );
 }
 
-/// Availability when the Kinect has recovered.
+/// Expected text of the newly available designs when the Kinect has recovered.
 const BACK: &str = "+fd_amcl_kinect, +fd_mrpt_kinect";
 const BETTER: [&str; 2] = [
     "plan 304: move wp3 wp6 (f_localization = fd_amcl_kinect); move_in_the_dark wp6 wp9 (f_localization = fd_amcl_kinect)",
@@ -273,7 +275,7 @@ fn a_recovered_better_design_is_used_after_the_settle_time() {
             (r#"{"event":"tick","time":12}"#, &BETTER),
         ],
     );
-    // The design is lost again within the settle time.
+    // The design becomes unavailable again within the settle time.
     check(
         &mut detour(0, 10),
         &[
@@ -343,7 +345,7 @@ fn the_goal_changes_and_actions_fail() {
         let answers = feed(&mut ugv, &format!(r#"{{"event":"action_failed","action":{action}}}"#));
         assert!(answers.iter().any(|answer| answer.effect().is_some()), "{answers:?}");
     }
-    // After three consecutive failures planning pauses. After a change of the situation it is tried again.
+    // After three consecutive failures planning pauses. It is tried again after a change of the situation.
     check(
         &mut ugv,
         &[(r#"{"event":"action_failed","action":4}"#, &["no plan: failed"]), (r#"{"event":"tick"}"#, &[])],
@@ -364,13 +366,14 @@ fn an_action_is_suspended_without_any_plan() {
         &mut uuv,
         &[
             (r#"{"event":"action_progress","action":1,"fraction":0.75}"#, &[]),
-            // No speed is available. Cancelling the search would lose three quarters of it without any benefit.
+            // No speed is available. Cancelling the search would discard three quarters of the work without
+            // any benefit.
             (&thruster(1, "FALSE"), &[stands, "suspend 1", "no plan: unsolvable"]),
             (r#"{"event":"tick"}"#, &[]),
             (r#"{"event":"component_status","component":"c_sonar","status":"OK"}"#, &[]),
             (&thruster(3, "FALSE"), &[]),
             (r#"{"event":"fact_changed","name":"battery","value":90}"#, &["no plan: unsolvable"]),
-            // The low speed is available again, and is used.
+            // The low speed is available again and is used.
             (
                 &thruster(1, "RECOVERED"),
                 &[

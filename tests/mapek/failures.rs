@@ -1,5 +1,5 @@
-//! The loop compared with other strategies under failures that no shipped scenario contains: one and two components,
-//! early and late, permanent, temporary, and repeated.
+//! Compares the loop with other strategies under failures that no shipped scenario contains: of one and two
+//! components, early and late, permanent, temporary, and repeated.
 #![expect(clippy::print_stdout, reason = "the table is what the long test is for")]
 
 use std::collections::BTreeMap;
@@ -12,18 +12,19 @@ use metaplan::simulate::{Disturbance, Experiment, RandomFailure, Run, Simulation
 /// A mission with components that can fail.
 struct Robot {
     mission: &'static str,
-    /// Components that fail together.
+    /// Sets of components that fail together.
     failing: &'static [&'static [&'static str]],
     /// Number of leading entries of `failing` whose permanent failure the mission tolerates.
     spare: usize,
-    /// Parameters of the simulation: step and patience.
+    /// Parameters of the simulation: step length and patience.
     pace: (f64, f64),
     lifeline: Option<&'static str>,
-    /// Earliest times of failures, and lengths of the intervals in which they occur.
+    /// Early and late failures: earliest time, and length of the interval in which the failure occurs.
     times: [(f64, f64); 2],
-    /// Shortest times to recovery, and lengths of the intervals in which it occurs.
+    /// Brief and long failures: shortest time to recovery, and length of the interval in which the recovery
+    /// occurs.
     recoveries: [(f64, f64); 2],
-    /// Mean time to a failure and time to its recovery, for repeated failures.
+    /// Mean time to a failure, and time to its recovery, for repeated failures.
     random: (f64, f64),
 }
 
@@ -67,7 +68,7 @@ const ROBOTS: [Robot; 2] = [
     },
 ];
 
-/// All scenarios of a robot with their names.
+/// Returns all scenarios of a robot with their names.
 fn scenarios(robot: &Robot) -> Vec<(String, Simulation)> {
     let mut scenarios = Vec::new();
     for (failing, number) in robot.failing.iter().zip(0..) {
@@ -92,7 +93,7 @@ fn scenarios(robot: &Robot) -> Vec<(String, Simulation)> {
     scenarios
 }
 
-/// Failure of components, and optionally their common recovery.
+/// Returns a failure of components within a time interval, and optionally their common recovery.
 fn once(failing: &[&str], time: (f64, f64), recovery: Option<(f64, f64)>) -> Vec<Disturbance> {
     let disturbance = |at: f64, within: f64| Disturbance {
         at: Some(at),
@@ -122,7 +123,7 @@ fn simulation(robot: &Robot, events: Vec<Disturbance>, failures: Vec<RandomFailu
 /// Comparison of the loop with another strategy in one scenario.
 struct Comparison {
     strategy: Strategy,
-    /// Mean cost and number of accomplished missions.
+    /// Mean cost and number of accomplished missions of the other strategy, as text.
     mean_cost_and_count: String,
     /// Number of missions in which the loop is better.
     better: usize,
@@ -130,7 +131,8 @@ struct Comparison {
     worse: Vec<u64>,
 }
 
-/// Simulates a scenario with all strategies. Returns the figures of the loop, and its comparisons with the others.
+/// Simulates a scenario with all strategies for the given number of seeds. Returns the figures of the loop,
+/// and its comparison with each other strategy.
 fn play(setup: &Setup, settings: &Simulation, seeds: u64) -> (String, Vec<Comparison>) {
     let (mission, control) = (setup.mission.clone(), setup.settings.clone());
     let experiment = Experiment::new(mission, control, settings.clone(), setup.time_unit);
@@ -163,7 +165,7 @@ fn setup(robot: &Robot) -> Setup {
     Setup::read(&manifest).expect("the mission is read")
 }
 
-/// Formats mean cost and number of accomplished missions.
+/// Formats the mean cost of the accomplished missions and their number.
 fn mean_cost_and_count(runs: &[Run]) -> String {
     let done: Vec<f64> = runs.iter().filter(|run| run.accomplished).map(|run| run.cost).collect();
     if done.is_empty() {
@@ -172,8 +174,8 @@ fn mean_cost_and_count(runs: &[Run]) -> String {
     format!("{:.2} ({})", done.iter().sum::<f64>() / done.len() as f64, done.len())
 }
 
-/// Simulates all scenarios of a robot and prints the table. For each strategy, returns the numbers of missions in which
-/// the loop is better and worse.
+/// Simulates all scenarios of a robot and prints a table. For each other strategy, returns the numbers of
+/// missions in which the loop is better and worse.
 fn table(robot: &Robot, seeds: u64) -> BTreeMap<&'static str, (usize, usize)> {
     let setup = setup(robot);
     let mut total: BTreeMap<&str, (usize, usize)> = BTreeMap::new();
@@ -196,7 +198,8 @@ fn table(robot: &Robot, seeds: u64) -> BTreeMap<&'static str, (usize, usize)> {
     total
 }
 
-/// Without knowledge of future failures, no strategy is always better. But the loop may be worse only rarely.
+/// Asserts that the loop is better than each other strategy at least ten times as often as it is worse. It cannot
+/// always be better, because no strategy knows future failures.
 fn check(robot: &Robot) {
     for (strategy, (better, worse)) in table(robot, 30) {
         assert!(worse * 10 <= better, "{strategy}: better {better}, worse {worse}");

@@ -1,5 +1,5 @@
-//! Fault injection into journals: after each small damage, the journal is refused, or the damage is reported, or the
-//! loop has the undamaged state.
+//! Fault injection into journals. After each small damage, the journal is refused, the damage is reported, or
+//! the loop has the undamaged state.
 #![expect(clippy::print_stdout, reason = "figures are what the long test is for")]
 
 use std::collections::BTreeMap;
@@ -14,12 +14,13 @@ use serde_json::Value;
 use crate::common::control;
 use crate::journal::{script, state};
 
-/// Small enough for two generations and an open segment.
+/// Journal policy with such a small snapshot interval that the journal has two generations and an open
+/// segment.
 const POLICY: Policy = Policy { sync: Sync::Never, snapshot_every: 9 };
 
 type Files = BTreeMap<String, Vec<u8>>;
 
-/// Runs the script and returns the files of the journal.
+/// Runs the script with a journal and returns the files of the journal.
 fn written(pristine: &Loop) -> Files {
     let directory = tempfile::tempdir().expect("a directory");
     let mut control = pristine.clone();
@@ -42,14 +43,14 @@ fn written(pristine: &Loop) -> Files {
 #[derive(Debug, PartialEq)]
 enum Outcome {
     Refused,
-    /// A part was cut off or is missing, and this was reported.
+    /// A part of the journal was cut off or is missing, and this was reported.
     Reported,
-    /// State, and repeated effects.
+    /// Undamaged journal: state of the loop, and effects that it repeats.
     Sound(Value, Vec<Answer>),
 }
 
-/// Creates a temporary directory, in memory if possible: hundreds of thousands of journals are opened, and each is
-/// flushed to disk.
+/// Creates a temporary directory, in memory if possible. The tests open hundreds of thousands of journals and
+/// flush each to disk.
 pub fn temporary_directory() -> tempfile::TempDir {
     let memory = Path::new("/dev/shm");
     let in_memory = memory.is_dir().then(|| tempfile::tempdir_in(memory).ok()).flatten();
@@ -91,7 +92,7 @@ fn open(files: &Files, pristine: &Loop) -> Outcome {
     sound
 }
 
-/// Number of faults per outcome.
+/// Number of injected faults per outcome.
 #[derive(Debug, Default)]
 struct Count {
     refused: usize,
@@ -129,7 +130,7 @@ impl Suite {
         }
     }
 
-    /// Injects all kinds of faults; bit and byte faults only at every `stride`-th position.
+    /// Injects all kinds of faults; faults of single bits and bytes only at every `stride`-th position.
     fn inject_all(&mut self, stride: usize) {
         let names: Vec<String> = self.files.keys().cloned().collect();
         for name in &names {
@@ -227,7 +228,7 @@ fn damage_to_every_bit_and_byte_is_noticed() {
     println!("{:?}", suite.count);
 }
 
-/// A crash between two steps of a checkpoint: the loop continues from the previous snapshot.
+/// After a crash between two steps of a checkpoint, the loop continues from the previous snapshot.
 #[test]
 fn an_unfinished_snapshot_loses_nothing() {
     let suite = Suite::new();
@@ -249,7 +250,7 @@ fn an_unfinished_snapshot_loses_nothing() {
     }
 }
 
-/// Asserts that opening the journal fails with a message.
+/// Asserts that opening the journal fails with a message that contains `words`.
 fn refused(directory: &Path, control: &Loop, words: &str) {
     let refused = Journal::open(directory, POLICY, &mut control.clone());
     let message = refused.map(|(journal, _)| journal).expect_err("it is refused").message.clone();
@@ -266,7 +267,7 @@ fn files_other_than_journals_are_not_changed() {
         refused(directory.path(), &pristine, "is not a journal");
         assert_eq!(std::fs::read_to_string(&file).expect("a file"), text);
     }
-    // Header of the previous format version. It is not damaged, so that nothing must be repaired.
+    // Header of the previous format version. The file is not damaged, so nothing must be repaired.
     let first = "6bcb2ca5 [\"mission\",\"metaplan-journal/1\",\"302a8d68\"]\n";
     std::fs::write(&file, first).expect("a file");
     let words = "or begin the mission anew with a journal in another directory; nothing was changed";

@@ -1,4 +1,4 @@
-//! A hundred robots in one process, each with a loop over SUAVE's own knowledge base.
+//! Tests with a hundred robots in one process, each with a loop over SUAVE's own knowledge base.
 #![expect(clippy::print_stdout, reason = "figures are what these tests are for")]
 
 use std::path::Path;
@@ -24,7 +24,7 @@ domain = "domain.pddl"
 problem = "problem.pddl"
 "#;
 
-/// Makes a design unrealisable if the measured visibility is below its estimation.
+/// Rule that makes a design unrealisable if the measured visibility is below the design's estimate.
 const RULES: &str = r"
 @prefix t: <http://metacontrol.org/tomasys#> .
 @prefix s: <http://www.metacontrol.org/suave#> .
@@ -53,7 +53,8 @@ const PROBLEM: &str = "
 (define (problem fleet) (:domain suave) (:init) (:goal (inspected)) (:metric minimize (total-time)))
 ";
 
-/// Files of the mission, with the manifest `m.toml`.
+/// Returns a directory with the files of the mission and the manifest `m.toml`. `None` if the shared material
+/// is absent.
 pub fn files() -> Option<tempfile::TempDir> {
     let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared");
     if !shared.is_dir() {
@@ -82,14 +83,15 @@ fn fleet() -> Option<Vec<Loop>> {
     Some(vec![first; ROBOTS])
 }
 
-/// Report of a robot's visibility sensor: a sine with a phase per robot, in full precision.
+/// Returns the report of a robot's visibility sensor: a sine with a phase per robot, in full precision.
 fn measurement(robot: usize, round: usize) -> Observation {
     let turn = round as f64 / 80.0 + robot as f64 / ROBOTS as f64;
     let value = 2.25 + 1.5 * (std::f64::consts::TAU * turn).sin();
     Observation::parse(&format!(r#"{{"event":"measured","attribute":"water_visibility","value":{value}}}"#))
 }
 
-/// Delivers measurements to every robot. Returns all reaction times and the number of reconfigurations.
+/// Delivers a measurement to every robot in each round. Returns all reaction times and the number of
+/// reconfigurations.
 fn feed(fleet: &mut [Loop], rounds: std::ops::Range<usize>) -> (Vec<Duration>, usize) {
     let (mut times, mut reconfigurations) = (Vec::new(), 0);
     for round in rounds {

@@ -1,4 +1,4 @@
-//! Random valid and invalid events, with invariants after each.
+//! Delivers random valid and invalid events to a loop and checks invariants after each event.
 
 use std::collections::BTreeSet;
 
@@ -8,13 +8,13 @@ use serde_json::{Value, json};
 
 use crate::common::{control, feed};
 
-/// Possible reports of a mission.
+/// Reports that the robot of a mission can send.
 pub struct World {
     pub mission: &'static str,
     components: &'static [&'static str],
-    /// Name and range of values.
+    /// Measured attributes: name, minimum, and maximum.
     measured: &'static [(&'static str, f64, f64)],
-    /// Name and possible values.
+    /// Facts and functions that can change: name and possible values.
     facts: &'static [(&'static str, &'static [&'static str])],
     goals: &'static [&'static str],
 }
@@ -63,13 +63,13 @@ const INVALID: [&str; 14] = [
     r#"{"event":"tick","extra":1}"#,
 ];
 
-/// Generator of events.
+/// Generator of random events.
 pub struct Fuzz {
     pub world: &'static World,
     pub random: fastrand::Rng,
-    /// Number of events between comparisons of the knowledge base with one from scratch.
+    /// The knowledge base is compared with a recomputed one after each `compare_every` events.
     pub compare_every: usize,
-    /// A loop without observations.
+    /// A loop that has not received any event.
     pristine: Loop,
 }
 
@@ -90,7 +90,7 @@ impl Fuzz {
         control
     }
 
-    /// Generates the next line. Returns `true` with it if it is valid.
+    /// Generates the next line. The flag is `true` if the line is valid.
     pub fn next(&mut self, control: &Loop) -> (String, bool) {
         let random = &mut self.random;
         if random.u32(..10) == 0 {
@@ -129,7 +129,7 @@ impl Fuzz {
         (event.to_string(), true)
     }
 
-    /// Two to five reports in one line.
+    /// Returns a line with two to five random reports.
     fn burst(&mut self) -> Value {
         let (random, world) = (&mut self.random, self.world);
         let (mut components, mut measured) = (Vec::new(), Vec::new());
@@ -150,7 +150,7 @@ impl Fuzz {
     }
 }
 
-/// Delivers `count` random lines and checks the invariants after each.
+/// Delivers `count` random lines to a new loop and checks the invariants after each line. Returns the loop.
 pub fn run(world: &'static World, seed: u64, count: usize) -> Loop {
     let mut fuzz = Fuzz::new(world, seed);
     let mut loop_ = fuzz.begin();
@@ -160,12 +160,12 @@ pub fn run(world: &'static World, seed: u64, count: usize) -> Loop {
     loop_
 }
 
-/// Delivers one line and checks the invariants.
+/// Delivers one random line and checks the invariants. Returns the answers.
 pub fn step(control: &mut Loop, fuzz: &mut Fuzz, number: usize) -> Vec<Answer> {
     let (line, valid) = fuzz.next(control);
     let before = (!valid).then(|| without_counters(control));
     let answers = feed(control, &line);
-    // Computed plans accumulate until a decision takes them.
+    // Computed plans accumulate until they are taken by a call of `decision`.
     let _ = control.decision(&answers);
     let context = || format!("line {number} of {}: {line}\n{answers:#?}", fuzz.world.mission);
     if let Some(before) = before {

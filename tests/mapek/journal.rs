@@ -1,5 +1,5 @@
-//! The journal within one process: after a cut at any byte, the loop is restored, and no acknowledged effect is
-//! repeated.
+//! Tests of the journal within one process: after a cut at any byte, the loop is restored, and no
+//! acknowledged effect is repeated.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -12,7 +12,7 @@ use crate::common::control;
 
 pub const POLICY: Policy = Policy { sync: Sync::Never, snapshot_every: 7 };
 
-/// Reports of a robot during the UGV mission, with every kind of event.
+/// Returns the reports of a robot during the UGV mission, with every kind of event.
 pub fn script() -> Vec<String> {
     let events = [
         r#""event":"action_started","action":1"#,
@@ -41,7 +41,8 @@ pub fn script() -> Vec<String> {
     numbered(&events)
 }
 
-/// Reports of a robot in the UUV mission. Its thrusters fail, so that an action is suspended, and its battery drops.
+/// Returns the reports of a robot during the UUV mission. Its thrusters fail, so an action is suspended, and
+/// its battery drops.
 pub fn uuv_script() -> Vec<String> {
     let events = [
         r#""event":"action_started","action":1"#,
@@ -70,21 +71,21 @@ pub fn uuv_script() -> Vec<String> {
     numbered(&events)
 }
 
-/// Adds sequence numbers and times.
+/// Adds sequence numbers and times to events and returns them as lines.
 fn numbered(events: &[&str]) -> Vec<String> {
     let line =
         |(index, event): (usize, &&str)| format!(r#"{{{event},"seq":{},"time":{}.25}}"#, index + 1, index);
     events.iter().enumerate().map(line).collect()
 }
 
-/// Effects that the program has sent, by number.
+/// Effects that the robot has received from the loop, by number.
 #[derive(Debug, Default, PartialEq)]
 pub struct Robot {
     pub effects: BTreeMap<u64, Effect>,
 }
 
 impl Robot {
-    /// Effects that no other one replaces. Only these must arrive.
+    /// Returns the effects that no other effect supersedes. Only these must arrive.
     fn needed(&self) -> Vec<&Effect> {
         let replaced: Vec<u64> = self.effects.values().flat_map(|effect| effect.supersedes.clone()).collect();
         self.effects.values().filter(|effect| !replaced.contains(&effect.number)).collect()
@@ -112,7 +113,7 @@ fn open(directory: &Path, pristine: &Loop) -> (Journal, Loop, Recovery, Vec<Answ
     (journal, control, recovery, answers)
 }
 
-/// Delivers all lines that were not handled yet.
+/// Delivers all lines of the script that the loop has not handled yet.
 fn go_on(journal: &mut Journal, control: &mut Loop, robot: &mut Robot) {
     for (index, line) in script().iter().enumerate() {
         if control.beliefs().sequence() < Some(index as u64 + 1) {
@@ -122,14 +123,15 @@ fn go_on(journal: &mut Journal, control: &mut Loop, robot: &mut Robot) {
     }
 }
 
-/// State of a loop without the number of lines, because refused lines may be repeated.
+/// Returns the state of a loop without the number of lines, because refused lines may be repeated.
 pub fn state(control: &Loop) -> serde_json::Value {
     let mut state = control.snapshot().0;
     state.as_object_mut().expect("an object").remove("lines");
     state
 }
 
-/// State and effects of an undisturbed run.
+/// Runs the script without a disturbance. Returns the final state, the robot with its effects, and the
+/// directory of the journal.
 fn undisturbed(pristine: &Loop) -> (serde_json::Value, Robot, tempfile::TempDir) {
     let directory = tempfile::tempdir().expect("a directory");
     let (mut journal, mut control, _, answers) = open(directory.path(), pristine);
@@ -151,7 +153,7 @@ fn a_journal_cut_at_five_hundred_places_restores_the_loop() {
     check(500);
 }
 
-/// Cuts the journal at random positions.
+/// Cuts the journal `cuts` times at random positions and checks that the loop is restored each time.
 fn check(cuts: usize) {
     let pristine = control("ugv");
     let (state, effects, _directory) = undisturbed(&pristine);
@@ -168,8 +170,8 @@ fn check(cuts: usize) {
             robot.take(&control, &answers);
         }
         drop(journal);
-        // The last one or two lines of the last segment are missing or incomplete. Only unsent effects may be lost, so
-        // that the robot forgets what it received for lost lines.
+        // The last one or two lines of the last segment are missing or incomplete. Only unsent effects may be
+        // lost, so the robot forgets the effects that it received for the lost lines.
         let last = last_segment(directory.path());
         let text = std::fs::read(&last).expect("a journal");
         let lines: Vec<&[u8]> = text.split_inclusive(|&byte| byte == b'\n').collect();
@@ -188,7 +190,7 @@ fn check(cuts: usize) {
     }
 }
 
-/// Effects that a robot has received, by the number of lines that it has sent.
+/// Returns the effects that the robot has received after each number of lines.
 fn received(pristine: &Loop) -> Vec<BTreeMap<u64, Effect>> {
     let mut control = pristine.clone();
     let mut robot = Robot::default();

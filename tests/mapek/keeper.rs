@@ -1,4 +1,5 @@
-//! Journal of the configuration loop: recovery from any cut, and reactions to the passing of time.
+//! Tests of the journal of the configuration loop ([`Keeper`]): recovery from any cut, and reactions to the
+//! passing of time.
 
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::{Path, PathBuf};
@@ -27,7 +28,7 @@ fn keeper() -> Keeper {
     keeper_of(robot(), Wishes::default())
 }
 
-/// Random lines with sequence numbers and times. Some are invalid, and some are repeated.
+/// Returns random lines with sequence numbers and times. Some are invalid, and some are repeated.
 fn script(seed: u64, length: usize) -> Vec<String> {
     let mut random = fastrand::Rng::with_seed(seed);
     let mut pick = |words: &[&str]| words[random.usize(..words.len())].to_owned();
@@ -74,7 +75,8 @@ fn to_json(keeper: &mut Keeper, answers: &[metaplan::configure::KeeperAnswer]) -
     keeper.decision(answers).answers
 }
 
-/// The answers to each line and before the first, and the state at the end, of a run that is not interrupted.
+/// Runs the loop without an interruption. Returns the answers before the first line and to each line, the
+/// final state, and the directory of the journal.
 fn uninterrupted(pristine: &Keeper, lines: &[String]) -> (Vec<Vec<Value>>, Value, tempfile::TempDir) {
     let directory = tempfile::tempdir().expect("a directory");
     let mut keeper = pristine.clone();
@@ -214,7 +216,7 @@ impl Program {
         let (sender, lines) = channel();
         std::thread::spawn(move || {
             for line in stdout.lines().map_while(Result::ok) {
-                // The last line of a killed program may not be complete.
+                // The last line of a killed program may be incomplete.
                 let Ok(value) = serde_json::from_str(&line) else { break };
                 if sender.send(value).is_err() {
                     break;
@@ -228,7 +230,7 @@ impl Program {
         writeln!(self.stdin, "{line}").expect("a pipe");
     }
 
-    /// The answers up to `handled`, without line numbers.
+    /// Returns the answers up to `handled`, without line numbers.
     fn answers(&self) -> Vec<Value> {
         let mut answers = Vec::new();
         loop {
@@ -241,7 +243,7 @@ impl Program {
         }
     }
 
-    /// Ends the program by SIGKILL.
+    /// Kills the program with SIGKILL.
     fn kill(mut self) {
         self.child.kill().expect("it is killed");
         self.child.wait().expect("it ends");
@@ -272,7 +274,7 @@ fn the_program_killed_after_every_line_gives_the_same_answers() {
             }
             program.send(line);
             let answers = program.answers();
-            // The number of a refused line can be used again.
+            // The sequence number of a refused line can be used again.
             if answers.iter().all(|answer| answer["answer"] != "error") {
                 seq = Some(index as u64 + 1);
             }
@@ -303,14 +305,14 @@ fn the_configuration_loop_reacts_when_a_report_becomes_due() {
     let answers = program.answers();
     assert_eq!(answers.len(), 1, "{answers:?}");
     assert_eq!(answers[0]["because"], "confirm");
-    // Nothing else is sent.
+    // The test sends no further line.
     let mut timed = || program.lines.recv_timeout(Duration::from_secs(60)).expect("an answer");
     let change = std::iter::repeat_with(&mut timed).find(|answer| answer["answer"] == "reconfigure");
     let change = change.expect("a design");
     assert!(sent.elapsed() >= Duration::from_millis(450), "{:?}", sent.elapsed());
     assert_eq!((&change["to"], &change["line"]), (&json!("fd_look_far"), &json!(1)));
     program.kill();
-    // The timer is in the journal.
+    // The journal contains the timer.
     let program = Program::start(directory.path(), &options);
     let ready = program.lines.recv().expect("a line");
     assert_eq!((&ready["resumed"], &ready["lines"]), (&json!(true), &json!(1)));
@@ -319,7 +321,7 @@ fn the_configuration_loop_reacts_when_a_report_becomes_due() {
     assert_eq!((&answers[0]["to"], &answers[0]["repeated"]), (&json!("fd_look_far"), &json!(true)));
     program.kill();
 
-    // Time advances with lines only if they have times.
+    // If the lines have times, time advances only with lines.
     let mut program = Program::start(directory.path(), &["--adaptation", &adaptation]);
     program.lines.recv().expect("a line");
     program.answers();

@@ -1,4 +1,5 @@
-//! The program is killed repeatedly. In the end, its effects and its state equal those of an undisturbed run.
+//! Tests in which the program is killed repeatedly. In the end, its effects and its state equal those of an
+//! undisturbed run.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead as _, BufReader, Write as _};
@@ -20,15 +21,15 @@ struct Story {
 }
 
 impl Story {
-    /// Effects acknowledged in the first `sent` lines.
+    /// Returns the effects that the robot acknowledges in the first `sent` lines.
     fn acknowledged(&self, sent: usize) -> Vec<u64> {
         let effect = |line: &String| serde_json::from_str::<Value>(line).ok()?.get("effect")?.as_u64();
         self.script[..sent].iter().filter_map(effect).collect()
     }
 }
 
-/// Manifest of a shipped mission in which every report counts at once. The scripts depend on the resulting numbers of
-/// effects.
+/// Writes the manifest of a shipped mission in which every report counts immediately. The scripts depend on
+/// the resulting numbers of effects.
 fn manifest(mission: &str) -> PathBuf {
     let root = env!("CARGO_MANIFEST_DIR");
     let text = std::fs::read_to_string(format!("{root}/missions/{mission}.toml")).expect("a manifest");
@@ -39,7 +40,7 @@ fn manifest(mission: &str) -> PathBuf {
     file
 }
 
-/// A running program with its output.
+/// A running program with its standard input and its output lines.
 struct Program {
     child: Child,
     stdin: ChildStdin,
@@ -76,7 +77,7 @@ impl Program {
     }
 }
 
-/// Output of the program, and its state at the end.
+/// Effects that the robot has received from the program, and the final state of the program.
 #[derive(Debug, Default, PartialEq)]
 struct Robot {
     effects: BTreeMap<u64, Value>,
@@ -103,7 +104,7 @@ impl Robot {
         }
     }
 
-    /// Runs the program to its end, and reads the state from its journal.
+    /// Sends all further lines, waits for the end of the program, and reads the state from its journal.
     fn finish(&mut self, mut program: Program, story: &Story, journal: &Path) {
         self.send_lines(&mut program, story, usize::MAX);
         drop(program.stdin);
@@ -119,7 +120,7 @@ impl Robot {
         self.state = state(&control);
     }
 
-    /// Sends the unhandled lines, at most `patience` + 1. Waits until each is handled, except the last one.
+    /// Sends at most `patience` + 1 unhandled lines. Waits until each line is handled, except the last one.
     fn send_lines(&mut self, program: &mut Program, story: &Story, patience: usize) {
         let ready = program.lines.recv().expect("a first line");
         assert_eq!(ready["answer"], "ready", "{ready}");
@@ -135,7 +136,7 @@ impl Robot {
         }
     }
 
-    /// Reads the answers to a line.
+    /// Reads and records the answers to one line.
     fn read_answers(&mut self, program: &Program) {
         for answer in &program.lines {
             let is_last = answer["answer"] == "handled";
@@ -147,7 +148,8 @@ impl Robot {
     }
 }
 
-/// Runs a story to its end and kills the program at most `kills` times. Returns the number of kills.
+/// Runs a mission to its end and kills the program at most `kills` times. Returns the robot and the number of
+/// kills.
 fn run(story: &Story, random: &mut fastrand::Rng, kills: usize) -> (Robot, usize) {
     let directory = tempfile::tempdir().expect("a directory");
     let mut robot = Robot::default();
@@ -162,7 +164,7 @@ fn run(story: &Story, random: &mut fastrand::Rng, kills: usize) -> (Robot, usize
             robot.send_lines(&mut program, story, random.usize(0..6));
             std::thread::sleep(Duration::from_micros(random.u64(..8_000)));
         }
-        // Kill with SIGKILL. Earlier output is still read.
+        // Kill with SIGKILL. Output that the program has already written is still read.
         program.child.kill().expect("it is killed");
         program.child.wait().expect("it ends");
         for line in program.lines {
@@ -223,7 +225,7 @@ fn a_second_process_cannot_open_a_journal() {
     let owner = format!("another process (number {}) uses the journal", first.child.id());
     assert!(message.contains("M322") && message.contains(&owner), "{message}");
     assert_eq!(std::fs::read(directory.path().join("journal-000000")).expect("a journal"), before);
-    // The refused process has not disturbed the first one.
+    // The refused second process has not disturbed the first one.
     writeln!(first.stdin, r#"{{"event":"tick"}}"#).expect("it listens");
     assert!(first.lines.iter().take(6).any(|answer| answer["answer"] == "handled"));
     // The lock of a killed process is released.

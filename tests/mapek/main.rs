@@ -1,4 +1,5 @@
-//! The adaptation loop as a library: the paper's experiments event by event, the journal under crashes, random events.
+//! Tests of the adaptation loop as a library: the paper's experiments event by event, the journal under
+//! crashes, and random events.
 
 mod common;
 mod configure;

@@ -1,4 +1,5 @@
-//! Noisy sensors and components, with the settings of shipped missions and with filters from a manifest.
+//! Tests of noisy sensors and components, with the settings of shipped missions and with filters from a
+//! manifest.
 
 use std::path::Path;
 use std::time::Duration;
@@ -9,7 +10,7 @@ use metaplan::setup::Setup;
 use num_rational::BigRational;
 use serde_json::json;
 
-/// Starts a loop for the ground vehicle with additional text in its manifest.
+/// Starts a loop for the ground vehicle, with `settings_text` appended to its manifest.
 fn started(settings_text: &str) -> Loop {
     let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("missions");
     let text = std::fs::read_to_string(directory.join("ugv.toml")).expect("a manifest");
@@ -53,7 +54,7 @@ fn a_noisy_light_costs_one_reconfiguration() {
         answers.extend(feed(&mut control, &light(value), f64::from(sample)));
     }
     assert_eq!(reconfigurations(&answers), 1, "{answers:#?}");
-    // Only three of a hundred held samples are reported.
+    // A hundred samples are held back, but only three of them are reported.
     let filtered: Vec<_> =
         answers.iter().map(Answer::to_json).filter(|answer| answer["answer"] == "filtered").collect();
     let held: Vec<_> = filtered.iter().filter_map(|answer| answer["held"].as_u64()).collect();
@@ -120,7 +121,7 @@ fn a_silent_sensor_has_a_stated_outcome() {
             .find(|measurement| measurement.attribute == "ambient_light")
             .and_then(|measurement| measurement.value);
         assert_eq!(value.is_none(), stale == "unknown", "{value:?}");
-        // Silence is reported once, and ends with a sample.
+        // A silent sensor is reported once; the silence ends with a sample.
         assert_eq!(words(&feed(&mut control, r#"{"event":"tick"}"#, 9.0)), [""; 0]);
         feed(&mut control, &light(0.3), 10.0);
         assert_eq!(

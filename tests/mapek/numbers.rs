@@ -1,5 +1,5 @@
-//! Sequence numbers: no line is lost, and no number blocks later ones. Memory: the state does not grow with the
-//! history.
+//! Tests of sequence numbers: no line is lost, and no number blocks later numbers. Tests of memory: the state
+//! does not grow with the history.
 #![expect(clippy::print_stdout, reason = "the table is what the long test is for")]
 
 use metaplan::mapek::{Answer, Loop};
@@ -14,7 +14,7 @@ fn ugv() -> Loop {
     control
 }
 
-/// Checks the answer about the acceptance of a line.
+/// Delivers a line and checks whether it is accepted (`None`), a duplicate, stale, or an error with a code.
 fn check(control: &mut Loop, line: &str, expected: Option<&str>) {
     let kind = |answer: &Answer| match answer {
         Answer::Duplicate { .. } => Some("duplicate".to_owned()),
@@ -70,7 +70,8 @@ fn very_many_gaps_make_old_numbers_stale() {
     check(&mut ugv, r#"{"event":"tick","seq":607}"#, None);
 }
 
-/// The Kinect fails and recovers, without acknowledgements.
+/// Reports a failure of the Kinect for even `number` and its recovery for odd `number`. Nothing is
+/// acknowledged.
 fn flap(control: &mut Loop, number: u64) {
     let status = if number.is_multiple_of(2) { "FALSE" } else { "TRUE" };
     feed(
@@ -115,7 +116,7 @@ fn memory_is_constant_over_ten_million_events() {
             if number % 10 == 0 {
                 flap(&mut ugv, number / 10);
             } else {
-                // Oscillates around the bound, in full precision.
+                // The measured value oscillates around the bound, in full precision.
                 let value = 0.8 + 0.1 * (number as f64).sin();
                 feed(
                     &mut ugv,

@@ -1,4 +1,4 @@
-//! Safe first, then optimal: effects before planning, and reports without consequences.
+//! Tests of the order "safe first, then optimal": effects before planning, and reports without consequences.
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -66,7 +66,8 @@ fn suspension_can_be_preferred() {
     assert!(!ugv.beliefs().suspended());
 }
 
-/// Plans of another thread are adopted after progress and the passing of time, and dropped after other news.
+/// Plans that another thread computed are adopted after progress and the passing of time, and dropped after
+/// other events.
 #[test]
 fn plans_of_another_thread_are_adopted_unless_outdated() {
     for (line, serves) in [
@@ -185,7 +186,7 @@ fn missed_deadlines_have_the_documented_outcomes() {
     assert!(!silent.beliefs().cancelling());
 }
 
-/// An unfinished search is repeated after increasing pauses.
+/// An unfinished search is repeated after pauses of increasing length.
 #[test]
 fn an_unfinished_search_is_repeated() {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/program/ferry/mission.toml");
@@ -207,7 +208,7 @@ fn an_unfinished_search_is_repeated() {
     assert_eq!(ferry.beliefs().lines(), 0, "time that passes is no line");
 }
 
-/// The safe effect does not wait for planning: nothing is planned in this test.
+/// The safe effect does not wait for planning; the test never runs the planner.
 #[test]
 fn a_planner_that_never_ends_does_not_delay_the_safe_effect() {
     let mut ugv = with(|settings| settings.with_time_limit(None));
@@ -220,7 +221,7 @@ fn a_planner_that_never_ends_does_not_delay_the_safe_effect() {
     assert!(start.elapsed() < Duration::from_secs(5));
 }
 
-/// Processor time from an observation to its safe effect, in parallel to an endless search.
+/// Measures the processor time from an observation to its safe effect, in parallel to an endless search.
 #[test]
 #[ignore = "measures; only an optimised build is of interest"]
 #[expect(clippy::print_stdout, reason = "figures are what this test is for")]
@@ -240,7 +241,7 @@ fn the_safe_effect_comes_within_five_milliseconds() {
         for number in 0..count {
             let (_, step) = robot.beliefs().running().expect("an action is under way");
             let designs: Vec<&String> = step.configuration.iter().map(|(_, design)| design).collect();
-            // Default: a design that is an argument but serves no function of the action.
+            // Fallback: a design that is an argument of the step but serves no function of the action.
             let design =
                 designs.get(number % designs.len().max(1)).copied().unwrap_or(&step.arguments[0]).clone();
             let line = |realisable: bool| {

@@ -1,10 +1,10 @@
-//! Acknowledgements that cross other messages, are duplicated, or arrive out of order.
+//! Tests of acknowledgements that cross other messages, are duplicated, or arrive out of order.
 
 use metaplan::mapek::{Answer, Command, Loop};
 
 use crate::common::{control, feed};
 
-/// Short texts of the effects.
+/// Formats the effects among the answers briefly.
 fn words(answers: &[Answer]) -> Vec<String> {
     let word = |answer: &Answer| match &answer.effect()?.command {
         Command::Reconfigure { from, to, .. } => {
@@ -70,8 +70,8 @@ fn a_reconfiguration_may_fail_after_it_was_acknowledged() {
     assert!(event(&mut ugv, "reconfiguration_failed", "effect", 1).is_empty());
 }
 
-/// A reconfiguration fails that has superseded an unanswered one. The superseded design is not believed, and the
-/// suspended action does not resume before a design is requested.
+/// A reconfiguration that has superseded an unanswered one fails. The superseded design is not believed, and
+/// the suspended action does not resume before a design is requested.
 #[test]
 fn a_superseded_design_is_not_believed() {
     let mut ugv = control("ugv");
@@ -137,8 +137,8 @@ fn a_start_implies_earlier_reconfigurations_without_acknowledgements() {
     assert_eq!(ugv.beliefs().pending().count(), 1);
 }
 
-/// Creates the situation of a table row: reconfiguration 3 from A (Kinect) to B (lidar), in the state named by the row.
-/// C is the camera.
+/// Creates the situation of a row of the table: reconfiguration 3 from A (Kinect) to B (lidar), in the given
+/// state. C is the camera.
 fn situation(state: &str) -> Loop {
     let mut ugv = control("ugv");
     ugv.start();
@@ -170,7 +170,7 @@ fn situation(state: &str) -> Loop {
     ugv
 }
 
-/// Reacts to a line without planning. The reaction must contain the reconfiguration with this number.
+/// Delivers a line without planning. Asserts that the reaction contains the reconfiguration with this number.
 fn feed_reconfiguration(ugv: &mut Loop, line: &str, number: u64) {
     let answers = react(ugv, line);
     let reconfiguration = answers.iter().filter_map(Answer::effect).find(|effect| effect.number == number);
@@ -185,12 +185,12 @@ fn react(ugv: &mut Loop, line: &str) -> Vec<Answer> {
     ugv.react(&metaplan::mapek::Observation::parse(line), now)
 }
 
-/// Delivers a failure without checks of the reaction.
+/// Delivers the failure of a reconfiguration without checking the reaction.
 fn fail_quietly(ugv: &mut Loop, effect: u64) {
     react(ugv, &format!(r#"{{"event":"reconfiguration_failed","effect":{effect}}}"#));
 }
 
-/// The loop implements the table of states and messages in the reference.
+/// The loop implements the table of states and messages in `docs/reference/events.md`.
 #[test]
 fn the_loop_implements_the_documented_table() {
     let page = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/reference/events.md");

@@ -1,5 +1,5 @@
-//! A rule that does not terminate: no report is refused, and no action starts while conclusions are missing. Once the
-//! rule terminates, the state equals the one without the rule.
+//! Tests with a rule that does not terminate: no report is refused, and no action starts while inferred facts
+//! are missing. Once the rule terminates, the state equals that of a loop without the rule.
 
 use std::path::Path;
 use std::time::Duration;
@@ -11,7 +11,7 @@ use serde_json::json;
 
 use crate::common::feed;
 
-/// A rule that counts without end while the first component has failed.
+/// Rule that counts without end while the first component has failed.
 const RUNAWAY: &str = "@prefix : <http://example.org/m#> .\n@prefix t: <http://metacontrol.org/tomasys#> .\n\
     [counting] t:c_status(:c_0, \"FALSE\") ^ :counts(?x, ?n) ^ swrlb:add(?m, ?n, 1) -> :counts(?x, ?m) .\n";
 
@@ -20,7 +20,8 @@ fn read(directory: &Path) -> Loop {
     Loop::new(mission, Settings::immediate()).expect("the mission can be planned for")
 }
 
-/// A mission with the non-terminating rule, and a loop for the mission without it.
+/// Returns the directory of a mission with the non-terminating rule, and a loop for the same mission without
+/// the rule.
 fn mission(seed: u64) -> (tempfile::TempDir, Loop) {
     let directory = crate::worlds::own_files(seed);
     let append = |name: &str, addition: &str| {
@@ -73,7 +74,7 @@ fn reports_are_accepted_despite_a_nonterminating_rule() {
         feed(&mut tame, &component(number, status));
     }
     nothing_begins(&feed(&mut wild, r#"{"event":"tick"}"#));
-    // A restored loop has the same missing conclusions.
+    // A restored loop lacks the same inferred facts.
     let mut restored = read(directory.path());
     restored.restore(&wild.snapshot()).expect("the snapshot fits");
     assert_eq!(restored.snapshot(), wild.snapshot());

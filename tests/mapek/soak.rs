@@ -1,4 +1,4 @@
-//! Long runs: `cargo test --release --test mapek -- --ignored --nocapture`.
+//! Long-running tests and benchmarks: `cargo test --release --test mapek -- --ignored --nocapture`.
 
 #![expect(clippy::print_stdout, reason = "figures are what these tests are for")]
 
@@ -11,20 +11,22 @@ use metaplan::mapek::{Answer, Loop};
 use crate::common::{control, feed};
 use crate::fuzz::{Fuzz, WORLDS, step};
 
-/// Default length of the soak test in seconds; set `METAPLAN_SOAK_SECONDS` for another one.
+/// Default length of the soak test in seconds. `METAPLAN_SOAK_SECONDS` overrides it.
 const SOAK_SECONDS: u64 = 3600;
 
-/// Number of events between comparisons with knowledge from scratch. At 1, the comparison would take most of the time.
+/// Number of events between two comparisons with a recomputed knowledge base. At 1, the comparisons would
+/// take most of the time.
 const COMPARE_EVERY: usize = 3;
 
-/// Resident memory in kilobytes; `None` without `/proc`.
+/// Returns the resident memory of this process in kilobytes; `None` without `/proc`.
 pub fn resident() -> Option<usize> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|line| line.starts_with("VmRSS:"))?;
     line.split_whitespace().nth(1)?.parse().ok()
 }
 
-/// Processor time of this process, which is independent of other processes; `None` without `/proc`.
+/// Returns the processor time of this process, which is independent of other processes; `None` without
+/// `/proc`.
 pub fn processor_time() -> Option<Duration> {
     let status = std::fs::read_to_string("/proc/self/stat").ok()?;
     // The fields after the name in parentheses contain user and system time in hundredths of a second.
@@ -102,18 +104,18 @@ fn reaction_times() {
     }
 }
 
-/// A benchmark with two alternating reports.
+/// A benchmark of the loop with two alternating reports.
 struct Rate {
     subject: &'static str,
     /// Alternating reports.
     reports: [&'static str; 2],
-    /// Lines before the measurement.
+    /// Lines that are delivered before the measurement.
     before: &'static [&'static str],
     /// Minimum number of lines per second of processor time, without and with a journal.
     least: [u64; 2],
 }
 
-/// After these lines, no planning is necessary.
+/// Lines after which no planning is necessary.
 const DONE: &[&str] =
     &[r#"{"event":"goal_changed","goal":"(robot_at wp1)"}"#, r#"{"event":"action_cancelled","action":1}"#];
 
@@ -178,7 +180,8 @@ fn lines_a_second() {
 }
 
 impl Rate {
-    /// Lines per second of processor time of one core, with serialization of the answers.
+    /// Returns the number of lines per second of processor time of one core, including serialisation of the
+    /// answers.
     fn measure(&self, pristine: &Loop, with_journal: bool) -> u64 {
         let lines = 10_000;
         let mut control = pristine.clone();

@@ -1,4 +1,5 @@
-//! Missions with the possible reports of their robots: shipped ones, SUAVE's knowledge base, and generated ones.
+//! Missions with the possible reports of their robots: shipped missions, SUAVE's knowledge base, and
+//! generated missions.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -8,27 +9,27 @@ use metaplan::mapek::{Loop, Settings};
 use metaplan::setup::Setup;
 use num_rational::BigRational;
 
-/// Requirements of a design, as stated by the knowledge base.
+/// Requirements of a design according to the knowledge base.
 #[derive(Debug, Clone)]
 pub struct Design {
     pub name: String,
     pub components: Vec<String>,
-    /// Attribute, minimum and maximum.
+    /// Quality bounds: attribute, minimum and maximum.
     pub bounds: Vec<(String, Option<BigRational>, Option<BigRational>)>,
 }
 
-/// A mission with its possible reports.
+/// A mission with the possible reports of its robot.
 pub struct Place {
     pub name: String,
-    /// A started loop without observations.
+    /// A started loop that has not received any event.
     pub started: Loop,
     pub components: Vec<String>,
-    /// Attributes with values on, between and beyond all bounds.
+    /// Attributes with values on, between and beyond all of their bounds.
     pub attributes: Vec<(String, Vec<String>)>,
     pub designs: Vec<Design>,
-    /// Pairs of a component and one that it depends on.
+    /// Pairs of a component and a component that it depends on.
     pub depends: Vec<(String, String)>,
-    /// Whether availability is determined by the shipped rules and dependencies only.
+    /// Whether the shipped rules and the dependencies alone determine the availability of designs.
     pub is_plain: bool,
 }
 
@@ -86,7 +87,8 @@ pub fn shipped() -> Vec<Place> {
     ["ugv", "uuv", "ugv_plain", "uuv_plain", "camara_like"].map(place).into()
 }
 
-/// SUAVE's own knowledge base, if the shared material is installed next to the project.
+/// Returns the mission with SUAVE's own knowledge base; `None` if the shared material is not installed next
+/// to the project.
 pub fn suave() -> Option<Place> {
     let directory = crate::fleet::files()?;
     Some(Place::new("suave", &directory.path().join("m.toml"), Vec::new(), false))
@@ -98,7 +100,7 @@ const PREFIXES: &str = "@prefix : <http://example.org/m#> .\n\
     <http://example.org/m> a owl:Ontology ; owl:imports <http://metacontrol.org/tomasys> .\n\
     :dependsOn a owl:ObjectProperty .\n";
 
-/// A component fails with those that it depends on, regardless of its own reports.
+/// Rule: a component fails if a component that it depends on has failed, regardless of its own reports.
 const DEPENDENCY: &str = "@prefix : <http://example.org/m#> .\n@prefix t: <http://metacontrol.org/tomasys#> .\n\
     [dependency] :dependsOn(?a, ?b) ^ t:c_status(?b, \"FALSE\") -> t:c_status(?a, \"FALSE\") .\n";
 
@@ -112,18 +114,19 @@ const DOMAIN: &str = "(define (domain m) (:requirements :typing :fluents :durati
   (:durative-action work :parameters (?p - place) :duration (= ?duration (+ 2 (usage)))
     :condition (over all (robot_at ?p)) :effect (at end (done ?p))))";
 
-/// A mission with random designs, bounds and dependencies, on a ring of places.
+/// Returns a mission with random designs, bounds and dependencies, on a ring of places.
 pub fn generated(seed: u64) -> Place {
     let (directory, depends) = files(seed);
     Place::new(&format!("generated {seed}"), &directory.path().join("m.toml"), depends, true)
 }
 
-/// Files of a generated mission, with the manifest `m.toml`.
+/// Returns a directory with the files of a generated mission, including the manifest `m.toml`.
 pub fn own_files(seed: u64) -> tempfile::TempDir {
     files(seed).0
 }
 
-/// Files of a generated mission, and pairs of a component and one that it depends on.
+/// Writes the files of a generated mission. Returns their directory, and pairs of a component and a component
+/// that it depends on.
 fn files(seed: u64) -> (tempfile::TempDir, Vec<(String, String)>) {
     let mut random = Rng::with_seed(seed);
     let (functions, components) = (random.usize(1..=2), random.usize(3..=5));

@@ -1,5 +1,5 @@
-//! Test of [`planner::alternatives`]: the reported set of cheapest plans against an enumeration of all cheapest plans up to a
-//! length, without idle actions.
+//! Test of [`planner::alternatives`]: compares the reported set of cheapest plans with an enumeration of all
+//! cheapest plans up to a length, without idle actions.
 //!
 //! An action is active if it can change a fact that the goal or an active action reads. All other actions are idle.
 
@@ -16,10 +16,11 @@ const FACTS: usize = 5;
 /// Maximum number of steps of an enumerated plan.
 const LENGTH: usize = 5;
 
-/// Bit set of the facts that hold.
+/// State as the bit set of the facts that hold.
 type State = u32;
 
-/// Bit sets of facts: required and forbidden facts of a condition, or added and deleted facts of an effect.
+/// Pair of bit sets of facts: required and forbidden facts of a condition, or added and deleted facts of an
+/// effect.
 type Literals = (State, State);
 
 #[derive(Debug)]
@@ -55,7 +56,7 @@ fn literals(rng: &mut Rng, count: usize, negative_in: u32) -> Literals {
     let mut chosen = (0, 0);
     for _ in 0..count {
         let fact = 1 << rng.usize(0..FACTS);
-        // A fact that was already drawn is skipped, so a condition cannot contradict itself.
+        // A fact that was already drawn is skipped, so that a condition cannot contradict itself.
         if (chosen.0 | chosen.1) & fact == 0 {
             *(if rng.u32(0..negative_in) == 0 { &mut chosen.1 } else { &mut chosen.0 }) |= fact;
         }
@@ -114,7 +115,7 @@ impl Task {
         (domain + ")", problem)
     }
 
-    /// Numbers of the actions that are not idle; see the head of the file.
+    /// Returns the numbers of the actions that are not idle; see the head of the file.
     fn active(&self) -> BTreeSet<usize> {
         // All reachable states, by exhaustive search.
         let (mut states, mut open) = (BTreeSet::from([self.initial]), vec![self.initial]);
@@ -140,7 +141,7 @@ impl Task {
         }
     }
 
-    /// All plans with at most [`LENGTH`] steps from `actions` that cost exactly `cost`.
+    /// Returns all plans with at most [`LENGTH`] steps from `actions` that cost exactly `cost`.
     fn plans(&self, actions: &BTreeSet<usize>, cost: u32) -> Vec<Vec<usize>> {
         let (mut plans, mut open) = (Vec::new(), vec![(self.initial, 0, Vec::new())]);
         while let Some((state, paid, steps)) = open.pop() {
@@ -161,14 +162,14 @@ impl Task {
     }
 }
 
-/// Compares the reported alternatives with the enumeration. Returns whether the report claims to be complete; `None` if the
-/// planner proved no optimum.
+/// Compares the reported alternatives with the enumeration. Returns `true` if the report claims to be
+/// complete, and `None` if the planner did not prove an optimum.
 fn check(seed: u64) -> Option<bool> {
     let task = Task::new(seed);
     let (domain, problem) = task.files();
     let about = || format!("seed {seed}\n{domain}\n{problem}");
     let (mission, filled) = read(&domain, &problem).unwrap_or_else(|messages| panic!("{messages:#?}"));
-    // Without thresholds, small tasks also reach the prunings that are meant for large ones.
+    // With all thresholds at zero, small tasks also reach the prunings that are meant for large tasks.
     let limits = Limits::none();
     let limits = if seed.is_multiple_of(2) { limits.with_thresholds(Thresholds::NONE) } else { limits };
     let ground = mission.ground(&filled, &[], &limits).expect("a ground task");
@@ -188,7 +189,8 @@ fn check(seed: u64) -> Option<bool> {
     let (first, cost) = (numbers(plan), plan.cost.to_string().parse().expect("a small number"));
     let reported: BTreeSet<Vec<usize>> = report.plans.iter().map(numbers).chain([first.clone()]).collect();
     let cheapest = task.plans(&task.active(), cost);
-    // Every enumerated plan must be reported if the report is complete, and must agree with each step that is reported as forced.
+    // A complete report must contain every enumerated plan, and every enumerated plan must agree with each
+    // step that is reported as forced.
     for plan_steps in &cheapest {
         assert!(
             !report.complete || reported.contains(plan_steps),

@@ -1,4 +1,4 @@
-//! Certifies the planner's claims and verifies the certificates.
+//! Writes certificates for the planner's claims and verifies the certificates.
 
 use metaplan::certificate::{self, Contents, Ground};
 use metaplan::mission::Mission;
@@ -7,14 +7,14 @@ use planner::{ExactTask, Limits, Solution, Status, Task};
 
 use crate::judge::{Case, Tally, Truth, compare, plan_lines, rational, steps_of};
 
-/// The ground task of a solution, by the kind of its numbers.
+/// The ground task of a solution, with integers or with exact rational numbers.
 #[derive(Debug)]
 pub enum Planned {
     Integers(Box<Task>),
     Exact(Box<ExactTask>),
 }
 
-/// Removes the parts of a message in parentheses, which contain names.
+/// Removes the parts of a message in parentheses, which contain names of the task.
 fn without_names(message: &str) -> String {
     let mut depth = 0_usize;
     let mut outside = String::new();
@@ -29,7 +29,8 @@ fn without_names(message: &str) -> String {
     outside
 }
 
-/// Writes a certificate for an optimality or unsolvability claim. Verification must succeed if the claim is true and fail otherwise.
+/// Writes a certificate for a claim of optimality or unsolvability. Asserts that verification succeeds if the
+/// claim is true and fails otherwise.
 pub fn check(
     case: &Case,
     (mission, problem): (&Mission, &Problem),
@@ -50,10 +51,10 @@ pub fn check(
     let contents = Contents { mission, problem, task, solution, plan: &plan };
     let limits = || Limits::none().with_time(case.limit);
     if let Err(message) = certificate::write(&directory, &contents, &limits()) {
-        // Names are specific to a task; without them, equal reasons are counted together.
+        // Names are specific to a task. Without them, equal reasons are counted together.
         return tally.count(format!("{}: {:.120}", message.code, without_names(&message.message)));
     }
-    // A generous time limit: a busy machine must not make verification fail.
+    // The time limit is generous, because a busy machine must not make verification fail.
     let limits = Limits::none().with_time(30 * case.limit);
     let report = certificate::Verifier::new(&directory).stop(|| limits.reached()).verify();
     // A claim is false if it contradicts the oracle; an optimum worse than a known plan is one such case.

@@ -1,12 +1,15 @@
-//! Test of the validator: it judges plans of up to three steps over all start times that can matter, on tiny tasks.
+//! Test of the validator on plans of up to three steps for tiny tasks, with all start times that can matter.
 //!
-//! Each plan is executed by the project's validator and by the oracle's executor. They must agree on validity, on whether only the
-//! goal fails, and on the value. The best plan that the *validator* accepts is then compared with the planner's claim.
+//! Each plan is executed by the project's validator and by the oracle's executor. Both must agree on
+//! validity, on whether only the goal fails, and on the value. The best plan that the *validator* accepts is
+//! then compared with the planner's claim.
 //!
-//! Sequential plans: applicability at a start s depends on the position of s and of the ends relative to the events. So the only
-//! relevant times are T − (sums of up to three durations) for events at T, the points between these times, and the end of the previous
-//! action. A plan with an inexecutable prefix is not extended. Concurrent plans: starts are multiples of half the separation.
-//! `ORACLE_PLANS` limits the number of plans per task; the order is random, so the limit selects a random sample.
+//! Sequential plans: the applicability of an action depends only on the positions of its start and of its end
+//! relative to the events. So the only relevant start times are T − (sums of up to three durations) for
+//! events at T, the points between these times, and the end of the previous action. A plan with an
+//! inexecutable prefix is not extended. Concurrent plans: starts are multiples of half the separation.
+//! `ORACLE_PLANS` limits the number of plans per task; the order is random, so the limit selects a random
+//! sample.
 
 use std::time::Duration;
 
@@ -45,7 +48,7 @@ struct Enumeration<'e> {
     valid: usize,
 }
 
-/// Relevant start times of sequential plans; see the head of the file.
+/// Returns the relevant start times of sequential plans; see the head of the file.
 fn times(world: &World, durations: &[Q]) -> Vec<Q> {
     let mut borders = vec![q(0)];
     let mut sums = vec![q(0)];
@@ -68,7 +71,7 @@ fn times(world: &World, durations: &[Q]) -> Vec<Q> {
     borders
 }
 
-/// Duration of an instance in the initial state; `None` if it is undefined or negative.
+/// Returns the duration of an instance in the initial state; `None` if the duration is undefined or negative.
 fn duration(world: &World, instance: usize) -> Option<Q> {
     let (action, objects) = &world.instances[instance];
     match &world.task.actions[*action].body {
@@ -80,7 +83,8 @@ fn duration(world: &World, instance: usize) -> Option<Q> {
 }
 
 impl Enumeration<'_> {
-    /// Executes a plan with both implementations and records a disagreement. Returns the executor's result, `None` on overflow.
+    /// Executes a plan with the validator and with the executor, and records a disagreement. Returns the
+    /// executor's result; `None` on overflow.
     fn outcome(&mut self, plan: &Schedule) -> Option<Outcome> {
         self.remaining_plans = self.remaining_plans.saturating_sub(1);
         let executed = match self.unit {
@@ -97,7 +101,8 @@ impl Enumeration<'_> {
         let verdict = project_verdict(self.mission, self.problem, &steps, &self.mode);
         let validated = match &verdict.violation {
             None if self.problem.metric.is_some() => Outcome::Valid(verdict.metric),
-            // Without a metric, the oracle may count the steps of sequential plans. The validator does not, so it cannot be compared.
+            // Without a metric, the oracle may count the steps of sequential plans. The validator does not,
+            // so its value cannot be compared.
             None if self.unit.is_some() => Outcome::Valid(Some(verdict.total_time)),
             None => match &executed {
                 Outcome::Valid(value) => Outcome::Valid(value.clone()),
@@ -187,7 +192,8 @@ fn check(name: &str, seed: u64, unit: Option<Q>, tally: &mut Tally) {
     let best = enumeration.best.map(|(value, plan)| (value, written(&world, &plan)));
     let disagreements = enumeration.disagreements;
     let maximize = maximizes(&world.task);
-    // The oracle's executor cannot check the claimed truth here: the validator found it, and both were compared above.
+    // The oracle's executor cannot check the claimed truth here: the validator found the truth, and both were
+    // compared above.
     let case = Case {
         name: format!("{name}-{seed}"),
         domain,

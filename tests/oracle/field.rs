@@ -1,7 +1,7 @@
 //! Regression tests from user reports: tasks on which the planner was wrong, with the correct answer in each mode.
 //!
-//! Small tasks are written out; others are files in `field/`. The correct answers follow the definition of a plan. Where they differ
-//! from the report, a comment gives the reason.
+//! Small tasks are written out; larger ones are files in `field/`. The correct answers follow the definition
+//! of a plan. Where an answer differs from the user's report, a comment gives the reason.
 
 use std::time::Duration;
 
@@ -19,7 +19,7 @@ fn exact(text: &str) -> BigRational {
     BigRational::new(digits, BigInt::from(10).pow(fraction.len() as u32))
 }
 
-/// Parses steps `start: (action arguments) [duration]`, separated by commas.
+/// Parses steps `start: (action arguments) [duration]`, which are separated by commas.
 fn steps(text: &str) -> Vec<Step> {
     let step = |text: &str| {
         let (start, remainder) = text.split_once(": (").expect("a start");
@@ -35,7 +35,7 @@ fn steps(text: &str) -> Vec<Step> {
     text.split(", ").filter(|text| !text.is_empty()).map(step).collect()
 }
 
-/// The best value, with a plan that attains it.
+/// Returns the truth with the best value and a plan that attains it.
 fn best(value: &str, plan: &str) -> Truth {
     Truth::Best(exact(value), steps(plan))
 }
@@ -83,7 +83,7 @@ fn conflict(costly_action: &str) -> String {
     )
 }
 
-/// Effects at the start that conflict only under a condition.
+/// Effects at the start conflict only under a condition.
 #[test]
 fn b1_conditional_start_conflict() {
     let problem = "(define (problem p) (:domain d) (:init (= (f) 2)) (:goal (q)))";
@@ -98,7 +98,7 @@ fn b1_conditional_start_conflict() {
     }
 }
 
-/// Every pair of conflicting numeric effects, at the start and at the end.
+/// Every pair of numeric effects, at the start and at the end. Some pairs conflict.
 #[test]
 fn b1_all_pairs() {
     let effects =
@@ -119,7 +119,7 @@ fn b1_all_pairs() {
     }
 }
 
-/// An undefined operand in a conditional effect whose condition does not hold.
+/// An operand is undefined in a conditional effect whose condition does not hold.
 #[test]
 fn b1_undefined_operand() {
     let domain = "(define (domain d) (:requirements :adl :fluents :durative-actions)
@@ -134,8 +134,8 @@ fn b1_undefined_operand() {
 const BETWEEN: &str = "(:durative-action a :parameters () :duration (= ?duration 10)
   :condition (and (at start (p)) (at end (q))) :effect (at end (g)))";
 
-/// The start lies between events. In concurrent mode the end reads the fact that the event at 12 adds, so it is at least the
-/// separation later.
+/// The start lies between two events. In concurrent mode the end reads the fact that the event at 12 adds, so
+/// the end is at least the separation later.
 #[test]
 fn b2_wait_between_events() {
     let costly_action = "(:durative-action dear :parameters () :duration (= ?duration 100) :condition (and) :effect (at end (g)))";
@@ -152,7 +152,8 @@ fn b2_wait_between_events() {
     }
 }
 
-/// A metric without a best value, and an event to wait for. The planner reported a horizon although none was set.
+/// The metric has no best value, and the plan must wait for an event. The planner once reported a horizon
+/// although none was set.
 #[test]
 fn b3_no_horizon() {
     let domain = "(define (domain d) (:requirements :durative-actions :timed-initial-literals :fluents)
@@ -166,7 +167,7 @@ fn b3_no_horizon() {
     }
 }
 
-/// An over-all condition need not hold at the end itself.
+/// A condition over all need not hold at the end itself.
 #[test]
 fn b4_event_at_the_end() {
     let costly_action = "(:durative-action dear :parameters () :duration (= ?duration 50) :condition (and) :effect (at end (g)))";
@@ -209,8 +210,9 @@ fn conc_14() {
     check("conc-14", (domain, problem), vec![(sequential(), truth.clone()), (overlapping(), truth)]);
 }
 
-/// The report expected 1, but an end at 1 adds the fact that the event at 1 deletes, so they interfere. (p2) holds from 3 on. The
-/// start reads it, so it is at 3.001 or later in concurrent mode, and after 3 in sequential mode.
+/// The user's report expected 1. However, an end at 1 adds the fact that the event at 1 deletes, so they
+/// interfere. (p2) holds from 3 on. The start reads (p2), so it is at 3.001 or later in concurrent mode, and
+/// after 3 in sequential mode.
 #[test]
 fn conc_30012() {
     let domain = "(define (domain c) (:requirements :durative-actions :fluents :negative-preconditions :timed-initial-literals)
@@ -255,7 +257,7 @@ fn one_action(functions: &str, condition: &str, values: &str) -> (String, String
     (domain, format!("(define (problem p) (:domain d) (:init {values}) (:goal (done)))"))
 }
 
-/// Products of decimals with many digits, in conditions.
+/// Conditions contain products of decimals with many digits.
 #[test]
 fn n1_products() {
     let cases = [
@@ -276,7 +278,7 @@ fn n1_products() {
     }
 }
 
-/// A cheap action whose condition is such a product, and a costly alternative.
+/// A cheap action has a product of decimals as its condition; the alternative is costly.
 #[test]
 fn n1_cheap_and_dear() {
     let domain = "(define (domain d) (:requirements :fluents) (:predicates (done)) (:functions (total-cost) (a) (b) (c))
@@ -294,7 +296,7 @@ fn n1_cheap_and_dear() {
     }
 }
 
-/// A cost of 2^128 next to a cost of 1.
+/// One action costs 2^128, another one costs 1.
 #[test]
 fn n1_large_cost() {
     let domain =
@@ -306,7 +308,7 @@ fn n1_large_cost() {
     check("n1-cost", (domain, problem), vec![(sequential(), best("1", "0: (cheap) [0]"))]);
 }
 
-/// An action must lie exactly between two events. Its start may interfere with the first of them.
+/// An action must lie exactly between two events. Its start may interfere with the first event.
 #[test]
 fn exactly_between_events() {
     let domain = "(define (domain d) (:requirements :adl :durative-actions :timed-initial-literals) (:predicates (e) (w) (q) (g))
@@ -322,7 +324,7 @@ fn exactly_between_events() {
     check("between-disturbed", (domain, &problem("(q)")), vec![(sequential(), Truth::NoPlan)]);
 }
 
-/// The slower design makes the action last over an event; the quicker one does not.
+/// The slower design makes the action last beyond an event; the quicker design does not.
 #[test]
 fn a_slow_design_reaches_over_events() {
     let domain = "(define (domain d) (:requirements :typing :fluents :durative-actions :timed-initial-literals)
@@ -334,7 +336,8 @@ fn a_slow_design_reaches_over_events() {
     check("slow-design", (domain, problem), vec![(sequential(), best("4", "1.001: (a f d2) [4]"))]);
 }
 
-/// Two actions in sequence, the second of which must end exactly at the second event. So the first must start exactly at the first.
+/// The second of two actions must end exactly at the second event, so the first action must start exactly at
+/// the first event.
 #[test]
 fn two_exactly_between_events() {
     let domain = "(define (domain d) (:requirements :adl :durative-actions :timed-initial-literals) (:predicates (e) (w) (q) (h) (g))
@@ -365,7 +368,8 @@ fn a_number_is_read_after_it_has_changed() {
     check("number-read", (domain, problem), cases);
 }
 
-/// A function has one design at a time. So actions with different designs do not overlap, although PDDL alone would permit it.
+/// A function has one design at a time. So actions with different designs do not overlap, although PDDL alone
+/// would permit an overlap.
 #[test]
 fn a_function_has_one_design_at_a_time() {
     let domain = "(define (domain d) (:requirements :typing :durative-actions) (:types function functiondesign)
@@ -386,7 +390,7 @@ fn a_function_has_one_design_at_a_time() {
     check("designs-together", (domain, &problem("d1")), together);
 }
 
-/// Coefficients of 10^18 in a linear condition.
+/// A linear condition has coefficients of 10^18.
 #[test]
 fn n2_coefficients() {
     let domain = "(define (domain d) (:requirements :fluents) (:predicates (done) (ready)) (:functions (x) (y) (z))
@@ -403,7 +407,7 @@ fn n2_coefficients() {
     check("n2", (domain, problem), cases);
 }
 
-/// A number that grows to 2^70.
+/// A number grows to 2^70 by doubling.
 #[test]
 fn n3_doublings() {
     let predicates: String = (0..71).map(|at| format!(" (c{at})")).collect();
@@ -429,7 +433,8 @@ fn n3_doublings() {
     }
 }
 
-/// A number that exceeds all integer types on the only way to the goal. An overflow must not be reported as "no plan".
+/// A number exceeds all integer types on the only way to the goal. The overflow must not be reported as "no
+/// plan".
 #[test]
 fn n3_more_doublings() {
     let predicates: String = (0..141).map(|at| format!(" (c{at})")).collect();
@@ -448,7 +453,7 @@ fn n3_more_doublings() {
     check("n3-more", (&domain, problem), vec![(sequential(), best("140", &plan.join(", ")))]);
 }
 
-/// A metric value beyond 64 bits.
+/// The metric value exceeds 64 bits.
 #[test]
 fn n5_large_measure() {
     let domain = "(define (domain d) (:requirements :durative-actions :fluents) (:predicates (done)) (:functions (cost))

@@ -1,6 +1,6 @@
-//! Compares the planner's answer for a task with the oracle's and records differences.
+//! Compares the planner's answer for a task with the oracle's answer and records differences.
 //!
-//! The stages are the same as in the program: read, ground, optimize, validate, certify, verify.
+//! The stages are the same as in the program: parse, ground, optimise, validate, certify, verify.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -33,13 +33,13 @@ pub struct Step {
 /// The correct answer for a task.
 #[derive(Debug, Clone)]
 pub enum Truth {
-    /// The best value of the metric, with a plan that attains it.
+    /// The metric has a best value. The fields are this value and a plan that attains it.
     Best(BigRational, Vec<Step>),
     /// There is no plan.
     NoPlan,
-    /// Solvable, but without a best value. The fields are the value of some plan and this plan.
+    /// The task is solvable, but has no best value. The fields are the value of some plan and this plan.
     NoBest(BigRational, Vec<Step>),
-    /// The oracle gave up. The field is its best plan with its value, if any.
+    /// The oracle reached its limit. The field is the best value found with its plan, if any.
     Open(Option<(BigRational, Vec<Step>)>),
 }
 
@@ -48,16 +48,17 @@ pub enum Truth {
 pub enum Mode {
     /// One action after another.
     Sequential,
-    /// Actions can overlap. Interfering happenings are at least the given time apart.
+    /// Actions can overlap. The field is the separation: the minimum distance of interfering happenings.
     Concurrent(BigRational),
 }
 
-/// Executes a plan according to the definition and returns its value, or the reason why it is invalid.
+/// Executes a plan according to the definition. Returns the value of the plan, or the reason why the plan is
+/// invalid.
 pub type Executor = Box<dyn Fn(&[Step]) -> Result<BigRational, String>>;
 
-/// A task with its correct answer.
+/// A task with its correct answer, ready for comparison with the planner.
 pub struct Case {
-    /// Generator and seed; also the directory name under which a failure is saved.
+    /// Name of the generator and seed. Also the name of the directory in which a failure is saved.
     pub name: String,
     pub domain: String,
     pub problem: String,
@@ -66,16 +67,16 @@ pub struct Case {
     pub maximize: bool,
     pub truth: Truth,
     pub execute: Executor,
-    /// `true` if a certificate is written and verified; in sequential mode only.
+    /// Whether a certificate is written and verified, in sequential mode only.
     pub certify: bool,
     /// Time limit of the planner.
     pub limit: Duration,
 }
 
-/// A contradiction between planner, certificate, validator and oracle.
+/// A contradiction between the planner, the certificate, the validator and the oracle.
 #[derive(Debug)]
 pub struct Failure {
-    /// Short description, the key for counting.
+    /// Short description of the kind of contradiction, by which failures are counted.
     pub kind: &'static str,
     pub text: String,
 }
@@ -86,8 +87,9 @@ pub struct Tally {
     pub tasks: usize,
     pub counts: BTreeMap<String, usize>,
     pub failures: Vec<Failure>,
-    /// Total time in the planner and in certificates (writing and verifying).
+    /// Total time of planning.
     pub planning: Duration,
+    /// Total time of writing and verifying certificates.
     pub certificates: Duration,
 }
 
@@ -101,18 +103,19 @@ enum Answer {
 #[derive(Debug)]
 struct Solved {
     solution: Solution,
-    /// `true` if plans without a metric are measured by their total time.
+    /// Whether plans without a metric are measured by their total time.
     timed: bool,
-    /// The task, if a certificate is to be written.
+    /// The ground task, if a certificate is to be written.
     task: Option<Planned>,
 }
 
-/// Converts an exact number of the planner.
+/// Converts an exact number of the planner to a rational number.
 pub fn rational(exact: &Exact) -> BigRational {
     exact.to_rational()
 }
 
-/// Decimal notation of a time: exact if at most 39 fractional digits suffice, otherwise rounded to nine.
+/// Formats a time as a decimal: exactly if at most 39 fractional digits suffice, otherwise rounded to nine
+/// digits.
 pub fn decimal(number: &BigRational) -> String {
     let mut scale = num_bigint::BigInt::from(1);
     for digits in 0..40_usize {
@@ -128,7 +131,7 @@ pub fn decimal(number: &BigRational) -> String {
     decimal(&((number * &billion).round() / billion))
 }
 
-/// Plan as lines `start: (action arguments) [duration]`.
+/// Formats a plan as lines `start: (action arguments) [duration]`.
 pub fn plan_lines(steps: &[Step]) -> String {
     steps.iter().fold(String::new(), |mut text, step| {
         let call = [std::slice::from_ref(&step.action), &step.arguments[..]].concat().join(" ");
@@ -137,7 +140,7 @@ pub fn plan_lines(steps: &[Step]) -> String {
     })
 }
 
-/// Converts the planner's plan to oracle steps.
+/// Converts the planner's plan to the oracle's steps.
 pub fn steps_of(plan: &Plan) -> Vec<Step> {
     plan.steps
         .iter()
@@ -150,7 +153,7 @@ pub fn steps_of(plan: &Plan) -> Vec<Step> {
         .collect()
 }
 
-/// Converts a plan to the validator's input.
+/// Converts the oracle's steps to the validator's input.
 pub fn plan_text(steps: &[Step]) -> PlanText {
     let step = |step: &Step| PlanStep {
         action: Name::new(&step.action),
@@ -163,7 +166,8 @@ pub fn plan_text(steps: &[Step]) -> PlanText {
     PlanText { steps: steps.iter().map(step).collect() }
 }
 
-/// Validator options for a mode. Sequential plans are checked without tolerance, as the times are exact.
+/// Returns the validator's options for a mode. Sequential plans are checked without tolerance, because their
+/// times are exact.
 pub fn options(mode: &Mode) -> Options {
     match mode {
         Mode::Sequential => Options::default().with_tolerance(BigRational::zero()),
@@ -173,12 +177,12 @@ pub fn options(mode: &Mode) -> Options {
     }
 }
 
-/// Validator's verdict on a plan.
+/// Returns the verdict of the project's validator on a plan.
 pub fn project_verdict(mission: &Mission, problem: &Problem, steps: &[Step], mode: &Mode) -> Verdict {
     validate(mission.domain(), problem, &plan_text(steps), &options(mode))
 }
 
-/// Parses domain and problem like the program.
+/// Parses and joins a domain and a problem as the program does.
 pub fn read(domain: &str, problem: &str) -> Result<(Mission, Problem), Errors> {
     let source = |name: &str, text: &str| Ok(Source::new(name, text.to_owned()));
     let (domain, problem) = (source("domain.pddl", domain), source("problem.pddl", problem));
@@ -187,7 +191,8 @@ pub fn read(domain: &str, problem: &str) -> Result<(Mission, Problem), Errors> {
     Ok((mission, problem))
 }
 
-/// Planner settings. The head start of the search varies with the task's name, so that all engines get their turn.
+/// Returns planner settings. The head start of the search varies with the name of the task, so that all
+/// engines are used.
 fn config(name: &str, limits: Limits, thresholds: Thresholds) -> Config {
     let sum: usize = name.bytes().map(usize::from).sum();
     let config = Config::default().with_limits(limits);
@@ -202,7 +207,8 @@ fn plan(
     (limits, thresholds): (&Limits, Thresholds),
 ) -> Answer {
     let limits = &limits.clone().with_thresholds(thresholds);
-    // A certificate does not depend on the engine that found the answer, so one per task is enough.
+    // A certificate does not depend on the engine that found the answer, so one certificate per task is
+    // enough.
     let is_certified = thresholds == Thresholds::default();
     let refused = |messages: Errors| {
         let mut codes: Vec<_> = messages.iter().map(|message| message.code.clone()).collect();
@@ -211,7 +217,8 @@ fn plan(
     };
     match mode {
         Mode::Sequential => match mission.ground(problem, &[], limits) {
-            // E304: numbers exceed the integers. The program then plans in rationals, too.
+            // E304: numbers exceed the integers. The program then plans with rational numbers, and so does
+            // the test.
             Err(messages) if messages.iter().all(|message| message.code == "E304") => {
                 match mission.ground_exact(problem, &[], limits) {
                     Err(messages) => refused(messages),
@@ -249,7 +256,8 @@ impl Tally {
         *self.counts.entry(key.into()).or_default() += 1;
     }
 
-    /// Records a failure and saves its files to the directory `ORACLE_SAVE`, if it is set.
+    /// Records a failure. Saves the files of the task to the directory `ORACLE_SAVE`, if this variable is
+    /// set.
     pub fn fail(&mut self, case: &Case, kind: &'static str, reason: &str) {
         let Case { name, domain, problem, mode, truth, .. } = case;
         let mode = match mode {
@@ -278,7 +286,7 @@ impl Tally {
         self.failures.push(Failure { kind, text });
     }
 
-    /// Counts, one per line, and mean times per task.
+    /// Formats the counts, one per line, and the mean times per task.
     pub fn summary(&self) -> String {
         let mut text = format!("{} tasks\n", self.tasks);
         for (key, count) in &self.counts {
@@ -300,12 +308,12 @@ impl Tally {
     }
 }
 
-/// Compares two metric values. `Less` means that the first is better.
+/// Compares two metric values. `Less` means that `left` is better.
 pub fn compare(maximize: bool, left: &BigRational, right: &BigRational) -> std::cmp::Ordering {
     if maximize { right.cmp(left) } else { left.cmp(right) }
 }
 
-/// Runs the planner on a task and records the result.
+/// Runs the planner on a task, compares its answers with the truth, and records the result.
 pub fn judge(case: &Case, tally: &mut Tally) {
     tally.tasks += 1;
     tally.count(match &case.truth {
@@ -322,7 +330,7 @@ pub fn judge(case: &Case, tally: &mut Tally) {
             unexpected => tally.fail(case, "the oracle refutes itself", &format!("{unexpected:?}")),
         }
     }
-    // A panic is a failure of this task only; the run continues.
+    // A panic is a failure of this task only, and the run continues.
     if let Err(panic) = catch_unwind(AssertUnwindSafe(|| judge_caught(case, tally))) {
         let reason = panic.downcast_ref::<String>().map(String::as_str);
         let reason = reason.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("?").to_owned();
@@ -339,7 +347,8 @@ fn judge_caught(case: &Case, tally: &mut Tally) {
         }
     };
     check_witness(case, &mission, &problem, tally);
-    // A task that the first run does not decide is rarely decided by the second one, so its limit is short.
+    // A task that the first run does not decide is rarely decided by the second run, so the second limit is
+    // short.
     let short = case.limit.min(Duration::from_millis(300));
     for (thresholds, limit) in [(Thresholds::default(), case.limit), (Thresholds::NONE, short)] {
         let started = Instant::now();
@@ -350,7 +359,7 @@ fn judge_caught(case: &Case, tally: &mut Tally) {
     }
 }
 
-/// Compares an answer with the correct one.
+/// Compares an answer of the planner with the correct answer.
 fn judge_answer(
     case: &Case,
     (mission, problem): (&Mission, &Problem),
@@ -481,17 +490,17 @@ fn check_plan(
     }
 }
 
-/// Integer from an environment variable.
+/// Returns an integer from an environment variable, or `default` if it is not set.
 pub fn setting(name: &str, default: u64) -> u64 {
     std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
 }
 
-/// Returns `true` if the run ends after a failure (`ORACLE_STOP`).
+/// Returns `true` if the run must end because of a failure (`ORACLE_STOP` is set).
 pub fn is_over(tally: &Tally) -> bool {
     !tally.failures.is_empty() && std::env::var_os("ORACLE_STOP").is_some()
 }
 
-/// Judges the cases of `ORACLE_TASKS` seeds (default: `default`), starting at `ORACLE_FROM`.
+/// Runs [`judge`] on the cases of `ORACLE_TASKS` seeds (default: `default`), starting at `ORACLE_FROM`.
 pub fn run(default: u64, cases: impl Fn(u64) -> Vec<Case>) -> Tally {
     let (from, tasks) = (setting("ORACLE_FROM", 0), setting("ORACLE_TASKS", default));
     let mut tally = Tally::default();

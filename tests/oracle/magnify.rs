@@ -1,11 +1,13 @@
-//! Benchmark: slowdown of planning, certifying and verifying if all numbers of a mission become decimals of 16 significant digits.
+//! Benchmark: slowdown of planning, certifying and verifying if all numbers of a mission are replaced by
+//! decimals of 16 significant digits.
 //!
 //! The missions come from `../shared/tools/gen_ratpa.py` (needs python3). Distances are multiplied by square roots, other numbers by
 //! decimals. Consumption does not grow and the battery holds slightly more, so a solvable mission remains solvable. The replaced
 //! numbers preserve the order of compared values, so the same designs can be used.
 //!
-//! Two variants: the factors in the domain (weights of the metric) remain integers, or they become decimals as well. Products of
-//! three numbers of 16 digits exceed the planner's integers, so the second variant is planned in rationals.
+//! There are two variants. The factors in the domain (weights of the metric) remain integers, or they become
+//! decimals as well. Products of three numbers of 16 digits exceed the planner's integers, so the second
+//! variant is planned with rational numbers.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -15,14 +17,15 @@ use std::process::Command;
 const DIGITS: usize = 16;
 /// Number of generated missions.
 const MISSIONS: usize = 50;
-/// Variants: name, whether factors are replaced, and the maximum ratio of times (geometric mean).
+/// Variants: name, whether the factors in the domain (weights of the metric) are replaced as well, and the maximum
+/// slowdown (geometric mean).
 const KINDS: [(&str, bool, f64); 2] = [("decimals", false, 3.0), ("all", true, 3.0)];
-/// Exit status shown for a proved plan without a certificate.
+/// Exit status that is shown for a proved plan without a certificate.
 const NO_CERTIFICATE: i32 = 120;
-/// Lower limit of a measured time in seconds; below it, the start of the process dominates.
+/// Lower limit of a measured time in seconds. Below it, the start of the process dominates.
 const MIN_SECONDS: f64 = 0.002;
 
-/// A pseudorandom number in [0, 1) that depends only on `name` (FNV hash with a final mix).
+/// Returns a pseudorandom number in [0, 1) that depends only on `name` (FNV hash with a final mix).
 fn fraction(name: &str) -> f64 {
     let hash = name.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
         (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
@@ -30,13 +33,13 @@ fn fraction(name: &str) -> f64 {
     ((hash ^ (hash >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-/// Decimal notation with [`DIGITS`] significant digits.
+/// Formats a number with [`DIGITS`] significant digits.
 fn written(value: f64) -> String {
     let integer_digits = (value.log10().floor() as i64 + 1).max(0) as usize;
     format!("{value:.digits$}", digits = DIGITS - integer_digits.min(DIGITS))
 }
 
-/// Replacement for a number of a function.
+/// Returns the replacement for the value of a function with these arguments.
 fn magnified(function: &str, arguments: &[&str], value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
@@ -49,14 +52,14 @@ fn magnified(function: &str, arguments: &[&str], value: f64) -> String {
     let fraction_of_name = fraction(&format!("{function} {}", sorted.join(" ")));
     written(match function {
         "dist" => value * (1.0 - fraction_of_name / 20.0).sqrt(),
-        // One factor for both, otherwise recharging would not fill the battery.
+        // Both functions get the same factor, otherwise recharging would not fill the battery.
         "battery" | "capacity" => value + fraction("battery") / 4.0,
         "visibility" => value * (1.0 + fraction_of_name / 50.0),
         _ => value * (1.0 - fraction_of_name / 50.0),
     })
 }
 
-/// Replaces the initial values of a problem.
+/// Replaces the initial values in the text of a problem.
 fn problem(text: &str) -> String {
     let mut parts = text.split("(= (");
     let mut magnified_text = parts.next().unwrap_or_default().to_owned();
@@ -71,7 +74,8 @@ fn problem(text: &str) -> String {
     magnified_text
 }
 
-/// Replaces the value to which the battery is charged and, if `factors`, all other numbers of the domain.
+/// Replaces in the text of a domain the value to which the battery is charged and, with `factors`, all other
+/// numbers.
 fn domain(text: &str, factors: bool) -> String {
     let mut words = Vec::new();
     for (position, word) in text.split(' ').enumerate() {
@@ -89,13 +93,13 @@ fn domain(text: &str, factors: bool) -> String {
     words.join(" ")
 }
 
-/// Exit status and processor time (in seconds) of a run.
+/// Exit status and processor time (in seconds) of a run of the program.
 struct Run {
     status: i32,
     time: f64,
 }
 
-/// Runs the program. A run under 1 s is repeated twice unless `once`; the median counts.
+/// Runs the program and measures it. Unless `once`, a run under 1 s is repeated twice, and the median counts.
 fn run(arguments: &[&str], once: bool) -> Run {
     let script = "import resource as r, subprocess as s, sys\n\
         def once():\n \
@@ -115,14 +119,14 @@ fn run(arguments: &[&str], once: bool) -> Run {
     Run { status: status.parse().expect("a status"), time: time.parse().expect("a time") }
 }
 
-/// Arguments of the planning command for a mission.
+/// Returns the arguments of the planning command for a mission.
 fn plan_arguments(directory: &Path, name: &str) -> [String; 6] {
     let file = |part: &str| directory.join(format!("{name}.{part}.pddl")).display().to_string();
     let [plan, quiet, limit, seconds] = ["plan", "--quiet", "--time-limit", "60"].map(str::to_owned);
     [plan, quiet, limit, seconds, file("domain"), file("problem")]
 }
 
-/// Runs planning, certifying and verifying.
+/// Runs and measures planning, certifying and verifying, in this order.
 fn all_runs(directory: &Path, name: &str) -> [Run; 3] {
     let certificate = directory.join(format!("{name}.certificate")).display().to_string();
     let _ = std::fs::remove_dir_all(&certificate);
@@ -137,7 +141,8 @@ fn all_runs(directory: &Path, name: &str) -> [Run; 3] {
     [planned, certified, verified]
 }
 
-/// Parameters of the generator: family, places or pipelines, designs, functions, goals, seed.
+/// Returns the parameters of the generated missions: family, places or pipelines, designs, functions, goals,
+/// seed.
 fn sizes() -> Vec<[usize; 6]> {
     let mut sizes = Vec::new();
     for seed in 1..=4 {
@@ -163,7 +168,8 @@ fn sizes() -> Vec<[usize; 6]> {
     sizes
 }
 
-/// Generates a mission with the tool and writes its variants with decimals. Returns `None` if python3 does not start.
+/// Generates a mission with the tool and writes its variants with decimals. Returns the name of the mission;
+/// `None` if python3 does not start.
 fn generate(tool: &Path, directory: &Path, size: &[usize; 6], encoding: &str) -> Option<String> {
     let [family, n, m, k, goals, seed] = size;
     let family = ["ugv", "uuv"][*family];
@@ -224,7 +230,7 @@ fn decimals_slow_planning_by_a_bounded_factor() {
             for ((whole, digits), ratios) in whole.iter().zip(&digits).zip(ratios) {
                 let ratio = digits.time.max(MIN_SECONDS) / whole.time.max(MIN_SECONDS);
                 let _ = write!(line, " | {:.3} {:.3} {ratio:.2}", whole.time, digits.time);
-                // A refused mission takes no time, so its ratio would be meaningless.
+                // A refused mission has no meaningful time, so its ratio is not counted.
                 if (whole.status, digits.status) == (0, 0) {
                     ratios.push(ratio);
                 } else {

@@ -1,8 +1,9 @@
 //! Tests of the planner, its certificates and its validator against independent oracles.
 //!
-//! A generator derives a tiny task from a seed. Its oracle computes the correct answer by brute force, and [`judge`] compares the
-//! planner's answer with it. The oracles implement the definition of a plan (PDDL 2.1, PDDL 2.2) and share no code with the planner,
-//! not even the parser: a generator has its own task structure, which is printed as PDDL.
+//! A generator derives a tiny task from a seed. The oracle computes the correct answer by brute force, and
+//! [`judge`] compares the planner's answer with this answer. The oracles implement the definition of a plan
+//! (PDDL 2.1, PDDL 2.2) and share no code with the planner, not even the parser: a generator has its own task
+//! structure, which is printed as PDDL.
 //!
 //! Environment variables: `ORACLE_FROM` is the first seed, `ORACLE_TASKS` the number of tasks, `ORACLE_SAVE` a directory for the files
 //! of failing tasks. If `ORACLE_STOP` is set, a run ends at the first failure. `mutants.toml` lists faults of the planner that the

@@ -1,7 +1,8 @@
-//! Generator B: numbers, function designs, optimisation.
+//! Generator B: tasks with numbers, function designs, and optimisation.
 //!
-//! Missions with designs and arithmetic tasks are derived from seeds. Their numbers are hard to compute with, and thresholds are hit
-//! exactly or missed by a tiny amount. The oracle is explicit search in rational numbers.
+//! Missions with designs, and arithmetic tasks, are derived from seeds. Their numbers are hard to compute
+//! with, and thresholds are hit exactly or missed by a tiny amount. The oracle is explicit search with
+//! rational numbers.
 
 mod arithmetic;
 mod deeds;
@@ -31,10 +32,10 @@ use ground::Ground;
 use model::{Expr, Number, Task};
 use truth::{Explored, Outcome};
 
-/// Work limits of the oracle for a task.
+/// Work limits of the oracle for one task.
 const BUDGET: Budget = Budget { states: 300, attempts: 25_000 };
 
-/// A task with the oracle's result.
+/// A generated task with the oracle's result.
 struct Puzzle {
     name: String,
     task: Task,
@@ -58,7 +59,7 @@ impl Puzzle {
         self.task.metric.as_ref().is_some_and(|(maximize, _)| *maximize)
     }
 
-    /// Steps of a sequential plan without gaps.
+    /// Converts a sequential plan to steps without gaps between them. The plan consists of instance numbers.
     fn steps(&self, plan: &[usize]) -> Vec<Step> {
         let mut clock = model::whole(0);
         let step = |number: &usize| {
@@ -105,7 +106,7 @@ impl Puzzle {
     }
 }
 
-/// Executor of sequential plans; returns the value of a plan.
+/// Returns an executor of sequential plans, which computes the value of a plan.
 fn executor(ground: Rc<Ground>) -> Executor {
     Box::new(move |steps: &[Step]| {
         let measures = Measures::new(&ground);
@@ -131,7 +132,7 @@ fn executor(ground: Rc<Ground>) -> Executor {
     })
 }
 
-/// Task of a seed.
+/// Returns the task of a seed.
 fn task(seed: u64) -> Task {
     let mut rng = Rng::with_seed(seed);
     // The first numbers of neighbouring seeds are correlated, so they are discarded.
@@ -141,7 +142,8 @@ fn task(seed: u64) -> Task {
     if rng.u32(0..5) < 3 { missions::mission(&mut rng) } else { arithmetic::arithmetic(&mut rng) }
 }
 
-/// Judges a task as the program plans it, with a certificate for even seeds, and one quarter each in other variants and objectives.
+/// Compares the planner with the oracle on the task of a seed, with a certificate for even seeds. Other
+/// variants and further objectives are checked for one quarter of the seeds each.
 fn judge_seed(seed: u64, tally: &mut Tally) {
     judge_task(seed, &task(seed), tally);
 }
@@ -153,7 +155,7 @@ fn judge_task(seed: u64, task: &Task, tally: &mut Tally) {
     judge(&case, tally);
     let mut rng = Rng::with_seed(seed ^ 0x5eed);
     variants::check_validator(&puzzle, &case, &mut rng, tally);
-    // The expensive checks run for a quarter of the seeds each.
+    // Each expensive check runs for a quarter of the seeds.
     if seed % 4 == 1 {
         variants::check_variants(&puzzle, &case, &mut rng, tally);
     }
@@ -165,7 +167,7 @@ fn judge_task(seed: u64, task: &Task, tally: &mut Tally) {
     }
 }
 
-/// Judges the seeds of one parity, so that two test threads share the work.
+/// Runs the seeds of one parity (`first` is 0 or 1), so that two test threads share the work.
 fn judge_seeds(first: u64) {
     let (from, tasks) = (setting("ORACLE_FROM", 0), setting("ORACLE_TASKS", 600));
     let mut tally = Tally::default();
@@ -214,7 +216,7 @@ fn smaller() {
             tally.failures.iter().map(|failure| failure.kind).collect::<Vec<_>>()
         };
         for kind in kinds(&task(seed)) {
-            // Delta debugging: the failure must remain of the same kind while the task shrinks.
+            // Delta debugging: the kind of failure must remain the same while the task shrinks.
             let small = shrink::shrink(task(seed), &|task| kinds(task).contains(&kind));
             let mut tally = Tally::default();
             judge_task(seed, &small, &mut tally);

@@ -1,11 +1,12 @@
-//! Brute-force state space of tasks without numbers, from the definition of PDDL 2.2: states, derived predicates as least fixpoints
-//! by strata, sequential actions. It shares only the syntax tree with the planner, the validator and the completion of domains.
+//! Brute-force state space of tasks without numbers, from the definition of PDDL 2.2: states, derived
+//! predicates as least fixpoints by strata, sequential actions. The code shares only the syntax tree with the
+//! planner, the validator and the completion of domains.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use pddl::ast::{ActionBody, Condition, Domain, Effect, InitialElement, Problem, Term, TypeExpression};
 
-/// A fact or a ground action in lower case, with its words separated by spaces.
+/// A fact or a ground action in lower case: its words, separated by spaces.
 pub type Text = String;
 type Words = Vec<String>;
 type Facts = BTreeMap<String, BTreeSet<Words>>;
@@ -13,9 +14,10 @@ type Facts = BTreeMap<String, BTreeSet<Words>>;
 /// The reachable part of the state space.
 #[derive(Debug, Default)]
 pub struct StateSpace {
-    /// All atoms that hold in some reachable state, including derived ones.
+    /// All atoms that hold in some reachable state, including derived atoms.
     pub atoms: BTreeSet<Text>,
-    /// Transitions: state, action, next state. A state has only the atoms that actions can change.
+    /// Transitions: state, action, next state. States are written with only the atoms that actions can
+    /// change.
     pub steps: BTreeSet<(Text, Text, Text)>,
     /// Length of a shortest plan, if there is a plan.
     pub least_steps: Option<usize>,
@@ -27,14 +29,14 @@ enum Argument {
     Object(String),
 }
 
-/// A condition in which all variables have unique names.
+/// A condition in which each quantified variable has a unique name.
 #[derive(Clone, Debug)]
 enum Part {
     And(Vec<Part>),
     Or(Vec<Part>),
     Holds(String, Vec<Argument>),
     Equal(Argument, Argument),
-    /// The variable is an object of one of the types. All types if the list is empty.
+    /// The variable is an object of one of these types. An empty list means all types.
     HasType(String, Vec<String>),
     Exists(Box<Part>),
     Not(Box<Part>),
@@ -44,7 +46,8 @@ type Binding = HashMap<String, String>;
 
 struct Rule {
     level: usize,
-    /// `true` if the body depends on predicates that actions change. Other rules have the same conclusions in every state.
+    /// Whether the body depends on predicates that actions change. Other rules derive the same facts in every
+    /// state.
     varies: bool,
     head: String,
     parameters: Vec<String>,
@@ -60,7 +63,7 @@ struct Schema {
 }
 
 pub struct Task {
-    /// Objects with all their types.
+    /// All types of each object.
     objects: BTreeMap<String, BTreeSet<String>>,
     rules: Vec<Rule>,
     schemas: Vec<Schema>,
@@ -123,7 +126,8 @@ impl Task {
     }
 
     fn rules(&mut self, domain: &Domain) {
-        // Strata by fixpoint: above negated predicates, and at least as high as the others.
+        // Strata by fixpoint: a predicate is above all predicates that it negates, and at least as high as
+        // all others that it uses.
         let mut levels: BTreeMap<String, usize> =
             domain.derived.iter().map(|axiom| (low(&axiom.head.identifier.name), 0)).collect();
         loop {
@@ -173,7 +177,7 @@ impl Task {
         }
     }
 
-    /// Declares variables with unique names. Returns the names and the conditions on their types.
+    /// Declares variables under unique names in `scope`. Returns the names and the conditions on their types.
     fn declare(&mut self, list: &[pddl::ast::TypedName], scope: &mut Binding) -> (Vec<String>, Vec<Part>) {
         let mut names = Vec::new();
         let mut type_conditions = Vec::new();
@@ -217,7 +221,8 @@ impl Task {
         }
     }
 
-    /// Calls `each` with every binding under which all parts hold. Stops when `each` returns `true`, and returns whether it did.
+    /// Calls `each` for every binding under which all parts hold, until `each` returns `true`. Returns `true`
+    /// if `each` did.
     fn solve(
         &self,
         mut open: Vec<&Part>,
@@ -303,13 +308,14 @@ impl Task {
         }
     }
 
-    /// Names of the predicates that actions change.
+    /// Returns the names of the predicates that actions change.
     fn changed_predicates(&self) -> BTreeSet<String> {
         let changed_atoms = self.schemas.iter().flat_map(|schema| schema.adds.iter().chain(&schema.deletes));
         changed_atoms.map(|(name, _)| name.clone()).collect()
     }
 
-    /// Closure of facts under the rules with `varies` equal to the argument, stratum by stratum.
+    /// Returns the closure of facts, stratum by stratum, under the rules whose field `varies` equals the
+    /// argument.
     fn closure(&self, mut facts: Facts, varies: bool) -> Facts {
         let highest = self.rules.iter().map(|rule| rule.level).max().unwrap_or(0);
         for level in 0..=highest {
@@ -445,7 +451,7 @@ fn unify(arguments: &[Argument], row: &Words, binding: &mut Binding) -> bool {
         })
 }
 
-/// Returns `true` if all variables of a part are bound by the binding or by an enclosing quantifier.
+/// Returns `true` if all variables of a part are bound by `binding` or by an enclosing quantifier.
 fn is_bound(part: &Part, binding: &Binding, hidden: &mut Vec<String>) -> bool {
     let is_argument_bound = |is_argument_bound: &Argument, hidden: &[String]| match is_argument_bound {
         Argument::Variable(name) => binding.contains_key(name) || hidden.contains(name),
@@ -471,7 +477,7 @@ fn is_bound(part: &Part, binding: &Binding, hidden: &mut Vec<String>) -> bool {
     }
 }
 
-/// Predicates in a condition, each with `true` if it is in the scope of an odd number of negations.
+/// Collects the predicates of a condition. The flag is `true` in the scope of an odd number of negations.
 fn collect_predicates(condition: &Condition, negated: bool, predicates: &mut Vec<(String, bool)>) {
     match condition {
         Condition::And(parts) | Condition::Or(parts) => {

@@ -1,4 +1,5 @@
-//! Tests with the examples of PLANTA's converter: planning from its inputs is compared with its output files.
+//! Tests with the examples of PLANTA's converter: planning from the converter's input files is compared with
+//! its output files.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -11,7 +12,7 @@ use serde_json::Value;
 use crate::brute::{StateSpace, Task};
 use crate::files::{Input, metaplan, parsed, real, text_of};
 
-/// An example, and the converter's output for it.
+/// An example, with the domain and problem that the converter writes for it.
 struct Example {
     name: &'static str,
     input: Input,
@@ -19,14 +20,14 @@ struct Example {
     expectation: Expectation,
 }
 
-/// Relation between the answer and the converter's files.
+/// Relation between Metaplan's answer and the converter's output files.
 #[derive(PartialEq)]
 enum Expectation {
-    /// Equal state spaces.
+    /// The state spaces are equal.
     Same,
-    /// Plans of equal length. The files belong to another version of the input.
+    /// Optimal plans have equal length. The output files belong to another version of the input.
     AsLong,
-    /// The files are not valid PDDL, for the given reason.
+    /// The output files are not valid PDDL, for the given reason.
     Broken(&'static str),
 }
 
@@ -81,7 +82,8 @@ fn examples(real: &Path) -> Vec<Example> {
     ]
 }
 
-/// Number of steps of an optimal plan by the program; `None` if it proves that there is no plan.
+/// Returns the number of steps of an optimal plan by the program; `None` if the program proves that there is
+/// no plan.
 fn planned(input: &Input) -> Option<usize> {
     let (status, stdout, stderr) = metaplan(&input.arguments("plan", &["--format", "json"]));
     let answer: Value =
@@ -93,13 +95,14 @@ fn planned(input: &Input) -> Option<usize> {
     }
 }
 
-/// Reached atoms of the selected predicates. Predicates that differ between two sets of files are excluded by the caller.
+/// Returns the reached atoms of the predicates that `is_kept` selects. The caller excludes predicates that
+/// legitimately differ.
 fn atoms(space: &StateSpace, is_kept: &dyn Fn(&str) -> bool) -> BTreeSet<String> {
     let predicate = |atom: &&String| is_kept(atom.split(' ').next().unwrap_or_default());
     space.atoms.iter().filter(predicate).cloned().collect()
 }
 
-/// Exports the files for other planners, and parses the exported text.
+/// Exports a domain and a problem for other planners, and parses the exported text.
 fn written(domain: &Domain, problem: &Problem) -> (Domain, Problem) {
     let (domain, problem) = portable(domain, problem);
     let text = |name: &str, text: String| pddl::Source::new(name, text);
@@ -108,10 +111,11 @@ fn written(domain: &Domain, problem: &Problem) -> (Domain, Problem) {
     (domain, problem)
 }
 
-/// Examples with tens of thousands of transitions, whose exploration takes minutes.
+/// Names of examples with tens of thousands of transitions, whose exploration takes minutes.
 const LARGE: [&str; 2] = ["suave", "testFeatures/otherConstantsInDomain"];
 
-/// Checks that the narrowed task, the export and the converter's files have the same state space.
+/// Checks that three tasks have the same state space: the narrowed task (the planner's input), the export,
+/// and the converter's files.
 fn compare(Example { name, input, created, expectation }: &Example) {
     let mission = input.mission();
     let (filled, _) = mission.filled().unwrap_or_else(|messages| panic!("{}", text_of(&messages)));
@@ -124,7 +128,8 @@ fn compare(Example { name, input, created, expectation }: &Example) {
         .iter()
         .map(|predicate| predicate.identifier.name.to_string().to_ascii_lowercase())
         .collect();
-    // Narrowing evaluates derived predicates that are equal in all states, so only the declared predicates can be compared.
+    // Narrowing evaluates derived predicates that are equal in all states in advance, so only the declared
+    // predicates can be compared.
     let is_declared = |predicate: &str| declared.contains(predicate) && !predicate.starts_with("possible-");
     assert_eq!(
         atoms(&narrowed, &is_declared),
@@ -147,8 +152,8 @@ fn compare(Example { name, input, created, expectation }: &Example) {
         return;
     }
     assert_eq!(exported.steps, golden.steps, "{name}");
-    // An early version of the converter writes `inferredInconsistent`. Our comparisons also include the numbers that the domain
-    // mentions, so they are tested separately below.
+    // An early version of the converter writes `inferredInconsistent`. Our comparisons also include the
+    // numbers that the domain mentions, so comparisons are tested separately below.
     let is_comparable = |predicate: &str| {
         !["inferredinconsistent", "inferred-inconsistent", "lessthan", "equalto"].contains(&predicate)
     };
@@ -188,7 +193,7 @@ fn inputs_and_the_converters_files_have_equally_long_plans() {
         let path = |file: &str| folder.join(file).display().to_string();
         let (status, stdout, _) =
             metaplan(&["plan", &path(domain), &path(problem), "--quiet", "--format", "json"]);
-        // For its test features, the converter's output is not valid PDDL: types or a goal are missing.
+        // The converter's output for its test features is not valid PDDL: types or a goal are missing.
         if name.starts_with("testFeatures") {
             assert_eq!(status, 3, "{name}: {stdout}");
             continue;
@@ -216,7 +221,7 @@ fn plans_are_valid_for_the_inputs_and_the_converters_files() {
         arguments.insert(3, plan);
         let (status, stdout, stderr) = metaplan(&arguments);
         assert_eq!(status, 0, "{name}: {stdout}{stderr}");
-        // In the other examples, the converter's problem has undeclared types.
+        // In the other examples, the converter's problem has undeclared types and cannot be validated.
         if *expectation == Expectation::Same && !name.starts_with("testFeatures") {
             let folder = input.domain.parent().expect("a folder");
             let (domain, problem) = created.expect("files of the converter");

@@ -10,7 +10,7 @@ use metaplan::mission::{Bindings, Mission};
 use ontology::ReadOptions;
 use pddl::ast::{Domain, Problem};
 
-/// Input files of the converter.
+/// Input files of PLANTA's converter.
 #[derive(Debug, Clone)]
 pub struct Input {
     pub domain: PathBuf,
@@ -20,7 +20,7 @@ pub struct Input {
     pub directory: PathBuf,
 }
 
-/// Directory of the real files, if available.
+/// Returns the directory of the real files, if available.
 pub fn real() -> Option<PathBuf> {
     let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/real");
     if directory.is_dir() {
@@ -34,7 +34,7 @@ pub fn real() -> Option<PathBuf> {
     None
 }
 
-/// Exit status, standard output and standard error of a run.
+/// Runs the program. Returns its exit status, standard output and standard error.
 pub fn metaplan(arguments: &[&str]) -> (i32, String, String) {
     let output = Command::new(env!("CARGO_BIN_EXE_metaplan")).args(arguments).output().expect("it runs");
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
@@ -42,7 +42,7 @@ pub fn metaplan(arguments: &[&str]) -> (i32, String, String) {
 }
 
 impl Input {
-    /// Input files in a directory, with the directory of PLANTA's imports.
+    /// Returns input files in `directory`, with the directory of PLANTA's imports.
     pub fn new(directory: &Path, domain: &str, problem: &str, knowledge: &str) -> Self {
         Self {
             domain: directory.join(domain),
@@ -52,7 +52,7 @@ impl Input {
         }
     }
 
-    /// Arguments of a command on these files, with further ones.
+    /// Returns the command line of a command on these files, with further options.
     pub fn arguments<'a>(&'a self, command: &'a str, options: &[&'a str]) -> Vec<&'a str> {
         let path = |path: &'a Path| path.to_str().expect("UTF-8");
         let mut command_line = vec![command, path(&self.domain), path(&self.problem), "--quiet"];
@@ -74,7 +74,7 @@ impl Input {
     }
 }
 
-/// Texts of messages.
+/// Concatenates the texts of messages.
 pub fn text_of(messages: &[Message]) -> String {
     messages.iter().map(Message::text).collect()
 }

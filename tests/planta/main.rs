@@ -1,5 +1,5 @@
-//! Tests of missions in PLANTA's form, planned from its input files. The oracle is the complete state space of the files that PLANTA's
-//! converter writes for them.
+//! Tests of missions in PLANTA's form, planned from the input files of PLANTA's converter. The oracle is the
+//! complete state space of the converter's output files.
 
 mod brute;
 mod examples;

@@ -1,7 +1,8 @@
-//! Random tasks in PLANTA's form: the narrowed task, which the planner gets, and the exported one have the same state space.
+//! Random tasks in PLANTA's form: the narrowed task, which the planner gets, and the exported task have the
+//! same state space.
 //!
-//! Both are explored by brute force, independently of the planner. The exported task is the oracle of narrowing: it has all axioms, and
-//! nothing in it is settled or bounded.
+//! Both tasks are explored by brute force, independently of the planner. The exported task is the oracle of
+//! narrowing: it has all axioms, and no fact is evaluated in advance or restricted.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -16,10 +17,10 @@ use crate::situations::run;
 const CLASSES: [&str; 5] = ["Ca", "Cb", "Cc", "Cd", "Ce"];
 const PROPERTIES: [&str; 2] = ["pa", "pb"];
 const INDIVIDUALS: [&str; 2] = ["i1", "i2"];
-/// Maximum number of states. Larger tasks are skipped.
+/// Maximum number of states of a task. Larger tasks are skipped.
 const MAX_STATES: usize = 300;
 
-/// Texts of a task: knowledge base, domain and problem.
+/// Input texts of a task: knowledge base, domain and problem.
 struct Texts {
     knowledge: String,
     domain: String,
@@ -58,10 +59,10 @@ fn pick<'n>(random: &mut Rng, names: &[&'n str]) -> &'n str {
     names[random.usize(..names.len())]
 }
 
-/// Random axioms about classes and properties, and assertions.
+/// Returns random axioms about classes and properties, and random assertions.
 fn axioms(random: &mut Rng) -> String {
     let mut text = String::new();
-    // An individual without an assertion does not become an object.
+    // An individual without an assertion would not become an object.
     for individual in INDIVIDUALS {
         let _ = writeln!(text, "ClassAssertion(:Ce :{individual})");
     }
@@ -94,12 +95,12 @@ fn axioms(random: &mut Rng) -> String {
     text
 }
 
-/// Name of the predicate for inferred members of a class or property.
+/// Returns the name of the predicate for inferred members of a class or property.
 fn inferred(name: &str) -> String {
     format!("inferred-{}{}", name[..1].to_uppercase(), &name[1..])
 }
 
-/// A random condition on one or two variables.
+/// Returns a random condition on one or two variables.
 fn condition(random: &mut Rng, has_axiom: bool) -> String {
     let variable = pick(random, &["?x", "?x", "?y"]);
     match random.u8(..if has_axiom { 8 } else { 7 }) {
@@ -133,7 +134,7 @@ fn texts(seed: u64) -> Texts {
     } else {
         domain.push(')');
     }
-    // PLANTA's form is recognised by a conclusion in a condition, so the first action has one.
+    // PLANTA's form is recognised by an inferred predicate in a condition, so the first action has one.
     for number in 0..random.usize(2..5) {
         let mut conditions = vec![condition(&mut random, has_axiom)];
         if number == 0 {
@@ -161,20 +162,21 @@ fn texts(seed: u64) -> Texts {
     Texts { knowledge, domain, problem }
 }
 
-/// Result for a task that is small enough to be compared.
+/// Result for a task that was small enough for the comparison.
 struct Comparison {
     /// Length of a shortest plan; `None` if there is no plan.
     least_steps: Option<usize>,
 }
 
-/// Compares the state spaces of the narrowed and the exported task. Returns `None` if there are too many states.
+/// Compares the state spaces of the narrowed task and the exported task. Returns `None` if there are too many
+/// states.
 fn compare(texts: &Texts, name: &str) -> Option<Comparison> {
     let directory = tempfile::tempdir().expect("a directory");
     let mission = texts.write(directory.path()).mission();
     let (filled, _) = mission.filled().unwrap_or_else(|messages| panic!("{}", text_of(&messages)));
     let exported = Task::new(mission.domain(), &filled).explore(MAX_STATES)?;
     let (domain, problem) = mission.narrowed(&filled);
-    // A higher limit, so that additional states of a wrong narrowing are found instead of skipped.
+    // The limit is higher, so that additional states of a wrong narrowing are detected instead of skipped.
     let narrowed = Task::new(&domain, &problem).explore(2 * MAX_STATES).expect("as many states");
     let text = format!("{name}\n{}\n{}\n{}", texts.knowledge, texts.domain, texts.problem);
     assert_eq!(narrowed.least_steps, exported.least_steps, "{text}");
@@ -182,7 +184,7 @@ fn compare(texts: &Texts, name: &str) -> Option<Comparison> {
     Some(Comparison { least_steps: exported.least_steps })
 }
 
-/// Compares the first `tasks` tasks from a seed on that are small enough.
+/// Compares the first `tasks` sufficiently small tasks, with seeds from `seed` on.
 fn compare_many(seed: u64, tasks: usize) {
     let outcomes = (seed..).filter_map(|seed| compare(&texts(seed), &format!("seed {seed}")));
     let solvable = outcomes.take(tasks).filter(|comparison| comparison.least_steps.is_some()).count();
@@ -200,7 +202,8 @@ fn many_random_tasks_have_the_states_of_their_export() {
     compare_many(1_000, 10_000);
 }
 
-/// Conditions on conclusions are satisfied by all facts that imply them, not only by stated ones. So later actions can add such facts.
+/// A condition on an inferred predicate is satisfied by all facts that imply the inferred fact, not only by
+/// asserted ones. Therefore narrowing must keep actions that add such facts.
 #[test]
 fn conditions_on_conclusions_do_not_bound_stated_facts() {
     let knowledge = knowledge("ClassAssertion(:Ca :i1)\n");
@@ -223,7 +226,8 @@ fn conditions_on_conclusions_do_not_bound_stated_facts() {
     }
 }
 
-/// A class that only one of two actions requires does not restrict the arguments of facts that the other action adds.
+/// A class that only one of two actions requires must not restrict the arguments of facts that the other
+/// action adds.
 #[test]
 fn classes_required_by_one_action_do_not_guard_facts_of_others() {
     let knowledge = knowledge(
@@ -239,7 +243,8 @@ fn classes_required_by_one_action_do_not_guard_facts_of_others() {
     assert_eq!(comparison.least_steps, Some(2));
 }
 
-/// An observed fact is used although no action could have added it: the action requires `Ca`, which `i2` is not stated to be.
+/// An observed fact is used even if no action could have added it: the action requires `Ca`, which is not
+/// asserted for `i2`.
 #[test]
 fn observations_that_violate_a_guard_are_used() {
     let knowledge = knowledge(
@@ -260,7 +265,8 @@ fn observations_that_violate_a_guard_are_used() {
     assert_eq!(plan["steps"].as_array().map(Vec::len), Some(1), "{plan}");
 }
 
-/// The public domain with a conclusion instead of a class in one condition has the same optimum as its export, and a valid certificate.
+/// The public domain, with an inferred predicate instead of a class in one condition, has the same optimum as
+/// its export, and a valid certificate.
 #[test]
 fn public_domain_with_conclusions_has_the_optimum_of_its_export() {
     let Some(real) = real() else { return };

@@ -32,7 +32,7 @@ fn grid(real: &Path, nodes: &str, with_designs: bool) -> Input {
     }
 }
 
-/// Optimal plan as JSON. Fails unless optimality is proved.
+/// Returns the optimal plan as JSON. Panics unless optimality is proved.
 fn plan(input: &Input, options: &[&str]) -> Value {
     let (status, stdout, stderr) =
         metaplan(&input.arguments("plan", &[&["--format", "json"], options].concat()));
@@ -42,7 +42,7 @@ fn plan(input: &Input, options: &[&str]) -> Value {
     answer
 }
 
-/// Arguments of all steps.
+/// Returns the arguments of all steps of a plan.
 fn arguments_of_steps(answer: &Value) -> BTreeSet<String> {
     let steps = answer["steps"].as_array().expect("steps").iter();
     let arguments = steps.flat_map(|step| step["arguments"].as_array().expect("arguments"));
@@ -53,7 +53,8 @@ fn arguments_of_steps(answer: &Value) -> BTreeSet<String> {
 fn knowledge_base_determines_the_designs_of_plans() {
     let Some(real) = real() else { return };
     let input = extended(&real);
-    // Situation, number of steps, a design or action in the plan, and one that is not in the plan.
+    // Options, number of steps, a design or action in the plan, and a design or action that is not in the
+    // plan.
     let cases: [(&[&str], usize, &str, &str); 4] = [
         (&[], 7, "fd_all_thrusters", "fd_recover_thrusters"),
         (&["--fail", "c_thruster_1"], 7, "fd_recover_thrusters", "fd_all_thrusters"),
@@ -134,11 +135,11 @@ fn manifests_support_scenarios_explanations_and_the_loop() {
     assert!(murky.contains("fd_spiral_low"), "{murky}");
     let explained = run(&["explain", manifest, "fd_spiral_high", "--scenario", "murky", "--quiet"]);
     assert!(explained.contains("fd_spiral_high (f_generate_search_path) is not available"), "{explained}");
-    // The plan with this design is described, in which no other search design is used.
+    // The explanation describes the plan with this design, in which no other search design is used.
     let (_, hypothetical) = explained.split_once("if it were available").expect("what would be");
     assert!(hypothetical.contains("f_generate_search_path = fd_spiral_high"), "{explained}");
     assert!(!hypothetical.contains("fd_spiral_low"), "{explained}");
-    // A reported failure changes the facts that are settled before planning.
+    // A reported failure changes facts that are evaluated before planning.
     let answers =
         run_with(manifest, r#"{"event":"component_status","component":"c_thruster_1","status":"ERROR"}"#);
     let plans: Vec<&Value> = answers.iter().filter(|answer| answer["answer"] == "plan_found").collect();
@@ -148,12 +149,13 @@ fn manifests_support_scenarios_explanations_and_the_loop() {
     assert!(after.contains("fd_recover_thrusters") && !after.contains("fd_all_thrusters"), "{after:?}");
 }
 
-/// Answers of the loop with a manifest to one input line.
+/// Runs the loop with a manifest and returns its answers to one input line.
 fn run_with(manifest: &str, line: &str) -> Vec<Value> {
     run(&["run", manifest, "--quiet"], line)
 }
 
-/// Answers of a command to one input line. The line comes from a file, so that the loop sends the first plan before it reads the line.
+/// Runs a command and returns its answers to one input line. The line comes from a file, so that the loop
+/// sends the first plan before it reads the line.
 pub fn run(arguments: &[&str], line: &str) -> Vec<Value> {
     let mut input = tempfile::tempfile().expect("a temporary file");
     input.write_all(line.as_bytes()).and_then(|()| input.rewind()).expect("a line");
@@ -175,14 +177,14 @@ fn missing_knowledge_base_is_reported_with_a_remedy() {
     let (status, _, stderr) = metaplan(&["plan", &domain, &problem]);
     assert_ne!(status, 0);
     assert!(stderr.contains("P134") && stderr.contains("`--kb FILE`"), "{stderr}");
-    // With a knowledge base that lacks the names, the names are listed.
+    // If the knowledge base lacks the names, the message lists them.
     let unrelated = path(&real.join("owl/pddl_tomasys/pddl.owl"));
     let (status, _, stderr) = metaplan(&["plan", &domain, &problem, "--kb", &unrelated]);
     assert_ne!(status, 0);
     assert!(stderr.contains("M215") && stderr.contains("`inferred-SolvesF`"), "{stderr}");
 }
 
-/// Facts of a predicate in the initial state.
+/// Returns the argument lists of a predicate's facts in the initial state.
 fn facts<'p>(problem: &'p Problem, predicate: &str) -> Vec<Vec<&'p str>> {
     let name = |term: &'p Term| match term {
         Term::Variable(identifier) | Term::Constant(identifier) => identifier.name.as_str(),
@@ -199,8 +201,9 @@ fn facts<'p>(problem: &'p Problem, predicate: &str) -> Vec<Vec<&'p str>> {
 /// Accuracy and light of the designs in PLANTA's navigation mission, in hundredths, from its knowledge base.
 const DESIGNS: [(u32, u32); 6] = [(100, 0), (90, 0), (80, 0), (80, 100), (70, 0), (60, 0)];
 
-/// Least number of moves and reconfigurations, by breadth-first search over place and current design. A corridor requires accuracy and
-/// light. Among the designs that satisfy both requirements, the most accurate one must be current.
+/// Returns the minimum number of moves and reconfigurations, by breadth-first search over place and current
+/// design. A corridor requires a minimum accuracy and light. Among the designs that satisfy both requirements, the most
+/// accurate one must be current.
 fn least_with_designs(problem: &Problem) -> usize {
     let amount =
         |name: &str| (name.trim_end_matches("_decimal").parse::<f64>().expect("a number") * 100.0) as u32;
@@ -241,7 +244,7 @@ fn least_with_designs(problem: &Problem) -> usize {
     panic!("the goal is not reached")
 }
 
-/// Least number of moves, by breadth-first search.
+/// Returns the minimum number of moves, by breadth-first search.
 fn least_moves(problem: &Problem) -> usize {
     let corridors = facts(problem, "corridor");
     let goal = format!("{:?}", problem.goal);

@@ -1,4 +1,5 @@
-//! Tests of answers at a limit and of further plans: they contain the results of the elapsed time, and no false claims.
+//! Tests of answers at a time limit and of alternative plans: they contain the results found by then, and no
+//! false claims.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -9,8 +10,8 @@ use serde_json::{Value, json};
 use crate::common::{copy_folder, edit, metaplan, metaplan_in, root};
 use crate::probabilistic::shared;
 
-/// A copy of the mission `ward`, with its larger problem if `large`. Returns `None` if the shared data are not
-/// available.
+/// Copies the mission `ward` into a temporary directory, with its larger problem if `large`. Returns `None`
+/// if the shared data are not available.
 fn ward(large: bool) -> Option<tempfile::TempDir> {
     let folder = shared("field3/newcomer3/ward")?;
     let directory = tempfile::tempdir().expect("a directory");
@@ -21,7 +22,7 @@ fn ward(large: bool) -> Option<tempfile::TempDir> {
     Some(directory)
 }
 
-/// Missions with several cheapest plans: directories, and their manifests.
+/// Returns missions with several cheapest plans: directory, and manifest in this directory.
 fn missions() -> Vec<(PathBuf, &'static str)> {
     let ward = ward(false).map(|directory| (directory.keep(), "mission.toml"));
     let shipped = ["missions/templates/warehouse/mission.toml", "missions/ugv.toml", "missions/uuv.toml"];
@@ -33,7 +34,8 @@ fn plan(directory: &Path, arguments: &[&str]) -> Value {
     metaplan_in(directory, &command, "").json()
 }
 
-/// Each further plan is valid, distinct, and as cheap as the first one. There are three unless fewer are proved to exist.
+/// Each alternative plan is valid, distinct, and as cheap as the first plan. There are three alternatives
+/// unless the program proves that fewer exist.
 #[test]
 fn three_alternatives_are_found_within_the_limit() {
     for (directory, mission) in missions() {
@@ -58,7 +60,8 @@ fn three_alternatives_are_found_within_the_limit() {
     }
 }
 
-/// The sequential plan, with gaps, is also a concurrent plan. So a concurrent plan must not cost more.
+/// The sequential plan, with gaps between its actions, is also a concurrent plan. So an optimal concurrent
+/// plan must not cost more.
 #[test]
 fn overlapping_plans_cost_no_more_than_the_sequential_one() {
     for (directory, mission) in missions() {
@@ -100,7 +103,7 @@ fn partial_explanations_are_printed_on_a_signal() {
         .stderr(Stdio::null())
         .spawn()
         .expect("the program starts");
-    // Long enough for the reasons, which come first, but not for planning.
+    // The sleep suffices for the reasons, which are computed first, but not for planning.
     std::thread::sleep(Duration::from_secs(3));
     Command::new("kill").args(["-TERM", &child.id().to_string()]).status().expect("kill");
     let status = child.wait().expect("it ends");
@@ -111,7 +114,7 @@ fn partial_explanations_are_printed_on_a_signal() {
     assert!(text.contains("limit was reached"), "{text}");
 }
 
-/// An incomplete front contains the points found until the limit, and is not reported as optimal.
+/// An incomplete Pareto front contains the points found until the limit, and is not reported as optimal.
 #[test]
 fn fronts_at_a_limit_have_the_points_found_so_far() {
     let Some(directory) = ward(true) else { return };

@@ -14,13 +14,13 @@ const NAMES: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "chro
 /// Screen widths in pixels: a desktop and a telephone.
 const WIDTHS: [u32; 2] = [1280, 400];
 
-/// A mission with two functions and a tank. The robot uses ways repeatedly in both directions, and recharges.
+/// Mission with two functions and a tank. The robot uses ways repeatedly in both directions, and recharges.
 const GREENHOUSE: &str = "tests/program/greenhouse/mission.toml";
 
-/// Script of the surrounding page. It collects the results for the pages in the frames.
+/// Script of the page that surrounds the tested pages. It collects the results for the pages in the frames.
 const QUESTIONS: &str = include_str!("browser.js");
 
-/// Path of the browser. Prints the reason for skipping if no browser is installed.
+/// Returns the path of the browser. Prints the reason for skipping if no browser is installed.
 pub fn browser() -> Option<PathBuf> {
     let path = std::env::var_os("PATH")?;
     let folders: Vec<PathBuf> = std::env::split_paths(&path).collect();
@@ -32,7 +32,7 @@ pub fn browser() -> Option<PathBuf> {
     program
 }
 
-/// Opens a page. Returns the console messages and the final document.
+/// Opens a page in the browser. Returns the console messages and the final document.
 fn open(browser: &Path, page: &Path, profile: &Path) -> (Vec<String>, String) {
     let output = Command::new(browser)
         .args(["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--hide-scrollbars"])
@@ -51,13 +51,14 @@ fn open(browser: &Path, page: &Path, profile: &Path) -> (Vec<String>, String) {
     (console, String::from_utf8_lossy(&output.stdout).into_owned())
 }
 
-/// Escapes a text for an attribute value.
+/// Escapes a text for use in an attribute value.
 fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('"', "&quot;")
 }
 
-/// Opens a page at each width and asserts that there are no errors. The widths are frames of one surrounding page, because the start of
-/// a browser takes seconds. Returns the results for the last width.
+/// Opens a page at each width of [`WIDTHS`] and asserts that there are no errors. The widths are frames of
+/// one surrounding page, because the start of a browser takes seconds. Returns the results for the last
+/// width.
 fn check(browser: &Path, name: &str, page: &str) -> Value {
     let folder = tempfile::tempdir().expect("a folder");
     let frames = WIDTHS.map(|width| {
@@ -112,8 +113,8 @@ fn pages_of_plans_work_in_a_browser() {
     }
 }
 
-/// Ways that are used in both directions show the numbers of all their steps, each next to its own arrow; `check` tests this at both
-/// widths. Two plans are shown on a common axis.
+/// Ways that are used in both directions show the numbers of all their steps, each next to its own arrow;
+/// `check` tests this at both widths. Two plans are shown on a common time axis.
 #[test]
 fn ways_in_both_directions_and_late_steps_are_visible() {
     let Some(browser) = browser() else { return };
@@ -143,7 +144,7 @@ fn ways_in_both_directions_and_late_steps_are_visible() {
     );
 }
 
-/// Pages of fronts, comparisons, simulations and journals.
+/// Pages of Pareto fronts, comparisons, simulations and journals also work in a browser.
 #[test]
 fn other_pages_work_in_a_browser() {
     let Some(browser) = browser() else { return };
@@ -174,7 +175,8 @@ fn other_pages_work_in_a_browser() {
     assert!(results["unfolding"].as_u64() > Some(1), "{results}");
 }
 
-/// The page of a run as one self-contained file: style and script inline, and the program's responses as constants.
+/// Returns the page of a run as one self-contained file: style and script inline, and the program's responses
+/// as constants.
 fn self_contained_page(run: &Run, lines: &[String], has_ended: bool) -> String {
     let get = |path: &str| run.get(path, "").1;
     let text = |text: String| Value::String(text).to_string().replace('<', "\\u003c");
@@ -228,8 +230,8 @@ fn the_page_of_a_run_works_in_a_browser() {
     run.end();
 }
 
-/// The headline reports "no plan" exactly as long as there is no plan. This holds for a client from the beginning, for a client that
-/// connects after most lines were discarded, and at the end.
+/// The headline reports "no plan" as long as there is no plan, and no longer. This holds for a client from
+/// the beginning, for a client that connects after most lines were discarded, and at the end.
 #[test]
 fn headline_shows_whether_there_is_a_plan() {
     let Some(browser) = browser() else { return };
@@ -291,7 +293,7 @@ fn headline_shows_whether_there_is_a_plan() {
     run.end();
 }
 
-/// Checks that `check` detects each kind of error.
+/// The function `check` detects each kind of error in a page.
 #[test]
 fn page_errors_are_detected() {
     let Some(browser) = browser() else { return };

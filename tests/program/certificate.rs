@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use crate::common::{Outcome, metaplan, metaplan_in, root, verify_in};
 
-/// Writes a certificate and returns its directory.
+/// Runs the program with `--certificate` and returns the directory of the certificate.
 pub fn certificate(directory: &Path, arguments: &[&str]) -> String {
     let target = directory.join("certificate").display().to_string();
     let plan_arguments: Vec<&str> = arguments.iter().copied().chain(["--certificate", &target]).collect();
@@ -49,7 +49,8 @@ fn unsolvability_has_a_certificate() {
         )
     };
     std::fs::write(directory.path().join("d.pddl"), domain).expect("a file");
-    // The first goal is unreachable even in the delete relaxation, the second one only with deletions.
+    // The first goal is unreachable even in the delete relaxation; the second goal is unreachable only
+    // because of deletions.
     for (name, goal) in [("relaxed", "(at c)"), ("searched", "(and (at a) (at b))")] {
         std::fs::write(directory.path().join("p.pddl"), problem(goal)).expect("a file");
         let arguments = ["plan", "d.pddl", "p.pddl", "--certificate", name];
@@ -105,7 +106,7 @@ pub fn change(certificate: &str, name: &str, edit: &dyn Fn(String) -> String) {
     std::fs::write(manifest, document.to_string()).expect("a manifest");
 }
 
-/// A short XML text that expands to 10^12 characters ("billion laughs").
+/// Returns a short XML text that expands to 10^12 characters ("billion laughs").
 fn bomb() -> String {
     let entity = |level: u32| format!("<!ENTITY a{} \"{}\">", level + 1, format!("&a{level};").repeat(10));
     let entities: String = (0..11).map(entity).collect();
@@ -157,7 +158,8 @@ fn modified_certificates_are_rejected_with_the_first_error() {
             "plan        failed",
         ),
         ("problem.pddl", |text| text.replace("(fd_available fd_amcl_kinect)", ""), "plan        failed"),
-        // A relaxed task still agrees with the PDDL files, but the argument does not hold for it.
+        // A relaxed task still agrees with the PDDL files, but the argument (the proof of the bound) does not
+        // hold for it.
         ("task.json", |text| text.replacen("\"constant\":", "\"constant\":1", 1), "argument    failed"),
         (
             "task.json",
@@ -314,8 +316,9 @@ fn malformed_certificates_are_rejected() {
     );
 }
 
-/// Needs `rate`, an independent checker of DRAT proofs, at the path `METAPLAN_RATE`. Install it with
-/// `cargo install rate --version 0.3.0 --root rate` and set `METAPLAN_RATE=rate/bin/rate`.
+/// The proofs are accepted by `rate`, an independent checker of DRAT proofs. The test needs `rate` at the
+/// path `METAPLAN_RATE`: `cargo install rate --version 0.3.0 --root rate`, then
+/// `METAPLAN_RATE=rate/bin/rate`.
 #[test]
 #[ignore = "needs a proof checker"]
 fn external_checker_accepts_the_proofs() {
@@ -348,7 +351,7 @@ pub const MISSIONS: [&[&str]; 5] = [
     &["plan", "missions/ugv.toml", "--fail", "c_kinect", "--set", "robot_at=wp2"],
 ];
 
-/// A claim about another metric than the one of the files must be rejected.
+/// A claim about a metric that is not the metric of the files must be rejected.
 #[test]
 fn claims_must_use_the_metric_of_the_files() {
     let directory = tempfile::tempdir().expect("a directory");
@@ -370,7 +373,7 @@ fn claims_must_use_the_metric_of_the_files() {
     document["refutation"] = json!({ "none": "taken away" });
     std::fs::write(&manifest, document.to_string()).expect("a manifest");
     assert_eq!(verify(&target).status, 0);
-    // No action has a duration, so the longer path is as good if total time is the metric.
+    // No action has a duration, so the longer path would be equally good if total time were the metric.
     change(&target, "plan.txt", &|_| "(go a b)\n(go b c)\n".to_owned());
     change(&target, "task.json", &|text| {
         text.replace("\"cost\":{\"constant\":1}", "\"cost\":{\"constant\":0}")
@@ -381,7 +384,7 @@ fn claims_must_use_the_metric_of_the_files() {
     std::fs::write(&manifest, text.replace("\"metric\":\"1\"", "\"metric\":\"0\"")).expect("a manifest");
     let outcome = verify(&target);
     assert_eq!(outcome.status, 30, "{outcome:#?}");
-    // A task with lower costs still yields valid lower bounds, but no plan of the files attains this cost.
+    // A task with lower costs still yields valid lower bounds, but no plan of the files attains such a cost.
     assert!(outcome.stdout.contains("plan        failed: its metric is 2"), "{outcome:#?}");
 }
 
@@ -431,8 +434,8 @@ fn unsupported_features_get_no_certificate() {
     assert!(!directory.path().join("c").exists());
 }
 
-/// A conflict between a conditional and an unconditional start effect rules out only the case in which the condition holds. If the
-/// grounder lost the whole action, no certificate could be written.
+/// A conflict between a conditional and an unconditional start effect excludes only the case in which the
+/// condition holds. If the grounder lost the whole action, no certificate could be written.
 #[test]
 fn a_lost_action_is_never_certified() {
     let action = "(:durative-action a :parameters () :duration (= ?duration 2) :condition (and)

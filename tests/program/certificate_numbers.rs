@@ -1,9 +1,10 @@
-//! Certificates of plans that are computed in fractions, and of formulas with duplicate literals.
+//! Tests of certificates of plans that are computed with fractions, and of formulas with duplicate literals.
 
 use crate::certificate::change;
 use crate::common::{metaplan_in, verify_in};
 
-/// Products that exceed all machine integers and a scaling effect force the planner to compute in fractions.
+/// Products that exceed all machine integers, together with a scaling effect, force the planner to compute
+/// with fractions.
 #[test]
 fn plans_found_in_fractions_have_certificates() {
     let directory = tempfile::tempdir().expect("a directory");
@@ -70,7 +71,8 @@ fn duplicate_literals_are_certified() {
     assert_eq!(outcome.status, 0, "{outcome:#?}");
 }
 
-/// A start that is too early by less than the tolerance is moved to the permitted time, and the plan is judged there.
+/// A start that is too early by less than the tolerance is moved to the permitted time, and the plan is
+/// validated with the moved start.
 #[test]
 fn tolerance_does_not_move_plans_into_a_window() {
     let directory = tempfile::tempdir().expect("a directory");

@@ -1,4 +1,4 @@
-//! Tests of `metaplan check`: refused inputs, and policies in files.
+//! Tests of `metaplan check`: rejected inputs, and policies in files.
 
 use std::path::Path;
 

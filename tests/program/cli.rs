@@ -2,7 +2,8 @@
 
 use crate::common::{Outcome, copy_of_mission, edit, metaplan, metaplan_in, root};
 
-/// Checks the exit status, and that standard error or output contains each text. Internal errors (panic, M170) always fail.
+/// Checks the exit status, and that standard error or output contains each text. An internal error (panic,
+/// M170) always fails the check.
 fn check(outcome: &Outcome, status: i32, texts: &[&str]) {
     assert_eq!(outcome.status, status, "{outcome:#?}");
     for text in texts {
@@ -24,7 +25,7 @@ const PROBLEM: &str = "(define (problem p) (:domain d)
   (:init (at a) (way a b) (way b c))
   (:goal (at c)))";
 
-/// Plans with a domain and a problem in a temporary directory.
+/// Runs `metaplan plan` with a domain and a problem in a temporary directory.
 fn plan(domain: &str, problem: &str, arguments: &[&str]) -> Outcome {
     let directory = tempfile::tempdir().expect("a temporary directory");
     std::fs::write(directory.path().join("domain.pddl"), domain).expect("a file");
@@ -86,7 +87,7 @@ fn pddl_errors_are_reported_with_their_position() {
     check(&plan(&DOMAIN[..DOMAIN.len() - 1], PROBLEM, &[]), 3, &["domain.pddl:1:1"]);
     check(&plan(DOMAIN, &PROBLEM.replace("way b c", "way b d"), &[]), 3, &["problem.pddl:3:"]);
     check(&plan(DOMAIN, "", &[]), 3, &["problem.pddl"]);
-    // Several errors are reported together, also as JSON.
+    // Several errors are reported together, in JSON as well.
     let two_errors = PROBLEM.replace("(at a)", "(on a)").replace("(way a b)", "(rail a b)");
     let outcome = plan(DOMAIN, &two_errors, &["--format", "json"]);
     check(&outcome, 3, &[]);
@@ -359,7 +360,7 @@ fn all_solvers_give_the_same_answer() {
 fn claims_of_external_solvers_are_not_proofs() {
     let directory = tempfile::tempdir().expect("a directory");
     let script = directory.path().join("solver.sh");
-    // The script answers correctly only during the test whether it is a usable solver.
+    // The script answers correctly only while the program tests whether it is a usable solver.
     let text = "case $(grep -vc '^p') in 1) printf 's SATISFIABLE\\nv 1 0\\n'; exit 10;; *) echo s UNSATISFIABLE; exit $1;; esac";
     std::fs::write(&script, text).expect("a file");
     let plan = |status: &str, options: &[&str]| {
@@ -368,7 +369,7 @@ fn claims_of_external_solvers_are_not_proofs() {
     };
     let unchecked = plan("20", &["--horizon", "2"]);
     check(&unchecked, 11, &["no plan with up to 2 steps, by the word of `sh ", "solver.sh 20`, unchecked"]);
-    // A claim that the search has proved does not depend on the external solver.
+    // A claim that the search has already proved does not depend on the external solver.
     check(&plan("20", &[]), 0, &["optimal, proved: the"]);
     check(&plan("7", &[]), 2, &["does not serve", "it failed: exit status: 7"]);
 }
@@ -388,7 +389,7 @@ fn memory_is_limited() {
     check(&suboptimal, 1, &["ask_for_help", "cost 1000", "not proved optimal"]);
 }
 
-/// The 15-puzzle, which no search exhausts.
+/// Returns the domain of the 15-puzzle, whose state space no search exhausts, with an additional action.
 fn sliding_tiles(extra_action: &str) -> String {
     let goal_atoms: Vec<String> = (1..16).map(|tile| format!("(on t{tile} c{tile})")).collect();
     let constants: Vec<String> = (1..16).map(|tile| format!("t{tile} - tile c{tile} - cell")).collect();
@@ -450,7 +451,8 @@ fn alternatives_are_listed_with_forced_steps() {
     assert_eq!(answer["alternatives"]["forced"][0]["action"].as_bool(), Some(false), "{answer:#}");
 }
 
-/// A free action whose effect nothing reads yields further plans of equal cost. They are not counted.
+/// A free action whose effect nothing reads yields further plans of equal cost. Such plans do not count as
+/// alternatives.
 #[test]
 fn alternatives_exclude_idle_actions() {
     let domain = "(define (domain d) (:predicates (p) (q) (seen)) (:functions (total-cost))

@@ -15,7 +15,8 @@ const DOMAIN: &str = "(define (domain d) (:requirements :typing) (:types place i
   (:action put :parameters (?i - item ?p - place) :precondition (and (at ?p) (has ?i))
     :effect (and (lies ?i ?p) (not (has ?i)) (free))))";
 
-/// A problem that takes more than a few seconds to solve: parcels on a grid, each with another destination.
+/// Returns a problem that takes more than a few seconds to solve: parcels on a grid, each with a different
+/// destination.
 fn parcels() -> String {
     let (side, count) = (9, 14);
     let mut text = "(define (problem p) (:domain d) (:objects".to_owned();
@@ -66,7 +67,7 @@ fn ready_is_followed_by_progress_during_search() {
     let kinds: Vec<&str> = answers.iter().filter_map(|answer| answer["answer"].as_str()).collect();
     assert_eq!(kinds[..3], ["ready", "planning", "planning"], "{kinds:?}");
     assert_eq!(answers[2]["seconds"], 2, "{answers:#?}");
-    // Bound and cost are reported only after grounding, once the search has begun.
+    // Bound and cost are reported only after grounding, when the search has begun.
     for planning in answers.iter().filter(|answer| answer["answer"] == "planning") {
         let (bound, cost) = (planning["lower_bound"].as_f64(), planning["cost"].as_f64());
         assert!(bound.is_none_or(|bound| bound > 0.0), "{planning}");
@@ -78,7 +79,7 @@ fn ready_is_followed_by_progress_during_search() {
     assert!(kinds[..end].contains(&"plan_requested"), "{kinds:?}");
 }
 
-/// A domain for which a few objects yield hundreds of thousands of operators.
+/// Domain for which a few objects yield hundreds of thousands of ground operators.
 const WIDE: &str = "(define (domain wide) (:predicates (p ?a ?b) (q ?a ?b ?c ?d) (done))
     (:action a :parameters (?a ?b ?c ?d) :precondition (and (p ?a ?b) (p ?c ?d)) :effect (q ?a ?b ?c ?d))
     (:action b :parameters (?a ?b ?c ?d) :precondition (q ?a ?b ?c ?d) :effect (done)))";

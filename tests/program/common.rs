@@ -1,4 +1,4 @@
-//! Functions that run the program like a user, and prepare files for it.
+//! Functions that run the program as a user would, and that prepare files for it.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -21,7 +21,8 @@ impl Outcome {
     }
 }
 
-/// The messages on standard error, one line `PLACE: SEVERITY[CODE]: SENTENCE` each, without source lines and help.
+/// Returns the messages on standard error, one line `PLACE: SEVERITY[CODE]: SENTENCE` each, without source
+/// lines and help.
 pub fn headlines(stderr: &str) -> String {
     let mut lines: Vec<String> = Vec::new();
     for line in stderr.lines() {
@@ -35,8 +36,8 @@ pub fn headlines(stderr: &str) -> String {
     lines.iter().fold(String::new(), |text, line| text + line + "\n")
 }
 
-/// Removes the progress lines, such as `planning, 3 s: cost 4`. They are printed at intervals of seconds, so their number depends on the
-/// load of the machine.
+/// Removes progress lines, such as `planning, 3 s: cost 4`. Progress lines are printed at intervals of
+/// seconds, so their number depends on the load of the machine.
 pub fn without_progress(text: &str) -> String {
     let is_progress = |line: &&str| {
         let Some((word, remainder)) = line.trim_end().split_once(", ") else { return false };
@@ -47,7 +48,7 @@ pub fn without_progress(text: &str) -> String {
     text.split_inclusive('\n').filter(|line| !is_progress(line)).collect()
 }
 
-/// Root directory of the project.
+/// Returns the root directory of the project.
 pub fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
 }
@@ -57,8 +58,9 @@ pub fn metaplan(arguments: &[&str]) -> Outcome {
     metaplan_in(&root(), arguments, "")
 }
 
-/// Path of the tested program: built by cargo for the tests, or `metaplan` in the directory `METAPLAN_PROGRAMS`.
-/// CI sets the directory of `cargo install`, as these tests take a fraction of the time with a release build.
+/// Returns the path of the tested program: built by cargo for the tests, or `metaplan` in the directory
+/// `METAPLAN_PROGRAMS`. CI sets the directory of `cargo install`, because these tests take a fraction of the
+/// time with a release build.
 pub fn program() -> PathBuf {
     match std::env::var_os("METAPLAN_PROGRAMS") {
         Some(directory) => Path::new(&directory).join(format!("metaplan{}", std::env::consts::EXE_SUFFIX)),
@@ -71,7 +73,8 @@ pub fn metaplan_in(directory: &Path, arguments: &[&str], input: &str) -> Outcome
     outcome(&program(), directory, arguments, input)
 }
 
-/// Runs `metaplan verify` and `metaplan-verify` in a directory. Their outcomes must be equal.
+/// Runs `metaplan verify` and `metaplan-verify` in a directory. Asserts that their outcomes are equal and
+/// returns the outcome.
 pub fn verify_in(directory: &Path, arguments: &[&str]) -> Outcome {
     let arguments_of_subcommand: Vec<&str> = ["verify"].iter().chain(arguments).copied().collect();
     let subcommand = metaplan_in(directory, &arguments_of_subcommand, "");
@@ -80,8 +83,9 @@ pub fn verify_in(directory: &Path, arguments: &[&str]) -> Outcome {
     subcommand
 }
 
-/// Path of the program `metaplan-verify`. Cargo does not build it for these tests, as it belongs to another package. So it is built
-/// here, through the test of its package, with the same options. This avoids a second compilation of the dependencies.
+/// Returns the path of the program `metaplan-verify`. Cargo does not build this program for these tests,
+/// because it belongs to another package. It is therefore built here, through the test of its package, with
+/// the same options. This avoids a second compilation of the dependencies.
 pub fn verifier() -> &'static Path {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
     PROGRAM.get_or_init(|| {
@@ -102,7 +106,8 @@ pub fn verifier() -> &'static Path {
 /// Runs a program in a directory with a text as standard input.
 pub fn outcome(program: &Path, directory: &Path, arguments: &[&str], input: &str) -> Outcome {
     use std::io::{Seek as _, Write as _};
-    // A file instead of a pipe: `run` then answers each line before it reads the next one.
+    // Standard input is a file instead of a pipe, so that `run` answers each line before it reads the next
+    // one.
     let mut stdin = tempfile::tempfile().expect("a file");
     stdin.write_all(input.as_bytes()).and_then(|()| stdin.rewind()).expect("written");
     let child = Command::new(program)
@@ -122,7 +127,8 @@ pub fn outcome(program: &Path, directory: &Path, arguments: &[&str], input: &str
     }
 }
 
-/// Processor time of a run in seconds (user and system), as the median of three runs. Needs python3.
+/// Returns the processor time of a run in seconds (user and system), as the median of three runs. Needs
+/// python3.
 pub fn processor_time(directory: &Path, arguments: &[&str]) -> f64 {
     let script = "import resource as r, subprocess as s, sys\n\
         def once():\n \
@@ -138,7 +144,7 @@ pub fn processor_time(directory: &Path, arguments: &[&str]) -> f64 {
     text.trim().parse().unwrap_or_else(|error| panic!("{error}: {output:?}"))
 }
 
-/// A temporary directory with an editable copy of a mission's files.
+/// Copies a mission's files into a temporary directory in which they can be edited.
 pub fn copy_of_mission(name: &str) -> tempfile::TempDir {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let files = [
@@ -177,7 +183,8 @@ pub fn edit(directory: &Path, file: &str, old: &str, new: &str) {
     std::fs::write(path, text.replace(old, new)).expect("the file is written");
 }
 
-/// Steps as `action arguments | design, design`; functions and designs are removed from the arguments.
+/// Formats the steps of an answer as `action arguments | design, design`. Functions and designs are removed
+/// from the arguments.
 pub fn steps(answer: &Value) -> Vec<String> {
     let step = |step: &Value| {
         let configuration = step["configuration"].as_object().expect("a configuration");

@@ -1,4 +1,5 @@
-//! Tests of `metaplan configure` and `metaplan run --configure`: SUAVE's knowledge base, and refused arguments.
+//! Tests of `metaplan configure` and `metaplan run --configure` with SUAVE's knowledge base, and of rejected
+//! arguments.
 
 #![allow(clippy::print_stdout)] // A skipped test prints the reason.
 

@@ -1,10 +1,12 @@
-//! Tests of warnings and refusals: models that mean less than intended, files of the wrong kind, hostile files.
+//! Tests of warnings and rejections: models that mean less than intended, files of the wrong kind, hostile
+//! files.
 
 use std::path::Path;
 
 use crate::common::{Outcome, copy_of_mission, edit, metaplan, metaplan_in, root};
 
-/// Plans a copy of a mission after a replacement in one file. Standard error must contain all `words`.
+/// Runs `metaplan plan` on a copy of a mission after a replacement in one file. Standard error must contain
+/// all `words`.
 fn check(mission: &str, (file, old, new): (&str, &str, &str), words: &[&str]) -> Outcome {
     let copy = copy_of_mission(mission.trim_end_matches("_plain"));
     for plain in [
@@ -83,7 +85,8 @@ fn unbound_names_of_plain_domains_are_reported() {
     check("ugv_plain", (domain, old, "(batery_usage)"), &["M206", "batery_usage", "plain.pddl"]);
 }
 
-/// The ground vehicle as a plain domain, with a function for the battery usage of changed designs.
+/// Creates the ground vehicle's mission with a plain domain, in which a function counts the battery usage of
+/// newly chosen designs.
 fn changing_mission() -> tempfile::TempDir {
     let copy = copy_of_mission("ugv");
     let read = |file: &str| std::fs::read_to_string(root().join(file)).expect("text");
@@ -98,7 +101,8 @@ fn changing_mission() -> tempfile::TempDir {
     copy
 }
 
-/// Costs of design changes are supported in increase and decrease effects. Elsewhere they would have no effect and are refused.
+/// Costs of design changes are supported in increase and decrease effects. Elsewhere they would have no
+/// effect and are rejected.
 #[test]
 fn design_change_costs_are_counted_or_refused() {
     let outcome = |place: &str, replacement: &str| {

@@ -6,8 +6,8 @@ use std::sync::OnceLock;
 
 use crate::common::root;
 
-/// Folder of the compiled examples. Cargo does not build the examples of other packages for these tests, so they are built here with the
-/// same options. This avoids a second compilation of the dependencies.
+/// Returns the folder of the compiled examples. Cargo does not build the examples of other packages for these
+/// tests, so they are built here with the same options. This avoids a second compilation of the dependencies.
 fn folder() -> &'static Path {
     static FOLDER: OnceLock<std::path::PathBuf> = OnceLock::new();
     FOLDER.get_or_init(|| {
@@ -24,7 +24,7 @@ fn folder() -> &'static Path {
     })
 }
 
-/// Output of an example.
+/// Runs an example and returns its output.
 fn printed(example: &str) -> String {
     let program = folder().join(format!("{example}{}", std::env::consts::EXE_SUFFIX));
     let output = Command::new(program).current_dir(root()).output().expect("the example starts");

@@ -14,7 +14,7 @@ fn explain(arguments: &[&str]) -> Value {
     answer
 }
 
-/// Name, relation, bound and resulting cost of each change.
+/// Returns the name, the relation, the bound and the resulting cost of each change in an answer.
 fn changes(answer: &Value) -> Vec<Value> {
     let change =
         |change: &Value| json!([change["name"], change["relation"], change["bound"], change["then"]["cost"]]);
@@ -34,7 +34,7 @@ fn why_not_another_design() {
     assert_eq!(figures, json!([true, 408, 516, 408, []]));
     assert_eq!(changes(&answer), [json!(["c_lidar", "failed", null, 408])]);
     let answer = explain(&["missions/ugv.toml", "fd_amcl_kinect"]);
-    // The second design with the Kinect is the next best.
+    // The second-best design is the other one with the Kinect.
     let figures = json!([answer["alone"]["cost"], answer["without"]["cost"], answer["used"]]);
     assert_eq!(figures, json!([408, 416, [1, 2, 3, 4]]));
     let expected = [json!(["c_kinect", "failed", null, 516]), json!(["ambient_light", "above", 0.8, 516])];

@@ -1,4 +1,5 @@
-//! Tests of `metaplan explain` for designs with several causes. The oracle tries every subset of failed components and measured values.
+//! Tests of `metaplan explain` for designs with several causes of unavailability. The oracle tries every
+//! subset of failed components and measured values.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -21,7 +22,7 @@ impl Random {
 const COMPONENTS: u64 = 4;
 const ATTRIBUTES: u64 = 2;
 
-/// A bound on an attribute: upper if `is_most`, otherwise lower.
+/// A bound on an attribute: an upper bound if `is_most`, otherwise a lower bound.
 #[derive(Debug, Clone, Copy)]
 struct Bound {
     attribute: u64,
@@ -41,12 +42,13 @@ struct Design {
     components: BTreeSet<u64>,
     bounds: Vec<Bound>,
     effort: u64,
-    /// Two components whose simultaneous failure also makes the design unavailable.
+    /// Two components; if both have failed, the design is unavailable.
     both: Option<(u64, u64)>,
 }
 
 impl Design {
-    /// Availability by definition: required components work, bounds hold, and not both components of `both` have failed.
+    /// Returns `true` if the design is available by definition: required components work, bounds hold, and
+    /// not both components of `both` have failed.
     fn is_available(&self, failed: &BTreeSet<u64>, measured: &[u64]) -> bool {
         self.components.is_disjoint(failed)
             && self.bounds.iter().all(|bound| bound.holds(measured))
@@ -54,7 +56,7 @@ impl Design {
     }
 }
 
-/// Designs of one function in a situation.
+/// The designs of one function, with the failed components and the measured values.
 #[derive(Debug)]
 struct World {
     designs: Vec<Design>,
@@ -136,7 +138,7 @@ impl World {
         }
     }
 
-    /// Command-line options that establish a situation.
+    /// Returns the command-line options that establish a situation: failed components and measured values.
     fn options(failed: &BTreeSet<u64>, measured: &[u64]) -> Vec<String> {
         let fail = failed.iter().flat_map(|component| ["--fail".to_owned(), format!("c_{component}")]);
         let set = measured.iter().zip(0..);
@@ -144,8 +146,8 @@ impl World {
         fail.chain(set).collect()
     }
 
-    /// Minimal sets of changes that make the design available, by names, with the least effort of an available design afterwards.
-    /// Computed by brute force over all subsets.
+    /// Returns the minimal sets of changes that make the design available, by names. Each comes with the
+    /// least effort of an available design after these changes. Computed by brute force over all subsets.
     fn repairs(&self, design: &Design) -> BTreeSet<(BTreeSet<String>, Option<u64>)> {
         let broken: Vec<Bound> =
             design.bounds.iter().copied().filter(|bound| !bound.holds(&self.measured)).collect();
@@ -179,7 +181,8 @@ impl World {
     }
 }
 
-/// Checks all designs. Returns the greatest number of causes and of repairs of an unavailable design.
+/// Compares the answers for all designs of a random world with the oracle. Returns the greatest number of
+/// causes and the greatest number of repairs of an unavailable design.
 fn check(seed: u64) -> (usize, usize) {
     let world = World::random(seed);
     let directory = tempfile::tempdir().expect("a directory");
@@ -208,7 +211,7 @@ fn check(seed: u64) -> (usize, usize) {
             .collect();
         let expected = world.repairs(design);
         assert_eq!(repair_sets, expected, "seed {seed}, {name}: {world:#?}");
-        // A change is reported as sufficient exactly if it is a repair by itself.
+        // A change is reported as sufficient if and only if it alone is a repair.
         for change in list(&answer["changes"]) {
             let single_change = BTreeSet::from([change["name"].as_str().expect("a name").to_owned()]);
             let suffices = expected.iter().any(|(names, _)| *names == single_change);

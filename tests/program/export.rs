@@ -1,4 +1,4 @@
-//! Tests of `metaplan export`: input for other planners with the same optimum as the mission.
+//! Tests of `metaplan export`: the exported input for other planners has the same optimum as the mission.
 
 use crate::common::{metaplan, metaplan_in, root};
 
@@ -51,7 +51,7 @@ fn exported_files_are_normalised() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     std::fs::write(directory.path().join("d.pddl"), DOMAIN).expect("a file");
     std::fs::write(directory.path().join("p.pddl"), PROBLEM).expect("a file");
-    // The domain mentions `a`, which is an object of the problem. The export declares it as a constant.
+    // The domain mentions `a`, which is an object of the problem. The export declares `a` as a constant.
     let arguments = ["export", "d.pddl", "p.pddl", "--to", "pddl", "--quiet", "--format", "json"];
     let outcome = metaplan_in(directory.path(), &arguments, "");
     assert_eq!(outcome.status, 0, "{outcome:#?}");
@@ -89,8 +89,9 @@ fn unwritable_targets_are_reported() {
     assert_eq!(metaplan(&["export", "missions/ugv.toml"]).status, 2);
 }
 
-/// Validates plans of LPG for exported files, and parses the files with the unified planning framework. Needs a Python with both
-/// (`python3 -m venv peers; peers/bin/pip install unified-planning up-lpg`) at the path `METAPLAN_PEERS=peers/bin/python`.
+/// LPG solves the exported files and its plans are valid, and the Unified Planning framework parses the
+/// files. Needs a Python with both (`python3 -m venv peers; peers/bin/pip install unified-planning up-lpg`)
+/// at the path `METAPLAN_PEERS=peers/bin/python`.
 #[test]
 #[ignore = "needs peers"]
 fn peers_read_exported_files() {

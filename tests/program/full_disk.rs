@@ -1,4 +1,5 @@
-//! Tests of a journal that cannot be written. A limit on the size of files has the effect of a full disk: the write fails.
+//! Tests of a journal that cannot be written. A limit on the size of files has the same effect as a full
+//! disk: the write fails.
 
 use std::io::Write as _;
 use std::path::Path;
@@ -8,12 +9,14 @@ use serde_json::{Value, json};
 
 use crate::common::{Outcome, copy_of_mission, metaplan, metaplan_in, outcome, program};
 
-/// Number of lines before the last one. Their records exceed the limit on the size of files.
+/// Number of input lines before the last one. The journal records of these lines exceed the limit on the size
+/// of files.
 const NOTES: usize = 60;
 
-/// Runs the program with a limit of a few kilobytes on the size of files, with lines of input from a pipe or a file.
+/// Runs the program with a limit of a few kilobytes on the size of files. The input lines come from a file if
+/// `is_file`, otherwise from a pipe.
 fn limited(directory: &Path, arguments: &[&str], is_file: bool) -> Outcome {
-    // The lines grow, so that later segments of the journal exceed the limit, too.
+    // The lines grow, so that later segments of the journal also exceed the limit.
     let note =
         |index: usize| json!({ "event": "note", "text": "x".repeat(100 + 30 * index) }).to_string() + "\n";
     let failure = json!({ "event": "component_status", "component": "c_kinect", "status": "FALSE" });
@@ -33,7 +36,7 @@ fn limited(directory: &Path, arguments: &[&str], is_file: bool) -> Outcome {
         .stderr(Stdio::piped())
         .spawn();
     let mut child = child.expect("the program starts");
-    // A program that has stopped closes the pipe.
+    // If the program has stopped, the pipe is closed and the write fails.
     let _ = child.stdin.take().expect("a pipe").write_all(input.as_bytes());
     let output = child.wait_with_output().expect("the program ends");
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
@@ -52,8 +55,8 @@ fn of_kind<'a>(answers: &'a [Value], kind: &str) -> Vec<&'a Value> {
     answers.iter().filter(|answer| answer["answer"] == kind).collect()
 }
 
-/// Runs a loop with both values of `unrecorded`. `command` runs it with `adaptation.toml`, and a journal in the directory of the
-/// last argument.
+/// Runs a loop with both values of the setting `unrecorded`. `command` runs the loop with `adaptation.toml`.
+/// The journal directory is appended to the command.
 fn check(directory: &Path, set: &dyn Fn(&str), command: &[&str], is_file: bool) {
     let context = format!("{command:?}, {is_file}");
     set("stop");
@@ -68,7 +71,7 @@ fn check(directory: &Path, set: &dyn Fn(&str), command: &[&str], is_file: bool) 
     let handled = of_kind(&answers(&stopped), "handled").len();
     assert!((2..NOTES).contains(&handled), "{context}: {handled}");
     assert!(of_kind(&answers(&stopped), "unrecorded").is_empty(), "{context}");
-    // With space on the disk, the run is resumed. The line without answer may have been written.
+    // Once there is space on the disk, the run is resumed. The line without an answer may have been written.
     let resumed = metaplan_in(directory, &journal("stop").split(' ').collect::<Vec<_>>(), "");
     assert_eq!(resumed.status, 0, "{context}: {resumed:#?}");
     let ready = &answers(&resumed)[0];

@@ -1,8 +1,8 @@
-//! Test of the examples in `metaplan help`.
+//! Test that the examples in `metaplan help` work.
 
 use crate::common::{copy_folder, metaplan, metaplan_in, root};
 
-/// Runs the examples in the order of the commands. Some examples need the output of earlier ones.
+/// Runs the examples in the order of the commands, because some examples need the output of earlier ones.
 #[test]
 fn every_example_works() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -15,7 +15,7 @@ fn every_example_works() {
     let overview = metaplan(&["help"]).stdout;
     let (_, commands) = overview.split_once("\nCommands:\n").expect("commands");
     let names = commands.lines().take_while(|line| !line.is_empty());
-    // A description can take several lines. Only the first one begins with the command.
+    // A description can take several lines. Only its first line begins with the command.
     let names = names.filter_map(|line| line.strip_prefix("  ").filter(|line| !line.starts_with(' ')));
     let names = names.filter_map(|line| line.split_whitespace().next()).filter(|name| *name != "help");
     let mut count = 0;

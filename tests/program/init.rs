@@ -1,4 +1,5 @@
-//! Tests of `metaplan init`: each template can be planned at once without warnings, and no existing file is overwritten.
+//! Tests of `metaplan init`: each template can be planned without changes and without warnings, and no
+//! existing file is overwritten.
 
 use std::path::Path;
 
@@ -63,7 +64,7 @@ fn warehouse_template_can_be_planned() {
     check("warehouse", "110.8", &scenarios);
 }
 
-/// Names of the entries of a directory.
+/// Returns the names of the entries of a directory.
 fn names(directory: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(directory).expect("a directory");
     entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned()).collect()
@@ -94,7 +95,7 @@ fn nothing_is_overwritten() {
     assert_eq!(names(here).len(), 2, "{:?}", names(here));
 }
 
-/// Every directory name is accepted as the name of the mission. The answer lists the files.
+/// Every directory name is accepted as the name of a mission, and the answer lists the created files.
 #[test]
 fn directory_names_become_mission_names() {
     let directory = tempfile::tempdir().expect("a directory");

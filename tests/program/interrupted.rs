@@ -1,5 +1,5 @@
-//! Tests of commands with several results: at a time limit and at Ctrl-C they show the complete results and report that others are
-//! missing.
+//! Tests of commands with several results. At a time limit and at Ctrl-C, the commands show the completed
+//! results and report that results are missing.
 
 use std::fs;
 use std::path::Path;
@@ -10,13 +10,14 @@ use serde_json::{Value, json};
 
 use crate::common::{Outcome, metaplan, metaplan_in, root};
 
-/// Limits in seconds. On a busy machine the first ones can end before there is any result.
+/// Time limits in seconds, tried in this order. On a busy machine the first limits can end before there is
+/// any result.
 const SECONDS: [u32; 4] = [5, 15, 60, 180];
 
 const SIMULATE: [&str; 6] =
     ["simulate", "missions/ugv.toml", "--scenario", "kinect_comes_and_goes", "--strategy", "joint"];
 
-/// Runs a command, interrupts it after some seconds, and waits for its end.
+/// Runs a command, interrupts it by SIGINT after some seconds, and waits for its end.
 #[cfg(unix)]
 fn interrupted(directory: &Path, arguments: &[&str], seconds: u32) -> Outcome {
     let child = Command::new(env!("CARGO_BIN_EXE_metaplan"))
@@ -38,8 +39,8 @@ fn interrupted(directory: &Path, arguments: &[&str], seconds: u32) -> Outcome {
     }
 }
 
-/// Ends a command early, by limit and by signal, with growing times until there is a result. `count_results`
-/// counts the results of an answer.
+/// Ends a command early, once by a time limit and once by a signal. The time is increased until there is a
+/// result. `count_results` counts the results of an answer. Returns the answers.
 fn check(
     directory: &Path,
     arguments: &[&str],
@@ -92,7 +93,8 @@ fn interrupted_simulations_show_the_finished_runs() {
             let runs = answer["runs"].as_array().expect("runs").iter();
             runs.filter(|run| run["strategy"] == strategy).cloned().collect()
         };
-        // Each seed is simulated with all strategies before the next seed. The runs are the first runs of a simulation without a limit.
+        // Each seed is simulated with all strategies before the next seed. The completed runs equal the first
+        // runs of a simulation without a limit.
         let (joint, none) = (runs_of("joint"), runs_of("none"));
         assert!(joint.len() - none.len() <= 1, "{} and {}", joint.len(), none.len());
         let count = joint.len().min(5).to_string();
@@ -119,7 +121,7 @@ fn interrupted_studies_can_be_resumed() {
     let sweep = ["sweep", "study.toml", "--output", "results", "--resume"];
     let count = |answer: &Value| answer["done"].as_u64().map_or(0, |done| done as usize);
     let answers = check(folder.path(), &sweep, 1, count);
-    // With `--resume`, later interruptions start from the results of earlier ones.
+    // With `--resume`, a later run starts from the results of the interrupted runs.
     assert!(answers.windows(2).all(|pair| count(&pair[0]) <= count(&pair[1])), "{answers:#?}");
     // An interrupted run is not counted as a failure.
     for answer in &answers {

@@ -1,4 +1,4 @@
-//! Tests of `metaplan journal`: the content of a journal and its check.
+//! Tests of `metaplan journal`: showing the content of a journal and checking the journal.
 
 use crate::common::{metaplan, metaplan_in, root};
 
@@ -12,7 +12,7 @@ fn journals_are_checked_and_shown() {
     let check = metaplan(&["journal", "check", &journal]);
     assert_eq!(check.status, 0, "{check:#?}");
     assert!(check.stdout.ends_with("the journal can be used\n"), "{check:#?}");
-    // The same mission can resume it, another mission cannot.
+    // The same mission can resume the journal, but another mission cannot.
     let resumed = metaplan(&["journal", "check", &journal, "--mission", "missions/ugv.toml"]);
     assert_eq!(resumed.status, 0, "{resumed:#?}");
     let other_mission = metaplan(&["journal", "check", &journal, "--mission", "missions/uuv.toml"]);
@@ -31,7 +31,8 @@ fn journals_are_checked_and_shown() {
     assert_eq!(kinds, ["decision", "event", "decision", "event", "decision"]);
     assert_eq!(json["records"][0]["answers"][0]["answer"], "plan_requested");
 
-    // Carriage returns, as inserted by an editor, make the journal unusable. It is neither changed nor restarted.
+    // Carriage returns, as inserted by an editor, make the journal unusable. The journal is neither changed
+    // nor restarted.
     let file = directory.path().join("journal-000000");
     let text = std::fs::read_to_string(&file).expect("text").replace('\n', "\r\n");
     std::fs::write(&file, &text).expect("written");

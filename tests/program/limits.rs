@@ -1,4 +1,5 @@
-//! Tests of limits and signals in early phases, and of certificates: write errors, and statements about their scope.
+//! Tests of limits and signals in early phases, and of certificates: write errors, and statements about the
+//! scope of a certificate.
 #![expect(clippy::print_stdout, reason = "what is skipped says so")]
 
 use std::process::{Child, Command, Stdio};
@@ -9,7 +10,7 @@ use serde_json::{Value, json};
 use crate::certificate::{certificate, change};
 use crate::common::{copy_of_mission, edit, metaplan, metaplan_in, root, verify_in};
 
-/// Waits up to 20 s for the program to end, then kills it.
+/// Waits up to 20 s for the program to end. If it does not end, kills it and returns `None`.
 fn wait(child: &mut Child) -> Option<std::process::ExitStatus> {
     let started = Instant::now();
     while started.elapsed() < Duration::from_secs(20) {
@@ -33,7 +34,8 @@ fn start(arguments: &[&str]) -> Child {
         .expect("the program starts")
 }
 
-/// Returns `true` if this process and its children ignore a signal, as background processes of a shell do.
+/// Returns `true` if this process ignores a signal, as background processes of a shell do. Child processes
+/// inherit this.
 #[cfg(unix)]
 fn is_ignored(signal: i32) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -65,7 +67,8 @@ fn signals_end_the_program_while_it_reads() {
     }
 }
 
-/// A round trip through a number of places. Its optimum takes long to prove.
+/// Returns the domain and the problem of a round trip through a number of places. The optimum takes long to
+/// prove.
 #[cfg(unix)]
 pub fn round_trip(places: u32) -> (String, String) {
     use std::fmt::Write as _;
@@ -90,7 +93,7 @@ pub fn round_trip(places: u32) -> (String, String) {
     (domain.to_owned(), problem)
 }
 
-/// At the soft limit of processor time, the answer is the incumbent.
+/// At the soft limit of processor time, the answer is the best plan found by then.
 #[cfg(unix)]
 #[test]
 fn soft_cpu_limit_of_the_shell_is_respected() {
@@ -124,7 +127,7 @@ fn time_limit_includes_reading() {
     assert_eq!(status.code(), Some(12));
 }
 
-/// A comparison at its limit shows the finished results and reports that they are incomplete.
+/// A comparison at its time limit shows the finished results and reports that they are incomplete.
 #[test]
 fn comparisons_at_a_limit_show_finished_results() {
     let outcome = metaplan(&["compare", "missions/camara_like.toml", "--time-limit", "0"]);
@@ -137,7 +140,7 @@ fn comparisons_at_a_limit_show_finished_results() {
     let complete_answer: Value = serde_json::from_str(&complete_answer.stdout).expect("JSON");
     assert_eq!((&complete_answer["complete"], &complete_answer["messages"]), (&json!(true), &json!([])));
     let mut rows = 0;
-    // More pairs than can be compared within any of these limits.
+    // 1,000 pairs cannot all be compared within any of these limits.
     for time in ["4", "16", "64"] {
         let limits = ["--pairs", "1000", "--time-limit", time, "--csv", &table];
         let outcome = metaplan(&[&arguments[..], &limits].concat());
@@ -207,7 +210,8 @@ fn verification_respects_the_time_limit() {
     assert!(outcome.stdout.contains("limits"), "{outcome:#?}");
 }
 
-/// A rule file with an additional rule proves another claim. It must not be reported as shipped, whatever its name.
+/// A certificate with an additional rule proves a different claim. Its rule file must not be reported as
+/// shipped, regardless of its name.
 #[test]
 fn modified_rules_are_not_reported_as_shipped() {
     let directory = tempfile::tempdir().expect("a directory");

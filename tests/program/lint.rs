@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::common::{Outcome, edit, metaplan, metaplan_in};
 
-/// Lints the warehouse mission after changes, as text and as JSON.
+/// Runs `metaplan lint` on the warehouse mission after textual changes, with text and with JSON output.
 fn check(changes: &[(&str, &str, &str)], status: i32, words: &[&str]) -> Outcome {
     let directory = tempfile::tempdir().expect("a directory");
     let here = directory.path();
@@ -77,7 +77,8 @@ fn unused_names_are_warnings() {
     );
 }
 
-/// Numbers that make a design or an action unusable: `lint` reports their position, and `plan` warns as well.
+/// Missing or negative numbers that make a design or an action unusable: `lint` reports their position, and
+/// `plan` warns as well.
 #[test]
 fn missing_and_negative_numbers_are_warnings() {
     let misspelt = (
@@ -123,8 +124,8 @@ fn missing_and_negative_numbers_are_warnings() {
     );
 }
 
-/// If there is no plan, `plan` lists the missing numbers, and `explain` gives them as the reason why an available design is not
-/// applicable.
+/// If there is no plan, `plan` lists the missing numbers, and `explain` gives these numbers as the reason why
+/// an available design is not applicable.
 #[test]
 fn missing_numbers_are_listed_if_there_is_no_plan() {
     let directory = tempfile::tempdir().expect("a directory");
@@ -158,7 +159,7 @@ fn missing_numbers_are_listed_if_there_is_no_plan() {
     assert!(outcome.stdout.contains(words), "{outcome:#?}");
 }
 
-/// A domain that omits values on purpose: distances between places without a way, and from a place to itself.
+/// A domain may omit values on purpose: distances between places without a way, and from a place to itself.
 #[test]
 fn unneeded_missing_numbers_are_not_reported() {
     let domain = "(define (domain d) (:requirements :typing :numeric-fluents) (:types place)

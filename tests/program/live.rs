@@ -10,10 +10,10 @@ use serde_json::{Value, json};
 
 use crate::common::{metaplan_in, root};
 
-/// Timeout for each expected event, generous for busy machines.
+/// Timeout for each expected event, which is generous for busy machines.
 const TIMEOUT: Duration = Duration::from_secs(60);
 
-/// A running loop with a live server.
+/// A running loop with a live HTTP server (`metaplan run --serve`).
 pub struct Run {
     child: Child,
     stdin: Option<ChildStdin>,
@@ -57,7 +57,7 @@ impl Run {
         self.handled(last);
     }
 
-    /// Receives all answers until a line is handled.
+    /// Receives all answers until the line with this number is handled.
     fn handled(&mut self, line: u64) -> Vec<Value> {
         let mut answers = Vec::new();
         loop {
@@ -70,7 +70,7 @@ impl Run {
         }
     }
 
-    /// Opens a connection and requests a path.
+    /// Opens a connection to the server and requests a path.
     fn request(&self, path: &str, headers: &str) -> TcpStream {
         let mut stream = TcpStream::connect(&self.address).expect("a connection");
         stream.set_read_timeout(Some(TIMEOUT)).expect("a timeout");
@@ -80,7 +80,7 @@ impl Run {
         stream
     }
 
-    /// Head and body of a finite response.
+    /// Requests a path with a finite response and returns head and body of the response.
     pub fn get(&self, path: &str, headers: &str) -> (String, String) {
         let mut text = String::new();
         self.request(path, headers).read_to_string(&mut text).expect("an answer");
@@ -99,7 +99,7 @@ impl Run {
         Events(reader)
     }
 
-    /// Closes standard input. The program must end with status 0.
+    /// Closes standard input. Asserts that the program ends with status 0.
     pub fn end(mut self) {
         drop(self.stdin.take());
         assert!(self.child.wait().expect("it ends").success());
@@ -113,11 +113,11 @@ impl Drop for Run {
     }
 }
 
-/// A stream of server-sent events.
+/// A stream of server-sent events from the live server.
 pub struct Events(BufReader<TcpStream>);
 
 impl Events {
-    /// Kind and data of the next event; `None` at the end.
+    /// Returns the kind and the data of the next event; `None` at the end of the stream.
     fn next(&mut self) -> Option<(String, Value)> {
         let (mut kind, mut data) = ("message".to_owned(), None);
         loop {
@@ -142,7 +142,7 @@ impl Events {
         }
     }
 
-    /// Events up to the first one that satisfies the predicate; `None` if the stream ends before.
+    /// Returns the events up to the first one that satisfies the predicate; `None` if the stream ends before.
     pub fn until_or_end(&mut self, is_last: impl Fn(&Value) -> bool) -> Option<Vec<Value>> {
         let mut received = Vec::new();
         loop {
@@ -155,7 +155,7 @@ impl Events {
         }
     }
 
-    /// Events up to the first one that satisfies the predicate.
+    /// Returns the events up to the first one that satisfies the predicate. Panics if the stream ends before.
     pub fn until(&mut self, is_last: impl Fn(&Value) -> bool) -> Vec<Value> {
         self.until_or_end(is_last).expect("it does not end before")
     }
@@ -165,7 +165,7 @@ fn note(text: &str) -> String {
     json!({"event": "note", "text": text}).to_string()
 }
 
-/// The answers among the messages, without progress reports.
+/// Returns the loop's answers among the messages, without progress reports.
 fn answers_in(messages: &[Value]) -> Vec<&Value> {
     messages
         .iter()
@@ -207,7 +207,7 @@ fn input_and_answers_are_streamed_as_they_come() {
     assert_eq!(remaining_kinds, ["end"]);
 }
 
-/// The page draws the current plan. Names are escaped.
+/// The page draws the current plan, with escaped names.
 #[test]
 fn current_plan_is_drawn() {
     let mut run = Run::begin(&["--serve=0"]);
@@ -256,7 +256,7 @@ fn late_clients_receive_the_current_state() {
     loop {
         assert!(started.elapsed() < TIMEOUT, "it always ends before something new");
         let is_new = |news: &Value| news.get("heard").is_some() || news.get("left_out").is_some();
-        // A client that is too slow is disconnected and connects again.
+        // A client that is too slow is disconnected and must connect again.
         let Some(messages) = run.events().until_or_end(is_new) else { continue };
         let kinds: Vec<&Value> = answers_in(&messages).into_iter().map(|answer| &answer["answer"]).collect();
         // The first lines are discarded once the server has processed all lines.
@@ -273,7 +273,7 @@ fn late_clients_receive_the_current_state() {
     }
 }
 
-/// Peak memory of the process in kB, on systems that report it.
+/// Returns the peak memory of the process in kB, on systems that report it.
 fn memory(run: &Run) -> Option<u64> {
     let status = std::fs::read_to_string(format!("/proc/{}/status", run.child.id())).ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
@@ -286,7 +286,7 @@ fn clients_that_do_not_read_are_disconnected_and_do_not_block() {
     run.handled(0);
     let before = memory(&run);
     let mut idle = run.request("/events", "");
-    // More data than socket buffers can hold.
+    // The amount of data exceeds the capacity of the socket buffers.
     let text = "x".repeat(4000);
     run.send((0..20_000).map(|_| note(&text)), 20_000);
     if let (Some(before), Some(after)) = (before, memory(&run)) {
@@ -296,11 +296,11 @@ fn clients_that_do_not_read_are_disconnected_and_do_not_block() {
     run.send([note("the last")], 20_001);
     let last = note("the last");
     let started = Instant::now();
-    // On a busy machine the client can be too slow and must connect again, like the page does.
+    // On a busy machine the client can be too slow and must connect again, as the page does.
     while run.events().until_or_end(|news| news["heard"] == json!(last)).is_none() {
         assert!(started.elapsed() < TIMEOUT, "it always ends before");
     }
-    // The client that did not read was disconnected, after a small part of the data.
+    // The client that did not read was disconnected after a small part of the data.
     let mut bytes = Vec::new();
     let ended = idle.read_to_end(&mut bytes);
     assert!(ended.is_ok() || ended.is_err_and(|error| error.kind() == ErrorKind::ConnectionReset));
@@ -318,7 +318,7 @@ fn clients_that_do_not_read_release_their_connections() {
     let started = Instant::now();
     let (mut line, mut refused) = (0, false);
     loop {
-        // More data than socket buffers can hold, as no client reads.
+        // The amount of data exceeds the capacity of the socket buffers, because no client reads.
         run.send((0..2000).map(|_| note(&text)), line + 2000);
         line += 2000;
         let (head, _) = run.get("/", "");

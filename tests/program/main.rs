@@ -1,4 +1,4 @@
-//! End-to-end tests: the program is run like by a user.
+//! End-to-end tests, which run the program as a user would.
 
 mod anytime;
 mod browser;

@@ -1,8 +1,10 @@
-//! Tests of errors in manifests: every command reports them with their position, even in sections that the command does not use.
+//! Tests of errors in manifests: every command reports the errors with their positions, even in sections that
+//! the command does not use.
 
 use crate::common::{headlines, metaplan_in, root};
 
-/// Appends lines to a manifest, from line 9 on. All commands must refuse it with this message.
+/// Appends lines to a manifest, from line 9 on. Asserts that all commands reject the manifest with the
+/// message `expected`.
 fn check(lines: &str, expected: &str) {
     let directory = tempfile::tempdir().expect("a directory");
     let root = root().display().to_string();

@@ -1,4 +1,5 @@
-//! Tests of `metaplan import camara-map` on maps in the format of 2017, with `coord` and without measurements. The map is invented.
+//! Tests of `metaplan import camara-map` with maps in the format of 2017, with `coord` and without
+//! measurements. The map is invented.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -7,7 +8,7 @@ use metaplan::comparison::{MapOptions, import_map};
 
 use crate::common::{Outcome, headlines, metaplan_in, steps};
 
-/// Name, coordinates, and neighbours. An arc is listed at one of its ends at least.
+/// Places of the map: name, coordinates, and neighbours. Each arc is listed at one or both of its ends.
 const PLACES: [(&str, f64, f64, &str); 6] = [
     ("h1", 0.0, 0.0, "\"h2\", \"c1\""),
     ("h2", 6.8, 0.0, "\"h1\", \"h3\""),
@@ -17,7 +18,7 @@ const PLACES: [(&str, f64, f64, &str); 6] = [
     ("hs", 30.0, 10.2, ""),
 ];
 
-/// The map as JSON in the format of 2017.
+/// Returns the map as JSON in the format of 2017.
 pub fn map() -> String {
     let mut text = "{\"map\": [\n".to_owned();
     for (number, (id, x, y, neighbours)) in (1..).zip(PLACES) {
@@ -36,7 +37,7 @@ fn import(directory: &Path, text: &str, options: &[&str]) -> Outcome {
     metaplan_in(directory, &[&arguments[..], options].concat(), "")
 }
 
-/// Length of the shortest path, by enumeration of all simple paths.
+/// Returns the length of the shortest path, by enumeration of all simple paths.
 fn shortest(from: &str, to: &str, visited: &[&str]) -> f64 {
     let at = |name: &str| PLACES.iter().find(|place| place.0 == name).expect("a place");
     let are_connected =
@@ -80,7 +81,7 @@ fn maps_of_2017_become_missions() {
     assert_eq!(outcome.status, 2, "an option is there twice: {outcome:#?}");
 }
 
-/// The formats with `coord` and with `coords` yield the same mission.
+/// Maps with the key `coord` and with the key `coords` yield the same mission.
 #[test]
 fn both_map_formats_give_the_same_mission() {
     let options = MapOptions { start: "h1".to_owned(), goal: "h4".to_owned(), ..MapOptions::default() };

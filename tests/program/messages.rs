@@ -4,7 +4,8 @@ use std::path::Path;
 
 use crate::common::{Outcome, metaplan_in};
 
-/// Texts that must not occur in messages: Rust debug output, names that exist only in the explicit form of a domain, and internal types.
+/// Texts that must not occur in messages: Rust debug output, internal types, and names that exist only in the
+/// explicit form of a domain.
 const INTERNAL: [&str; 14] = [
     "Some(",
     "None)",
@@ -22,7 +23,8 @@ const INTERNAL: [&str; 14] = [
     "{:?}",
 ];
 
-/// Returns `true` if a capitalised word is followed by its content, like Rust debug output: `Violation { step`, `InvalidUri(`.
+/// Returns `true` if a text contains a capitalised word followed by a bracket, as Rust debug output does:
+/// `Violation { step`, `InvalidUri(`.
 fn is_debug_text(text: &str) -> bool {
     text.char_indices().filter(|(_, c)| "({".contains(*c)).any(|(at, c)| {
         let prefix = if c == '{' { text[..at].trim_end() } else { &text[..at] };
@@ -31,13 +33,14 @@ fn is_debug_text(text: &str) -> bool {
     })
 }
 
-/// Faulty messages of an outcome. Source lines and positions are excluded, as they are content of the user's files.
+/// Returns the lines of an outcome that contain internal texts. Source lines and positions are excluded,
+/// because they are content of the user's files.
 fn faults(outcome: &Outcome) -> Vec<String> {
     let output = format!("{}{}", outcome.stdout, outcome.stderr);
     let message_lines = output.lines().filter(|line| !line.contains(" │"));
     let mut faults = Vec::new();
     for line in message_lines {
-        // Quoted texts and IRIs are content of the files, too.
+        // Quoted texts and IRIs are content of the user's files as well.
         let unquoted: String = line.split('`').step_by(2).collect();
         let own_words: String = unquoted
             .split('<')
@@ -55,7 +58,7 @@ fn faults(outcome: &Outcome) -> Vec<String> {
     faults
 }
 
-/// A copy of a file with one error. `number` determines the line and the kind of error.
+/// Returns a copy of a text with one error. `number` determines the line and the kind of error.
 fn mangled(text: &str, number: usize) -> String {
     let lines: Vec<&str> = text.lines().collect();
     let at = number / 5 * 7 % lines.len();
@@ -73,7 +76,7 @@ fn mangled(text: &str, number: usize) -> String {
     changed_lines.join("\n") + "\n"
 }
 
-/// Runs the commands for `count` errors in each file, on two threads.
+/// Runs the commands with each of `count` errors in each file, on two threads.
 fn check(files: &[&str], template: &str, count: usize, commands: &[&[&str]]) {
     let work: Vec<(&str, usize)> =
         files.iter().flat_map(|file| (0..count).map(move |number| (*file, number))).collect();
@@ -115,7 +118,7 @@ fn messages_about_files_contain_no_internals() {
     check(&["problem.pddl"], "blank", 10, &[&["plan", "m/mission.toml", "--time-limit", "2"]]);
 }
 
-/// Unknown names and invalid values for all kinds of arguments.
+/// Messages about unknown names and invalid values in all kinds of arguments contain no internal names.
 #[test]
 fn messages_about_arguments_contain_no_internals() {
     let directory = tempfile::tempdir().expect("a directory");
@@ -167,7 +170,7 @@ fn messages_about_arguments_contain_no_internals() {
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
-/// Messages are equal with and without colours. The default without a terminal is no colours.
+/// Messages have equal texts with and without colours. Without a terminal, the default is no colours.
 #[test]
 fn colours_depend_on_option_and_terminal() {
     let directory = tempfile::tempdir().expect("a directory");

@@ -4,7 +4,8 @@ use std::fs;
 
 use crate::common::{edit, metaplan_in};
 
-/// Checks the errors of `lint` and `simulate` for the warehouse mission after changes. Each error begins at the given text.
+/// Runs `lint` and `simulate` on the warehouse mission after textual changes and checks the errors. Each
+/// expected error begins at the given text and contains the given words.
 fn check(changes: &[(&str, &str, &str)], expected: &[(&str, &[&str])]) {
     let directory = tempfile::tempdir().expect("a directory");
     let here = directory.path();
@@ -65,7 +66,7 @@ fn unknown_names_in_event_conditions_are_reported() {
         ("when = \"\"", "\"\"\nwithin", &["M135", "is not a condition"]),
         ("when = \"(< (batery) 3)\"", "(batery)", &["P122", "did you mean `battery`?"]),
     ] {
-        // The position of an atom is the one of its predicate, after the parenthesis.
+        // The position of an atom's error is the position of its predicate, after the parenthesis.
         let place = if place == "(batery)" { "batery" } else { place };
         check(&[(MISSION, WHEN, new)], &[(place, words)]);
     }
@@ -122,7 +123,7 @@ fn all_unknown_names_of_a_scenario_are_reported_together() {
     );
 }
 
-/// `plan` and `run`, too, report all errors in the parts of a scenario that they use.
+/// `plan` and `run` also report all errors in the parts of a scenario that they use.
 #[test]
 fn all_errors_of_a_situation_are_reported_together() {
     let directory = tempfile::tempdir().expect("a directory");
@@ -179,7 +180,7 @@ fn parentheses_of_conditions_are_optional() {
     assert!(costs.iter().all(|cost| (cost - costs[0]).abs() < 1e-9 && *cost > 111.0), "{costs:?}");
 }
 
-/// A study with an invalid command is refused before anything is run.
+/// A study with an invalid command is rejected before anything is run.
 #[test]
 fn unknown_names_in_studies_are_reported() {
     for (study, place, words) in [
@@ -228,7 +229,7 @@ fn unknown_names_in_studies_are_reported() {
     }
 }
 
-/// A pointer to nonexistent rows would yield a table without figures.
+/// A JSON pointer to nonexistent rows would yield a table without figures, so it is an error.
 #[test]
 fn nonexistent_rows_are_an_error() {
     let directory = tempfile::tempdir().expect("a directory");

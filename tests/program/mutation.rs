@@ -1,4 +1,4 @@
-//! Tests of randomly changed certificates: every accepted claim must be true.
+//! Tests of randomly changed certificates: every claim that is accepted must be true.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -21,7 +21,8 @@ impl Random {
     }
 }
 
-/// Changes a random part of a text: a line is removed, duplicated or swapped, or a word is replaced by a number or another word.
+/// Changes a random part of a text: a line is removed, duplicated or swapped, or a word is replaced by a
+/// number or by another word.
 fn mutate(text: &str, random: &mut Random) -> String {
     let mut lines: Vec<&str> = text.split_inclusive('\n').collect();
     let line = random.below(lines.len());
@@ -51,7 +52,8 @@ fn mutate(text: &str, random: &mut Random) -> String {
     lines.concat()
 }
 
-/// Kinds of targeted changes. The last kind changes a random part of a random file.
+/// Kinds of changes to a certificate. All except the last are targeted; the last one changes a random part of
+/// a random file.
 const KINDS: [&str; 14] = [
     "literal of the formula",
     "literal of the proof",
@@ -69,7 +71,7 @@ const KINDS: [&str; 14] = [
     "anything",
 ];
 
-/// An unchanged certificate.
+/// An unchanged certificate on disk, with the texts of its files for restoration.
 struct Original {
     directory: tempfile::TempDir,
     target: PathBuf,
@@ -163,7 +165,7 @@ fn edit_json(text: &str, edit: impl FnOnce(&mut Value)) -> String {
     if document == original { text.to_owned() } else { document.to_string() }
 }
 
-/// Name and text of the changed file, for a kind of change.
+/// Returns the name and the new text of the file that a kind of change modifies.
 fn mutant(kind: &str, original: &Original, random: &mut Random) -> (String, String) {
     let name = match kind {
         "literal of the formula" => "formula.cnf",
@@ -212,7 +214,7 @@ fn mutant(kind: &str, original: &Original, random: &mut Random) -> (String, Stri
     (name.to_owned(), changed)
 }
 
-/// Returns `true` if a claim agrees with the result of planning for the files of the certificate.
+/// Returns `true` if a claim agrees with the planner's result for the files of the certificate.
 fn is_true(claim: &Value, target: &Path) -> bool {
     let files = ["domain.pddl", "problem.pddl"].map(|name| target.join(name).display().to_string());
     let answer = metaplan(&["plan", &files[0], &files[1], "--format", "json", "--quiet"]).json();
@@ -223,8 +225,9 @@ fn is_true(claim: &Value, target: &Path) -> bool {
     answer["status"] == "optimal" && metric == Some(answer["cost"].to_string().as_str())
 }
 
-/// Changes the certificate of each mission once per seed, usually with a matching manifest. Accepted claims must be true. Returns the
-/// number of changes and of accepted changes for each kind.
+/// Changes the certificate of each mission once per seed, usually with a matching manifest. Asserts that
+/// accepted claims are true. Returns, for each kind of change, the number of changes and the number of
+/// accepted changes.
 fn check_mutants(
     missions: &[&[&str]],
     seeds: std::ops::Range<u64>,

@@ -1,4 +1,5 @@
-//! Tests of names of individuals and objects: equal names, mapped names, and names without a counterpart.
+//! Tests of the correspondence between individuals and objects: equal names, names mapped by
+//! `[bindings.names]`, and names without a counterpart.
 
 use std::path::Path;
 
@@ -7,7 +8,7 @@ use serde_json::{Value, json};
 use crate::certificate::change;
 use crate::common::{Outcome, copy_of_mission, edit, headlines, metaplan, metaplan_in, steps, verify_in};
 
-/// Objects of the mission `uuv` that its knowledge base provides, and that the problem can declare as well.
+/// Objects of the mission `uuv` that its knowledge base provides. The problem can declare them as well.
 const OBJECTS: &str = "fd_speed_low fd_speed_medium fd_speed_high fd_search_low fd_search_medium fd_search_high \
     fd_follow fd_recharge - functiondesign f_maintain_motion f_generate_search_path f_follow_pipeline f_recharge - function";
 
@@ -15,14 +16,15 @@ const MANIFEST: &str = "missions/uuv.toml";
 const PROBLEM: &str = "encodings/uuv/problem.pddl";
 const KB: &str = "ontology/kb/uuv.ttl";
 
-/// A copy of the mission `uuv` in which the problem declares functions and designs.
+/// Copies the mission `uuv` and declares functions and designs in its problem.
 fn declared() -> tempfile::TempDir {
     let copy = copy_of_mission("uuv");
     edit(copy.path(), PROBLEM, "(:objects ", &format!("(:objects {OBJECTS} "));
     copy
 }
 
-/// A copy with other names for functions, designs and actions in the knowledge base, and with these entries of the name map.
+/// Copies the mission `uuv` with other names for functions, designs and actions in the knowledge base, and
+/// with these entries of the name map.
 fn renamed(entries: &str) -> tempfile::TempDir {
     let copy = declared();
     let mut text = std::fs::read_to_string(copy.path().join(KB)).expect("the knowledge base");
@@ -38,7 +40,8 @@ fn renamed(entries: &str) -> tempfile::TempDir {
 
 const ENTRIES: &str = "\"kd_*\" = \"fd_*\"\n\"kf_*\" = \"f_*\"\n\"ka_*\" = \"a_*\"";
 
-/// Output of the program in the names of the problem, without times and digests.
+/// Runs the program and returns its output without times and digests. Renamed designs, functions and actions get
+/// their names in the problem.
 fn output_in_problem_names(directory: &Path, arguments: &[&str], input: &str) -> String {
     let outcome = metaplan_in(directory, arguments, input);
     assert!(
@@ -94,7 +97,7 @@ fn mapped_names_do_not_change_the_mission() {
             "{arguments:?}"
         );
     }
-    // The comparison is not vacuous.
+    // The compared output contains a design, so the comparison is not vacuous.
     assert!(output_in_problem_names(original.path(), &["run", MANIFEST], &lines).contains("fd_search_low"));
     // A design can also be given by its name in the knowledge base.
     let explain = |name| output_in_problem_names(mapped.path(), &["explain", MANIFEST, name], "");
@@ -134,7 +137,7 @@ fn certificates_depend_on_the_name_map() {
         assert!(outcome.stdout.contains(words), "no `{words}`: {outcome:#?}");
     };
     check_mission(0, "it is about `uuv` as it is now");
-    // Another name map makes it another mission, although the plan is the same.
+    // With another name map the mission is a different one, although the plan is the same.
     edit(copy.path(), MANIFEST, "\"ka_*\" = \"a_*\"", "\"ka_*\" = \"a_*\"\nkd_recharge = \"fd_recharge\"");
     check_mission(30, "the bindings differ");
     // Exchanged designs in the name map contradict the problem of the certificate.
@@ -151,7 +154,8 @@ fn certificates_depend_on_the_name_map() {
     assert!(outcome.stdout.contains("the knowledge says"), "{outcome:#?}");
 }
 
-/// Plans the renamed mission with these entries of the name map. Standard error must contain the words.
+/// Runs `metaplan plan` on the renamed mission with these entries of the name map. Asserts that standard
+/// error contains the words.
 fn check(entries: &str, status: i32, words: &[&str]) -> Outcome {
     let copy = renamed(entries);
     let outcome = metaplan_in(copy.path(), &["plan", MANIFEST], "");
@@ -240,7 +244,7 @@ fn patterns_skip_individuals_without_an_object() {
     {
         assert!(outcome.stderr.contains(word), "no `{word}`: {outcome:#?}");
     }
-    // The design keeps its own name.
+    // The design keeps its name from the knowledge base.
     assert!(outcome.stderr.contains("in the knowledge base only: `kd_search_medium`"), "{outcome:#?}");
 }
 
@@ -258,7 +262,7 @@ fn unmatched_names_are_listed_from_both_sides() {
     ] {
         assert!(outcome.stderr.contains(word), "no `{word}`: {outcome:#?}");
     }
-    // If some names match, the others are only warnings.
+    // If some names match, unmatched names cause only warnings.
     let misspelt = declared();
     edit(misspelt.path(), PROBLEM, "fd_search_low ", "fd_serach_low ");
     let outcome = metaplan_in(misspelt.path(), &["plan", MANIFEST], "");
@@ -306,7 +310,7 @@ fn missions_with_optional_declarations_have_no_warnings() {
     }
 }
 
-/// Components can be objects as well. Names of the knowledge base take precedence.
+/// Components can be objects as well. Names of the knowledge base take precedence over object names.
 #[test]
 fn components_have_object_and_individual_names() {
     let copy = declared();
@@ -330,7 +334,8 @@ fn components_have_object_and_individual_names() {
     assert_eq!(outcome.status, 2, "{outcome:#?}");
 }
 
-/// A journal can be resumed only with the same name map. Its position in the manifest does not matter.
+/// A journal can be resumed only with the same name map. The position of the map in the manifest does not
+/// matter.
 #[test]
 fn journals_depend_on_the_name_map() {
     let copy = renamed(ENTRIES);

@@ -1,4 +1,5 @@
-//! Tests of output files: special files are written to, links are followed, and a file keeps its mode, owner and hard links.
+//! Tests of output files: special files are written to, symbolic links are followed, and a file keeps its
+//! mode, owner and hard links.
 //!
 //! No test uses a real device, because a faulty program could replace it by a file.
 
@@ -11,7 +12,7 @@ use std::process::{Command, Stdio};
 
 use crate::common::{metaplan, root};
 
-/// Commands that write to `FILE`. The content is deterministic.
+/// Commands that write deterministic content to `FILE`.
 const OUTPUTS: [&[&str]; 11] = [
     &["plan", "missions/ugv.toml", "-o", "FILE"],
     &["plan", "missions/ugv.toml", "--svg", "FILE"],
@@ -38,7 +39,7 @@ fn mode(path: &Path) -> u32 {
     fs::metadata(path).expect("a file").mode() & 0o7777
 }
 
-/// Creates a FIFO, and starts a process that copies its content to a file.
+/// Creates a FIFO and starts a process that copies its content to the file `copy`.
 fn fifo(path: &Path, copy: &Path) -> std::process::Child {
     let status = Command::new("mkfifo").arg(path).status().expect("mkfifo runs");
     assert!(status.success());
@@ -150,7 +151,8 @@ fn files_keep_mode_owner_and_hard_links() {
     assert!(file.symlink_metadata().expect("a link").is_symlink() && moved.is_file());
 }
 
-/// Runs a script in the root of the project. The program is in PATH, and `$1` is a folder.
+/// Runs a script in the root of the project and returns its output. The tested program is in PATH, and `$1`
+/// is `folder`.
 fn shell(program: &str, script: &str, folder: &Path) -> String {
     let programs =
         Path::new(env!("CARGO_BIN_EXE_metaplan")).parent().expect("a folder").display().to_string();
@@ -183,7 +185,7 @@ fn dash_and_device_files_are_standard_output() {
     let convert = "metaplan convert ontology/kb/ugv.ttl --to ntriples";
     let plain = shell("sh", convert, folder.path());
     assert!(plain.lines().count() > 50);
-    // Links like `/dev/stdout`, as the test must not touch the real device file.
+    // The links imitate `/dev/stdout`, because the test must not touch the real device file.
     symlink("/proc/self/fd/1", folder.path().join("stdout")).expect("a link");
     symlink("/proc/self/fd/3", folder.path().join("third")).expect("a link");
     for script in [
@@ -204,7 +206,7 @@ fn dash_and_device_files_are_standard_output() {
     } else {
         println!("skipped: there is no bash");
     }
-    // A plan on standard output has the human-readable format, by whatever name it is given.
+    // A plan on standard output has the human-readable format, regardless of the name of the output.
     let plan = "metaplan plan missions/ugv.toml";
     let table = shell("sh", plan, folder.path());
     assert!(table.starts_with(" step"));

@@ -1,11 +1,11 @@
-//! Tests of the problem of the Metaplan paper with SUAVE's knowledge base, whose names differ.
+//! Tests of the problem in the Metaplan paper with SUAVE's knowledge base. Their names differ and are mapped.
 
 use serde_json::{Value, json};
 
 use crate::common::{Outcome, metaplan, metaplan_in};
 use crate::real::shared;
 
-/// Files of the Metaplan paper and options for SUAVE's knowledge base, if available.
+/// Returns the files of the Metaplan paper and the options for SUAVE's knowledge base, if available.
 fn paper() -> Option<([String; 2], Vec<String>)> {
     let real = shared()?.join("real").display().to_string();
     let file = |name: &str| format!("{real}/pddl/suave_metaplan/suave_extended_metaplan_{name}.pddl");
@@ -16,7 +16,7 @@ fn paper() -> Option<([String; 2], Vec<String>)> {
     Some(([file("domain"), file("problem")], options.collect()))
 }
 
-/// Name map from SUAVE's designs to designs of the paper.
+/// Name map from SUAVE's designs to the designs of the paper.
 const MAP: [(&str, &str); 4] = [
     ("fd_spiral_*", "fd_search_*"),
     ("fd_all_thrusters", "fd_maintain_motion"),
@@ -29,7 +29,8 @@ fn plan(files: &[String], options: &[&str]) -> Outcome {
     metaplan(&[&["plan"], &files[..], options, &["--format", "json"]].concat())
 }
 
-/// Plan for the paper's problem with its own availability facts, except for the given designs.
+/// Returns the plan for the paper's problem without a knowledge base. The problem states the availability of
+/// all designs except the given ones.
 fn by_hand(files: &[String; 2], unavailable: &[&str]) -> Value {
     let mut text = std::fs::read_to_string(&files[1]).expect("the problem");
     for design in unavailable {
@@ -43,7 +44,8 @@ fn by_hand(files: &[String; 2], unavailable: &[&str]) -> Value {
     plan(&[files[0].clone(), problem.display().to_string()], &[]).json()
 }
 
-/// Greatest value of the three actions of the shortest plan, by brute force over the available designs of the paper's table.
+/// Returns the greatest value of the three actions of the shortest plan, by brute force over the available
+/// designs in the paper's table.
 fn greatest_value(unavailable: &[&str]) -> f64 {
     let designs = [
         ("search", "fd_search_low", 0.5),
@@ -106,14 +108,16 @@ fn problem_of_the_paper_works_with_the_knowledge_base_of_suave() {
         plans.push(answer["steps"].clone());
     }
     assert!(plans[1..].iter().all(|steps| *steps != plans[0]), "{plans:#?}");
-    // Recharging is unknown to the knowledge base, so its availability can be set. The availability of known designs cannot.
+    // The knowledge base does not have the recharging design, so its availability can be set. The
+    // availability of designs in the knowledge base cannot.
     let outcome =
         plan(&files, &[&options, &names, &["--set", "fd_available fd_recharge=false"][..]].concat());
     assert_eq!(outcome.status, 10, "{outcome:#?}");
     let outcome =
         plan(&files, &[&options, &names, &["--set", "fd_available fd_search_low=false"][..]].concat());
     assert!(outcome.status == 2 && outcome.stdout.contains("the knowledge base decides"), "{outcome:#?}");
-    // Water too murky for all search designs: unsolvable because of the knowledge base, not because of unmatched names.
+    // The water is too murky for all search designs. The mission is unsolvable because of the knowledge base,
+    // not because of unmatched names.
     let outcome = plan(&files, &[&options, &names, &["--set", "water_visibility=1"][..]].concat());
     assert_eq!(outcome.status, 10, "{outcome:#?}");
     assert_eq!(
@@ -162,7 +166,7 @@ fn problem_of_the_paper_needs_a_name_map() {
     }
 }
 
-/// The problem determines everything that the knowledge base does not know.
+/// The problem determines the availability of designs and functions that the knowledge base does not have.
 #[test]
 fn functions_unknown_to_the_knowledge_base_are_kept() {
     let Some((files, options)) = paper() else { return };

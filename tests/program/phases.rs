@@ -1,4 +1,5 @@
-//! Tests of limits in every phase. For each phase there is an input that is slow in this phase, with a limit on processor time or memory.
+//! Tests of limits in every phase. For each phase there is an input that is slow in that phase, with a limit
+//! on processor time or memory.
 //!
 //! Each command must end within 110 % of its limit plus 0.2 s of processor time.
 #![cfg(target_os = "linux")]
@@ -12,7 +13,7 @@ use serde_json::Value;
 use crate::common::{program, verify_in};
 use crate::limits::round_trip;
 
-/// Outcome of a command, with its processor time and memory.
+/// Outcome of a command, with its processor time and memory usage.
 #[derive(Debug)]
 struct Run {
     status: i64,
@@ -24,7 +25,7 @@ struct Run {
     memory: f64,
 }
 
-/// Runs and measures the program. Needs python3.
+/// Runs the program and measures its processor time and memory. Needs python3.
 fn run(directory: &Path, arguments: &[&str]) -> Run {
     let script = "import json, resource as r, subprocess as s, sys\n\
         o = s.run(sys.argv[1:], stdout=s.PIPE, stderr=s.PIPE)\n\
@@ -46,8 +47,8 @@ fn run(directory: &Path, arguments: &[&str]) -> Run {
     }
 }
 
-/// Runs a command with a time limit in seconds and asserts that it keeps the limit in one of three runs. Several attempts are needed
-/// because shared caches increase even the processor time.
+/// Runs a command with a time limit in seconds and asserts that at least one of three runs keeps the limit.
+/// Several attempts are needed because shared caches increase even the processor time.
 fn limited(directory: &Path, arguments: &[&str], limit: f64) -> Run {
     let limit_text = limit.to_string();
     let allowed = 1.1 * limit + 0.2;
@@ -66,12 +67,12 @@ fn limited(directory: &Path, arguments: &[&str], limit: f64) -> Run {
     latest_run
 }
 
-/// Asserts that there is no result and that a limit is named as the reason.
+/// Asserts that the command has no result and names a limit as the reason.
 fn assert_nothing_to_show(outcome: &Run) {
     assert!(outcome.status == 12 && outcome.stderr.contains("limit was reached"), "{outcome:#?}");
 }
 
-/// Concatenates the texts for the numbers below `count`.
+/// Concatenates the texts for the numbers from 0 to `count - 1`.
 fn repeated(count: usize, text: impl Fn(usize) -> String) -> String {
     (0..count).fold(String::new(), |joined, number| joined + &text(number))
 }
@@ -100,7 +101,7 @@ fn reading_keeps_the_limit() {
     assert_nothing_to_show(&limited(directory.path(), &PLAN, 0.3));
 }
 
-/// A transitive property along a chain of individuals.
+/// Creates a knowledge base with a transitive property along a chain of individuals.
 fn transitive(count: usize) -> tempfile::TempDir {
     let mut text = "@prefix : <http://example.org/> . @prefix owl: <http://www.w3.org/2002/07/owl#> .\n\
         :before a owl:TransitiveProperty , owl:ObjectProperty .\n"
@@ -119,7 +120,8 @@ fn reasoning_keeps_the_limit() {
     assert_nothing_to_show(&limited(directory.path(), &["reason", "chain.ttl"], 0.5));
 }
 
-/// A condition over a number of variables that no static fact restricts, each with the given objects.
+/// Creates a task with a condition over many variables that no static fact restricts. Each variable ranges
+/// over the given objects.
 fn quantified(variables: usize, objects: &str) -> tempfile::TempDir {
     let names = repeated(variables, |number| format!(" ?v{number}"));
     let parts = repeated(variables, |number| format!("(not (p ?v{number}))"));
@@ -139,14 +141,15 @@ fn grounding_keeps_the_limit() {
     assert_nothing_to_show(&limited(quantified(40, "x y").path(), &PLAN, 0.5));
 }
 
-/// There is only one combination.
+/// With one object per variable, there is only one combination.
 #[test]
 fn variables_with_one_object_are_cheap() {
     let outcome = limited(quantified(1_000, "x").path(), &PLAN, 3.0);
     assert_eq!(outcome.status, 0, "{outcome:#?}");
 }
 
-/// A universal precondition with two objects per variable. Grounding joins the few edges, but the validator tries all combinations.
+/// Creates a task with a universal precondition and two objects per variable. Grounding joins the few edges,
+/// but the validator tries all combinations.
 fn universal(variables: usize) -> tempfile::TempDir {
     let names = repeated(variables, |number| format!(" ?v{number}"));
     let edges = repeated(variables - 1, |number| format!("(not (edge ?v{number} ?v{}))", number + 1));
@@ -169,7 +172,8 @@ fn validating_keeps_the_limit() {
     assert_nothing_to_show(&limited(directory.path(), &validate, 0.3));
 }
 
-/// A derived predicate along a chain, in its usual formulation. Regression test: it once took 10 s.
+/// Creates a task with a derived predicate along a chain, in its usual formulation. Regression test: this
+/// task once took 10 s.
 fn chain(length: usize) -> tempfile::TempDir {
     let objects = repeated(length + 1, |number| format!(" o{number}"));
     let next = repeated(length, |number| format!("(next o{number} o{})", number + 1));
@@ -189,7 +193,7 @@ fn planning_with_a_chain_of_derived_facts_keeps_the_limit() {
     limited(chain(700).path(), &PLAN, 1.0);
 }
 
-/// A round trip whose optimum takes long to prove, with a manifest.
+/// Creates a round trip whose optimum takes long to prove, with a manifest.
 fn trip(places: u32) -> tempfile::TempDir {
     let (domain, problem) = round_trip(places);
     let directory = files(&domain, &problem);
@@ -228,7 +232,7 @@ fn certifying_keeps_the_limit() {
     }
 }
 
-/// Residual conditions that need much memory.
+/// Conditions that grounding cannot simplify need much memory.
 #[test]
 fn grounding_keeps_the_memory_limit() {
     let directory = quantified(40, "x y");

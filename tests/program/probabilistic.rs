@@ -18,7 +18,7 @@ use serde_json::{Value, json};
 
 use crate::common::{metaplan, metaplan_in, root};
 
-/// Path of a shared file; prints a message if it is not available.
+/// Returns the path of a shared file; prints a message if the file is not available.
 pub fn shared(path: &str) -> Option<PathBuf> {
     let path = root().join("../shared").join(path);
     if !path.exists() {
@@ -27,7 +27,7 @@ pub fn shared(path: &str) -> Option<PathBuf> {
     path.exists().then_some(path)
 }
 
-/// The mission of an imported map, in a temporary directory.
+/// Creates the mission of an imported map in a temporary directory.
 pub fn mission(map: &str, options: &MapOptions) -> (tempfile::TempDir, Setup) {
     let files = import_map("map", map, options).expect("a map");
     let directory = tempfile::tempdir().expect("a directory");
@@ -55,7 +55,7 @@ pub fn dark() -> Vec<(String, String)> {
     pairs.iter().map(|(a, b)| ((*a).to_owned(), (*b).to_owned())).collect()
 }
 
-/// Exact answer of the checker for the PRISM model of a process.
+/// Returns the exact answer of the model checker to a question about the PRISM model of a mission.
 fn answer(mission: &Coadaptation, risk: Risk, question: &str) -> Outcome {
     let model = program(mission, risk);
     let options = Options::default().with_exactness(Exactness::Always);
@@ -71,7 +71,8 @@ fn fraction(answer: &Answer) -> String {
 fn known_results_on_the_map_of_camara() {
     let Some(path) = shared("real/map/map-p2cp3.json") else { return };
     let map = std::fs::read_to_string(path).expect("readable");
-    // More speeds yield more configurations, but not better results: slower ones take more time and more energy.
+    // More speeds yield more configurations, but not better results: slower speeds take more time and more
+    // energy.
     for (speeds, configurations) in [(false, 6), (true, 18)] {
         known_results(&map, speeds, configurations);
     }
@@ -115,7 +116,7 @@ fn known_results(map: &str, speeds: bool, configurations: usize) {
     assert_eq!(front, expected.map(|pair| pair.map(str::to_owned)));
 }
 
-/// Least expected time to the goal, exactly; `None` if the goal is not reached with probability 1.
+/// Returns the exact minimum expected time to the goal; `None` if the goal is not reached with probability 1.
 fn least_time(mission: &Coadaptation, risk: Risk) -> Option<BigRational> {
     let process = Process::<BigRational>::new(mission, risk, &["time"]);
     let explored = explore(&process, &Bounds::default()).expect("explored");
@@ -125,7 +126,7 @@ fn least_time(mission: &Coadaptation, risk: Risk) -> Option<BigRational> {
     (!solution.infinite.contains(0)).then(|| solution.values[0].clone())
 }
 
-/// Optimal cost of the planner; `None` if it proves that there is no plan.
+/// Returns the optimal cost of the planner; `None` if the planner proves that there is no plan.
 fn planned(mission: &Mission) -> Option<f64> {
     let (problem, _) = mission.filled().expect("filled");
     let task = mission.ground(&problem, &[], &planner::Limits::none()).expect("ground");
@@ -137,7 +138,7 @@ fn planned(mission: &Mission) -> Option<f64> {
     }
 }
 
-/// Asserts that both engines agree. Returns whether there is a plan.
+/// Asserts that the planner and the model checker agree. Returns `true` if there is a plan.
 fn agree(label: &str, setup: &Setup, risk: Risk) -> bool {
     let (process, plan) = (least_time(&coadaptation(setup), risk), planned(&setup.mission));
     let is_equal = match (&process, plan) {
@@ -149,7 +150,7 @@ fn agree(label: &str, setup: &Setup, risk: Risk) -> bool {
     plan.is_some()
 }
 
-/// Numbers of solvable and unsolvable cases on which the engines agree.
+/// Numbers of solvable and unsolvable cases on which the planner and the model checker agree.
 #[derive(Debug, Default)]
 struct Agreement {
     solved: usize,
@@ -162,7 +163,8 @@ impl Agreement {
     }
 }
 
-/// Compares random pairs of places until `count` of them have a plan. `None` if the map is not available.
+/// Compares random pairs of places on the map until `count` pairs have a plan. `None` if the map is not
+/// available.
 fn pairs_of_the_map(count: usize) -> Option<Agreement> {
     let map = std::fs::read_to_string(shared("real/map/map-p2cp3.json")?).expect("readable");
     let (_directory, setup) = mission(&map, &MapOptions { dark: dark(), ..places("l1", "l18") });
@@ -193,7 +195,8 @@ impl Random {
     }
 }
 
-/// A random map in the importer's format. The last place may be unreachable.
+/// Returns a random map in the importer's format, and its number of places. The last place may be
+/// unreachable.
 fn random_map(random: &mut Random) -> (String, usize) {
     let n = 3 + random.below(6);
     let mut neighbours = vec![Vec::new(); n];
@@ -222,7 +225,7 @@ fn random_map(random: &mut Random) -> (String, usize) {
     (json!({ "map": nodes, "time": time }).to_string(), n)
 }
 
-/// Compares generated missions until `count` of them have a plan.
+/// Compares random missions until `count` of them have a plan.
 fn generated_missions(count: usize) -> Agreement {
     let mut random = Random(11);
     let mut agreement = Agreement::default();
@@ -269,7 +272,7 @@ fn process_and_planner_agree_on_many_missions() {
     println!("pairs of the map: {:?}", pairs_of_the_map(300));
 }
 
-/// Compares candidates on an imported map. Returns the first comparison.
+/// Runs `metaplan compare` on an imported map. Returns the first comparison of the answer.
 fn compared(map: &str, options: &MapOptions, extra_arguments: &[&str]) -> Value {
     let (directory, _) = mission(map, options);
     let arguments = [&["compare", "camara.toml", "--format", "json"], extra_arguments].concat();
@@ -282,7 +285,7 @@ fn compared(map: &str, options: &MapOptions, extra_arguments: &[&str]) -> Value 
 fn plans_that_ignore_losses_have_a_price() {
     let Some(path) = shared("real/map/map-p2cp3.json") else { return };
     let map = std::fs::read_to_string(path).expect("readable");
-    // Start, goal, loss rate; least expected time, and expected time of our plan with replanning.
+    // Start, goal, loss rate, minimum expected time, and expected time of our plan with replanning.
     let cases =
         [("l59", "l35", "0.2", 79.3925, 84.950_524_8), ("l25", "l7", "0.05", 102.467_925, 102.467_925)];
     for (start, goal, rate, best, replanning) in cases {
@@ -324,7 +327,8 @@ fn shipped_mission_is_compared() {
     assert!((answer["price_of_determinism"].as_f64().expect("a number") - 197.94).abs() < 1e-6, "{answer:#}");
 }
 
-/// Every mission has a decision process. Without uncertainty, its least time is the planner's optimum.
+/// Every mission has a Markov decision process. Without uncertainty, its minimum time is the planner's
+/// optimum.
 #[test]
 fn processes_of_missions_without_places_have_the_optimum_of_the_planner() {
     let cases = [
@@ -342,7 +346,8 @@ fn processes_of_missions_without_places_have_the_optimum_of_the_planner() {
     }
 }
 
-/// The Kinect of the ground vehicle may be lost. Policies that consider this are compared with plans that do not, and with bounds.
+/// The Kinect of the ground vehicle may be lost. Policies that consider this loss are compared with plans
+/// that do not, and with bounds.
 #[test]
 fn missions_without_places_are_compared() {
     let outcome = metaplan(&["compare", "missions/ugv.toml", "--loss", "c_kinect=0.1", "--format", "json"]);
@@ -358,7 +363,8 @@ fn missions_without_places_are_compared() {
     assert_eq!(first["replanned"], first["solved_again"], "{answer:#}");
 }
 
-/// Values that are invalid in a process, and more configurations than a state can represent.
+/// Values that are invalid in a process are rejected, and so are more configurations than a state can
+/// represent.
 #[test]
 fn invalid_processes_are_refused() {
     use pddl::ast::{InitialElement, Name, Problem as Pddl, Term};

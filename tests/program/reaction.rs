@@ -43,7 +43,8 @@ impl Run {
         writeln!(self.input, "{line}").expect("the program reads");
     }
 
-    /// Answers up to the first one that satisfies the predicate, without progress reports, and the time of the last one.
+    /// Returns the answers up to the first one that satisfies the predicate, without progress reports, and
+    /// the time of this last answer.
     fn until(&self, is_wanted: impl Fn(&Value) -> bool) -> (Vec<Value>, Instant) {
         let mut received = Vec::new();
         loop {
@@ -75,7 +76,8 @@ fn failure_event(component: &str) -> String {
     format!(r#"{{"event":"component_status","component":"{component}","status":"FALSE"}}"#)
 }
 
-/// Each plan of this mission takes its full limit of 4 s. The losses are answered before, and the plan reflects the latest knowledge.
+/// Planning takes the full limit of 4 s in this mission. Lost designs are answered before planning, and the
+/// plan takes all losses into account.
 #[test]
 fn lost_designs_are_answered_before_planning() {
     let journal = tempfile::tempdir().expect("a directory");
@@ -95,7 +97,7 @@ fn lost_designs_are_answered_before_planning() {
         answer["line"] == 2 && ["reconfigure", "suspend_action"].iter().any(|kind| answer["answer"] == *kind)
     };
     let (answers, time) = run.until(is_safe);
-    // Far below the time limit of planning. The exact bound is measured in tests of the library.
+    // The bound is far below the time limit of planning. The exact bound is measured in tests of the library.
     assert!(time - started < Duration::from_secs(2), "{:?}", time - started);
     let kinds: Vec<&str> = answers.iter().filter_map(|answer| answer["answer"].as_str()).collect();
     assert!(!kinds.contains(&"plan_requested"), "{kinds:?}");
@@ -106,14 +108,15 @@ fn lost_designs_are_answered_before_planning() {
         assert!(!text.contains("fd_gps") && !text.contains("fd_eye") || !is_steering, "{text}");
     }
     assert!(run.end().is_empty());
-    // Decisions made while input was pending are replayed from the journal.
+    // Decisions that were made while input was pending are replayed from the journal.
     let resumed = Run::new(&["tests/program/ferry/mission.toml", "--journal", directory]);
     let (ready, _) = resumed.until(|answer| answer["answer"] == "ready");
     assert_eq!((&ready[0]["resumed"], &ready[0]["lines"]), (&Value::Bool(true), &Value::from(2)));
     resumed.end();
 }
 
-/// After the filter's delay, a recovery takes effect and a better plan is searched for without further input.
+/// After the filter's delay, a recovery takes effect and a better plan is searched for, without further
+/// input.
 #[test]
 fn timers_run_without_input() {
     let directory = tempfile::tempdir().expect("a directory");

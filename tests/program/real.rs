@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use crate::common::{metaplan, metaplan_in, root};
 use serde_json::Value;
 
-/// Directory of the real files, if available.
+/// Returns the directory of the real files, if available.
 pub fn shared() -> Option<PathBuf> {
     let directory = root().join("../shared");
     if directory.is_dir() {
@@ -20,7 +20,8 @@ pub fn shared() -> Option<PathBuf> {
     None
 }
 
-/// Compares `metaplan reason` for SUAVE's knowledge base, plus the assertions of a golden case, with the reference reasoner.
+/// Compares the result of `metaplan reason` with that of the reference reasoner. The input is SUAVE's
+/// knowledge base with the assertions of a golden case.
 fn reason(case: &str) {
     let Some(shared) = shared() else { return };
     let text = std::fs::read_to_string(shared.join(format!("golden/kb/{case}.json"))).expect("the case");

@@ -2,7 +2,8 @@
 
 use crate::common::{Outcome, edit, metaplan, metaplan_in, processor_time, root};
 
-/// Checks the exit status, and that standard error or output contains each text. Internal errors (panic, M170) always fail.
+/// Checks the exit status, and that standard error or output contains each text. An internal error (panic,
+/// M170) always fails the check.
 fn check(outcome: &Outcome, status: i32, texts: &[&str]) {
     assert_eq!(outcome.status, status, "{outcome:#?}");
     for text in texts {
@@ -11,7 +12,8 @@ fn check(outcome: &Outcome, status: i32, texts: &[&str]) {
     assert!(!outcome.stderr.contains("panicked") && !outcome.stderr.contains("M170"), "{outcome:#?}");
 }
 
-/// Runs a command on a text, as standard input if the arguments contain `-`, and as the file `model.ttl`.
+/// Runs a command on a text, which is the file `model.ttl` and, if the arguments contain `-`, also standard
+/// input.
 fn run(arguments: &[&str], text: &str) -> Outcome {
     let directory = tempfile::tempdir().expect("a temporary directory");
     std::fs::write(directory.path().join("model.ttl"), text).expect("a file");
@@ -31,7 +33,7 @@ fn inferred_assertions_as_turtle() {
     let arguments = ["reason", "ontology/kb/ugv.ttl", "--fail", "c_kinect", "--format", "turtle"];
     let outcome = metaplan(&arguments);
     check(&outcome, 0, &["@prefix tomasys: <http://metacontrol.org/tomasys#>", "tomasys:fd_realisability"]);
-    // The output is a valid document.
+    // The output of the command is a valid document.
     check(&metaplan_in(&root(), &["reason", "-"], &outcome.stdout), 0, &["inferred assertions"]);
     check(&metaplan(&["plan", "missions/ugv.toml", "--format", "turtle"]), 2, &["M107", "reason"]);
 }
@@ -78,7 +80,7 @@ fn standard_input_can_replace_any_document() {
     }
 }
 
-/// Axioms outside the profile are reported once each, with a summary.
+/// Each axiom outside the supported profile is reported once, with a summary.
 #[test]
 fn axioms_outside_the_profile_are_summarised() {
     let model = format!(
@@ -103,7 +105,7 @@ const ZOO: &str =
 :tom a :Cat .
 ";
 
-/// Entailment queries, the class hierarchy, and derivations.
+/// Tests entailment queries, the class hierarchy, and derivations.
 #[test]
 fn queries_are_answered_with_derivations() {
     let directory = tempfile::tempdir().expect("a temporary directory");
@@ -150,7 +152,7 @@ fn queries_are_answered_with_derivations() {
     }
 }
 
-/// A diverging rule ends with an error that names it. Missing imports can be ignored.
+/// A diverging rule ends with an error that names the rule. Missing imports can be ignored.
 #[test]
 fn step_limit_and_missing_imports_are_options() {
     let counting_rule = "<http://x#n>(?x, ?n) ^ swrlb:add(?m, ?n, 1) -> <http://x#n>(?x, ?m) .\n";
@@ -273,7 +275,7 @@ fn hostile_rule_files_are_escaped() {
 const EMPTY: &str = "@prefix : <urn:x#> . @prefix owl: <http://www.w3.org/2002/07/owl#> . \
     @prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .\n";
 
-/// Asserting and retracting documents has the same status and conclusions as reading the resulting document.
+/// Asserting and retracting documents has the same status and conclusions as reading the combined document.
 #[test]
 fn updates_are_equivalent_to_the_resulting_document() {
     let negative = "[] a owl:NegativePropertyAssertion ; owl:sourceIndividual :a ; owl:assertionProperty :p ; \
@@ -326,7 +328,7 @@ fn updates_are_equivalent_to_the_resulting_document() {
     }
 }
 
-/// Updates without effect, and invalid ones, are reported.
+/// Updates without effect are reported, and so are invalid updates.
 #[test]
 fn ineffective_updates_are_reported() {
     let change = |option: &str, text: &str| {
@@ -344,8 +346,8 @@ fn ineffective_updates_are_reported() {
     check(&change("--assert", ":A rdfs:subClassOf [ a owl:Class ; owl:unionOf ( :B :C ) ] ."), 0, &["O301"]);
 }
 
-/// A rule that derives ever larger values ends each command within 2 s and with default limits. The message contains the rule and the
-/// value.
+/// A rule that derives ever larger values ends each command within 2 s, also with default limits. The message
+/// contains the rule and the value.
 #[test]
 fn diverging_rules_end_every_command() {
     let directory = tempfile::tempdir().expect("a temporary directory");

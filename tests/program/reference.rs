@@ -1,4 +1,4 @@
-//! Benchmark: optima of generated instances, which are known from several planners and an exact oracle.
+//! Benchmark with generated instances, whose optima are known from several planners and an exact oracle.
 //!
 //! `cargo test --release --test program reference -- --ignored --nocapture --test-threads 1` prints one line per instance: name, cost,
 //! kind of proof, and processor time of the program; then the time with a certificate, and the time of verification, which must be at
@@ -12,7 +12,7 @@ use std::time::Instant;
 use crate::common::{metaplan_in, processor_time, root};
 use crate::real::shared;
 
-/// Rows of a CSV table, as pairs of column name and value.
+/// Reads a CSV table. Returns its rows as pairs of column name and value.
 fn table(file: &Path) -> Vec<Vec<(String, String)>> {
     let text = std::fs::read_to_string(file).expect("the table");
     let mut lines = text.lines().map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
@@ -29,10 +29,10 @@ fn generate(script: &Path, arguments: &[&str]) {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
-/// Results for one instance.
+/// Results and measurements for one instance.
 #[derive(Debug)]
 struct Row {
-    /// The cost, or the status if there is no plan.
+    /// Cost of the plan, or the status if there is no plan.
     result: String,
     expected: String,
     line: String,
@@ -80,8 +80,8 @@ fn timed(directory: &Path, name: &str, arguments: &[&str], certificate: &str) ->
     Row { result: String::new(), expected: String::new(), line, planning, verifying }
 }
 
-/// Prints the results and asserts that the costs are right. In release builds, verification must take at most ten times the time of
-/// planning.
+/// Prints the results and asserts that the costs are right. In release builds, verification must take at most
+/// ten times as long as planning.
 #[allow(clippy::print_stdout)]
 fn report(rows: &[Row]) {
     let mut text = String::new();

@@ -1,4 +1,5 @@
-//! Tests of `metaplan report` and of pictures of plans: they contain the whole answer, and hostile names are escaped.
+//! Tests of `metaplan report` and of pictures of plans: they contain the whole answer, and hostile names are
+//! escaped.
 
 use std::time::Instant;
 
@@ -7,7 +8,8 @@ use serde_json::Value;
 
 use crate::common::{copy_of_mission, edit, metaplan, metaplan_in, root};
 
-/// Number of drawings of each picture of a page, for columns of different widths. Plans shown side by side have two.
+/// Number of drawings of each picture on a page, for columns of different widths. Plans shown side by side
+/// have two drawings.
 const DRAWINGS: usize = 3;
 /// Maximum size of a page in bytes.
 const MAX_PAGE_BYTES: usize = 500_000;
@@ -19,7 +21,7 @@ fn page(arguments: &[&str]) -> String {
     outcome.stdout
 }
 
-/// Number of occurrences of an attribute with a value.
+/// Returns the number of occurrences of an attribute with the given value in a page.
 fn count(page: &str, attribute: &str, value: &str) -> usize {
     page.matches(&format!("{attribute}=\"{value}\"")).count()
 }
@@ -91,7 +93,8 @@ fn missing_plan_is_stated_plainly() {
     }
 }
 
-/// A design that is unavailable for several causes: all are listed, with the note that removing one is not sufficient.
+/// If several causes make a design unavailable, all are listed, with the note that removing one cause is not
+/// sufficient.
 #[test]
 fn all_causes_of_an_unavailable_design_are_listed() {
     let sentence = "2 causes rule it out, and all of them have to go before it is available:";
@@ -114,7 +117,7 @@ fn all_causes_of_an_unavailable_design_are_listed() {
     check(&["--fail", "c_kinect", "--set", "ambient_light=0.9"], true, true);
 }
 
-/// Times and values of the points of a curve in a picture.
+/// Returns the times and the values of the points of a curve in a picture.
 fn values(picture: &str) -> Vec<(f64, f64)> {
     let document = Document::parse(picture).expect("XML");
     let points = document.descendants().filter(|node| node.attribute("class") == Some("point"));
@@ -253,7 +256,7 @@ fn places_are_drawn_at_positions_of_the_manifest() {
     assert!(outcome.stderr.contains("places.csv:4:1"), "{}", outcome.stderr);
 }
 
-/// A corridor of 1,001 places.
+/// Pages of plans with a thousand steps, along a corridor of 1,001 places, are drawn within the time limit.
 #[test]
 fn pages_of_thousand_steps_are_fast() {
     let mission = copy_of_mission("ugv");
@@ -278,7 +281,7 @@ fn pages_of_thousand_steps_are_fast() {
     assert_eq!(outcome.status, 0, "{}", outcome.stderr);
     assert!(count(&outcome.stdout, "data-step", "1000") >= 2);
     let drawn = report_started.elapsed().saturating_sub(planned);
-    // The limit is for debug builds; release builds take a tenth.
+    // The time limit is for debug builds; release builds take a tenth of the time.
     assert!(drawn.as_secs_f64() < 20.0, "{drawn:?} beside {planned:?} for the plan");
 }
 
@@ -347,7 +350,7 @@ fn reports_have_no_json_format() {
     assert_eq!(error["messages"][0]["code"], "M107");
 }
 
-/// Overlapping actions are drawn in separate rows. Curves show the effects of both.
+/// Overlapping actions are drawn in separate rows. Curves show the effects of both actions.
 #[test]
 fn overlapping_actions_are_drawn() {
     let folder = tempfile::tempdir().expect("a folder");

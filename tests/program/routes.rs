@@ -11,22 +11,22 @@ use serde_json::Value;
 
 use crate::probabilistic::{coadaptation, dark, mission, places, shared};
 
-/// For each place, its neighbours in numeric order with the lengths of the ways in metres.
+/// Maps each place to its neighbours in numeric order, with the lengths of the ways in metres.
 type Graph = BTreeMap<String, Vec<(String, f64)>>;
 
-/// State of the search from one end.
+/// State of the bidirectional search from one end.
 #[derive(Default)]
 struct Side {
-    /// Places with final distance.
+    /// Places whose distance is final.
     settled: BTreeSet<String>,
     distances: BTreeMap<String, f64>,
     routes: BTreeMap<String, Vec<String>>,
     fringe: BinaryHeap<Reverse<(u64, usize, String)>>,
 }
 
-/// Shortest route by bidirectional Dijkstra (I. Pohl: Bi-directional search, 1971), with alternating expansions of both sides. Ties are
-/// broken like in the common Python graph library: the first route found wins, and places at equal distance are expanded in the order
-/// of insertion.
+/// Returns the shortest route by bidirectional Dijkstra (I. Pohl: Bi-directional search, 1971), with
+/// alternating expansions of both sides. Ties are broken as in the common Python graph library: the first
+/// route found wins, and places at equal distance are expanded in the order of insertion.
 fn shortest(graph: &Graph, start: &str, goal: &str) -> Vec<String> {
     let mut sides = [start, goal].map(|place| {
         let mut side = Side::default();
@@ -58,7 +58,8 @@ fn shortest(graph: &Graph, start: &str, goal: &str) -> Vec<String> {
             route.push(neighbour.clone());
             let side = &mut sides[turn];
             side.distances.insert(neighbour.clone(), distance);
-            // The bit patterns of non-negative floats have the order of the numbers, and unlike floats they implement `Ord`.
+            // The bit patterns of non-negative floats are ordered like the numbers and, unlike floats,
+            // implement `Ord`.
             side.fringe.push(Reverse((distance.to_bits(), push_count, neighbour.clone())));
             side.routes.insert(neighbour.clone(), route);
             if let [Some(from_start), Some(from_goal)] =
@@ -77,7 +78,8 @@ fn shortest(graph: &Graph, start: &str, goal: &str) -> Vec<String> {
     }
 }
 
-/// Parses the map: the graph with lengths rounded to millimetres, and the endpoints of ways with measurements.
+/// Parses the map. Returns the graph with lengths rounded to millimetres, and the endpoints of ways with
+/// measurements.
 fn read(map: &str) -> (Graph, BTreeSet<String>) {
     let map: Value = serde_json::from_str(map).expect("JSON");
     let text = |value: &Value| value.as_str().expect("a name").to_owned();
@@ -108,7 +110,7 @@ fn read(map: &str) -> (Graph, BTreeSet<String>) {
     (graph, measured_places)
 }
 
-/// Least energy from each place to the goal, by solving the process.
+/// Returns the minimum energy from each place to the goal, by solving the decision process.
 fn least_energy(mission: &Coadaptation) -> BTreeMap<usize, f64> {
     let process = Process::<f64>::new(mission, Risk::default(), &["energy"]);
     let explored = explore(&process, &Bounds::default()).expect("explored");
@@ -120,8 +122,9 @@ fn least_energy(mission: &Coadaptation) -> BTreeMap<usize, f64> {
     initial_values.map(|(situation, value)| (situation.place, *value)).collect()
 }
 
-/// Joint optimisation uses less energy than the best configurations on the fixed shortest route for 337 of 3,080 pairs. The pairs are
-/// places with measured ways; routes can use all ways of the map, including dark ones.
+/// For 337 of 3,080 pairs of places, joint optimisation uses less energy than the best configurations on the
+/// fixed shortest route. The pairs are places with measured ways; routes can use all ways of the map,
+/// including dark ones.
 #[test]
 fn joint_optimisation_beats_fixed_shortest_routes() {
     let Some(path) = shared("real/map/map-p2cp3.json") else { return };

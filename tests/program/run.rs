@@ -4,7 +4,8 @@ use serde_json::Value;
 
 use crate::common::{metaplan_in, root};
 
-/// Runs the loop on input lines and checks line numbers and kinds of the answers. Line 0 is the start.
+/// Runs the loop on input lines and compares the line number and the kind of each answer with `expected`.
+/// Line 0 is the start. Returns the answers.
 fn check(arguments: &[&str], input: &str, expected: &[&str]) -> Vec<Value> {
     let command: Vec<&str> = ["run"].iter().chain(arguments).copied().collect();
     let outcome = metaplan_in(&root(), &command, input);

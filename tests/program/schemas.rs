@@ -1,4 +1,4 @@
-//! Tests of the JSON Schemas: valid outputs and inputs conform to them, and invalid ones do not.
+//! Tests of the JSON Schemas: valid outputs and inputs conform to the schemas, and invalid ones do not.
 
 use jsonschema::Validator;
 use metaplan::mapek::Observation;
@@ -12,7 +12,7 @@ fn validator(format: &str) -> Validator {
     jsonschema::validator_for(&schema).unwrap_or_else(|error| panic!("{format}: {error}"))
 }
 
-/// Validates a document. The error has the reasons.
+/// Validates a document against the schema of a format. The error contains the reasons.
 fn validate(format: &str, document: &Value) -> Result<(), String> {
     let faults: Vec<String> = validator(format)
         .iter_errors(document)
@@ -21,7 +21,7 @@ fn validate(format: &str, document: &Value) -> Result<(), String> {
     if faults.is_empty() { Ok(()) } else { Err(format!("{format}: {}\n{document:#}", faults.join("\n"))) }
 }
 
-/// Name of the format that a document declares.
+/// Returns the name of the format that a document declares.
 fn format_of(document: &Value) -> &str {
     let format = document["format"].as_str().expect("a format");
     format.strip_prefix("metaplan-").and_then(|name| name.split('/').next()).expect("a name and a version")
@@ -120,7 +120,7 @@ fn schemas_refuse_other_formats() {
     }
 }
 
-/// Parses a manifest to JSON.
+/// Reads a manifest as a JSON value.
 fn manifest(path: &std::path::Path) -> Value {
     let text = std::fs::read_to_string(path).expect("a manifest");
     toml::from_str(&text).expect("TOML")
@@ -140,7 +140,8 @@ fn manifests_conform_and_unknown_keys_are_refused() {
     for path in paths.iter().filter(|path| path.extension().is_some_and(|extension| extension == "toml")) {
         let valid_manifest = manifest(path);
         assert_eq!(validate("manifest", &valid_manifest), Ok(()), "{}", path.display());
-        // Each table gets an unknown key in turn. Tables that map names accept any key, so they are excluded.
+        // Each table gets an unknown key in turn. Tables that map names accept any key and are therefore
+        // excluded.
         for pointer in [
             "",
             "/knowledge",
@@ -174,7 +175,7 @@ fn manifests_conform_and_unknown_keys_are_refused() {
     assert_eq!(validate("manifest", &valid_manifest), Ok(()));
 }
 
-/// Parser and schema must agree on all kinds of events, with removed, invalid and additional fields.
+/// Parser and schema agree on all kinds of events, with removed, invalid and additional fields.
 #[test]
 fn event_schema_agrees_with_the_parser() {
     let events = [
@@ -226,7 +227,7 @@ fn event_schema_agrees_with_the_parser() {
     assert!(!is_accepted(&json!({"event": "measrued"})));
 }
 
-/// The answers of a loop conform to the schema that recordings contain as well.
+/// The answers of a loop conform to the schema, which recordings contain as well.
 #[test]
 fn answers_of_the_loop_conform() {
     let lines = "{\"event\":\"component_status\",\"component\":\"c_kinect\",\"status\":\"FALSE\"}\n{\"event\":\"zzz\"}\n";

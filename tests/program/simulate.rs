@@ -1,10 +1,11 @@
-//! Tests of `metaplan simulate`: the loop and baseline strategies in identical worlds.
+//! Tests of `metaplan simulate`, which runs the loop and baseline strategies in identical worlds.
 
 use serde_json::Value;
 
 use crate::common::{edit, metaplan, metaplan_in, root};
 
-/// Simulates a scenario. For each strategy: accomplished missions, and runs that are better and worse than the loop's.
+/// Simulates a scenario. Returns for each strategy: name, number of accomplished missions, and numbers of
+/// runs that are better and worse than the run of the loop.
 fn check(mission: &str, scenario: &str, runs: usize) -> Vec<(String, u64, u64, u64)> {
     let (file, count) = (format!("missions/{mission}.toml"), runs.to_string());
     let arguments =
@@ -27,13 +28,13 @@ fn worse_runs(rows: &[(String, u64, u64, u64)], strategy: &str) -> u64 {
     rows.iter().find(|row| row.0 == strategy).expect("the strategy").3
 }
 
-/// Compares the strategies over a number of seeds.
+/// Compares the strategies in several scenarios over the given number of seeds.
 fn compare(runs: usize) {
     let run_count = runs as u64;
     for (mission, scenario) in [("ugv", "kinect_at_wp2"), ("uuv", "battery_under_way")] {
         let rows = check(mission, scenario, runs);
         assert_eq!(rows[0], ("joint".to_owned(), run_count, 0, 0), "{scenario}");
-        // The argument of the paper: route and designs, order and speed must be chosen together.
+        // The claim of the paper: route and designs, order and speed must be chosen together.
         for strategy in ["failure", "greedy", "random", "none"] {
             assert_eq!(worse_runs(&rows, strategy), run_count, "{strategy} in {scenario}");
         }
@@ -132,7 +133,8 @@ fn scenarios_with_a_simulation_are_suggested() {
     assert!(outcome.stderr.contains("kinect_at_wp2"), "{outcome:#?}");
 }
 
-/// Log of a simulation of the warehouse in which the lidar fails for 10 units of time. The default unit is the second.
+/// Returns the log of a simulation of the warehouse in which the lidar fails for 10 units of time. The
+/// default unit is the second.
 fn simulate_lidar_outage(unit: &str, settle: u32) -> Vec<Value> {
     let directory = tempfile::tempdir().expect("a directory");
     let here = directory.path();
@@ -169,7 +171,8 @@ fn simulate_lidar_outage(unit: &str, settle: u32) -> Vec<Value> {
     log.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect()
 }
 
-/// Times in the log are seconds, for every unit of the domain. `settle` is in seconds as well.
+/// Times in the log are seconds, for every time unit of the domain. The setting `settle` is in seconds as
+/// well.
 #[test]
 fn clock_of_the_loop_is_in_seconds() {
     for (unit, second, settle) in [
@@ -191,7 +194,7 @@ fn clock_of_the_loop_is_in_seconds() {
                 replanning_time.get_or_insert(now);
             }
         }
-        // Reports come once per time unit of the domain, and at the ends of actions.
+        // Reports are sent once per time unit of the domain, and at the ends of actions.
         let (failure_time, recovery_time) =
             (failure_time.expect("it fails"), recovery_time.expect("it is back"));
         assert!(
@@ -242,8 +245,9 @@ fn units_are_shown() {
     }
 }
 
-/// Requirements of actions depend on their context in the tutorial's knowledge base: no light in the dark aisle, and a gentle grip for
-/// fragile items. The baseline strategies request no design that violates them, and complete every possible action.
+/// In the tutorial's knowledge base, the requirements of actions depend on their context: no light in the
+/// dark aisle, and a gentle grip for fragile items. The baseline strategies request no design that violates a
+/// requirement, and complete every possible action.
 #[test]
 fn greedy_control_observes_requirements() {
     let directory = tempfile::tempdir().expect("a directory");
@@ -282,7 +286,8 @@ fn greedy_control_observes_requirements() {
     }
 }
 
-/// A mission from outside the project, if available. The requirements of its rooms and corridors are listed by hand.
+/// A mission from outside the project, if available. The test lists the requirements of the mission's rooms
+/// and corridors by hand.
 #[test]
 #[expect(clippy::print_stdout, reason = "what is skipped says so")]
 fn greedy_control_observes_requirements_in_a_ward() {

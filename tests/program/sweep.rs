@@ -19,7 +19,7 @@ fn sweep(study: &str, results: &Path, options: &[&str]) -> crate::common::Outcom
     metaplan(&arguments)
 }
 
-/// Merged table and JSON answer of a study.
+/// Merges the shards of a study. Returns the merged table and the JSON answer.
 fn merged(study: &str, results: &Path) -> (String, Value) {
     let csv = results.join("table.csv");
     let outcome = sweep(study, results, &["--merge", "--csv", &csv.to_string_lossy()]);
@@ -138,7 +138,8 @@ fn runs_end_at_their_time_limit_and_files_are_generated() {
     assert_eq!((outcome.status, &outcome.json()["timed_out"]), (1, &1.into()), "{outcome:#?}");
 }
 
-/// All ordered pairs of places of the invented map are runs of a study, with the same results as the comparison of the map.
+/// A study can vary all ordered pairs of places of the invented map. Its results equal those of the
+/// comparison of the map.
 #[test]
 fn pairs_of_a_map_can_be_varied() {
     let folder = tempfile::tempdir().expect("a directory");

@@ -5,13 +5,13 @@ use std::path::Path;
 
 use crate::common::{Outcome, copy_folder, copy_of_mission, edit, headlines, metaplan, metaplan_in, root};
 
-/// Files below a folder, recursively.
+/// Returns all files below a folder.
 fn texts(folder: &Path) -> Vec<std::path::PathBuf> {
     let entries = fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path());
     entries.flat_map(|path| if path.is_dir() { texts(&path) } else { vec![path] }).collect()
 }
 
-/// A copy of the tutorial's mission in which a name is replaced in all files.
+/// Copies the tutorial's mission and replaces a name in all files.
 fn warehouse_with(old: &str, new: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     copy_folder(&root().join("missions/templates/warehouse"), folder.path());
@@ -36,7 +36,7 @@ fn names_can_have_letters_of_any_script() {
     for (old, new) in [
         ("fd_lidar", "fd_lidär"),
         ("fd_lidar", "激光雷达"),
-        // A base letter with a combining mark.
+        // The name contains a base letter with a combining mark.
         ("fd_lidar", "fd_lida\u{308}r"),
         ("f_navigate", "f_überqueren"),
         ("c_lidar", "c_лидар"),
@@ -156,7 +156,7 @@ fn byte_order_marks_are_ignored() {
     }
     assert!(count > 20, "{count} files");
     assert_eq!(without_times(answers()), expected);
-    // UTF-16 with CRLF, like the output of `>` in Windows PowerShell.
+    // The file is UTF-16 with CRLF, as written by `>` in Windows PowerShell.
     let plan = fs::read_to_string(within("plan.txt")).expect("a plan").replace('\n', "\r\n");
     let bytes: Vec<u8> = plan.encode_utf16().flat_map(u16::to_le_bytes).collect();
     fs::write(within("plan.txt"), bytes).expect("written");
@@ -199,7 +199,7 @@ fn plans_in_files_can_be_validated() {
         assert_eq!(text, metaplan(&["plan", mission, "--plan-format", "ipc"]).stdout, "{mission}");
         let valid = metaplan(&["validate", mission, &file]);
         assert!(valid.status == 0 && valid.stdout.starts_with("valid"), "{mission}: {valid:#?}");
-        // A table is refused with one message, which names the remedy.
+        // A table of a plan is rejected with a single message, which names the remedy.
         for table in [&["--plan-format", "table"][..], &["--plan-format", "table", "--verbose"]] {
             assert_eq!(metaplan(&[&["plan", mission, "-o", &file], table].concat()).status, 0);
             let refused = metaplan(&["validate", mission, &file]);
@@ -208,8 +208,8 @@ fn plans_in_files_can_be_validated() {
             assert!(refused.stderr.contains("M111") && refused.stderr.contains("--plan-format ipc"));
         }
     }
-    // Answers that are not a plan cannot be written in a plan format. They go to standard error, or into the file in the format of standard
-    // output.
+    // Answers that are not a plan cannot be written in a plan format. They are printed to standard error, or
+    // written to the file in the format of standard output.
     let unsolvable = metaplan(&["plan", "missions/uuv.toml", "--set", "water_visibility=1", "-o", &file]);
     assert_eq!(unsolvable.status, 10);
     let printed = metaplan(&["plan", "missions/uuv.toml", "--set", "water_visibility=1"]);

@@ -1,4 +1,4 @@
-//! Tests of `--trace`: complete spans with counts, or no file.
+//! Tests of `--trace`: the trace file contains complete spans with counts, or there is no file.
 
 use std::collections::BTreeMap;
 
@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::common::{metaplan, root};
 
-/// Spans by name, each with its fields at the end.
+/// Parses a trace. Returns the spans by name, each with its fields at the end of the span.
 fn spans(text: &str) -> BTreeMap<String, Vec<Value>> {
     let events: Vec<Value> = serde_json::from_str(text).expect("JSON");
     let mut spans: BTreeMap<String, Vec<Value>> = BTreeMap::new();

@@ -1,8 +1,10 @@
-//! Tests of the UGV mission of the paper: both plans, their uniqueness by brute force, and the three modifications.
+//! Tests of the UGV mission of the paper: both plans, their uniqueness by brute force, and the three
+//! modifications.
 
 use crate::common::{copy_of_mission, edit, metaplan, metaplan_in, steps};
 
-/// Plans with these arguments. Checks steps, cost, the proof of optimality, and the plan by validation.
+/// Runs `metaplan plan` with these arguments. Checks steps, cost, the proof of optimality, and the plan by
+/// validation.
 fn check(arguments: &[&str], expected: &[&str], cost: i64) {
     let directory = crate::common::root();
     check_in(&directory, arguments, expected, cost);
@@ -56,7 +58,8 @@ fn small_missions_are_proved_by_the_sat_solver() {
     assert!(answer["statistics"]["clauses"].as_i64() > Some(100), "{answer:#}");
 }
 
-/// The designs in the table: battery per move, safety in tenths, whether it needs light, components.
+/// Designs of the mission: name, battery usage per move, safety in tenths, whether the design needs
+/// light, and components.
 const DESIGNS: [(&str, i64, i64, bool, &[&str]); 6] = [
     ("fd_amcl_lidar", 4, 4, false, &["c_lidar"]),
     ("fd_amcl_kinect", 2, 10, false, &["c_kinect"]),
@@ -66,7 +69,8 @@ const DESIGNS: [(&str, i64, i64, bool, &[&str]); 6] = [
     ("fd_aruco_with_light", 10, 7, false, &["c_camera", "c_flashlight"]),
 ];
 
-/// All plans from a waypoint to wp9 with a cost of at most `limit`, by enumeration.
+/// Enumerates all plans from a waypoint to wp9 with a cost of at most `limit`. `prefix` contains the steps so
+/// far.
 fn enumerate(
     waypoint: usize,
     failed: &str,
@@ -141,7 +145,7 @@ fn battery_usage_is_defined_in_the_domain() {
         "{text_before}move_with_obstacles{expensive_obstacles}(:durative-action move_in_the_dark{text_after}"
     );
     std::fs::write(mission.path().join(domain), text).expect("the domain is written");
-    // 60 times the usual consumption exceeds the battery, so the plan avoids the obstacles.
+    // At 60 times the usual consumption, the battery would not suffice, so the plan avoids the obstacles.
     let detour = [
         "move wp1 wp2 | fd_amcl_kinect",
         "move wp2 wp3 | fd_amcl_kinect",
@@ -176,10 +180,11 @@ fn availability_comes_from_the_knowledge_base() {
         "move wp3 wp6 | fd_amcl_lidar",
         "move_in_the_dark wp6 wp9 | fd_amcl_lidar",
     ];
-    // A measurement outside the range of the Kinect designs.
+    // The measured value is outside the range of the Kinect designs.
     check(&["--set", "ambient_light=0.9"], &detour, 516);
     check(&["--set", "ambient_light=0.8"], &THROUGH_THE_OBSTACLES, 408);
-    // If both fail, the camera remains. Its design without flashlight does not work in the dark.
+    // If both the Kinect and the lidar fail, the camera remains. Its design without flashlight does not work
+    // in the dark.
     let camera = [
         "move wp2 wp3 | fd_aruco",
         "move wp3 wp6 | fd_aruco",
@@ -188,7 +193,7 @@ fn availability_comes_from_the_knowledge_base() {
     check(&["--set", "robot_at=wp2", "--fail", "c_kinect", "--fail", "c_lidar"], &camera, 424);
     // The optimal plan does not use the lidar.
     check(&["--fail", "c_lidar"], &THROUGH_THE_OBSTACLES, 408);
-    // The limit is a value of the knowledge base.
+    // The limit of the light is a value of the knowledge base.
     let mission = copy_of_mission("ugv");
     edit(mission.path(), "ontology/kb/ugv.ttl", "t:hasMaximum 0.8", "t:hasMaximum 0.2");
     check_in(mission.path(), &[], &detour, 516);

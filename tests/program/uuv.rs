@@ -43,13 +43,13 @@ fn visibility_limits_the_search_height() {
     assert_eq!(outcome.status, 10, "{outcome:#?}");
 }
 
-/// Designs for motion (time, battery per unit).
+/// Designs for motion: time and battery usage, each per unit of work.
 const SPEEDS: [(i64, i64); 3] = [(6, 2), (4, 5), (2, 10)];
-/// Designs for searching, by their time. Each uses 1 unit of battery.
+/// Designs for searching: time per unit of work. Each design uses 1 unit of battery per unit of work.
 const HEIGHTS: [i64; 3] = [6, 4, 2];
 const RESERVE: i64 = 10;
 
-/// Costs of all plans with at most five actions and a cost of at most `limit`, by enumeration.
+/// Enumerates the costs of all plans with at most five actions and a cost of at most `limit`.
 fn enumerate(battery: i64, stage: usize, actions: usize, cost: i64, limit: i64, costs: &mut Vec<i64>) {
     if cost > limit || actions > 5 {
         return;
@@ -87,7 +87,7 @@ fn optima_are_unique_by_brute_force() {
 
 #[test]
 fn only_blocking_designs_are_listed() {
-    // Without thruster 3 only the low speed is available, but it is sufficient.
+    // Without thruster 3 only the low speed is available, which is sufficient.
     let arguments = ["plan", "missions/uuv.toml", "--fail", "c_sonar", "--fail", "c_thruster_3"];
     let answer = metaplan(&[&arguments[..], &["--format", "json"]].concat());
     assert_eq!((answer.status, answer.json()["blocking"].clone()), (10, serde_json::json!(["fd_follow"])));

@@ -1,4 +1,4 @@
-//! Tests of `metaplan validate`: the fields of its answer, and the positions of its messages.
+//! Tests of `metaplan validate`: the fields of the answer, and the positions of messages.
 
 use serde_json::{Value, json};
 
@@ -30,7 +30,7 @@ fn validate(domain: &str, problem: &str, plan: &str, arguments: &[&str]) -> Outc
     metaplan_in(directory.path(), &command.copied().collect::<Vec<_>>(), "")
 }
 
-/// Checks the exit status and the complete JSON answer.
+/// Validates a plan for the survey domain. Checks the exit status and the complete JSON answer.
 fn check(plan: &str, status: i32, expected: &Value) {
     let outcome = validate(DOMAIN, PROBLEM, plan, &["--format", "json"]);
     assert_eq!((outcome.status, &outcome.json()), (status, expected), "{plan}");
@@ -80,7 +80,7 @@ fn messages_have_a_position_and_a_suggestion() {
     assert!(message["help"].as_str().is_some_and(|help| help.contains("`at`")), "{message}");
 }
 
-/// Plans written by `plan` are valid in each format, for plain and explicit domains.
+/// Plans that `metaplan plan` writes are valid in each format, for plain and explicit domains.
 #[test]
 fn plans_are_valid_in_each_format() {
     for mission in ["ugv", "ugv_plain", "uuv", "uuv_plain"] {

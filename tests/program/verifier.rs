@@ -1,4 +1,5 @@
-//! Agreement of `metaplan verify` and `metaplan-verify`. All tests of certificates run both programs, see [`verify_in`].
+//! Tests that `metaplan verify` and `metaplan-verify` agree. All tests of certificates run both programs, see
+//! [`verify_in`].
 
 use std::path::Path;
 
@@ -7,7 +8,7 @@ use serde_json::{Value, json};
 use crate::certificate::{certificate, change};
 use crate::common::{metaplan, root, verify_in};
 
-/// Missing certificates, unwritable outputs, and time limits.
+/// Missing certificates, unwritable outputs, and time limits are reported alike by both programs.
 #[test]
 fn both_programs_give_the_same_refusals() {
     let directory = tempfile::tempdir().expect("a directory");
@@ -29,8 +30,9 @@ fn both_programs_give_the_same_refusals() {
     }
 }
 
-/// The knowledge files can be removed from the manifest. The certificate then covers its PDDL files only, and the verdict states this. If a
-/// mission is given, the certificate must be about this mission.
+/// The knowledge files can be removed from the manifest of a certificate. The certificate then covers only
+/// its PDDL files, and the verdict states this. If a mission is given, the certificate must be about this
+/// mission.
 #[test]
 fn verdicts_state_the_subject_of_the_certificate() {
     use sha2::{Digest as _, Sha256};
@@ -43,7 +45,7 @@ fn verdicts_state_the_subject_of_the_certificate() {
     let optimal = "verified: the plan is optimal, metric 408, for";
     let full_verdict = format!("{optimal} these PDDL files and their knowledge base; not checked: mission");
     assert_eq!(verdict(&[]), full_verdict);
-    // The digest is the hash of the output of `sha256sum` for these files.
+    // The digest is the hash of the output of `sha256sum` for the certificate's input files.
     let lines = ["domain.pddl", "problem.pddl", "knowledge.nt", "origin.json"].map(|name| {
         let text = std::fs::read(Path::new(&target).join(name)).expect("a file");
         format!("{:x}  {name}\n", Sha256::digest(text))

@@ -1,10 +1,10 @@
-//! Tests of widths: tables and help fit into `COLUMNS`. Without a terminal, tables are not wrapped.
+//! Tests of output widths: tables and help fit into `COLUMNS`. Without a terminal, tables are not wrapped.
 
 use std::process::Command;
 
 use crate::common::root;
 
-/// Output with the given value of `COLUMNS`, or without it.
+/// Returns the output of a command with the given value of the variable `COLUMNS`, or without the variable.
 fn answer(arguments: &[&str], columns: Option<&str>) -> String {
     let mut program = Command::new(env!("CARGO_BIN_EXE_metaplan"));
     program.args(arguments).current_dir(root()).env_remove("COLUMNS");
@@ -20,14 +20,14 @@ fn width(text: &str) -> usize {
     text.lines().map(|line| line.chars().count()).max().unwrap_or(0)
 }
 
-/// Words of a text, sorted.
+/// Returns the words of a text, sorted.
 fn words(text: &str) -> Vec<&str> {
     let mut words: Vec<&str> = text.split_whitespace().collect();
     words.sort_unstable();
     words
 }
 
-/// Visible characters of a text, sorted.
+/// Returns the non-blank characters of a text, sorted.
 fn characters(text: &str) -> Vec<char> {
     let mut characters: Vec<char> = text.chars().filter(|character| !character.is_whitespace()).collect();
     characters.sort_unstable();
@@ -51,7 +51,7 @@ fn tables_fit_into_the_terminal_width() {
         let table = |text: &str| text.split("\n\n").next().unwrap_or_default().to_owned();
         assert!(width(&table(&wide)) > columns, "{arguments:?} is narrow anyway:\n{wide}");
         assert!(width(&table(&narrow)) <= columns, "{arguments:?}:\n{narrow}");
-        // Words are broken only if the longest words of the columns do not fit next to each other.
+        // Words are broken only if the longest words of all columns do not fit next to each other.
         if keeps_words {
             assert_eq!(words(&wide), words(&narrow), "{arguments:?}");
         } else {

@@ -1,4 +1,5 @@
-//! Tests that need no Storm: early termination for decided properties, and bounded rewards.
+//! Tests of the model checker that do not need Storm: early termination for decided properties, and bounded
+//! rewards.
 
 use probabilistic::check::{Exactness, Options, check};
 use probabilistic::explore::{Bounds, explore};
@@ -9,7 +10,8 @@ use probabilistic::property;
 use super::ours;
 use super::random::{Random, questions, random_model};
 
-/// Exploration stops at states in which the property is decided, unless a policy is requested. The answers are equal.
+/// Exploration stops at states in which the property is decided, unless a policy is requested. The answers
+/// are equal to those without early termination.
 #[test]
 fn decided_states_are_not_explored_further() {
     let mut random = Random(7);
@@ -35,11 +37,12 @@ fn decided_states_are_not_explored_further() {
             fewer += usize::from(early_report.states < full_report.states);
         }
     }
-    // Guards against tasks in which nothing is decided early.
+    // Guards against models in which no property is decided early.
     assert!(fewer > 100, "{fewer} have fewer states");
 }
 
-/// Probability of reaching `s=m-1` within a reward budget, by value iteration over states and remaining budget.
+/// Returns the probability of reaching `s=m-1` within a reward budget, by value iteration over pairs of state
+/// and remaining budget.
 fn unfolded(model: &Model, budget: usize, greatest: bool) -> f64 {
     let program = Program::<f64>::new(model, &Settings::default()).expect("a program").with_rewards(&[0]);
     let explored = explore(&program, &Bounds::default()).expect("explored");
@@ -78,7 +81,8 @@ fn unfolded(model: &Model, budget: usize, greatest: bool) -> f64 {
     probabilities[budget][0]
 }
 
-/// Value iteration on the unfolded process is the oracle, with and without cycles of choices without reward.
+/// The oracle is value iteration on the process that is unfolded over the remaining budget. The models have
+/// cycles of choices with and without reward.
 #[test]
 fn bounds_on_rewards_are_those_of_the_unfolded_process() {
     let mut random = Random(11);

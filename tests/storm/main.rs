@@ -1,4 +1,5 @@
-//! Comparison of the model checker with Storm: values on random models and on our mission, JANI files, and speed on co-adaptation models.
+//! Comparison of the model checker with Storm: values on random models and on the co-adaptation mission
+//! `camara_like`, JANI files, and speed.
 //!
 //! Setup: `python3 -m venv storm && storm/bin/pip install stormpy==2.0.0`. Run:
 //! `STORM_PYTHON=storm/bin/python cargo test --release --test storm -- --ignored --nocapture`. `SEED` and `MODELS` set the seed and the
@@ -25,7 +26,8 @@ use serde_json::{Value, json};
 
 use random::{Random, questions, random_model};
 
-/// Answers each line of JSON (`file`, `property`, `exact`) with the value or an error, and with times and memory.
+/// Python script that answers each line of JSON (`file`, `property`, `exact`) with the value or an error, and
+/// with times and memory.
 const SCRIPT: &str = r#"
 import json, sys, time, resource
 import stormpy
@@ -54,7 +56,7 @@ for line in sys.stdin:
     print(json.dumps(out), flush=True)
 "#;
 
-/// Storm's answers; `None` if it is not installed.
+/// Returns Storm's answers to the questions; `None` if Storm is not installed.
 fn storm(questions: &[Value]) -> Option<Vec<Value>> {
     let python = std::env::var("STORM_PYTHON").unwrap_or_else(|_| "python3".to_owned());
     let installed = Command::new(&python).args(["-c", "import stormpy"]).output().ok()?.status.success();
@@ -87,7 +89,8 @@ fn storm(questions: &[Value]) -> Option<Vec<Value>> {
     )
 }
 
-/// Our value with lower and upper bound; `None` if it is infinite.
+/// Returns the value that Metaplan's model checker computes for a property, with its lower and upper bound. `None` if
+/// the value is infinite.
 fn ours(model: &Model, text: &str, exactness: Exactness) -> Option<(f64, f64, f64)> {
     let options = Options::default().with_exactness(exactness);
     let report = check(model, &property::parse(text).expect("a property"), &options).expect("an answer");
@@ -141,7 +144,7 @@ fn random_models() {
             let [exact, rounded] =
                 [Exactness::Always, Exactness::Never].map(|exactness| ours(&read, question, exactness));
             infinite += usize::from(exact.is_none());
-            // The JANI file must have the same values, which tests the export.
+            // Storm must compute the same values from the JANI file, which tests the export.
             for file in [&prism_file, &jani_file] {
                 queries.push(json!({ "file": file, "property": question, "exact": true }));
                 expected.push((format!("{question}\n{text}"), exact, rounded));
@@ -171,7 +174,7 @@ fn random_models() {
     assert_eq!(refused, 0);
 }
 
-/// A property of our mission with more battery levels.
+/// A property of the mission `camara_like`, which is checked with larger numbers of battery levels.
 struct Case {
     property: &'static str,
     reward: Option<&'static str>,
@@ -183,7 +186,8 @@ const CASES: [Case; 2] = [
     Case { property: "R{\"time\"}min=? [ F \"goal\" ]", reward: Some("time"), failures: false },
 ];
 
-/// Our mission with a battery capacity and an optional size of its levels, such as `14000/20`.
+/// Returns the mission `camara_like` with another battery capacity, optionally with the size of a battery level:
+/// `14000/20`.
 fn larger(battery: &str, case: &Case) -> (Coadaptation, Risk) {
     let number = |text: &str| text.parse::<u32>().expect("a number");
     let (battery, unit) = battery.split_once('/').unwrap_or((battery, "1"));
@@ -207,7 +211,7 @@ struct Run {
     solve: f64,
 }
 
-/// Explores and solves the process without its text.
+/// Explores and solves the process directly, without its text in the PRISM language.
 fn native(mission: &Coadaptation, risk: Risk, case: &Case) -> Run {
     let started = processor();
     let names: Vec<&str> = case.reward.into_iter().collect();
@@ -228,7 +232,7 @@ fn native(mission: &Coadaptation, risk: Risk, case: &Case) -> Run {
     Run { states: explored.mdp.states(), value, build, solve }
 }
 
-/// Checks the process as PRISM text, like any other model.
+/// Checks the process as a text in the PRISM language, like any other model.
 fn as_text(text: &str, case: &Case) -> Run {
     let model = prism::parse(text).expect("a model");
     let bounds = Bounds::default().with_states(100_000_000);
@@ -246,7 +250,8 @@ fn as_text(text: &str, case: &Case) -> Run {
     Run { states: report.states, value, build, solve: total - build }
 }
 
-/// Runs one size in its own process, to measure its memory. Parameters: `LEVELS`, `CASE` and `SIDE` (`native` or `text`).
+/// Runs one size in a separate process, so that its memory can be measured. Environment variables: `LEVELS`,
+/// `CASE` and `SIDE` (`native` or `text`).
 #[test]
 #[ignore = "part of `speed_on_coadaptation_models`"]
 fn one_side() {
@@ -310,14 +315,14 @@ fn speed_on_coadaptation_models() {
     }
 }
 
-/// Processor time of this thread in seconds, so that other processes do not matter.
+/// Returns the processor time of this thread in seconds, which does not depend on other processes.
 fn processor() -> f64 {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
     let nanoseconds = text.split_whitespace().next().and_then(|word| word.parse::<f64>().ok());
     nanoseconds.unwrap_or(0.0) / 1e9
 }
 
-/// Peak resident memory of this process in megabytes.
+/// Returns the peak resident memory of this process in megabytes.
 fn peak() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).unwrap_or("0");

@@ -1,4 +1,4 @@
-//! Random models of two modules that synchronise on an action.
+//! Random models of two modules that synchronise on common actions.
 
 use probabilistic::Place;
 use probabilistic::prism::ast::{
@@ -23,7 +23,8 @@ fn equals(name: &str, value: usize) -> Expr {
     Expr::name(name).op(BinaryOp::Equal, Expr::int(value as i64))
 }
 
-/// A module over `variable` with random commands. The other module synchronises on common actions.
+/// Returns a module over `variable` with random commands. The second module synchronises with it on common
+/// actions.
 fn module(random: &mut Random, name: &str, variable: &str, size: usize, actions: &[&str]) -> Module {
     let mut commands = Vec::new();
     for state in 0..size {

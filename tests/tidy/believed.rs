@@ -8,7 +8,7 @@ use super::packages::linked;
 /// Line counts are rounded up to a multiple of this number.
 const ROUNDING_STEP: usize = 100;
 
-/// Number of lines of code, without blank lines, comments and tests.
+/// Returns the number of lines of code, without blank lines, comments and tests.
 fn code_lines(text: &str) -> usize {
     let mut lines = text.lines().map(str::trim);
     let mut count = 0;
@@ -25,7 +25,7 @@ fn code_lines(text: &str) -> usize {
     count
 }
 
-/// Rows of the table: folders and files (without extension), and the number of lines.
+/// Parses the rows of the table. Each row has folders and files (without extension), and the number of lines.
 fn rows(page: &str) -> Vec<(Vec<String>, usize)> {
     let table =
         page.split("| part | lines | checked how | trusted why |\n").nth(1).expect("a table of parts");
@@ -38,7 +38,7 @@ fn rows(page: &str) -> Vec<(Vec<String>, usize)> {
     .collect()
 }
 
-/// Row of a file: the one with the longest matching path.
+/// Returns the row of a file: the row with the longest matching path.
 fn row_of<'a>(path: &'a str, rows: &BTreeMap<&'a str, usize>) -> Option<usize> {
     let mut part = path.strip_suffix(".rs")?;
     loop {

@@ -1,7 +1,7 @@
 //! Test that the modules of a crate do not import from each other in a cycle.
 //!
-//! A file imports from another one if one of its paths (`use` or inline) refers to a module there. Code below `#[cfg(test)]` is ignored,
-//! because tests can import from any module.
+//! A file imports from a module if one of its paths (`use` or inline) refers to this module. Code below
+//! `#[cfg(test)]` is ignored, because tests can import from any module.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -29,10 +29,10 @@ const CRATES: [&str; 15] = [
     "src",
 ];
 
-/// Path of a module below the crate, without `crate`.
+/// Path of a module below the crate root, without `crate`.
 pub type Module = Vec<String>;
 
-/// Module of a file.
+/// Returns the module that a file defines.
 fn module(path: &str, folder: &str) -> Module {
     let inner = path.strip_prefix(folder).expect("below the folder").trim_start_matches('/');
     let mut parts: Module = inner.trim_end_matches(".rs").split('/').map(str::to_owned).collect();
@@ -57,7 +57,7 @@ impl Paths<'_> {
     fn add(&mut self, segments: &[String]) {
         let mut remaining = segments;
         let mut path = match remaining.first().map(String::as_str) {
-            // The command line refers to the library by its name.
+            // The command line program refers to the library by its name.
             Some("crate" | "metaplan") => Vec::new(),
             _ => self.module.clone(),
         };
@@ -73,11 +73,11 @@ impl Paths<'_> {
             return;
         }
         path.extend(remaining.iter().cloned());
-        // Removes names of items, down to a module.
+        // Names of items are removed until the path names a module.
         while !self.modules.contains(&path) && !path.is_empty() {
             path.pop();
         }
-        // A path without a module of the crate refers to an item of the file or of another crate.
+        // A path without a module of the crate refers to an item of this file or of another crate.
         let is_import = path.len() > self.module.len() || !path.is_empty() || segments[0] == "crate";
         if path != *self.module && is_import {
             self.imports.insert(path);
@@ -156,7 +156,7 @@ impl<'a> Visit<'a> for Paths<'_> {
     }
 }
 
-/// For each module of a crate, the modules that it imports from.
+/// Returns for each module of a crate the modules that it imports from.
 pub fn imports(files: &[(String, String)], folder: &str) -> BTreeMap<Module, BTreeSet<Module>> {
     let crate_files: Vec<_> = files.iter().filter(|(path, _)| Path::new(path).starts_with(folder)).collect();
     let modules: BTreeSet<Module> = crate_files.iter().map(|(path, _)| module(path, folder)).collect();
@@ -178,13 +178,13 @@ pub fn imports(files: &[(String, String)], folder: &str) -> BTreeMap<Module, BTr
         };
         paths.visit_file(&parsed(path, text));
         let targets = paths.imports;
-        // The roots of a library and a program of the same crate are one module.
+        // The roots of a library and of a program in the same crate count as one module.
         imports.entry(module_of_file).or_default().extend(targets);
     }
     imports
 }
 
-/// One cycle for each group of modules that import from each other (strongly connected component).
+/// Returns one cycle for each group of modules that import from each other (strongly connected component).
 fn circles(imports: &BTreeMap<Module, BTreeSet<Module>>) -> Vec<String> {
     let graph: DiGraphMap<&Module, ()> =
         imports.iter().flat_map(|(from, to)| to.iter().map(move |to| (from, to))).collect();
@@ -192,7 +192,7 @@ fn circles(imports: &BTreeMap<Module, BTreeSet<Module>>) -> Vec<String> {
     groups.map(|group| shortest(&group.into_iter().collect(), imports)).collect()
 }
 
-/// Shortest cycle through the first module of a group, by breadth-first search.
+/// Returns the shortest cycle through the first module of a group, by breadth-first search.
 fn shortest(group: &BTreeSet<&Module>, imports: &BTreeMap<Module, BTreeSet<Module>>) -> String {
     let first = *group.first().expect("a group has files");
     let mut paths = vec![vec![first]];
@@ -237,7 +237,8 @@ fn import_cycles_are_detected() {
     ];
     assert_eq!(circles(&imports(&files, "x/src")), ["crate::a -> crate::c -> crate::a (a group of 2)"]);
     assert!(circles(&imports(&files[..3], "x/src")).is_empty());
-    // A re-export of another crate's item is not an import within this crate. A re-export of an own item is.
+    // A re-export of another crate's item is not an import within this crate, but a re-export of an item of
+    // this crate is.
     for (root, expected) in [("pub use ::other::c; mod a;", 0), ("pub use a::c; mod a;", 1)] {
         let files = [file("lib.rs", root), file("a.rs", "use crate::c::Item;")];
         assert_eq!(circles(&imports(&files, "x/src")).len(), expected, "{root}");

@@ -7,10 +7,10 @@ use metaplan::codes::{self, Code};
 /// Crates with a table of codes.
 const TABLES: [&str; 10] =
     ["rules", "ontology", "pddl", "task", "probabilistic", "mission", "verify", "src", "ros", "fleet"];
-/// First letters of codes.
+/// First letters of message codes.
 const LETTERS: &str = "EMNOPQR";
 
-/// Codes in a text, except for comments and tests.
+/// Returns the codes in a text, except for those in comments and tests.
 fn codes_in(text: &str) -> BTreeSet<String> {
     let library_part = text.split("#[cfg(test)]").next().unwrap_or(text);
     let lines = library_part.lines().filter(|line| !line.trim_start().starts_with("//"));
@@ -19,7 +19,7 @@ fn codes_in(text: &str) -> BTreeSet<String> {
     words.filter(is_code).map(str::to_owned).collect()
 }
 
-/// Crate of a file, if it has a table.
+/// Returns the crate of a file if this crate has a table of codes.
 fn owner(path: &str) -> Option<&'static str> {
     let folder = path
         .trim_start_matches("crates/")
@@ -36,7 +36,8 @@ fn is_table(path: &str) -> bool {
 
 type ByCrate = BTreeMap<&'static str, BTreeSet<String>>;
 
-/// For each crate, the codes in its sources and in its table. The facade lists the codes of `metaplan-ros` and `metaplan-fleet`.
+/// Returns two maps: the codes in the sources of each crate, and the codes in its table. The facade lists the
+/// codes of `metaplan-ros` and `metaplan-fleet`.
 fn codes_by_crate() -> (ByCrate, ByCrate) {
     let (mut used, mut listed) = (BTreeMap::new(), BTreeMap::new());
     for (path, text) in super::files() {
@@ -81,7 +82,7 @@ fn used_codes_and_listed_codes_agree() {
     assert_eq!(exported_codes, all_listed.into_iter().collect::<Vec<_>>(), "each code once, in order");
 }
 
-/// Entries are sentences, and meaning, cause and remedy differ.
+/// Entries of the tables are sentences, and their meaning, cause and remedy differ.
 #[test]
 fn entries_of_tables_are_sentences() {
     for Code { code, meaning, cause, remedy } in codes::all() {

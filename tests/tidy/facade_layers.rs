@@ -1,25 +1,26 @@
-//! Test that the modules of `src` import exactly what ARCHITECTURE.md lists, and only from lower lines of its picture.
+//! Test that each module of `src` imports exactly the modules that ARCHITECTURE.md lists, and only from lower
+//! lines of its picture.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use super::circles::imports;
 
-/// Layers and imports according to ARCHITECTURE.md.
+/// Layers and imports of the modules of `src` according to ARCHITECTURE.md.
 struct Documented {
-    /// The picture: the line of each module, counted from the top.
+    /// Line of each module in the picture, counted from the top.
     lines: BTreeMap<String, usize>,
-    /// The table: the imports of each module.
+    /// Imports of each module according to the table.
     imports: BTreeMap<String, BTreeSet<String>>,
 }
 
-/// Names in backticks in a table cell, without `/` and `.rs`.
+/// Returns the names in backticks in a table cell, without `/` and `.rs`.
 fn names(cell: &str) -> Vec<String> {
     let quoted = cell.split('`').skip(1).step_by(2);
     quoted.map(|name| name.trim_end_matches('/').trim_end_matches(".rs").to_owned()).collect()
 }
 
-/// Parses the picture and the table in the section on `src`.
+/// Parses the picture and the table in ARCHITECTURE.md's section on `src`.
 fn documented(document: &str) -> Documented {
     let section = document.split("\n### src").nth(1).expect("a section on `src`");
     let picture = section.split("```text\n").nth(1).and_then(|block| block.split("```").next());
@@ -37,7 +38,7 @@ fn documented(document: &str) -> Documented {
     Documented { lines: lines.collect(), imports: imports.collect() }
 }
 
-/// Imports between the modules, from the source files.
+/// Returns the imports of each module according to the source files.
 fn actual_imports(files: &[(String, String)]) -> BTreeMap<String, BTreeSet<String>> {
     let mut modules: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
     for (file, from) in imports(files, "src") {
@@ -49,7 +50,8 @@ fn actual_imports(files: &[(String, String)]) -> BTreeMap<String, BTreeSet<Strin
     modules
 }
 
-/// Differences between the files and the page, and between the picture and the table.
+/// Returns the differences between the source files and ARCHITECTURE.md, and between its picture and its
+/// table.
 fn differences(documented: &Documented, actual: &BTreeMap<String, BTreeSet<String>>) -> Vec<String> {
     let mut differences = Vec::new();
     let no_modules = BTreeSet::new();

@@ -65,7 +65,7 @@ const CEILINGS: [Ceiling; 17] = [
 /// Upper limit on discouraged phrases per 10,000 words in Markdown files.
 const MARKDOWN_CEILING: u64 = 6;
 
-/// Counts of one folder.
+/// Counts of words, doc comments, variables and discouraged occurrences in one folder.
 #[derive(Debug, Default)]
 struct Counts {
     words: u64,
@@ -99,14 +99,15 @@ impl Patterns {
     }
 
     fn count_prose(&self, prose: &str, counts: &mut Counts) {
-        // Code in backticks and fenced blocks is not prose.
+        // Code in backticks and in fenced blocks is not prose.
         let prose = self.code.replace_all(prose, " ");
         counts.words += self.word.find_iter(&prose).count() as u64;
         let occurrences = |phrase: &Regex| phrase.find_iter(&prose).count() as u64;
         counts.phrases += self.phrases.iter().map(occurrences).sum::<u64>();
     }
 
-    /// Counts comments and variables of a Rust file. Only the first line of a doc comment is checked for first words.
+    /// Counts comments and variables of a Rust file. Only the first line of a doc comment is checked for
+    /// discouraged first words.
     fn count_rust(&self, text: &str, counts: &mut Counts) {
         let mut prose = String::new();
         let mut is_inside_doc = false;
@@ -128,7 +129,7 @@ impl Patterns {
     }
 }
 
-/// Rate per `base`, rounded up.
+/// Returns `part` per `base` units of `whole`, rounded up.
 fn rate(part: u64, whole: u64, base: u64) -> u64 {
     (part * base).div_ceil(whole.max(1))
 }

@@ -1,4 +1,4 @@
-//! Rules of style and structure that can be checked mechanically.
+//! Tests of rules of style and structure that can be checked mechanically.
 
 mod believed;
 mod circles;
@@ -40,7 +40,7 @@ const FORBIDDEN: [(&str, &[&str]); 14] = [
     ("src/cli", &["horned", "oxrdf", "varisat", "crepe", "json!"]),
 ];
 
-/// Crates that only one file or folder may use.
+/// Crates that only one file or folder may use, with this file or folder.
 const SINGLE_FILE: [(&str, &str); 6] = [
     ("horned_owl", "ontology/src/horned/"),
     ("varisat::", "encodings/src/sat/"),
@@ -63,7 +63,7 @@ fn rust_files(directory: &Path, files: &mut Vec<PathBuf>) {
     }
 }
 
-/// All Rust files of the workspace, with paths relative to its root, and their texts.
+/// Returns all Rust files of the workspace: path relative to the workspace root, and text.
 fn files() -> Vec<(String, String)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut paths = Vec::new();
@@ -78,13 +78,13 @@ fn files() -> Vec<(String, String)> {
         .collect()
 }
 
-/// Fails with the list of all violations.
+/// Applies `offends` to the path and the text of each file. Fails with the list of all violations.
 fn check(rule: &str, offends: impl Fn(&str, &str) -> Vec<String>) {
     let offenders: Vec<String> = files().iter().flat_map(|(path, text)| offends(path, text)).collect();
     assert!(offenders.is_empty(), "{rule}:\n{}", offenders.join("\n"));
 }
 
-/// Library code of a file, without tests. `None` if the file is not part of a library.
+/// Returns the library code of a file, without tests. `None` if the file is not part of a library.
 fn library_part<'a>(path: &str, text: &'a str) -> Option<&'a str> {
     let library = [
         "src/",

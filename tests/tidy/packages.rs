@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::process::Command;
 
-/// Packages that plan, decide or search. The trusted packages must not depend on them.
+/// Packages that plan, decide or search. The trusted packages must not depend on any of them.
 const PLANNERS: [&str; 11] = [
     "metaplan",
     "metaplan-task",
@@ -18,11 +18,12 @@ const PLANNERS: [&str; 11] = [
     "varisat",
 ];
 
-/// Packages that reason or read knowledge bases. The checker of plans does not depend on them. The checker of derivations does: it replays
-/// derivations with the rule engine, and reads OWL.
+/// Packages that reason or read knowledge bases. The checker of plans does not depend on them. The checker of
+/// derivations does depend on them: it replays derivations with the rule engine, and reads OWL.
 const KNOWLEDGE: [&str; 3] = ["metaplan-ontology", "metaplan-rules", "crepe"];
 
-/// Names of all packages in the dependency tree of a package, including itself, for all platforms and features.
+/// Returns the names of all packages in the dependency tree of a package, including the package itself, for
+/// all platforms and features.
 pub fn linked(package: &str) -> BTreeSet<String> {
     let output = Command::new(env!("CARGO"))
         .args(["tree", "--package", package, "--edges", "normal,build", "--all-features", "--target", "all"])
@@ -35,7 +36,7 @@ pub fn linked(package: &str) -> BTreeSet<String> {
     lines.lines().filter_map(|line| line.split_whitespace().next()).map(str::to_owned).collect()
 }
 
-/// Packages of a list that are in the dependency tree of `package`.
+/// Returns the candidates that are in the dependency tree of `package`.
 fn linked_of(package: &str, candidates: &[&'static str]) -> Vec<&'static str> {
     let linked = linked(package);
     candidates.iter().copied().filter(|name| linked.contains(*name)).collect()
@@ -53,11 +54,11 @@ fn trusted_packages_do_not_depend_on_planners() {
         assert_eq!(linked_of(package, &KNOWLEDGE), KNOWLEDGE, "{package}");
     }
     assert_eq!(linked_of("metaplan-verify", &["metaplan-pddl", "metaplan-certificate"]).len(), 2);
-    // The check is not vacuous: the facade depends on all of them.
+    // The facade depends on all of them, so the check is not vacuous.
     assert_eq!(linked_of("metaplan", &PLANNERS), PLANNERS);
 }
 
-/// Narrowing belongs to the facade, on which no checker depends. Only grounding uses it.
+/// Narrowing belongs to the facade, on which no checker depends. Only grounding uses narrowing.
 #[test]
 fn only_grounding_narrows_tasks() {
     let files = crate::files();
@@ -72,7 +73,8 @@ fn only_grounding_narrows_tasks() {
     }
 }
 
-/// Arithmetic must be exact, so overflows are errors in release builds, too, also for future packages.
+/// Arithmetic must be exact, so overflows are also errors in release builds, including those of future
+/// packages.
 #[test]
 fn own_packages_check_for_overflows_in_releases() {
     let text =

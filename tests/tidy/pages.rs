@@ -5,13 +5,13 @@ use std::path::{Component, Path, PathBuf};
 
 use pulldown_cmark::{Event, Options, Parser, Tag, TagEnd};
 
-/// Maximum length of README. Details belong to the book.
+/// Maximum number of lines of README. Details belong to the book.
 const README_LINES: usize = 200;
 
-/// Folders without pages of the project.
+/// Folders that contain no pages of the project.
 const NO_PAGES: [&str; 3] = ["target", ".git", "node_modules"];
 
-/// All Markdown files, relative to the root.
+/// Returns the paths of all Markdown files, relative to the root.
 pub fn pages(root: &Path) -> Vec<PathBuf> {
     let mut paths = Vec::new();
     let mut folders = vec![PathBuf::new()];
@@ -32,7 +32,7 @@ pub fn pages(root: &Path) -> Vec<PathBuf> {
     paths
 }
 
-/// Text of a page with its includes.
+/// Returns the text of a page with its includes expanded.
 fn read(root: &Path, page: &Path) -> String {
     let text = std::fs::read_to_string(root.join(page)).expect("a page");
     let mut expanded = String::new();
@@ -59,7 +59,8 @@ fn within(page: &Path, target: &str) -> Option<PathBuf> {
     Some(path)
 }
 
-/// Anchors of the headings, in the form of mdBook and of Git forges, and targets of the links.
+/// Returns the anchors of the headings, in the form of mdBook and of Git forges, and the targets of the
+/// links.
 fn anchors_and_links(text: &str) -> (BTreeSet<String>, Vec<String>) {
     let (mut anchors, mut links) = (BTreeSet::new(), Vec::new());
     let (mut heading, mut used) = (None, BTreeMap::<String, usize>::new());
@@ -114,7 +115,7 @@ fn links_have_targets() {
             }
         }
     }
-    // Guards against a parser that finds no links.
+    // Guards against a parser that finds no links, because the test would then always pass.
     assert!(link_count > 100, "only {link_count} links were found");
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }

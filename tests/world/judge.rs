@@ -1,5 +1,5 @@
-//! The judge of a simulation. It knows the designs, the messages and the robot, and is independent of the loop's
-//! decisions.
+//! Oracle of a simulation: checks the demands of [`crate`]. It uses the designs, the delivered messages and
+//! the state of the robot, and is independent of the loop's decisions.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,40 +10,42 @@ use crate::robot::{Action, Robot};
 use crate::schedule::Message;
 use crate::{DESIGNS, FUNCTION, GOAL};
 
-/// Content of the delivered messages, and the demands that follow from them.
+/// State of the oracle: the content of the delivered messages, and the demands that follow from them.
 #[derive(Debug, Default)]
 pub struct Judge {
-    /// Failed components by the reports that were delivered to the loop.
+    /// Components that have failed according to the reports that were delivered to the loop.
     failed: BTreeSet<String>,
-    /// Designs that the robot has refused or the loop has abandoned.
+    /// Designs whose reconfiguration the robot has refused or the loop has abandoned.
     refused: BTreeSet<String>,
-    /// Effects that the loop has requested.
+    /// All effects that the loop has requested, by number.
     requested: BTreeMap<u64, Effect>,
-    /// Effects that a later one has superseded.
+    /// Effects that a later effect has superseded.
     superseded: BTreeSet<u64>,
     /// Effects that the loop has abandoned with a report.
     given_up: BTreeSet<u64>,
-    /// The belief that follows from the messages by the table of `docs/reference/events.md`.
+    /// Design that the loop must believe, derived from the messages by the table of
+    /// `docs/reference/events.md`.
     belief: Belief,
-    /// Whether the last delivered observation of the function was outdated on arrival. Observations have no time stamp,
-    /// so that no loop can detect this.
+    /// Whether the last delivered observation of the function's design was outdated on arrival. Observations
+    /// have no time stamp, so no loop can detect this.
     is_misled: bool,
-    /// Whether such an observation determined the design before the last reconfiguration.
+    /// Whether an outdated observation determined the design before the last reconfiguration.
     was_misled: bool,
-    /// Actions whose start, and actions whose progress, was delivered to the loop.
+    /// Actions whose start was delivered to the loop.
     started: BTreeSet<u64>,
+    /// Actions whose progress was delivered to the loop.
     progressed: BTreeSet<u64>,
-    /// The action that the loop waits for after its deadline, as it has reported.
+    /// Action that the loop still waits for after its deadline, according to its own report.
     awaited: Option<u64>,
     /// Actions whose end was delivered to the loop.
     ended: BTreeSet<u64>,
-    /// Last decision about plans, including that the goal is reached.
+    /// Last decision of the loop about plans, including that the goal is reached.
     plan: Plan,
-    /// Failed component that the moving robot uses, and the number of consecutive steps of that motion.
+    /// Failed component that the moving robot uses, and the number of consecutive steps with this motion.
     forbidden: Option<(&'static str, u64)>,
 }
 
-/// Last decision about plans.
+/// Last decision of the loop about plans. `None` has the reason.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 enum Plan {
     #[default]
@@ -53,7 +55,8 @@ enum Plan {
 }
 
 impl Judge {
-    /// Records a line that was delivered to the loop.
+    /// Records an event line that was delivered to the loop. Lines that the loop has not accepted are
+    /// ignored.
     pub fn record_event(&mut self, event: &Value, is_taken: bool, robot: &Robot) {
         if !is_taken {
             return;
@@ -103,7 +106,7 @@ impl Judge {
         self.is_misled &= self.belief.design != robot.design;
     }
 
-    /// Records an answer of the loop.
+    /// Records an answer (line of output) of the loop.
     pub fn note(&mut self, answer: &Answer) {
         match answer {
             Answer::Effect(effect) => {
@@ -136,15 +139,16 @@ impl Judge {
         }
     }
 
-    /// Returns a failed component that the design requires, if any.
+    /// Returns a component that the design requires and that has failed, if there is one.
     fn forbids(&self, design: &str) -> Option<&'static str> {
         let components =
             DESIGNS.iter().find(|entry| entry.0 == design).map(|entry| entry.1).unwrap_or_default();
         components.iter().find(|component| self.failed.contains(**component)).copied()
     }
 
-    /// (a) After the arrival of all outstanding effects and then of all effects in transit, no action moves without a
-    /// design, with a design that the delivered reports forbid, or with another design than the loop has requested.
+    /// Demand (a): after the arrival of all outstanding effects and then of all effects in transit, no moving
+    /// action violates the loop's intention. A violation is motion without a design, with a design that the
+    /// delivered reports forbid, or with a design other than the requested one.
     pub fn intended_motion<'a>(
         &self,
         robot: &Robot,
@@ -169,7 +173,7 @@ impl Judge {
                 Message::Event(_) => None,
             })
             .collect();
-        // Worst order of arrival: outdated effects arrive last, unless an earlier one has superseded them.
+        // Worst order of arrival: outdated effects arrive last, unless an earlier effect has superseded them.
         for effect in beliefs.outstanding().chain(on_their_way.into_values()) {
             let is_moot =
                 self.ended.contains(&effect.action) && !matches!(effect.command, Command::Reconfigure { .. });
@@ -187,7 +191,8 @@ impl Judge {
             && !beliefs.cancelling()
             && !control.has_agenda();
         if !action.is_moving() {
-            // After a restart, a robot without a design waits for one, and the report of the restart may be lost.
+            // After a restart, a robot without a design waits for a design, and the report of the restart may
+            // be lost.
             return if goes_on && (action.suspended || !robot.has_lost_design) {
                 Err(format!("(g) action {} stands still, and is to go on: {action:?}", action.number))
             } else {
@@ -212,8 +217,9 @@ impl Judge {
         }
     }
 
-    /// (f) If a line makes the design of the action under way unusable, the answers contain a safe effect before
-    /// planning: the best other design, or suspension. `before` is the moving action before the line, with its design.
+    /// Demand (f): if a line makes the design of the action under way unusable, the answers before planning
+    /// contain a safe effect: a change to the best other design, or suspension. `before` is the moving action
+    /// before the line, with its design.
     pub fn reaction(
         &self,
         before: Option<(u64, String)>,
@@ -242,8 +248,8 @@ impl Judge {
         });
         let beliefs = control.beliefs();
         let has_best = beliefs.running().and_then(|(_, step)| step.design(FUNCTION)) == best;
-        // A reconfiguration to the best design may be in transit already, or the function may still have it after a
-        // failure.
+        // A reconfiguration to the best design may already be in transit, or the function may still have the
+        // best design after a failure.
         let is_on_its_way = beliefs.pending().any(|(_, to)| Some(to) == best);
         let is_there = self.belief.is_settled() && self.belief.design.as_deref() == best;
         if is_safe || best.is_some() && has_best && (is_on_its_way || is_there) {
@@ -255,7 +261,7 @@ impl Judge {
         }
     }
 
-    /// (e) After a restart of the loop, all unanswered reconfigurations are requested again at once.
+    /// Demand (e): after a restart of the loop, all unanswered reconfigurations are requested again at once.
     pub fn repeated(&self, answers: &[Answer]) -> Result<(), String> {
         let numbers: BTreeSet<u64> =
             answers.iter().filter_map(Answer::effect).map(|effect| effect.number).collect();
@@ -265,7 +271,7 @@ impl Judge {
         }
     }
 
-    /// (h) After planning, an action is suspended only if no design is available or no plan exists.
+    /// Demand (h): after planning, an action is suspended only if no design is available or no plan exists.
     pub fn standstill(&self, control: &Loop) -> Result<(), String> {
         let beliefs = control.beliefs();
         let is_possible = DESIGNS.iter().any(|(design, _)| beliefs.available().contains(*design));
@@ -276,7 +282,7 @@ impl Judge {
         Ok(())
     }
 
-    /// (a) The robot moves with a forbidden design for at most `bound` consecutive steps.
+    /// Demand (a): the robot moves with a forbidden design for at most `bound` consecutive steps.
     pub fn motion(&mut self, robot: &Robot, bound: Option<u64>) -> Result<(), String> {
         let is_moving = robot.action.as_ref().is_some_and(Action::is_moving);
         let forbidden = robot.design.as_ref().filter(|_| is_moving).and_then(|design| self.forbids(design));
@@ -291,7 +297,8 @@ impl Judge {
         }
     }
 
-    /// (b) The believed design follows from the messages. If nothing is pending, it is the actual design.
+    /// Demand (b): the believed design follows from the messages. If no reconfiguration is pending, it is the
+    /// actual design.
     pub fn configuration<'a>(
         &self,
         robot: &Robot,
@@ -319,7 +326,7 @@ impl Judge {
         let is_unknowable = self.is_misled || robot.has_lost_design || is_late;
         let is_certain = self.belief.is_settled() && !is_on_its_way && !is_unknowable;
         match believed {
-            // By the table, an uncertain design is not believed.
+            // According to the table, an uncertain design is not believed.
             Some(_) if is_certain && believed != robot.design.as_ref() => {
                 Err(format!("(b) believed {believed:?}, actual {:?}", robot.design))
             }
@@ -327,8 +334,8 @@ impl Judge {
         }
     }
 
-    /// Returns `true` if a robot with the reporting habits observed until now would have reported more about an action by
-    /// now.
+    /// Returns `true` if the robot should have reported more about an action by now, judging by the kinds of
+    /// reports that it has already sent.
     fn is_report_due(&self, action: u64) -> bool {
         if self.started.contains(&action) {
             self.progressed.contains(&action)
@@ -337,8 +344,8 @@ impl Judge {
         }
     }
 
-    /// (c) Each effect was carried out, superseded, abandoned with a report, or belongs to an action that has ended.
-    /// (d) The goal is reached, or no plan exists.
+    /// Demand (c): each effect was carried out, superseded, abandoned with a report, or belongs to an action
+    /// that has ended. Demand (d): the goal is reached, or no plan exists.
     pub fn at_the_end(&self, robot: &Robot) -> Result<(), String> {
         let is_open = |(number, effect): &(&u64, &Effect)| {
             let is_moot =
@@ -360,7 +367,7 @@ impl Judge {
         match self.plan {
             Plan::Reached if robot.place == GOAL && robot.action.is_none() => Ok(()),
             Plan::Reached => Err(format!("(d) the goal is reached, but the robot is at {}", robot.place)),
-            // One step has failed three times in a row. It is not tried again until something changes.
+            // One step has failed three times in a row and is not tried again until something changes.
             Plan::None("failed") => Ok(()),
             Plan::None("unsolvable") if !is_possible => Ok(()),
             // The loop waits for a robot that has forgotten its action if the robot never sends the missing reports.
@@ -370,37 +377,41 @@ impl Judge {
     }
 }
 
-/// The last reconfiguration that was carried out according to the delivered messages.
+/// The last reconfiguration that was carried out, according to the delivered messages.
 #[derive(Debug)]
 struct Last {
     effect: u64,
     design: String,
-    /// Previous design, and the reconfiguration that had set it, if any.
+    /// Previous design, and the number of the reconfiguration that had set it, if known.
     before: Option<(String, Option<u64>)>,
 }
 
-/// Design that the loop must believe, by the table of `docs/reference/events.md`.
+/// Design that the loop must believe, derived from the messages by the table of `docs/reference/events.md`.
 ///
-/// Its author had read `src/mapek/acknowledge.rs`, so that both can contain the same misreading of the table. Only the
-/// comparison with the robot's actual design is independent of the loop.
+/// The author of this code had read `src/mapek/acknowledge.rs`, so both can contain the same misreading of
+/// the table. Only the comparison with the robot's actual design is independent of the loop.
 #[derive(Debug, Default)]
 struct Belief {
     design: Option<String>,
     /// Whether any reconfiguration was acknowledged by its number.
     has_receipts: bool,
-    /// The last reconfiguration, if unanswered, and the earlier unanswered ones that it has superseded.
+    /// The last requested reconfiguration, if unanswered: number and design.
     pending: BTreeMap<u64, String>,
+    /// Earlier unanswered reconfigurations, which were superseded or abandoned.
     superseded: BTreeMap<u64, String>,
     /// The acknowledged reconfiguration with the greatest number, if it has not failed since.
     last: Option<Last>,
     greatest: u64,
-    /// Reconfigurations up to this number may have been carried out before or after an observation.
+    /// Reconfigurations up to this number may have been carried out before or after an observation of the
+    /// design.
     crossed: u64,
-    /// Reconfigurations that count as carried out, implied by a report before the first acknowledgement by number.
+    /// Reconfigurations that count as carried out because a later report implies them, before the first
+    /// acknowledgement by number.
     implied: BTreeSet<u64>,
-    /// Failed reconfigurations according to the delivered messages.
+    /// Reconfigurations that have failed according to the delivered messages.
     failed: BTreeSet<u64>,
-    /// Superseded reconfigurations up to this number did not determine the design that was observed after them.
+    /// Superseded reconfigurations up to this number precede an observation of the design, so they leave no
+    /// uncertainty.
     settled: u64,
 }
 
@@ -439,8 +450,8 @@ impl Belief {
         }
     }
 
-    /// Until a reconfiguration is acknowledged by its number, a report of an action implies the reconfigurations before
-    /// its request.
+    /// Confirms the reconfigurations before the request of an action, because a report of this action implies
+    /// them. Applies only until a reconfiguration is acknowledged by its number.
     fn confirm_before_request(&mut self, action: u64, requested: &BTreeMap<u64, Effect>) {
         let is_request =
             |effect: &&Effect| effect.action == action && matches!(effect.command, Command::Request { .. });
@@ -454,11 +465,11 @@ impl Belief {
         }
     }
 
-    /// Records a failure. Returns the design that then counts as unrealisable.
+    /// Records the failure of a reconfiguration. Returns its design, which then counts as unrealisable.
     fn record_failure(&mut self, effect: u64) -> Option<String> {
         self.failed.insert(effect);
         if let Some(design) = self.pending.remove(&effect).or_else(|| self.superseded.remove(&effect)) {
-            // If the function was observed with the design, the reconfiguration had been carried out.
+            // If the function was observed with this design, the reconfiguration had been carried out.
             self.design.take_if(|design_before| *design_before == design);
             return Some(design);
         }
@@ -474,7 +485,7 @@ impl Belief {
         Some(design)
     }
 
-    /// Abandons a reconfiguration, which may still be carried out.
+    /// Abandons a pending reconfiguration, which the robot may still carry out. Returns its design.
     fn give_up(&mut self, effect: u64) -> Option<String> {
         let to = self.pending.remove(&effect)?;
         self.design = None;

@@ -4,13 +4,14 @@
 //! fail and recover. Reconfigurations and actions fail. The loop crashes, and recovers from its snapshot and the later
 //! lines. After some time, the robot is fair: nothing is lost, nothing fails, and the last reports are repeated.
 //!
-//! The judge knows [`DESIGNS`], the messages, and the robot. Rules (a) and (f) also read the beliefs of the loop.
+//! The judge ([`judge::Judge`]) is the oracle. It uses [`DESIGNS`], the messages, and the state of the robot.
+//! Rules (a) and (f) also read the beliefs of the loop.
 //! Demands:
 //! - (a) After each reaction, before planning, and after the arrival of all outstanding effects and then of all effects
 //!   in transit, no action moves without a design, with a design that the delivered reports forbid, or with another
 //!   design than the loop has requested. The robot does so for a bounded number of steps only.
-//! - (b) The believed configuration follows from the messages by the table of `docs/reference/events.md`. If nothing is
-//!   pending, it is the actual one.
+//! - (b) The believed configuration follows from the messages by the table of `docs/reference/events.md`. If
+//!   no reconfiguration is pending, the believed configuration is the actual one.
 //! - (c) At the end, each effect was carried out, superseded, abandoned with a report, or belongs to an action that has
 //!   ended.
 //! - (d) At the end, the robot is at the goal, or the last decision is that no plan exists, and this is true.
@@ -32,7 +33,8 @@ use metaplan::setup::Setup;
 
 use schedule::{Faults, Schedule};
 
-/// Designs of the function with the components that they require. The judge knows no other conditions.
+/// Designs of the robot's function, each with the components that it requires. The judge uses no other
+/// conditions.
 pub const DESIGNS: [(&str, &[&str]); 3] = [("fd_a", &["c_a"]), ("fd_b", &["c_b"]), ("fd_c", &["c_a", "c_b"])];
 
 /// Components of the robot.
@@ -41,10 +43,10 @@ pub const COMPONENTS: [&str; 2] = ["c_a", "c_b"];
 /// Initial place of the robot.
 pub const START: &str = "p0";
 
-/// Place of the robot in the goal.
+/// Place of the robot that the goal requires.
 pub const GOAL: &str = "p2";
 
-/// Function of the robot.
+/// The only function of the robot.
 pub const FUNCTION: &str = "f_drive";
 
 const DOMAIN: &str = "(define (domain m) (:requirements :typing :fluents :durative-actions)
@@ -59,7 +61,7 @@ const PROBLEM: &str = "(define (problem p) (:domain m) (:objects p0 p1 p2 - plac
   (:init (robot_at p0) (way p0 p1) (way p1 p0) (way p1 p2) (way p2 p1))
   (:goal (robot_at p2)) (:metric minimize (total-time)))";
 
-/// A knowledge base with the designs. By its estimations, later designs are faster.
+/// Returns a knowledge base with the designs. According to its estimates, later designs are faster.
 fn knowledge() -> String {
     let mut text = "@prefix : <http://example.org/m#> .\n@prefix owl: <http://www.w3.org/2002/07/owl#> .\n\
         @prefix t: <http://metacontrol.org/tomasys#> .\n\
@@ -83,7 +85,7 @@ fn knowledge() -> String {
     text
 }
 
-/// Creates a loop without observations.
+/// Creates a loop that has not received any event.
 fn pristine(settings: Settings) -> Loop {
     let directory = tempfile::tempdir().expect("a directory");
     let manifest = "name = \"m\"\n[knowledge]\nfiles = [\"kb.ttl\"]\n[planning]\ndomain = \"domain.pddl\"\n\
@@ -98,7 +100,8 @@ fn pristine(settings: Settings) -> Loop {
     Loop::new(mission, settings).expect("the mission can be planned for")
 }
 
-/// Runs schedules and returns all violations with their seeds.
+/// Runs the schedules of the seeds and returns all violations with their seeds. `faults` gives the fault
+/// rates of a seed.
 fn violations(seeds: impl Iterator<Item = u64>, faults: fn(u64) -> Faults) -> Vec<(u64, String)> {
     let loops = [pristine(Settings::immediate()), pristine(Settings::default())];
     let run = |seed: u64| {
@@ -118,13 +121,14 @@ fn no_schedule_violates_a_demand() {
     assert!(violations_found.is_empty(), "{}", summary(&violations_found));
 }
 
-/// In schedules with an even seed, the effects of the start can be lost, too.
+/// Returns the fault rates of a seed. In schedules with an even seed, the effects sent at the start can be
+/// lost, too.
 fn faults(seed: u64) -> Faults {
     let faults = Faults::of(seed);
     if seed.is_multiple_of(2) { faults.with_lost_start() } else { faults }
 }
 
-/// Formats the seeds of each kind of violation, with the messages of the first one.
+/// Formats the seeds of each kind of violation, with the messages of the first violation of this kind.
 fn summary(violations_found: &[(u64, String)]) -> String {
     let kind = |violation: &str| violation.get(..3).unwrap_or_default().to_owned();
     let mut kinds: BTreeMap<String, Vec<&(u64, String)>> = BTreeMap::new();
@@ -138,7 +142,7 @@ fn summary(violations_found: &[(u64, String)]) -> String {
     text.collect()
 }
 
-/// Parses a variable of the environment as a number.
+/// Parses an environment variable as a number. `None` if it is not set or not a number.
 fn number(variable: &str) -> Option<u64> {
     std::env::var(variable).ok()?.parse().ok()
 }

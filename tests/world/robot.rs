@@ -1,4 +1,4 @@
-//! A robot with one function, which carries out each effect once and reports.
+//! Simulated robot with one function. It carries out each effect once and sends reports.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,18 +10,19 @@ use crate::{COMPONENTS, FUNCTION, START};
 /// Number of work steps per action.
 const WORK: u32 = 4;
 
-/// An action under way on the robot.
+/// The action that the robot is executing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Action {
     pub number: u64,
-    /// Number of the last effect that has requested or resumed the action.
+    /// Number of the last effect that requested or resumed the action.
     request: u64,
-    /// Completed work steps.
+    /// Number of completed work steps.
     pub done: u32,
     pub suspended: bool,
     /// Destination of the action.
     pub to: String,
-    /// The design that the action waits for before it starts or continues.
+    /// Design that the function must have before the action starts or continues; `None` if the action need
+    /// not wait.
     awaited_design: Option<String>,
 }
 
@@ -38,28 +39,28 @@ pub struct Robot {
     pub design: Option<String>,
     pub action: Option<Action>,
     pub place: String,
-    /// Numbers of effects that were carried out, refused, or superseded before they arrived.
+    /// Numbers of effects that were carried out, refused, or superseded before their arrival.
     pub processed: BTreeSet<u64>,
-    /// Reconfigurations that were refused since the last successful one. Includes the latter if it has failed after its
-    /// acknowledgement.
+    /// Reconfigurations that were refused since the last successful one. The successful one is included
+    /// if it failed after its acknowledgement.
     pub refused: BTreeSet<u64>,
-    /// As `refused`, for the reconfigurations before the last successful one.
+    /// Reconfigurations that were refused before the last successful one.
     refused_before: BTreeSet<u64>,
-    /// Answers to effects and ends of actions, for repetition.
+    /// Answers to effects and reports of ended actions, kept for repetition.
     pub past_reports: Vec<Value>,
-    /// Greatest number of a started action.
+    /// Greatest number of an action that has started.
     last_started: u64,
     has_restarted: bool,
-    /// Whether the function has lost its design in a restart and has not got one since.
+    /// Whether the function lost its design in a restart and has not got a new design since.
     pub has_lost_design: bool,
-    /// The last reconfiguration that was carried out, with the previous design, if it can still fail.
+    /// Number of the last reconfiguration that was carried out and can still fail, with the previous design.
     before: Option<(u64, String)>,
-    /// Action and number of the last reconfiguration that was carried out.
+    /// Action number and effect number of the last reconfiguration that was carried out.
     pub configured: (u64, u64),
     /// Future actions that were suspended before their request arrived.
     suspended_early: BTreeSet<u64>,
-    /// Future actions that were suspended and resumed before their request arrived, with number and design of the
-    /// resumption.
+    /// Future actions that were suspended and resumed before their request arrived, with the effect number
+    /// and the design of the resumption.
     resumed: BTreeMap<u64, (u64, Option<String>)>,
 }
 
@@ -86,12 +87,12 @@ impl Default for Robot {
 }
 
 impl Robot {
-    /// Receives an effect and carries it out unless it is a repetition. `fails` is for a reconfiguration that is
-    /// refused. Returns the reports.
+    /// Receives an effect and carries it out unless it was processed before. With `fails`, a reconfiguration
+    /// is refused. Returns the reports.
     pub fn take(&mut self, effect: &Effect, fails: bool) -> Vec<Value> {
         self.processed.extend(&effect.supersedes);
         if !self.processed.insert(effect.number) {
-            // A repeated effect gets the previous answer.
+            // A repeated effect gets the same answer as before.
             let is_answer = |past_reports: &&Value| past_reports["effect"] == effect.number;
             return self.past_reports.iter().filter(is_answer).cloned().collect();
         }
@@ -112,12 +113,12 @@ impl Robot {
         reports
     }
 
-    /// Lets the last reconfiguration fail after its acknowledgement, so that the function has the previous design
-    /// again. Returns the report.
+    /// Makes the last reconfiguration fail after its acknowledgement, so that the function has the previous
+    /// design again. Returns the report, or `None` if it can no longer fail.
     pub fn fail_late(&mut self) -> Option<Value> {
         let (effect, design) = self.before.take()?;
         self.design = Some(design);
-        // An action may have waited for the design before.
+        // The action may have waited for the previous design.
         if let Some(action) = &mut self.action {
             action.awaited_design.take_if(|awaited| self.design.as_ref() == Some(awaited));
         }
@@ -128,7 +129,7 @@ impl Robot {
         Some(report)
     }
 
-    /// Copies the robot without its answers, to predict the result of later effects.
+    /// Returns a copy of the robot without its answers, to predict the result of later effects.
     pub fn prospect(&self) -> Self {
         Self {
             failed: BTreeSet::new(),
@@ -151,7 +152,7 @@ impl Robot {
         }
     }
 
-    /// Carries out an effect. Returns a report about its action, if any.
+    /// Carries out an effect. Returns a report about its action, if there is one.
     pub fn carry_out(&mut self, effect: &Effect) -> Option<Value> {
         let number = effect.action;
         let action = self.action.as_mut().filter(|action| action.number == number);
@@ -161,8 +162,9 @@ impl Robot {
                 let before = self.design.replace(to.clone());
                 self.before = before.filter(|before| before != to).map(|before| (effect.number, before));
                 self.configured = (number, effect.number);
-                // An action starts only when the function has the requested design, regardless of the action that the
-                // reconfiguration belongs to, or a later design for this action.
+                // An action starts only when the function has the requested design, regardless of the action
+                // to which the reconfiguration belongs. A later reconfiguration for this action also starts
+                // it.
                 if let Some(action) = &mut self.action
                     && let Some(awaited_design) = &action.awaited_design
                     && (awaited_design == to || action.number == number && effect.number > action.request)
@@ -224,7 +226,8 @@ impl Robot {
         None
     }
 
-    /// Advances the action by one work step. `fails` makes it fail. Returns a report.
+    /// Advances the action by one work step, or makes it fail if `fails` is set. Returns a report, if
+    /// there is one.
     pub fn work(&mut self, fails: bool) -> Option<Value> {
         let action = self.action.as_mut().filter(|action| action.is_moving() || fails)?;
         action.done += 1;
@@ -243,8 +246,8 @@ impl Robot {
         Some(report)
     }
 
-    /// Restarts the robot: the function loses its design, and the action under way ends. With `forgets`, the end of the
-    /// action is not reported. Returns the reports.
+    /// Restarts the robot: the function loses its design, and the action under way ends. With `forgets`, the
+    /// end of the action is not reported. Returns the reports.
     pub fn restart(&mut self, forgets: bool) -> Vec<Value> {
         (self.design, self.has_restarted, self.has_lost_design, self.before) = (None, true, true, None);
         let failed = self.action.take().filter(|_| !forgets);
@@ -253,19 +256,20 @@ impl Robot {
         failed.into_iter().chain([self.observed()]).collect()
     }
 
-    /// Reports the actual status of a component.
+    /// Returns a report of the actual status of a component.
     pub fn status(&self, component: &str) -> Value {
         let status = if self.failed.contains(component) { "FALSE" } else { "TRUE" };
         json!({ "event": "component_status", "component": component, "status": status })
     }
 
-    /// Reports the actual design of the function.
+    /// Returns a report of the actual design of the function.
     pub fn observed(&self) -> Value {
         json!({ "event": "configuration_observed", "function": FUNCTION, "design": self.design })
     }
 
-    /// Repeats the statuses of all components and the ends of actions, like robots that publish them periodically.
-    /// Answers to effects are not repeated: the loop has to repeat unanswered effects.
+    /// Returns repeated reports of the statuses of all components and of ended actions, as from robots that
+    /// publish them periodically. Answers to effects are not repeated: the loop has to repeat unanswered
+    /// effects.
     pub fn periodic_reports(&self) -> Vec<Value> {
         let mut reports: Vec<Value> = COMPONENTS.iter().map(|component| self.status(component)).collect();
         reports.extend(self.past_reports.iter().filter(|past_reports| is_end(past_reports)).cloned());
@@ -274,7 +278,7 @@ impl Robot {
     }
 }
 
-/// Returns the design of the function in a configuration.
+/// Returns the design of the robot's function in a configuration.
 fn design_in(configuration: &[(String, String)]) -> Option<&String> {
     configuration.iter().find(|(function, _)| function == FUNCTION).map(|pair| &pair.1)
 }

@@ -1,4 +1,4 @@
-//! A schedule: the loop, the robot, and the messages between them.
+//! Simulation of one schedule: the loop, the robot, and the messages between them.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -11,57 +11,57 @@ use crate::judge::Judge;
 use crate::robot::Robot;
 use crate::{COMPONENTS, DESIGNS, FUNCTION};
 
-/// Length of a simulation step.
+/// Simulated time of one step.
 const STEP: Duration = Duration::from_millis(500);
 
-/// Number of steps with faults, and of fair steps after them.
+/// Number of steps with faults, and number of steps in the subsequent fair phase, which has no faults.
 const STEPS: (u64, u64) = (60, 300);
 
-/// Number of logged messages in the report of a violation.
+/// Maximum number of logged messages in the report of a violation.
 const MAX_LOG: usize = 400;
 
-/// Additional delay of a belated message, in steps: longer than two deadlines.
+/// Range of the additional delay of a belated message, in steps: longer than two deadlines of the loop.
 const BELATED: (u64, u64) = (45, 90);
 
-/// Number of lines after which a new snapshot is taken.
+/// Number of loop steps after which a new snapshot is taken.
 const SNAPSHOT_EVERY: usize = 23;
 
-/// Upper limit on the number of reactions before a deliberation.
+/// Maximum number of reactions of the loop before the next deliberation (planning).
 const MAX_UNDELIBERATED: u32 = 4;
 
-/// Faults of a schedule. Unless stated otherwise, each number is a percentage.
+/// Fault rates of a schedule. Unless stated otherwise, each number is a percentage.
 #[derive(Debug, Clone, Copy)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a fault of its own")]
 pub struct Faults {
     pub lost: u32,
     pub doubled: u32,
-    /// Greatest delay of a message, in steps.
+    /// Maximum delay of a message, in steps.
     pub delay: u64,
     pub breaks: u32,
     pub refuses: u32,
     pub fails: u32,
     pub crashes: u32,
     pub restarts: u32,
-    /// Reconfigurations that fail after their acknowledgement.
+    /// Percentage of reconfigurations that fail after their acknowledgement.
     pub late: u32,
-    /// Observations of the function's design.
+    /// Percentage of steps with an observation of the function's design.
     pub observes: u32,
-    /// Messages that arrive after the deadlines.
+    /// Percentage of messages that arrive after the deadlines.
     pub belated: u32,
     /// Whether a restarting robot forgets the action under way.
     pub forgets: bool,
-    /// Whether the effects of the start can be lost, too.
+    /// Whether the effects sent at the start can be lost, too.
     pub start: bool,
-    /// Whether lines have sequence numbers.
+    /// Whether event lines have sequence numbers.
     pub numbered: bool,
-    /// Whether planning runs in parallel to the input.
+    /// Whether planning runs in parallel to the processing of events.
     pub beside: bool,
-    /// Whether a fair robot reports only once.
+    /// Whether the robot sends its reports of the fair phase only once.
     pub quiet: bool,
 }
 
 impl Faults {
-    /// Faults of a seed. Each kind is absent from some schedules.
+    /// Returns the fault rates of a seed. Each kind of fault is absent from some schedules.
     pub fn of(seed: u64) -> Self {
         let mut random = Rng::with_seed(seed ^ 0x5eed);
         let mut share = |maximum: u32| if random.bool() { 0 } else { random.u32(0..=maximum) };
@@ -86,7 +86,8 @@ impl Faults {
         .with_later_kinds(seed)
     }
 
-    /// Adds kinds that were introduced after seeds of violations had been recorded. The other kinds must not change.
+    /// Adds the kinds of faults that were introduced after the first seeds of violations had been recorded.
+    /// The other rates must not change.
     fn with_later_kinds(self, seed: u64) -> Self {
         let mut random = Rng::with_seed(seed ^ 0x1a7e);
         let mut share = |maximum: u32| if random.bool() { 0 } else { random.u32(0..=maximum) };
@@ -94,12 +95,12 @@ impl Faults {
         Self { late, observes, belated: share(8), forgets: random.bool(), ..self }
     }
 
-    /// Removes the kinds that were introduced later.
+    /// Removes the kinds of faults that were introduced after the first seeds of violations had been recorded.
     pub fn of_earlier_kinds(self) -> Self {
         Self { late: 0, observes: 0, belated: 0, forgets: false, ..self }
     }
 
-    /// Allows the loss of the effects of the start.
+    /// Allows the loss of the effects sent at the start.
     pub fn with_lost_start(self) -> Self {
         Self { start: true, ..self }
     }
@@ -112,7 +113,8 @@ pub enum Message {
     Event(Value),
 }
 
-/// A step of the loop, as recorded in its journal.
+/// A step of the loop, as recorded in its journal: a reaction to an event line at a time, or a deliberation
+/// with the resulting plans.
 #[derive(Debug)]
 enum Step {
     React(String, Duration),
@@ -127,19 +129,20 @@ pub struct Schedule<'a> {
     random: Rng,
     faults: Faults,
     now: u64,
-    /// Number of the last line.
+    /// Number of the last event line.
     line: u64,
-    /// Messages in transit by step of arrival and a random number that orders messages of one step.
+    /// Messages in transit, by step of arrival and a random number that orders the messages of one step.
     messages: BTreeMap<(u64, u64), Message>,
-    /// Plans that were computed in parallel to the input and are not adopted yet.
+    /// Result of planning in parallel to the events that is not adopted yet.
     thoughts: Option<Thoughts>,
     /// Number of reactions since the last deliberation.
     undeliberated: u32,
-    /// Last snapshot, and the steps since.
+    /// Last snapshot of the loop, if any.
     snapshot: Option<Snapshot>,
+    /// Loop steps since the last snapshot.
     steps: Vec<Step>,
     judge: Judge,
-    /// Messages, if recorded.
+    /// Log of all messages, if enabled.
     log: Option<Vec<String>>,
 }
 
@@ -177,8 +180,7 @@ impl<'a> Schedule<'a> {
 
     /// Runs the schedule to its end.
     ///
-    /// # Errors
-    /// The first violation, with the last messages.
+    /// Returns the first violation, with the last messages.
     pub fn run(mut self) -> Result<(), String> {
         self.deliberate();
         for now in 1..=STEPS.0 + STEPS.1 {
@@ -222,7 +224,7 @@ impl<'a> Schedule<'a> {
             && let Some(report) = self.robot.fail_late()
         {
             self.log(|| "a reconfiguration fails late".to_owned());
-            // A robot repeats this report until it arrives: otherwise no loop could know of the failure.
+            // A robot repeats this report until it arrives; otherwise no loop could learn of the failure.
             self.report_safely(report);
         }
         if self.faults.observes > 0 && self.chance(self.faults.observes) {
@@ -266,7 +268,7 @@ impl<'a> Schedule<'a> {
         self.judge.motion(&self.robot, bound)
     }
 
-    /// Reports of a fair robot.
+    /// Sends the reports of a robot in the fair phase.
     fn fair_reports(&mut self) {
         if self.now == STEPS.0 + 1 && self.random.bool() {
             self.robot.failed.clear();
@@ -284,8 +286,8 @@ impl<'a> Schedule<'a> {
         }
     }
 
-    /// Number of steps for which the robot may move with a design that the delivered reports forbid. `None` if the last
-    /// message about it may have been lost or refused.
+    /// Returns the maximum number of steps for which the robot may move with a design that the delivered
+    /// reports forbid. `None` if the last message about the design may have been lost or refused.
     fn bound(&self) -> Option<u64> {
         // Two deadlines and one step each way: the effect is repeated once, and then abandoned.
         let deadlines = 2 * 20 + 6;
@@ -303,12 +305,12 @@ impl<'a> Schedule<'a> {
         }
     }
 
-    /// Time since the start of the mission.
+    /// Simulated time since the start of the mission.
     fn time(&self) -> Duration {
         STEP * u32::try_from(self.now).unwrap_or(u32::MAX)
     }
 
-    /// Sends a report of the robot.
+    /// Sends a report of the robot to the loop. The report can be lost.
     fn report(&mut self, mut event: Value) {
         if self.faults.numbered {
             self.line += 1;
@@ -324,9 +326,9 @@ impl<'a> Schedule<'a> {
         self.faults.lost = lost;
     }
 
-    /// Sends a message, which can be lost, duplicated and overtaken.
+    /// Puts a message in transit. It can be lost, duplicated, and overtaken by later messages.
     fn post(&mut self, message: &Message) {
-        // Before the first acknowledgement, the loop cannot know whether this robot sends any.
+        // Before the first acknowledgement, the loop cannot detect whether this robot sends acknowledgements.
         let is_safe = self.now == 0 && !self.faults.start;
         if !is_safe && self.chance(self.faults.lost) {
             self.log(|| format!("lost {message:?}"));
@@ -335,7 +337,7 @@ impl<'a> Schedule<'a> {
         let copies = 1 + u32::from(self.chance(self.faults.doubled));
         for _ in 0..copies {
             let (mut arrival, mut order) = (self.now, (1 << 41) + self.messages.len() as u64);
-            // Fair messages arrive in order.
+            // In the fair phase, messages arrive in order.
             if self.is_unfair() {
                 arrival += self.random.u64(0..=self.faults.delay);
                 order = self.random.u64(..1 << 40);
@@ -351,7 +353,7 @@ impl<'a> Schedule<'a> {
         }
     }
 
-    /// Delivers a line or a timer to the loop, and judges the reaction.
+    /// Delivers a line or a timer to the loop, and checks the reaction.
     fn deliver(&mut self, line: &str) -> Result<(), String> {
         if line != Observation::TIMER {
             self.log(|| format!("loop hears {line}"));
@@ -374,14 +376,14 @@ impl<'a> Schedule<'a> {
         self.judge.reaction(before, &self.control, &answers)?;
         self.send(answers);
         self.undeliberated += 1;
-        // The safe effect precedes planning.
+        // The safe effect must precede planning.
         self.judge.intended_motion(&self.robot, &self.control, self.messages.values())?;
         self.continue_deliberation()?;
         self.judge.intended_motion(&self.robot, &self.control, self.messages.values())?;
         self.judge.configuration(&self.robot, &self.control, self.messages.values())
     }
 
-    /// Deliberates, starts planning in parallel to the input, or adopts its plans.
+    /// Deliberates, starts planning in parallel to the events, or adopts the resulting plans.
     fn continue_deliberation(&mut self) -> Result<(), String> {
         if !self.faults.beside || self.undeliberated >= MAX_UNDELIBERATED {
             return self.finish_deliberation();
@@ -434,7 +436,7 @@ impl<'a> Schedule<'a> {
         }
     }
 
-    /// Sends the effects and logs all answers.
+    /// Sends the effects among the answers to the robot and logs all answers.
     fn send(&mut self, answers: Vec<Answer>) {
         for answer in answers {
             self.log(|| answer.to_json().to_string());
@@ -444,7 +446,7 @@ impl<'a> Schedule<'a> {
         }
     }
 
-    /// Replaces the loop by one that is restored from its snapshot and the later steps.
+    /// Replaces the loop by a loop that is restored from the snapshot and the later steps.
     fn crash(&mut self) -> Result<(), String> {
         self.log(|| "crash".to_owned());
         let mut restored = self.pristine.clone();
@@ -474,7 +476,7 @@ impl<'a> Schedule<'a> {
     }
 }
 
-/// Short text of an effect: number, kind, action and design.
+/// Formats an effect briefly: number, kind, action and design.
 fn brief(effect: &Effect) -> String {
     let json = Answer::Effect(effect.clone()).to_json();
     format!("{} {} {} {}", json["effect"], json["answer"], json["action"], json["to"])

@@ -1,4 +1,4 @@
-//! All that is wrong with a line, as one error.
+//! Collects all parse errors in a line of numbers as one error.
 //!
 //! `cargo run -p metaplan-diagnostics --example numbers -- "1 2 x 300"`
 #![expect(clippy::print_stdout, reason = "an example prints")]

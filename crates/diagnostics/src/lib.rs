@@ -1,4 +1,4 @@
-//! Everything that is wrong with an input, as one error.
+//! An error type that contains all errors of an input.
 //!
 #![doc = include_str!("../README.md")]
 
@@ -10,29 +10,31 @@ use std::ops::Deref;
 
 pub use spelling::nearest;
 
-/// Everything that is wrong with an input: one error or more, in the order in which they are to be read.
+/// All errors of an input, in reading order; at least one unless constructed from an empty vector
+/// or iterator.
 ///
-/// It is a slice of them and can be iterated. Shown by `Display` or `Debug` each begins on a line of its own, so that a `main`
-/// that returns it prints what a user is to read. [`Error::source`] is that of the first.
+/// Dereferences to a slice of the errors. `Display` and `Debug` begin each error on a separate
+/// line, so a `main` that returns this type prints a readable list. [`Error::source`] is the source
+/// of the first error.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Errors<E>(Vec<E>);
 
 impl<E> Errors<E> {
-    /// An error if there is anything wrong.
+    /// Returns `Ok` if the iterator is empty, otherwise all its items as an error.
     ///
     /// # Errors
-    /// All that the iterator yields, if it yields anything.
+    /// Returns all items of a non-empty iterator.
     pub fn unless_empty(wrong: impl IntoIterator<Item = E>) -> Result<(), Self> {
         let wrong: Vec<E> = wrong.into_iter().collect();
         if wrong.is_empty() { Ok(()) } else { Err(Self(wrong)) }
     }
 
-    /// Each of them as another type.
+    /// Converts each error with `change`.
     pub fn map<T>(self, change: impl FnMut(E) -> T) -> Errors<T> {
         Errors(self.0.into_iter().map(change).collect())
     }
 
-    /// All of them.
+    /// Returns all errors as a vector.
     pub fn into_vec(self) -> Vec<E> {
         self.0
     }

@@ -1,9 +1,11 @@
-//! Spelling suggestions: the known name that is most similar to an unknown one.
+//! Spelling suggestions: finds the known name that is most similar to an unknown name.
 
-/// Returns the known name with the smallest edit distance to `written`, the first one of equally similar names.
+/// Returns the name in `known` with the smallest edit distance to `written`; among equally similar
+/// names, the first one. `None` if no name is similar enough.
 ///
-/// Case does not matter, and the same words in another order are one edit. At most a third of the letters and at most three
-/// may differ; in a name of two letters one may. A single letter has no suggestion, because it is near every other letter.
+/// Case does not matter, and a different order of the words counts as one edit. The maximum
+/// distance is a third of the letters of `written`, at least 1 and at most 3. A single letter has
+/// no suggestion, because it is similar to every other letter.
 pub fn nearest<'n>(written: &str, known: impl IntoIterator<Item = &'n str>) -> Option<&'n str> {
     let written = written.to_lowercase();
     let limit = match written.chars().count() {
@@ -20,9 +22,11 @@ pub fn nearest<'n>(written: &str, known: impl IntoIterator<Item = &'n str>) -> O
     best.map(|(_, name)| name)
 }
 
-/// Optimal string alignment distance, in which transposed neighbours are one edit.
+/// Returns the optimal string alignment distance, in which a transposition of neighbours is one
+/// edit. Names with the same words in another order have distance 1.
 fn distance(left: &str, right: &str) -> usize {
-    // No suggestion differs in length by more than three letters of at most four bytes each.
+    // Names within the maximum distance of 3 differ in length by at most three letters of at most
+    // four bytes each.
     if left.len().abs_diff(right.len()) > 12 {
         return usize::MAX;
     }

@@ -1,4 +1,5 @@
-//! Prints the contributions of a knowledge base to a PDDL problem, before and after the failure of a component.
+//! Prints the facts and values that a knowledge base adds to a PDDL problem, before and after the
+//! failure of a component.
 //!
 //! `cargo run -p metaplan-mission --example filled`
 #![expect(clippy::print_stdout, reason = "an example prints")]

@@ -1,5 +1,5 @@
-//! Bindings of PDDL symbols to queries on the knowledge base, and the completion of a problem with
-//! their results.
+//! Bindings of PDDL symbols to queries on the knowledge base. Fills a problem with the results of
+//! these queries.
 //!
 //! The defaults fit the names of the Metaplan paper and of the files of kas-lab. A type is bound to
 //! a class, a predicate to a relation between designs, functions and actions, and a numeric
@@ -21,8 +21,8 @@ use crate::knowledge::{Catalogue, Knowledge};
 use crate::message::Message;
 use crate::visible::visible;
 
-/// Predicates `(p DESIGN FUNCTION)` that are bound to `solves` by default. Explicit bindings add to
-/// them.
+/// Predicates `(p DESIGN FUNCTION)` that are bound to `solves` by default. Explicit bindings add
+/// further predicates.
 const SOLVES: [&str; 4] = ["fd_solve_f", "fd_solves_f", "inferred-SolvesF", "solvesF"];
 
 /// The knowledge-base query that a PDDL symbol is bound to.
@@ -30,38 +30,40 @@ const SOLVES: [&str; 4] = ["fd_solve_f", "fd_solves_f", "inferred-SolvesF", "sol
 enum Query {
     /// Type: the individuals of a class, given by local name or IRI.
     Class(String),
-    /// Predicate `(p DESIGN FUNCTION)`: the solved functions of each design.
+    /// Predicate `(p DESIGN FUNCTION)`: pairs of a design and a function that the design solves.
     Solves,
     /// Predicate `(p DESIGN)`: the available designs.
     Available,
-    /// Predicate `(p ACTION FUNCTION…)`: the required functions of all actions, or of the
-    /// named action.
+    /// Predicate `(p ACTION FUNCTION…)`: the functions that each action requires. With a name, only
+    /// the action of this name.
     Requires(Option<String>),
     /// Numeric function of a design: the estimated value of an attribute.
     Estimation(String),
     /// Numeric function without parameters: the measured value of an attribute.
     Measured(String),
-    /// Numeric function without parameters in a plain domain: the sum of an attribute over the
-    /// designs that are chosen for an action.
+    /// Numeric function without parameters in a plain domain (without a type of designs): the sum
+    /// of an attribute over the designs that are chosen for an action.
     Chosen(String),
-    /// Variant of `Chosen` that sums only over the designs that were not in use before the action.
+    /// Like `Chosen`, but sums only over the designs that were not in use before the action.
     Reconfigured(String),
-    /// Action of a plain domain: the corresponding action of the knowledge base.
+    /// Action schema of a plain domain (without a type of designs): the corresponding action of the
+    /// knowledge base.
     Action(String),
 }
 
-/// Bindings of PDDL symbols to queries, and of individuals to object names.
+/// Bindings of PDDL symbols to queries on the knowledge base, and object names of individuals.
 #[derive(Debug, Clone, Default)]
 pub struct Bindings {
     own: BTreeMap<Name, Query>,
     /// Explicit bindings as text, for reports.
     written: BTreeMap<String, String>,
-    /// Object names of individuals.
+    /// Object names that replace the local names of individuals.
     names: Names,
 }
 
 impl Bindings {
-    /// Returns the default bindings, overridden by the given ones.
+    /// Returns the default bindings, overridden by the explicit bindings `own`: query by PDDL
+    /// symbol.
     ///
     /// ```
     /// use std::collections::BTreeMap;
@@ -71,7 +73,7 @@ impl Bindings {
     /// ```
     ///
     /// # Errors
-    /// Describes the first value that is not a query.
+    /// Describes the first value in `own` that is not a query.
     pub fn with(own: &BTreeMap<String, String>) -> Result<Self, String> {
         let parse =
             |(symbol, query): (&String, &String)| Ok((Name::new(symbol), parse_query(symbol, query)?));
@@ -90,7 +92,7 @@ impl Bindings {
         &self.names
     }
 
-    /// Returns the explicit bindings, as they are written.
+    /// Returns the explicit bindings as written: query by PDDL symbol.
     pub fn written(&self) -> &BTreeMap<String, String> {
         &self.written
     }
@@ -110,7 +112,7 @@ impl Bindings {
         }
     }
 
-    /// Returns `true` if a predicate states which functions an action requires.
+    /// Returns `true` if a predicate is bound to the required functions of actions.
     pub(super) fn is_requirement(&self, predicate: &Name) -> bool {
         matches!(self.predicate(predicate), Some(Query::Requires(_)))
     }
@@ -120,8 +122,9 @@ impl Bindings {
         self.r#type(name) == Some(Query::Class("FunctionDesign".to_owned()))
     }
 
-    /// Returns `true` if an action of a plain domain corresponds to an action of the knowledge
-    /// base, by its local name or its object name.
+    /// Returns `true` if the action schema `name` of a plain domain (without a type of designs)
+    /// corresponds to the action `known` of the knowledge base. Without an explicit binding, the
+    /// names must agree.
     pub(super) fn is_action(&self, name: &Name, known: &Individual) -> bool {
         both(known).iter().any(|known| match self.own.get(name) {
             Some(Query::Action(own)) => own == known,
@@ -129,8 +132,8 @@ impl Bindings {
         })
     }
 
-    /// Returns `true` if a predicate states the required functions of an action of the knowledge
-    /// base.
+    /// Returns `true` if a predicate states the required functions of the action `known` of the
+    /// knowledge base.
     pub(super) fn says_needs(&self, predicate: &Name, known: &Individual) -> bool {
         match self.predicate(predicate) {
             Some(Query::Requires(None)) => true,
@@ -142,7 +145,8 @@ impl Bindings {
         }
     }
 
-    /// Returns the attribute that a function is explicitly bound to sum over chosen designs.
+    /// Returns the attribute whose sum over the chosen designs is the value of a function.
+    /// Considers only explicit bindings.
     pub(super) fn chosen(&self, name: &Name) -> Option<String> {
         match self.own.get(name) {
             Some(Query::Chosen(attribute)) => Some(attribute.clone()),
@@ -150,7 +154,8 @@ impl Bindings {
         }
     }
 
-    /// Returns the attribute that a function is bound to sum over changed designs.
+    /// Returns the attribute whose sum over the newly chosen designs is the value of a function.
+    /// Considers only explicit bindings.
     pub(super) fn reconfigured(&self, name: &Name) -> Option<String> {
         match self.own.get(name) {
             Some(Query::Reconfigured(attribute)) => Some(attribute.clone()),
@@ -158,13 +163,13 @@ impl Bindings {
         }
     }
 
-    /// Returns `true` if a predicate states which designs are available.
+    /// Returns `true` if a predicate is bound to the availability of designs.
     pub fn is_availability(&self, predicate: &Name) -> bool {
         self.predicate(predicate) == Some(Query::Available)
     }
 
-    /// Returns `true` if a numeric function without parameters is the measured value of an
-    /// attribute.
+    /// Returns `true` if the numeric function `declared` has no parameters and is bound to the
+    /// measured value of `attribute`.
     pub(super) fn is_measured(&self, declared: &Declaration, attribute: &str) -> bool {
         let query = self.function(declared);
         declared.parameters.is_empty() && matches!(query, Query::Measured(name) if name == attribute)
@@ -206,7 +211,7 @@ impl Bindings {
     }
 }
 
-/// Returns the object name and the local name of an individual.
+/// Returns the two names of an individual: object name and local name.
 fn both(known: &Individual) -> [&str; 2] {
     [&known.name, local_name(&known.iri)]
 }
@@ -232,11 +237,13 @@ fn parse_query(symbol: &str, query: &str) -> Result<Query, String> {
     }
 }
 
-/// Adds the objects, facts and values that the knowledge base has for the symbols of the domain.
+/// Adds to a problem the objects, facts and values that the knowledge base has for the symbols of
+/// the domain. Returns warnings and errors.
 ///
-/// Availability facts of the problem are removed with a warning, except those about its `own`
-/// designs. Values that the problem states take precedence. Symbols for which `stands` returns
-/// `true` count as declared, because the explicit form removes them from a plain domain.
+/// Availability facts of the problem are removed with a warning, except those about the designs
+/// `own`, whose availability the problem decides. Values that the problem states take precedence.
+/// Symbols for which `stands` returns `true` count as declared, because the explicit form removes
+/// them from a plain domain.
 pub(super) fn fill(
     domain: &Domain,
     problem: &mut Problem,
@@ -284,9 +291,10 @@ struct Fill<'a> {
     problem: &'a mut Problem,
     view: View<'a>,
     known: &'a Catalogue,
-    /// `false` if inference has failed, so that the derived facts are unknown.
+    /// `false` if inference has failed, so that the derived facts are unknown and no design counts
+    /// as available.
     is_known: bool,
-    /// Designs whose availability is stated by the problem.
+    /// Designs whose availability is stated by the problem instead of the knowledge base.
     own: &'a BTreeSet<Name>,
     warnings: Vec<Message>,
 }
@@ -313,14 +321,14 @@ impl Fill<'_> {
         self.problem.objects.extend(objects);
     }
 
-    /// Adds a fact, unless an argument is an individual without a PDDL name.
+    /// Adds a fact to the problem unless an argument is not a PDDL name.
     fn fact(&mut self, predicate: &Name, arguments: &[&str]) {
         if arguments.iter().all(|argument| is_pddl_name(argument)) {
             self.problem.init.push(InitialElement::Fact(atom(predicate, arguments)));
         }
     }
 
-    /// Returns the argument lists of the facts that the problem states with a predicate.
+    /// Returns the argument lists of the problem's facts with this predicate.
     fn stated(&self, predicate: &Name) -> HashSet<Vec<Name>> {
         let arguments = |element: &InitialElement| match element {
             InitialElement::Fact(atom) if atom.predicate.name == *predicate => Some(names(&atom.arguments)),
@@ -364,7 +372,8 @@ impl Fill<'_> {
         }
     }
 
-    /// Adds a fact per action: the action, followed by all its functions.
+    /// Adds a fact per action of the knowledge base: the action, followed by its required
+    /// functions. `only` restricts the facts to one action.
     fn requires(&mut self, declared: &Declaration, only: Option<&str>) {
         let stated = self.stated(&declared.identifier.name);
         for action in self.known.actions() {
@@ -454,8 +463,8 @@ pub fn atom(predicate: &Name, arguments: &[&str]) -> Atom {
     }
 }
 
-/// Returns `true` if an object may have this name: letters of any script, digits, `-`, `_` and `.`, and no invisible
-/// characters.
+/// Returns `true` if a name can be used as an object name: letters of any script, digits, `-`, `_`
+/// and `.`, and no invisible characters.
 pub(super) fn is_pddl_name(name: &str) -> bool {
     let allowed =
         |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c) || !c.is_ascii() && !c.is_whitespace();

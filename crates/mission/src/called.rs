@@ -1,4 +1,5 @@
-//! Entries of `[bindings.names]` and `--name`: object names of individuals of the knowledge base.
+//! Entries of `[bindings.names]` and `--name`, which give individuals of the knowledge base object
+//! names.
 //!
 //! An entry is exact (`fd_spiral_low = "fd_search_low"`), or a pattern with one star on each side
 //! (`"fd_spiral_*" = "fd_search_*"`). Module `names` resolves the entries for a knowledge base and
@@ -12,24 +13,24 @@ use crate::message::Message;
 /// Source location of an entry: a file, and a line and column in it.
 pub type Place = (String, Option<(usize, usize)>);
 
-/// Assignments of object names to individuals.
+/// Entries of `[bindings.names]` and `--name`: assignments of object names to individuals.
 #[derive(Clone, Default)]
 pub struct Names {
     entries: Vec<Naming>,
 }
 
-/// A single entry.
+/// A single entry of `[bindings.names]` or `--name`.
 #[derive(Debug, Clone)]
 pub(crate) struct Naming {
-    /// The local name or IRI of an individual, or a pattern.
+    /// The local name or IRI of an individual, or a pattern with one `*`.
     pub(crate) individual: String,
-    /// The name of an object, or a pattern.
+    /// The name of an object, or a pattern with one `*`.
     pub(crate) object: String,
     place: Option<Place>,
 }
 
 impl Names {
-    /// Adds an entry. An entry without a place originates from the command line.
+    /// Adds an entry. `place` is `None` for entries of the command line.
     pub fn add(&mut self, individual: &str, object: &str, place: Option<Place>) {
         self.entries.push(Naming { individual: individual.to_owned(), object: object.to_owned(), place });
     }
@@ -39,7 +40,7 @@ impl Names {
         self.entries.is_empty()
     }
 
-    /// Returns all entries, without their places.
+    /// Returns all entries without their places: object name by individual.
     pub fn written(&self) -> BTreeMap<String, String> {
         self.entries.iter().map(|entry| (entry.individual.clone(), entry.object.clone())).collect()
     }
@@ -59,7 +60,8 @@ impl From<&BTreeMap<String, String>> for Names {
     }
 }
 
-/// Omits the places: equal names make equal missions, wherever they are written.
+/// Omits the places: missions with equal names are equal, regardless of where the names are
+/// written.
 impl fmt::Debug for Names {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.written().fmt(f)
@@ -67,13 +69,13 @@ impl fmt::Debug for Names {
 }
 
 impl Naming {
-    /// Returns `true` if the entry applies to several individuals.
+    /// Returns `true` if the entry is a pattern, which can apply to several individuals.
     pub(crate) fn is_pattern(&self) -> bool {
         self.individual.contains('*')
     }
 
-    /// Returns the object name that this entry gives to an individual with the local name or IRI
-    /// `name`.
+    /// Returns the object name that this entry gives to an individual. `name` is a local name or
+    /// IRI. `None` if the entry does not apply.
     pub(crate) fn call(&self, name: &str) -> Option<String> {
         let Some((head, tail)) = self.individual.split_once('*') else {
             return (self.individual == name).then(|| self.object.clone());
@@ -93,7 +95,7 @@ impl Naming {
         }
     }
 
-    /// Creates an error about the entry.
+    /// Creates an error about this entry, at its place if it has one.
     pub(crate) fn wrong(&self, code: &str, text: &str) -> Message {
         match &self.place {
             Some((file, place)) => Message::at(code, file, *place, format!("`[bindings.names]`: {text}")),
@@ -101,7 +103,7 @@ impl Naming {
         }
     }
 
-    /// Creates a warning about the entry.
+    /// Creates a warning about this entry, at its place if it has one.
     pub(crate) fn questionable(&self, code: &str, text: &str) -> Message {
         match &self.place {
             Some((file, Some(place))) => {

@@ -1,5 +1,5 @@
 //! Lints: legal but suspicious missions, which adapt less than their authors expect. Most of these
-//! lints report names of one side without a counterpart on the other side.
+//! lints report names that occur only in the knowledge base or only in the PDDL files.
 
 use std::collections::BTreeSet;
 
@@ -15,12 +15,12 @@ use crate::knowledge::Knowledge;
 use crate::message::{Message, did_you_mean};
 
 impl Mission {
-    /// Returns lint warnings about names of the knowledge base without counterpart in PDDL, and
-    /// about functions and attributes without a value.
+    /// Returns lint warnings about names of the knowledge base without counterpart in the PDDL
+    /// files, and about functions and attributes without a value.
     pub fn doubts(&self) -> Vec<Message> {
         let Some(knowledge) = &self.knowledge else { return self.functions_without_value() };
         let mut doubts = Vec::new();
-        // PLANTA's form names actions of the knowledge base in conditions, so schemas need no
+        // In PLANTA's form, conditions name the actions of the knowledge base, so schemas need no
         // matching names.
         if self.planta.is_none() {
             doubts.extend(self.actions_without_schema(knowledge));
@@ -34,7 +34,8 @@ impl Mission {
         doubts
     }
 
-    /// Warns about bindings to names that the knowledge base does not have.
+    /// Warns about bindings to classes, attributes or actions that the knowledge base does not
+    /// have.
     fn idle_bindings(&self, knowledge: &Knowledge) -> Vec<Message> {
         let (view, catalogue) = (knowledge.view(), knowledge.catalogue());
         let estimated: BTreeSet<&str> = catalogue.designs().iter().flat_map(estimates).collect();
@@ -113,7 +114,7 @@ impl Mission {
             .collect();
         let text = print_domain(&self.domain);
         let is_used = |name: &Name| {
-            // The declaration is an occurrence itself, so a used function occurs at least twice.
+            // The declaration counts as one occurrence, so a used function occurs at least twice.
             let count = [format!("({name})"), format!("({name} ")];
             count.iter().map(|form| text.matches(form.as_str()).count()).sum::<usize>() > 1
         };
@@ -159,15 +160,15 @@ fn assigns(effect: &Effect, name: &Name) -> bool {
     }
 }
 
-/// Returns the asserted facts with an individual as their subject, and those with it as another
-/// argument.
+/// Returns the asserted facts about an individual: those with the individual as their first
+/// argument, and those with the individual as another argument.
 fn stated(engine: &Engine, iri: &str) -> (Vec<Fact>, Vec<Fact>) {
     let Some(symbol) = engine.symbols().find_name(iri) else { return (Vec::new(), Vec::new()) };
     let facts = engine.facts().filter(|fact| engine.is_asserted(fact) && fact.arguments.contains(&symbol));
     facts.partition(|fact| fact.arguments.first() == Some(&symbol))
 }
 
-/// Warns about components that are only mentioned, and about components that no design requires.
+/// Warns about components without facts of their own, and about components that no design requires.
 fn components(knowledge: &Knowledge) -> Vec<Message> {
     let (engine, view) = (knowledge.engine(), knowledge.view());
     let designs = view.function_designs();
@@ -206,8 +207,8 @@ fn components(knowledge: &Knowledge) -> Vec<Message> {
     doubts
 }
 
-/// Returns `true` if the fact is a class membership or a component status. Such a fact does not link
-/// the component to a design.
+/// Returns `true` if the fact is a class membership or a component status. Such a fact does not
+/// link a component to a design.
 fn is_plain(engine: &Engine, fact: &Fact) -> bool {
     let name = engine.symbols().value(fact.predicate).as_name().unwrap_or_default();
     fact.arguments.len() == 1 || local_name(name) == "c_status"
@@ -260,8 +261,8 @@ fn attributes(knowledge: &Knowledge) -> Vec<Message> {
     doubts
 }
 
-/// Creates a warning at the first occurrence of an individual's local name in the documents, or
-/// without a location.
+/// Creates a warning at the first occurrence of an individual's local name in the documents.
+/// Without an occurrence, the warning has no location.
 pub fn doubt_about(knowledge: &Knowledge, code: &str, iri: &str, text: String) -> Message {
     let name = local_name(iri);
     // `fd_a` must not match inside `fd_ab`, and a comment is not the place to correct.

@@ -73,7 +73,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// Detects the kind of a text by its first words.
+    /// Detects the kind of a text by its first words. Returns `None` if the kind is unknown.
     fn of(text: &str) -> Option<Self> {
         let mut lines = text.lines().map(str::trim_start);
         let first = lines.find(|line| !line.is_empty() && !line.starts_with([';', '#']))?;
@@ -107,7 +107,7 @@ impl Kind {
     }
 }
 
-/// Returns `true` if a line is `key = ...` or `[table]`.
+/// Returns `true` if a line has the form `key = …` or `[table]`.
 fn is_toml(line: &str) -> bool {
     let is_key =
         |key: &str| !key.is_empty() && key.chars().all(|c| c.is_alphanumeric() || "_-.\"' ".contains(c));
@@ -155,8 +155,8 @@ pub fn expect(kind: Kind, file: &str, text: &str) -> Result<(), Message> {
 const BEGINNINGS: [&str; 10] =
     ["@", "prefix", "base", "<", "_:", "[", "(", "ontology", "version", "\u{feff}"];
 
-/// Replaces parse errors of files that do not begin like a knowledge base. Such a file may be any
-/// file of the system, and parse errors quote their input.
+/// Replaces parse errors of files that do not begin like a knowledge base by a message without
+/// quotation. Such a file may be any file of the system, and parse errors quote their input.
 pub(crate) fn discreet(messages: Vec<Message>) -> Vec<Message> {
     let mut result: Vec<Message> = Vec::new();
     for message in messages {

@@ -14,7 +14,7 @@ use crate::names::{self, Meeting, NeverNamed};
 use crate::native::CoAdaptation;
 use crate::planta::Planta;
 
-/// A mission that is ready for planning.
+/// A mission that is ready for planning: a domain, a problem and, optionally, a knowledge base.
 #[derive(Debug, Clone)]
 pub struct Mission {
     /// Name of the mission.
@@ -28,7 +28,7 @@ pub struct Mission {
     pub(super) adaptation: Option<CoAdaptation>,
     /// Designs whose availability is stated by the problem, not inferred from the knowledge base.
     pub(super) own: BTreeSet<Name>,
-    /// Set if the problem does not name all designs of the knowledge base: the IRI of the first
+    /// Set if the problem names designs, but not all of the knowledge base: the IRI of the first
     /// unnamed design and the text of the warning.
     pub(super) never_named: NeverNamed,
     pub(super) planta: Option<Planta>,
@@ -87,8 +87,8 @@ impl Mission {
             Some(planta)
         });
         let (problem_designs, never_named) = match &mut knowledge {
-            // PLANTA's form completes the domain with the names of the knowledge base, so there is
-            // nothing to align.
+            // PLANTA's form completes the domain with the names of the knowledge base, so no names
+            // need to be aligned.
             Some(knowledge) if planta.is_none() => {
                 let files = ((&domain, &domain_source), (&problem, &problem_source));
                 joined_names(files, knowledge, &bindings, &mut warnings)?
@@ -126,14 +126,14 @@ impl Mission {
         self.warnings.iter().chain(self.knowledge.iter().flat_map(Knowledge::warnings))
     }
 
-    /// Replaces the warnings of the mission by the result of `change`. The caller can thus adapt
-    /// them to a context that this crate does not have.
+    /// Replaces the warnings of the mission by the result of `change`. The caller can thus add
+    /// context that this crate does not have.
     pub fn change_warnings(&mut self, change: impl FnOnce(Vec<Message>) -> Vec<Message>) {
         self.warnings = change(std::mem::take(&mut self.warnings));
     }
 
-    /// Adds [`Mission::doubts`] to the warnings. To be called after all settings and failures are
-    /// applied.
+    /// Adds the lint warnings [`Mission::doubts`] to the warnings. Must be called after all
+    /// settings and failures have been applied.
     pub fn note_doubts(&mut self) {
         self.warnings.extend(self.doubts());
     }
@@ -143,7 +143,7 @@ impl Mission {
         self.knowledge.as_ref()
     }
 
-    /// Marks a component as failed.
+    /// Marks a component of the knowledge base as failed.
     ///
     /// # Errors
     /// The knowledge base has no such component, or the mission has no knowledge base.
@@ -157,7 +157,8 @@ impl Mission {
         }
     }
 
-    /// Replaces the last argument of the first goal atom with this predicate.
+    /// Finds the first atom with this predicate in the conjunction of the goal and replaces its
+    /// last argument by `object`.
     pub fn aim(&mut self, predicate: &str, object: &str) {
         let mut parts = vec![&mut self.problem.goal];
         // Popping from a stack with reversed pushes visits the atoms in their textual order.
@@ -175,8 +176,8 @@ impl Mission {
         }
     }
 
-    /// Returns the problem completed with the objects, facts and values from the knowledge base,
-    /// and warnings.
+    /// Returns the problem filled with the objects, facts and values of the knowledge base, and
+    /// warnings.
     ///
     /// # Errors
     /// The contributions of the knowledge base do not fit the domain.
@@ -195,8 +196,8 @@ impl Mission {
             warnings.extend(Message::from_pddl(&questionable, &sources));
             return Ok((problem, warnings));
         }
-        // Contributions of settings and of the knowledge base have no source location. Their
-        // messages must not point into a file.
+        // Contributions of settings and of the knowledge base have no source location. Messages
+        // about them must not point into a file.
         let (contributed, located): (Vec<_>, Vec<_>) =
             errors.into_iter().partition(|diagnostic| diagnostic.span == pddl::ast::Span::default());
         let mut messages = Message::from_pddl(&located, &sources);
@@ -211,22 +212,23 @@ impl Mission {
         Err(messages.into())
     }
 
-    /// Returns the predicates that the knowledge base adds to the domain in PLANTA's form, or
-    /// `None` for other missions.
+    /// Returns the predicates that the knowledge base adds to a domain in PLANTA's form, which uses
+    /// undeclared names of the ontology. `None` for other missions.
     pub fn completed_predicates(&self) -> Option<&HashSet<Name>> {
         self.planta.as_ref().map(Planta::known)
     }
 
-    /// Rewrites a condition for display: predicates that only the explicit form has are replaced.
-    /// "A design meets a requirement" becomes `(meets DESIGN REQUIREMENT)`.
+    /// Rewrites a condition for display: predicates that only the explicit form of a plain domain
+    /// has are replaced. For example, "a design meets a requirement" becomes `(meets DESIGN
+    /// REQUIREMENT)`.
     pub fn spoken(&self, condition: &str) -> String {
         self.adaptation
             .as_ref()
             .map_or_else(|| condition.to_owned(), |adaptation| adaptation.spoken(condition))
     }
 
-    /// Returns the additions of the knowledge base to the actions of a plain domain, or `None` if
-    /// the domain is explicit.
+    /// Returns the additions of the knowledge base to the actions of a plain domain (without a type
+    /// of designs). `None` for other missions.
     pub fn adaptation(&self) -> Option<&CoAdaptation> {
         self.adaptation.as_ref()
     }
@@ -251,7 +253,8 @@ impl Mission {
         self.bindings.solves()
     }
 
-    /// Returns the domain, in explicit form if its file is plain.
+    /// Returns the domain. A plain domain (without a type of designs) is returned in its explicit
+    /// form, with design parameters.
     pub fn domain(&self) -> &Domain {
         &self.domain
     }
@@ -271,13 +274,13 @@ impl Mission {
     }
 }
 
-/// Renames individuals according to the bindings and aligns the names of both sides. Returns the
-/// designs whose availability is stated by the problem, and the designs that the problem never
-/// names.
+/// Renames individuals according to `[bindings.names]`, and compares the names in the PDDL files
+/// with those in the knowledge base. Returns the designs whose availability is stated by the
+/// problem, and the designs that the problem never names.
 ///
 /// # Errors
-/// Invalid entries of `[bindings.names]`, and required functions without a design that both sides
-/// know.
+/// Invalid entries of `[bindings.names]`, and required functions without a design that occurs in
+/// both the problem and the knowledge base.
 fn joined_names(
     (domain, problem): ((&Domain, &Source), (&Problem, &Source)),
     knowledge: &mut Knowledge,
@@ -286,7 +289,7 @@ fn joined_names(
 ) -> Result<(BTreeSet<Name>, NeverNamed), Errors> {
     let (called, more) = names::resolve(domain.0, problem.0, knowledge, bindings)?;
     warnings.extend(more);
-    // The alignment compares names, so the renaming must be complete before it.
+    // The comparison is by name, so the individuals must be renamed before it.
     knowledge.call(called);
     let Meeting { own: problem_designs, errors, warnings: more, never_named } =
         names::meet(domain, problem, knowledge, bindings);

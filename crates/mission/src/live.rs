@@ -14,8 +14,8 @@ use crate::knowledge::Knowledge;
 use crate::message::{Errors, Message};
 
 impl Mission {
-    /// Adds the current contributions of the knowledge base to a problem of this mission. Returns
-    /// warnings.
+    /// Adds the current objects, facts and values of the knowledge base to a problem of this
+    /// mission. Returns warnings.
     pub fn fill(&self, problem: &mut Problem) -> Vec<Message> {
         self.knowledge.as_ref().map_or_else(Vec::new, |knowledge| {
             if let Some(planta) = &self.planta {
@@ -30,8 +30,8 @@ impl Mission {
         })
     }
 
-    /// Returns `true` if a function of a plain domain is a sum over the chosen designs or over the
-    /// changed designs.
+    /// Returns `true` if a numeric function of a plain domain (without a type of designs) is
+    /// replaced by a sum over the chosen or the newly chosen designs.
     pub(crate) fn stands_for_designs(&self, function: &Name) -> bool {
         self.adaptation.as_ref().is_some_and(|adaptation| adaptation.stands_for_designs(function))
     }
@@ -46,14 +46,15 @@ impl Mission {
         &self.problem
     }
 
-    /// Returns the function of the problem whose value is a measured attribute, given by local
-    /// name.
+    /// Returns the numeric function of the domain whose value is a measured attribute, given by
+    /// local name.
     pub fn fed_by(&self, attribute: &str) -> Option<String> {
         let fed = |declared: &&Declaration| self.bindings.is_measured(declared, attribute);
         self.domain.functions.iter().find(fed).map(|declared| declared.identifier.name.to_string())
     }
 
-    /// Returns `true` if the problem has a numeric function of that name and number of arguments.
+    /// Returns `true` if the domain has a numeric function, given as `name arguments`, with this
+    /// number of arguments.
     pub fn is_function(&self, name: &str) -> bool {
         let mut words = name.split_whitespace();
         let symbol = words.next().map(Name::new);
@@ -64,7 +65,8 @@ impl Mission {
             .any(|d| Some(&d.identifier.name) == symbol.as_ref() && d.parameters.len() == arguments)
     }
 
-    /// Returns `true` if the problem states a fact, given as `predicate arguments`.
+    /// Returns `true` if the problem states a fact, given without parentheses: `predicate
+    /// arguments`.
     pub fn holds(&self, fact: &str) -> bool {
         let words: Vec<Name> = fact.split_whitespace().map(Name::new).collect();
         self.problem.init.iter().any(|element| match element {
@@ -76,8 +78,8 @@ impl Mission {
         })
     }
 
-    /// Returns the functions without parameters that have a value in the problem, with their
-    /// values.
+    /// Returns the numeric functions without parameters that have a value in the problem, with
+    /// their values.
     pub fn values(&self) -> Vec<(String, BigRational)> {
         let values = self.problem.init.iter().filter_map(|element| match element {
             InitialElement::Value(atom, value, _) if atom.arguments.is_empty() => {
@@ -88,7 +90,7 @@ impl Mission {
         values.collect()
     }
 
-    /// Returns the value that the problem states for a function, given by name and arguments.
+    /// Returns the value that the problem states for a numeric function, given as `name arguments`.
     pub fn value(&self, name: &str) -> Option<BigRational> {
         let words: Vec<&str> = name.split_whitespace().collect();
         self.problem.init.iter().find_map(|element| match element {
@@ -97,13 +99,14 @@ impl Mission {
         })
     }
 
-    /// Returns `true` if the availability of a design is stated by the problem, because the
-    /// knowledge base has neither the design nor a function that it solves.
+    /// Returns `true` if the problem decides on the availability of a design, because the knowledge
+    /// base has neither the design nor a function that the design solves.
     pub fn decides_on(&self, design: &str) -> bool {
         self.own.contains(&Name::new(design))
     }
 
-    /// Returns `true` if the problem decides on a design and states that it is available.
+    /// Returns `true` if the problem decides on the availability of a design and states that the
+    /// design is available.
     pub fn provides(&self, design: &str) -> bool {
         let declared = self.domain.predicates.iter().map(|declared| &declared.identifier.name);
         let mut predicates = declared.filter(|name| self.bindings.is_availability(name));
@@ -112,12 +115,13 @@ impl Mission {
 
     /// Replaces the available designs of a filled problem and returns the domain for that problem.
     ///
-    /// `allowed` is called with the name of each design of the knowledge base and its availability.
-    /// Designs whose availability is stated by the problem are kept.
+    /// `allowed` is called with the name of each design of the knowledge base and its current
+    /// availability; the design becomes available if the result is `true`. Designs whose
+    /// availability is stated by the problem are kept.
     pub fn allow(&self, problem: &mut Problem, allowed: &dyn Fn(&str, bool) -> bool) -> Cow<'_, Domain> {
         let designs = self.knowledge.iter().flat_map(|knowledge| knowledge.catalogue().designs());
         let designs = designs.map(|design| (design.individual.name.as_str(), design.available));
-        // PLANTA's form expresses availability in derived predicates, which are part of the domain.
+        // In PLANTA's form, derived predicates of the domain express availability.
         if let Some(planta) = &self.planta {
             let says = designs.map(|(design, available)| (design, allowed(design, available)));
             return Cow::Owned(planta.allow(&self.domain, problem, says));
@@ -138,13 +142,13 @@ impl Mission {
         Cow::Borrowed(&self.domain)
     }
 
-    /// Returns the number of arguments of an action in the domain file, if the knowledge base has
-    /// added parameters.
+    /// Returns the number of parameters of an action in the domain file if the knowledge base has
+    /// added design parameters. `None` for other actions.
     pub fn written_arguments(&self, action: &str) -> Option<usize> {
         self.adaptation.as_ref().and_then(|adaptation| adaptation.parameters(action))
     }
 
-    /// Replaces the facts and values of the problem.
+    /// Replaces the initial state of the problem.
     pub fn set_init(&mut self, init: Vec<InitialElement>) {
         self.problem.init = init;
     }
@@ -171,13 +175,14 @@ impl Mission {
         self.fill(&mut problem);
         let diagnostics = pddl::check(&self.domain, &self.domain_source, &problem, &source);
         let errors = diagnostics.into_iter().filter(|diagnostic| diagnostic.severity == Severity::Error);
-        // Only the goal is part of this text. Other diagnostics were reported when the mission was
-        // read.
+        // Only the goal is part of this text. Diagnostics about the domain were reported when the
+        // mission was read.
         let errors: Vec<_> = errors.filter(|diagnostic| diagnostic.file == "goal").collect();
         if errors.is_empty() { Ok(problem.goal) } else { Err(Message::from_pddl(&errors, &[&source]).into()) }
     }
 
-    /// Returns the functions of the knowledge base that have designs, in alphabetical order.
+    /// Returns the functions of the knowledge base that at least one design solves, in alphabetical
+    /// order.
     pub fn functions(&self) -> Vec<String> {
         let designs = self.knowledge.iter().flat_map(|knowledge| knowledge.catalogue().designs());
         let names: std::collections::BTreeSet<String> =
@@ -185,7 +190,7 @@ impl Mission {
         names.into_iter().collect()
     }
 
-    /// Returns the designs that solve a function, by their object names, including unavailable
+    /// Returns the object names of the designs that solve a function, including unavailable
     /// designs.
     pub fn designs_of(&self, function: &str) -> Vec<String> {
         let Some(knowledge) = &self.knowledge else { return Vec::new() };

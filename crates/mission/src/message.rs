@@ -56,7 +56,7 @@ pub struct Details {
 }
 
 impl Details {
-    /// Formats the message for a terminal, after applying `part` to each of its texts.
+    /// Formats the message for a terminal. `part` is applied to each of its texts first.
     fn shown(&self, color: bool, part: impl Fn(&str) -> String) -> String {
         let place = self.file.as_ref().map(|file| match (self.line, self.column) {
             (Some(line), Some(column)) => format!("{file}:{line}:{column}"),
@@ -132,7 +132,8 @@ impl Message {
         Self(Box::new(details))
     }
 
-    /// Adds the source line of the message, taken from the text of its file.
+    /// Adds the source line of the message as an excerpt. `text` is the content of the message's
+    /// file.
     #[must_use]
     pub fn with_source(mut self, text: &str) -> Self {
         let details = &mut *self.0;
@@ -151,7 +152,7 @@ impl Message {
         self
     }
 
-    /// Converts diagnostics of the PDDL front end, including the source lines.
+    /// Converts diagnostics of the PDDL front end, with their source lines.
     pub fn from_pddl(diagnostics: &[Diagnostic], sources: &[&Source]) -> Vec<Self> {
         let details = |diagnostic: &Diagnostic| Details {
             severity: if diagnostic.severity == Severity::Error { "error" } else { "warning" },
@@ -167,7 +168,7 @@ impl Message {
         diagnostics.iter().map(|diagnostic| Self::of(details(diagnostic))).collect()
     }
 
-    /// Converts an error of the ontology crate.
+    /// Converts an error of the ontology crate to a message.
     pub fn from_ontology(error: &ontology::Error) -> Self {
         match error {
             ontology::Error::Engine(error) => Self::from_rules(error),
@@ -179,12 +180,12 @@ impl Message {
         }
     }
 
-    /// Converts a warning of reading or lowering a knowledge base.
+    /// Converts a warning of the ontology crate to a message.
     pub fn from_ontology_warning(warning: &ontology::Warning) -> Self {
         Self::from_text("warning", warning.code(), &warning.to_string())
     }
 
-    /// Converts an error in rules.
+    /// Converts an error of the rules crate to a message.
     pub fn from_rules(error: &rules::Error) -> Self {
         let (text, code) = (error.to_string(), error.code());
         let sentence = text.split_once(&format!("{code} ")).map_or(text.as_str(), |(_, sentence)| sentence);
@@ -192,8 +193,8 @@ impl Message {
         Self::plain("error", code, sentence.to_owned(), place)
     }
 
-    /// Parses a message of the form `[FILE:[LINE:COLUMN:]] [SEVERITY[CODE]:] SENTENCE`, in which
-    /// libraries format theirs.
+    /// Parses the text of an error or warning of a library: `[FILE:[LINE:COLUMN:]]
+    /// [SEVERITY[CODE]:] SENTENCE`.
     fn from_text(severity: &'static str, code: &str, text: &str) -> Self {
         let marks = [format!("{severity}[{code}]: "), format!("{code} ")];
         let cut = marks.iter().find_map(|mark| text.find(mark.as_str()).map(|at| (at, at + mark.len())));
@@ -221,7 +222,7 @@ impl Message {
         &self.text
     }
 
-    /// Formats the message with ANSI colours. Control characters of its texts are escaped as by
+    /// Formats the message with ANSI colours. Control characters in its texts are escaped as in
     /// [`visible`].
     pub fn colored(&self) -> String {
         self.shown(true, |part| visible(part).into_owned())

@@ -36,8 +36,8 @@ impl Mission {
         self.set_in_problem(name, value)
     }
 
-    /// Sets a fluent or fact of the problem, as [`Mission::set`] does, but ignores the knowledge
-    /// base.
+    /// Sets a numeric function or fact of the problem. Like [`Mission::set`], but ignores the
+    /// measured attributes of the knowledge base.
     ///
     /// # Errors
     /// No symbol of the problem matches.
@@ -154,7 +154,8 @@ fn decimal(text: &str) -> Option<BigRational> {
     rules::Literal::parse(text, Some("http://www.w3.org/2001/XMLSchema#decimal"), None).as_rational()
 }
 
-/// Returns `true` if an attribute is measured, or bounded by the requirements of a design.
+/// Returns `true` if an attribute has a measured value, or if a design has a requirement that
+/// bounds it.
 fn is_measured(knowledge: &Knowledge, attribute: &str) -> bool {
     let view = knowledge.view();
     let local = ontology::vocab::local_name(attribute);

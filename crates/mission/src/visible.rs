@@ -6,16 +6,16 @@ use std::fmt::Write as _;
 use serde::Serialize;
 
 /// Escapes control characters except line breaks and tabs, marks of bidirectional text, and
-/// characters of zero width. Such characters could change what a terminal displays. They are
-/// escaped because names originate from files that may be hostile. Joiners are kept, because some
-/// languages need them.
+/// characters of zero width. Such characters could change what a terminal displays, and names
+/// originate from files that may be hostile. Joiners are kept, because some languages need them.
 pub fn visible(text: &str) -> Cow<'_, str> {
     escaped(text, |character, all| {
         let _ = write!(all, "\\u{{{:x}}}", u32::from(character));
     })
 }
 
-/// Escapes the same characters in JSON text, where they can only occur within strings.
+/// Escapes in JSON text the characters that [`visible`] escapes. Such characters can only occur
+/// within JSON strings.
 pub fn visible_json(text: &str) -> Cow<'_, str> {
     escaped(text, |character, all| {
         for unit in character.encode_utf16(&mut [0; 2]) {
@@ -30,7 +30,7 @@ pub fn pretty(answer: &impl Serialize) -> String {
     serde_json::to_string_pretty(answer).unwrap_or_default() + "\n"
 }
 
-/// Returns `true` if a character is not displayed as itself.
+/// Returns `true` if a character is invisible or changes the display of other characters.
 fn hides(character: char) -> bool {
     let is_unseen = matches!(
         character,

@@ -95,15 +95,15 @@ pub struct Identifier {
     pub span: Span,
 }
 
-/// Identifier that occurs in no file. Its span is empty.
+/// Creates an identifier for a name that occurs in no file. Its span is empty.
 impl From<Name> for Identifier {
     fn from(name: Name) -> Self {
         Self { name, span: Span::default() }
     }
 }
 
-/// Type of a typed-list entry: one name, or `either` with several. Empty means `object`, whether written or
-/// implied.
+/// Type of a typed-list entry: one type name, or several for `either`. An empty list means `object`, whether
+/// written or implied.
 #[derive(Debug, Clone, Default)]
 pub struct TypeExpression {
     /// Names of the alternative types.
@@ -183,7 +183,8 @@ pub struct Action {
 /// prevent the action.
 #[derive(Debug, Clone)]
 pub struct Preference {
-    /// Variables of the enclosing quantifiers. Each instance is counted separately.
+    /// Variables of the quantifiers that enclose the preference. Each violated instance counts as one
+    /// violation.
     pub variables: Vec<TypedName>,
     /// Name of the preference. Several preferences may share one.
     pub name: Identifier,
@@ -198,13 +199,14 @@ pub struct Preference {
 /// Constraint on the trajectory of a plan, that is, on all its states and not only on the last one.
 #[derive(Debug, Clone)]
 pub struct Constraint {
-    /// Variables of the enclosing quantifiers. If the constraint is a preference, each instance is counted
-    /// separately.
+    /// Variables of the quantifiers that enclose the constraint. If the constraint is a preference, each
+    /// violated instance counts as one violation.
     pub variables: Vec<TypedName>,
     /// Name, if the constraint is a preference. Several preferences may share one. `(is-violated NAME)` is
     /// the number of violated instances. A constraint without a name is mandatory.
     pub preference: Option<Identifier>,
-    /// Modal formula. A preference in the goal refers to the last state.
+    /// Modal formula that the trajectory must satisfy. A preference of the goal is stored as
+    /// [`Trajectory::AtEnd`].
     pub trajectory: Trajectory,
     /// Extent of the whole constraint.
     pub span: Span,
@@ -236,7 +238,7 @@ pub enum Trajectory {
     /// `(always-within T A B)`: for every state with A, B holds in this or a later state at most T time units
     /// later.
     AlwaysWithin(BigRational, Condition, Condition),
-    /// `(hold-during T U A)`: A holds from time T until time U.
+    /// `(hold-during T U A)`: A holds from time T until just before time U.
     HoldDuring(BigRational, BigRational, Condition),
     /// `(hold-after T A)`: A holds from time T on.
     HoldAfter(BigRational, Condition),

@@ -110,8 +110,8 @@ impl Diagnostic {
         }
     }
 
-    /// Returns the excerpts to display: the line of the diagnostic and that of its related position, if their
-    /// files are among `sources`.
+    /// Returns the excerpts to display: the line of the diagnostic, and the line of its related position if
+    /// it has one. A position in a file that is not among `sources` gives no excerpt.
     pub fn excerpts(&self, sources: &[&Source]) -> Vec<Excerpt> {
         let excerpt = |file: &str, span: Span, message: &str| {
             let source = sources.iter().find(|source| source.name() == file)?;
@@ -140,7 +140,7 @@ impl Diagnostic {
     }
 }
 
-/// Maximum number of diagnostics per file. A file that is not PDDL at all produces countless ones.
+/// Maximum number of diagnostics per file. A file in another language would produce very many.
 const MAX_DIAGNOSTICS: usize = 200;
 
 /// Collects the diagnostics of one source.
@@ -196,13 +196,14 @@ impl<'s> Sink<'s> {
         self.source
     }
 
-    /// Number of reported diagnostics, including those beyond the limit.
+    /// Number of reported diagnostics, including those beyond [`MAX_DIAGNOSTICS`] that are only counted.
     #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(crate) fn len(&self) -> usize {
         self.diagnostics.len() + self.beyond_limit
     }
 
-    /// Returns `true` if further diagnostics are only counted, so that suggestions need not be computed.
+    /// Returns `true` if the limit is reached. Further diagnostics are only counted, so suggestions need not
+    /// be computed.
     pub(crate) fn is_full(&self) -> bool {
         self.diagnostics.len() > MAX_DIAGNOSTICS
     }
@@ -223,7 +224,7 @@ impl<'s> Sink<'s> {
                 format!("{} more messages about this file are not shown", self.beyond_limit + 1),
             );
         }
-        // Checks run by kind of declaration, readers work through a file by position.
+        // The checks run by kind of declaration, but readers work through a file by position.
         self.diagnostics.sort_by_key(|diagnostic| (diagnostic.span.start, diagnostic.code));
         // Constructs that are compiled to several forms are checked in each form.
         self.diagnostics.dedup();

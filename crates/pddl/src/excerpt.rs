@@ -68,8 +68,8 @@ impl Excerpt {
         Self::new(file, text, line, begin + place..begin + place + word.max(first), "")
     }
 
-    /// Applies `change` to the file name, the message, and each part of the text separately, so that the mark
-    /// stays on its part.
+    /// Returns a copy with `change` applied to the file name, the message and the text. The text before,
+    /// inside and after the mark is changed separately, so the mark stays on the same word.
     #[must_use]
     pub fn map(&self, change: impl Fn(&str) -> String) -> Self {
         let (before, remainder) = self.text.split_at(self.range.start);
@@ -85,7 +85,7 @@ impl Excerpt {
     }
 }
 
-/// A message with everything that is displayed.
+/// A message with its source lines and its suggested correction, ready for display.
 #[derive(Debug, Clone, Copy)]
 pub struct Shown<'a> {
     /// Whether the message is an error; otherwise it is a warning.
@@ -94,7 +94,7 @@ pub struct Shown<'a> {
     pub code: &'a str,
     /// Description of the problem, in one sentence.
     pub message: &'a str,
-    /// File, or `FILE:LINE:COLUMN`. Shown if there is no source line.
+    /// File, or `FILE:LINE:COLUMN`. Displayed only if there are no excerpts.
     pub place: Option<&'a str>,
     /// Suggested correction.
     pub help: Option<&'a str>,
@@ -141,7 +141,7 @@ impl Shown<'_> {
     }
 }
 
-/// Adapter: each excerpt is a file for `codespan_reporting`.
+/// Presents each excerpt to `codespan_reporting` as a file.
 struct Excerpts<'e>(&'e [Excerpt]);
 
 impl<'a> Files<'a> for Excerpts<'_> {

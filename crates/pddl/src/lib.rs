@@ -49,7 +49,7 @@ pub use validator::Validator;
 
 use ast::{Direction, Domain, Metric, Problem};
 
-/// Parses an objective and checks it against a domain and a problem.
+/// Parses the expression of a metric and checks it against a domain and a problem. Returns the metric.
 ///
 /// # Errors
 ///
@@ -72,7 +72,7 @@ pub fn read_objective(
     Err(parsed.diagnostics.into())
 }
 
-/// Parses and checks a domain and a problem. Returns them with the warnings about both.
+/// Parses and checks a domain and a problem. Returns both trees and the warnings.
 ///
 /// ```
 /// use metaplan_pddl::{Source, read};
@@ -85,7 +85,8 @@ pub fn read_objective(
 ///
 /// # Errors
 ///
-/// Returns all errors and warnings: those about the domain first, each file's in the order of the file.
+/// Returns all errors and warnings if a file has an error. Diagnostics about the domain come first; those
+/// about one file are sorted by position.
 pub fn read(domain: &Source, problem: &Source) -> Result<(Domain, Problem, Vec<Diagnostic>), Errors> {
     let parsed_domain = parse::domain(domain);
     let parsed_problem = match &parsed_domain.tree {

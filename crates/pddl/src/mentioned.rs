@@ -5,14 +5,14 @@ use std::collections::BTreeSet;
 use crate::ast::{Atom, Condition, Domain, Effect, InitialElement, Name, Problem, Term};
 use crate::visit::Node;
 
-/// Names that occur in a domain and a problem.
+/// Names that occur in a domain, and optionally in a problem, whether declared or not.
 #[derive(Debug, Clone, Default)]
 pub struct Mentioned {
-    /// Predicates in conditions, effects, preferences and constraints.
+    /// Predicates in conditions, effects, preferences, constraints, and the initial state.
     pub predicates: BTreeSet<Name>,
-    /// Predicates that actions or timed initial literals change.
+    /// Predicates of atomic effects and of timed initial literals.
     pub changed: BTreeSet<Name>,
-    /// Predicates that timed initial literals change.
+    /// Predicates of timed initial literals.
     pub timed: BTreeSet<Name>,
     /// Objects in conditions, effects and the initial state.
     pub objects: BTreeSet<Name>,

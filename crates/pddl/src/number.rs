@@ -4,8 +4,8 @@ use num_bigint::BigInt;
 use num_rational::BigRational;
 use num_traits::{One, Pow, Signed, Zero};
 
-/// Maximum number of digits of a number written without exponent. It exceeds any measurement precision and
-/// prevents a short text from requesting a number that fills the memory.
+/// Maximum number of digits of a number written without exponent. The limit exceeds any measurement precision
+/// and prevents a short text from requesting a number that fills the memory.
 const MAX_DIGITS: usize = 400;
 
 /// Result of reading a symbol as a number.
@@ -19,7 +19,8 @@ pub(crate) enum Literal {
     TooLong,
 }
 
-/// Reads `5`, `-0.5`, `100.`, `.5`, `1e-3`. Any other symbol is a name, for example `0.8_decimal`.
+/// Parses a symbol as a number: `5`, `-0.5`, `100.`, `.5`, `1e-3`. Any other symbol is a name, for example
+/// `0.8_decimal`.
 pub(crate) fn literal(text: &str) -> Literal {
     let unsigned = text.strip_prefix(['-', '+']).unwrap_or(text);
     let (mantissa, exponent) = match unsigned.split_once(['e', 'E']) {
@@ -43,7 +44,8 @@ pub(crate) fn literal(text: &str) -> Literal {
     Literal::Number(if text.starts_with('-') { -value } else { value })
 }
 
-/// Number of digits of a number when it is written without exponent.
+/// Returns the number of digits of a number written without exponent. `digits` and `fraction` count the
+/// digits of the mantissa and those after its point.
 fn written_out(digits: usize, fraction: usize, exponent: i32) -> usize {
     // A length that does not fit exceeds the limit in any case.
     let exponent_length = usize::try_from(exponent.unsigned_abs()).unwrap_or(usize::MAX);
@@ -58,7 +60,7 @@ fn all_digits(text: &str) -> bool {
     text.bytes().all(|byte| byte.is_ascii_digit())
 }
 
-/// Value of `whole.fraction` · 10^`exponent`.
+/// Returns the value of `whole.fraction` · 10^`exponent`.
 #[expect(clippy::arithmetic_side_effects, reason = "digits are from 0 to 9, and 18 of them fit")]
 fn decimal(whole: &str, fraction: &str, exponent: i32) -> BigRational {
     let digits = || whole.bytes().chain(fraction.bytes());
@@ -80,12 +82,12 @@ fn decimal(whole: &str, fraction: &str, exponent: i32) -> BigRational {
     }
 }
 
-/// Text of a number: a decimal if it has a finite one, else a fraction.
+/// Formats a number as a decimal, or as a fraction if its decimal expansion is infinite.
 pub(crate) fn show_number(value: &BigRational) -> String {
     to_decimal(value).unwrap_or_else(|| value.to_string())
 }
 
-/// Shortest decimal that equals `value`; `None` if the decimal expansion is infinite.
+/// Returns the shortest decimal that equals `value`; `None` if the decimal expansion is infinite.
 pub fn to_decimal(value: &BigRational) -> Option<String> {
     let mut denominator = value.denom().clone();
     // A reduced fraction has a finite decimal if its denominator has no prime factors except 2 and 5.
@@ -110,7 +112,8 @@ pub fn to_decimal(value: &BigRational) -> Option<String> {
     Some(format!("{sign}{whole}{point}{fraction}"))
 }
 
-/// Converts an index to 32 bits. It counts bytes, names or parameters in memory, fewer than 2^32.
+/// Converts an index to 32 bits. Panics from 2^32 on, which no index of bytes, names or parameters in memory
+/// reaches.
 pub(crate) fn dense(index: usize) -> u32 {
     u32::try_from(index).expect("invariant: fewer than 2^32 of anything are held in memory")
 }

@@ -136,7 +136,7 @@ fn names(atom: &Atom) -> Vec<Name> {
     atom.arguments.iter().map(name).collect()
 }
 
-/// Requirements that imply others: (implied, implying).
+/// Pairs of requirement flags: a file that states the second flag need not state the first.
 const IMPLIED: [(&str, &str); 12] = [
     ("typing", "adl"),
     ("negative-preconditions", "adl"),
@@ -152,7 +152,8 @@ const IMPLIED: [(&str, &str); 12] = [
     ("action-costs", "numeric-fluents"),
 ];
 
-/// Adds the requirements that are used but not stated.
+/// Adds the requirement flags of all features that the domain or the problem uses, except those that stated
+/// flags imply.
 fn require(domain: &mut Domain, problem: &Problem) {
     let mut required: FxHashSet<&'static str> = FxHashSet::default();
     required.insert("strips");
@@ -194,7 +195,8 @@ fn walk<'t>(domain: &'t Domain, problem: &'t Problem, visit: Visit<'_, 't>) {
     problem.walk(visit);
 }
 
-/// Function in an expression, or target of a numeric effect.
+/// Returns the numeric function that a node reads or changes: a fluent of an expression, or the target of a
+/// numeric effect.
 fn function(node: Node<'_>) -> Option<&Atom> {
     match node {
         Node::Effect(Effect::Assign(_, target, ..)) => Some(target),
@@ -202,7 +204,8 @@ fn function(node: Node<'_>) -> Option<&Atom> {
     }
 }
 
-/// Requirement of a node, without those of its children.
+/// Returns the requirement flag that a node needs by itself, regardless of its children. `None` if it needs
+/// no flag.
 fn needs(node: Node<'_>) -> Option<&'static str> {
     match node {
         Node::Preference(_) => Some("preferences"),

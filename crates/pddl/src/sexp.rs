@@ -39,7 +39,7 @@ pub(super) const SECTIONS: [&str; 20] = [
 #[derive(Debug, Clone, Copy)]
 struct Node {
     span: Span,
-    /// Index of the first node after this one and all its items.
+    /// Index of the next node that is neither this node nor one of its items.
     next: u32,
     is_list: bool,
 }
@@ -241,7 +241,8 @@ impl Reader<'_, '_> {
             .help("put a space before the question mark");
     }
 
-    /// Handles a section at top level: the preceding `(define` was closed too early and is reopened.
+    /// Handles a section keyword at top level: the preceding `(define …)` was closed too early and is
+    /// reopened.
     #[expect(clippy::arithmetic_side_effects, reason = "the definition was closed before, by a parenthesis")]
     fn reopen_define(&mut self, span: Span, text: &str) {
         // Only the first definition of the file can be reopened, and only if it is closed.
@@ -257,7 +258,8 @@ impl Reader<'_, '_> {
         self.open.insert(0, 0);
     }
 
-    /// Handles a section inside another one: closes all lists of the enclosing section here.
+    /// Handles a section keyword inside another section: reports the unclosed parenthesis and ends the
+    /// enclosing section before the keyword.
     fn close_section_before(&mut self, span: Span, text: &str) {
         let Some(list) = self.open.pop() else { return };
         let unclosed = self.nodes[self.open[1] as usize].span;

@@ -2,8 +2,8 @@
 
 use super::ast::Span;
 
-/// Converts a byte offset to 32 bits, saturating. Texts beyond 4 GB are rejected with a message about their
-/// first bytes.
+/// Converts a byte offset to 32 bits; larger offsets become `u32::MAX`. Texts beyond 4 GB are rejected by the
+/// parser.
 pub(crate) fn place(at: usize) -> u32 {
     u32::try_from(at).unwrap_or(u32::MAX)
 }
@@ -41,9 +41,9 @@ impl Source {
         Self { name: name.into(), text, line_starts }
     }
 
-    /// Decodes the bytes of the file `name`: as UTF-16 if they begin with its byte order mark, else as UTF-8.
-    /// Windows PowerShell's `>` writes UTF-16. Invalid sequences become U+FFFD, because comments of older
-    /// files are often Latin-1.
+    /// Decodes the bytes of the file `name`: as UTF-16 if they begin with a UTF-16 byte order mark, else as
+    /// UTF-8. Windows PowerShell's `>` writes UTF-16. Invalid sequences become U+FFFD, because comments of
+    /// older files are often Latin-1.
     pub fn from_bytes(name: impl Into<String>, bytes: &[u8]) -> Self {
         match bytes {
             [0xff, 0xfe, content @ ..] => Self::new(name, utf16(content, u16::from_le_bytes)),

@@ -1,4 +1,5 @@
-//! Stratification of derived predicates: a predicate is evaluated after all predicates that it negates.
+//! Stratification of derived predicates: each predicate is in a higher stratum than all derived predicates
+//! that its axioms negate.
 
 use rustc_hash::FxHashMap;
 
@@ -10,12 +11,12 @@ pub(crate) struct Strata<'d> {
     level: FxHashMap<&'d Name, usize>,
 }
 
-/// A derived predicate that depends on its own negation.
+/// Error: the derived predicate depends on its own negation.
 #[derive(Debug)]
 pub(crate) struct NegativeCycle<'d>(pub(crate) &'d Name);
 
 impl<'d> Strata<'d> {
-    /// Computes the strata.
+    /// Computes the stratum of each derived predicate of a domain.
     ///
     /// # Errors
     ///
@@ -62,7 +63,8 @@ impl<'d> Strata<'d> {
     }
 }
 
-/// Calls `visit` with each predicate of a condition and whether it occurs below an odd number of negations.
+/// Calls `visit(predicate, negated)` for each atom of a condition. `negated` is `true` below an odd number of
+/// negations.
 fn uses<'d>(condition: &'d Condition, negated: bool, visit: &mut impl FnMut(&'d Name, bool)) {
     match condition {
         Condition::Not(inner) => uses(inner, !negated, visit),

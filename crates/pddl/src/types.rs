@@ -4,8 +4,8 @@ use rustc_hash::FxHashMap;
 
 use super::ast::{Domain, Name, TypeExpression};
 
-/// Types of a domain with their supertypes. Supertypes that are only mentioned count as declared. `object` is
-/// the root.
+/// Types of a domain with their supertypes. A type that occurs only as a supertype counts as declared.
+/// `object` is the root.
 #[derive(Debug)]
 pub struct TypeHierarchy {
     index: FxHashMap<Name, usize>,
@@ -37,7 +37,7 @@ impl TypeHierarchy {
         self.parents.len() - 1
     }
 
-    /// Returns `true` if the type exists.
+    /// Returns `true` if the type is declared or occurs as a supertype of a declared type.
     pub fn contains(&self, name: &Name) -> bool {
         self.index.contains_key(name)
     }
@@ -70,7 +70,8 @@ impl TypeHierarchy {
         supertype.alternatives.is_empty() || subtype.alternatives.iter().any(|lower| is_subtype(&lower.name))
     }
 
-    /// Returns `true` if an object can be of both types.
+    /// Returns `true` if some object can be of both types: one is a subtype of the other, or the two have a
+    /// common subtype.
     pub(crate) fn overlap(&self, left: &TypeExpression, right: &TypeExpression) -> bool {
         let common = |left: &Name, right: &Name| {
             self.is_a(left, right) || self.is_a(right, left) || self.have_common_subtype(left, right)
@@ -95,7 +96,7 @@ impl TypeHierarchy {
         below_left.iter().zip(&below_right).any(|(left, right)| *left && *right)
     }
 
-    /// Returns `true` if a type is a proper supertype of itself.
+    /// Returns `true` if a type is its own supertype through at least one other type.
     pub(crate) fn is_cyclic(&self, name: &Name) -> bool {
         let Some(index) = self.index.get(name) else { return false };
         *index != 0
@@ -103,7 +104,7 @@ impl TypeHierarchy {
     }
 }
 
-/// For each type: whether it is reachable from `from` (reflexive and transitive).
+/// Returns for each type whether it is reachable from `from` by zero or more `links`.
 fn closure(links: &[Vec<usize>], from: usize) -> Vec<bool> {
     let mut reached = vec![false; links.len()];
     reached[from] = true;

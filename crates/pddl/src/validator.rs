@@ -7,8 +7,9 @@ use crate::diagnostic::Errors;
 use crate::source::Source;
 use crate::validate::{Options, PlanText, Verdict, validate};
 
-/// Validator for plans of one domain and problem. Both must have passed [`check`](crate::check()), as the
-/// results of [`read`](crate::read()) have.
+/// Validator for plans of one domain and problem. The domain and the problem must have passed
+/// [`check`](crate::check()); [`read`](crate::read()) returns only checked domains
+/// and problems.
 ///
 /// ```
 /// use metaplan_pddl::{Source, Validator, read};
@@ -50,7 +51,7 @@ impl<'a> Validator<'a> {
         self.options(Options { concurrent: true, tolerance: separation })
     }
 
-    /// Executes a plan. An invalid plan is not an error: see [`Verdict::violation`].
+    /// Parses and executes a plan. An invalid plan is not an error: see [`Verdict::violation`].
     ///
     /// # Errors
     /// Returns an error for each line that is not a step of a plan.

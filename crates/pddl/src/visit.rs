@@ -26,11 +26,12 @@ pub enum Node<'t> {
     Preference(&'t Preference),
 }
 
-/// Receives each node of a walk.
+/// Callback that receives each node of a walk.
 pub type Visit<'v, 't> = &'v mut dyn FnMut(Node<'t>);
 
 impl Domain {
-    /// Visits all conditions, effects, expressions, constraints and preferences of the domain.
+    /// Visits all conditions, effects, expressions, constraints and preferences of the domain. A parent
+    /// precedes its children.
     pub fn walk<'t>(&'t self, visit: Visit<'_, 't>) {
         self.constraints.iter().for_each(|constraint| constraint.walk(visit));
         self.derived.iter().for_each(|derived| derived.condition.walk(visit));
@@ -45,7 +46,7 @@ impl Domain {
 }
 
 impl Problem {
-    /// Visits the goal, the constraints and the metric.
+    /// Visits the goal, the constraints and the metric, with all nodes below them.
     pub fn walk<'t>(&'t self, visit: Visit<'_, 't>) {
         self.goal.walk(visit);
         self.constraints.iter().for_each(|constraint| constraint.walk(visit));
@@ -56,7 +57,7 @@ impl Problem {
 }
 
 impl ActionBody {
-    /// Conditions of the action, of all times.
+    /// Conditions of the action, regardless of their times.
     pub fn conditions(&self) -> impl Iterator<Item = &Condition> {
         let (single, timed) = match self {
             Self::Instantaneous { precondition, .. } => (Some(precondition), &[][..]),
@@ -65,7 +66,7 @@ impl ActionBody {
         single.into_iter().chain(timed.iter().map(|(_, condition)| condition))
     }
 
-    /// Effects of the action, of all times.
+    /// Effects of the action, regardless of their times.
     pub fn effects(&self) -> impl Iterator<Item = &Effect> {
         let (single, timed) = match self {
             Self::Instantaneous { effect, .. } => (Some(effect), &[][..]),
@@ -94,7 +95,7 @@ impl ActionBody {
 }
 
 impl Constraint {
-    /// Visits the constraint and its conditions.
+    /// Visits the constraint and all conditions of its trajectory.
     pub fn walk<'t>(&'t self, visit: Visit<'_, 't>) {
         visit(Node::Constraint(self));
         self.trajectory.walk(visit);
@@ -102,7 +103,7 @@ impl Constraint {
 }
 
 impl Trajectory {
-    /// Visits the conditions of a trajectory.
+    /// Visits all conditions of a trajectory formula.
     pub fn walk<'t>(&'t self, visit: Visit<'_, 't>) {
         match self {
             Self::And(parts) => parts.iter().for_each(|part| part.walk(visit)),
@@ -147,7 +148,7 @@ impl Condition {
         first.iter_mut().chain(second)
     }
 
-    /// Visits the condition, the conditions within, and their expressions.
+    /// Visits the condition, all subconditions, and the numeric expressions in comparisons.
     pub fn walk<'t>(&'t self, visit: Visit<'_, 't>) {
         visit(Node::Condition(self));
         self.parts().for_each(|part| part.walk(visit));
@@ -157,12 +158,13 @@ impl Condition {
         }
     }
 
-    /// Visits the numeric functions that the condition reads.
+    /// Visits the numeric functions in the comparisons of the condition.
     pub fn walk_fluents<'t>(&'t self, visit: &mut dyn FnMut(&'t Atom)) {
         self.walk(&mut |node| node.fluent().into_iter().for_each(&mut *visit));
     }
 
-    /// Applies a change to every expression of the condition that has no operands.
+    /// Applies a change to every numeric leaf expression of the condition, that is, to each number, fluent,
+    /// `?duration` and `total-time`.
     pub fn change_leaves(&mut self, change: &mut dyn FnMut(&mut Expression)) {
         self.parts_mut().for_each(|part| part.change_leaves(change));
         if let Self::Compare(_, left, right, _) = self {
@@ -191,8 +193,8 @@ impl Effect {
         }
     }
 
-    /// Visits the effect, the effects within, their conditions and expressions. The target of an assignment is visited
-    /// with the effect only.
+    /// Visits the effect, all subeffects, and their conditions and numeric expressions. The target of an
+    /// assignment is part of the effect node and is not visited separately.
     pub fn walk<'t>(&'t self, visit: Visit<'_, 't>) {
         visit(Node::Effect(self));
         match self {
@@ -203,7 +205,8 @@ impl Effect {
         self.parts().iter().for_each(|part| part.walk(visit));
     }
 
-    /// Applies a change to every expression of the effect that has no operands.
+    /// Applies a change to every numeric leaf expression of the effect, that is, to each number, fluent,
+    /// `?duration` and `total-time`. Targets of assignments are not changed.
     pub fn change_leaves(&mut self, change: &mut dyn FnMut(&mut Expression)) {
         match self {
             Self::When(condition, _) => condition.change_leaves(change),
@@ -215,7 +218,7 @@ impl Effect {
 }
 
 impl Expression {
-    /// Operands from left to right; empty for numbers and fluents.
+    /// Operands of an operation from left to right; empty for all other expressions.
     pub fn operands(&self) -> &[Self] {
         match self {
             Self::Operation(_, operands, _) => operands,
@@ -223,7 +226,7 @@ impl Expression {
         }
     }
 
-    /// Visits the expression and all operands within.
+    /// Visits the expression and all its subexpressions.
     pub fn walk<'t>(&'t self, visit: Visit<'_, 't>) {
         visit(Node::Expression(self));
         self.operands().iter().for_each(|operand| operand.walk(visit));
@@ -234,7 +237,8 @@ impl Expression {
         self.walk(&mut |node| node.fluent().into_iter().for_each(&mut *visit));
     }
 
-    /// Applies a change to every subexpression that has no operands.
+    /// Applies a change to every leaf of the expression, that is, to each number, fluent, `?duration` and
+    /// `total-time`.
     pub fn change_leaves(&mut self, change: &mut dyn FnMut(&mut Self)) {
         match self {
             Self::Operation(_, operands, _) => {
@@ -248,7 +252,7 @@ impl Expression {
 }
 
 impl<'t> Node<'t> {
-    /// Returns the numeric fluent if the node is one.
+    /// Returns the function with its arguments if the node is a numeric fluent.
     pub fn fluent(self) -> Option<&'t Atom> {
         match self {
             Self::Expression(Expression::Fluent(atom)) => Some(atom),

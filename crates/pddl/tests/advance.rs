@@ -1,6 +1,8 @@
-//! One step is executed in a smaller problem, without facts and values that it cannot read. The result is that of the whole problem.
+//! Compares [`advance`] in a reduced problem, without the facts and values that the step cannot read, with
+//! the step in the whole problem.
 //!
-//! A domain with a derived predicate is never reduced, so that the same domain with one more predicate is the oracle.
+//! Problems of domains with derived predicates are never reduced. The oracle is therefore the same domain
+//! with one additional derived predicate.
 
 use std::path::{Path, PathBuf};
 
@@ -8,13 +10,13 @@ use metaplan_pddl::ast::{Domain, Problem};
 use metaplan_pddl::validate::{PlanStep, PlanText, advance, advance_each};
 use metaplan_pddl::{Source, read};
 
-/// Number of ground steps that are compared for each action.
+/// Maximum number of ground steps that are compared for each action schema.
 const STEPS: u64 = 150;
 
-/// Steps of the walk from the initial state, so that other states are compared as well.
+/// Number of steps of a random walk from the initial state, so that other states are compared as well.
 const WALK: usize = 6;
 
-/// A pseudo-random sequence (Knuth's MMIX generator).
+/// Pseudo-random number generator (Knuth's MMIX generator).
 struct Sequence(u64);
 
 impl Sequence {
@@ -24,7 +26,7 @@ impl Sequence {
     }
 }
 
-/// Pairs of `domain.pddl` and `problem.pddl` in the repository, in the order of their paths.
+/// Returns the paths of all folders of the repository with a `domain.pddl` and a `problem.pddl`, sorted.
 fn tasks() -> Vec<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let mut folders: Vec<PathBuf> = [
@@ -43,7 +45,8 @@ fn tasks() -> Vec<PathBuf> {
     folders
 }
 
-/// Returns the domain and the problem of a folder, with a derived predicate that nothing reads if `is_whole` is set.
+/// Parses the domain and the problem of a folder. If `is_whole` is set, a derived predicate that nothing
+/// reads is added, which prevents the reduction.
 fn task(folder: &Path, is_whole: bool) -> (Domain, Problem) {
     let text = |name: &str| std::fs::read_to_string(folder.join(name)).expect("a file");
     let mut domain = text("domain.pddl");

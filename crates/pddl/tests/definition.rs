@@ -1,5 +1,5 @@
-//! Tests of the definition of a plan (`validate/definition.md`): for each rule, plans on both sides of its
-//! boundary, in sequence and concurrently.
+//! Tests of the definition of a plan (`validate/definition.md`). For each rule there are plans on both sides
+//! of its boundary, in sequential and in concurrent execution.
 
 use metaplan_pddl::validate::{Options, PlanStep, PlanText, advance, validate};
 use metaplan_pddl::{Source, read};
@@ -45,7 +45,8 @@ impl Task {
         (domain, problem)
     }
 
-    /// Returns `valid` or the kind of the violation. Times are exact; concurrently, the separation is 0.001.
+    /// Validates a plan. Returns `valid` or the kind of the violation. The tolerance is 0 in sequential
+    /// execution; the separation is 0.001 in concurrent execution.
     fn verdict(&self, concurrent: bool, plan: &str) -> String {
         let (domain, problem) = self.parse();
         let plan = PlanText::parse(&Source::new("plan", plan)).expect("the plan can be read");
@@ -66,7 +67,7 @@ impl Task {
         }
     }
 
-    /// Checks the cases in both modes.
+    /// Checks the cases, each a plan and its verdict, in sequential and in concurrent execution.
     fn check_both(&self, cases: &[(&str, &str)]) {
         self.check(IN_SEQUENCE, cases);
         self.check(CONCURRENTLY, cases);
@@ -76,7 +77,8 @@ impl Task {
 #[test]
 fn a_condition_over_all_holds_in_the_open_interval() {
     let a = durative("a", "2", "(over all (p))", "(at end (g))");
-    // An event exactly at the end has no effect on the condition; one before the end or at the start has.
+    // An event exactly at the end has no effect on the condition over all; an event before the end or at the
+    // start has.
     let ends = task(std::slice::from_ref(&a), "(p) (at 5 (not (p)))", "(g)");
     ends.check_both(&[
         ("3: (a) [2]", "valid"),
@@ -86,13 +88,13 @@ fn a_condition_over_all_holds_in_the_open_interval() {
     ]);
     let begins = task(&[a], "(at 5 (p))", "(g)");
     begins.check_both(&[("5: (a) [2]", "valid"), ("4.999: (a) [2]", "over_all")]);
-    // The action's own effects at start are part of the interval, those at end are not.
+    // The action's effects at start belong to the interval; its effects at end do not.
     let self_supporting =
         durative("a", "2", "(over all (p))", "(at start (p)) (at end (not (p))) (at end (g))");
     task(&[self_supporting], "", "(g)").check_both(&[("0: (a) [2]", "valid")]);
     let broken = durative("a", "2", "(over all (p))", "(at start (not (p))) (at end (g))");
     task(&[broken], "(p)", "(g)").check_both(&[("0: (a) [2]", "over_all")]);
-    // `p` becomes true again within the interval: too late.
+    // `p` becomes true again within the interval, which is too late.
     let gap = durative("a", "2", "(over all (p))", "(at end (g))");
     task(&[gap], "(p) (at 1 (not (p))) (at 1.5 (p))", "(g)").check_both(&[("0: (a) [2]", "over_all")]);
 }
@@ -125,7 +127,7 @@ fn an_event_must_not_interfere_with_a_simultaneous_happening() {
     let reads = task(&[a], "(at 5 (p))", "(g)");
     reads.check(IN_SEQUENCE, &[("5: (a) [2]", "at_start"), ("5.000001: (a) [2]", "valid")]);
     reads.check(CONCURRENTLY, &[("5.0009: (a) [2]", "interference"), ("5.001: (a) [2]", "valid")]);
-    // The event adds an atom that holds already, and still interferes with the read.
+    // The event adds an atom that already holds, and still interferes with the read.
     let a = durative("a", "2", "(at start (p))", "(at end (g))");
     task(&[a], "(p) (at 5 (p))", "(g)")
         .check_both(&[("5: (a) [2]", "interference"), ("4.999: (a) [2]", "valid")]);
@@ -137,7 +139,7 @@ fn an_event_must_not_interfere_with_a_simultaneous_happening() {
         &[("2.999999: (a) [2]", "valid"), ("3: (a) [2]", "interference"), ("3.000001: (a) [2]", "at_end")],
     );
     reads.check(CONCURRENTLY, &[("2.999: (a) [2]", "valid"), ("2.9991: (a) [2]", "interference")]);
-    // One adds the atom that the other deletes; both add; both delete.
+    // The effect adds the atom that the event deletes, or vice versa; both add it; both delete it.
     for (effect, event, expected) in [
         ("(at end (p))", "(not (p))", "interference"),
         ("(at end (not (p)))", "(p)", "interference"),
@@ -215,15 +217,15 @@ fn changes_of_one_number_interfere_unless_they_commute() {
 #[test]
 fn an_action_of_duration_zero_is_one_happening() {
     for (condition, effect, expected) in [
-        // All conditions are evaluated in the state before, so effects at start do not enable conditions at
-        // end.
+        // All conditions are evaluated in the preceding state, so effects at start do not enable conditions
+        // at end.
         ("(at end (q))", "(at start (p)) (at end (g))", "at_end"),
         ("(at end (p))", "(at start (p)) (at end (g))", "at_end"),
         ("(at end (r))", "(at start (p)) (at end (g))", "valid"),
-        // The end reads an atom that the start writes, although it holds before.
+        // The end reads an atom that the start writes, although the atom held before.
         ("(at end (r))", "(at start (r)) (at end (g))", "interference"),
         ("(at start (r))", "(at end (not (r))) (at end (g))", "interference"),
-        // One adds the atom that the other deletes; both add; both delete.
+        // The start adds the atom that the end deletes, or vice versa; both add it; both delete it.
         ("", "(at start (p)) (at end (not (p))) (at end (g))", "interference"),
         ("", "(at start (not (p))) (at end (p)) (at end (g))", "interference"),
         ("", "(at start (p)) (at end (p)) (at end (g))", "valid"),
@@ -275,7 +277,7 @@ fn conflicting_effects_of_one_happening_are_reported() {
 #[test]
 fn the_goal_holds_when_the_last_action_ends() {
     let a = durative("a", "2", "", "(at end (g))");
-    // An event at the end counts, a later one does not, and a plan cannot wait for one.
+    // An event at the end of the plan counts; a later event does not, and a plan cannot wait for it.
     let adds = task(std::slice::from_ref(&a), "(at 5 (p))", "(g) (p)");
     adds.check_both(&[
         ("3: (a) [2]", "valid"),
@@ -290,7 +292,7 @@ fn the_goal_holds_when_the_last_action_ends() {
     task(std::slice::from_ref(&a), "(at 0 (p))", "(p)").check_both(&[("", "valid"), ("0: (a) [2]", "valid")]);
     task(std::slice::from_ref(&a), "(p) (at 0 (not (p)))", "(p)").check_both(&[("", "goal")]);
     task(&[a], "(at 0.001 (p))", "(p)").check_both(&[("", "goal")]);
-    // A condition over all that becomes false exactly at the end, as the goal requires.
+    // The condition over all becomes false exactly at the end, as the goal requires.
     let guarded = durative("a", "2", "(over all (p))", "(at end (g))");
     task(&[guarded], "(p) (at 2 (not (p)))", "(g) (not (p))")
         .check_both(&[("0: (a) [2]", "valid"), ("0.001: (a) [2]", "over_all")]);
@@ -357,7 +359,7 @@ fn an_instance_may_overlap_with_itself() {
             ("0: (a) [2]\n1.999: (a) [2]", "valid"),
         ],
     );
-    // The occurrences follow each other directly and interfere.
+    // The second occurrence starts when the first one ends, and the two interfere.
     let a = durative("a", "2", "(at start (not (p)))", "(at start (p)) (at end (not (p)))");
     task(&[a], "", "").check(
         CONCURRENTLY,
@@ -379,7 +381,7 @@ fn the_tolerance_delays_steps_and_limits_rounding_of_durations() {
         validate(&domain, &problem, &plan, options).violation.map(|violation| violation.kind.as_str())
     };
     // A step that starts too early within the tolerance is delayed to the end of the preceding step. The
-    // event has then taken place.
+    // event has then already taken place.
     assert_eq!(verdict(&Options::default(), "0: (a) [5]\n4.9995: (b) [1]"), Some("at_start"));
     // A large separation does not enlarge the tolerance of durations.
     let separation = BigRational::from_integer(BigInt::from(1));

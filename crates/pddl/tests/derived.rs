@@ -1,4 +1,5 @@
-//! Tests of derived predicates: comparison with the definition, number of evaluation steps, and interruption.
+//! Tests of derived predicates: comparison with the definition, number of evaluation steps, and interruption
+//! of the evaluation.
 //!
 //! The oracle evaluates every ground instance of every axiom repeatedly until a fixpoint is reached.
 
@@ -17,13 +18,14 @@ fn concat(texts: impl Iterator<Item = String>) -> String {
 }
 
 const OBJECTS: usize = 3;
-/// Variables. An inner quantifier may shadow a variable of an outer quantifier or of the head.
+/// Names of the variables. An inner quantifier may shadow a variable of an outer quantifier or of the head.
 const VARIABLES: [&str; 3] = ["?a", "?b", "?c"];
-/// Derived predicates with their arity. The last one is not negated by any other and may negate the others.
+/// Derived predicates with their arity. Only the last predicate may negate others, and no predicate negates
+/// it.
 const DERIVED: [(&str, usize); 4] = [("p", 1), ("q", 1), ("r", 2), ("s", 1)];
 const LAST: usize = 3;
 
-/// Object of each variable, if bound.
+/// Object to which each of the three variables is bound; `None` if unbound or not in scope.
 type Scope = [Option<usize>; 3];
 type Fact = (usize, Vec<usize>);
 
@@ -32,7 +34,7 @@ enum Condition {
     Edge(usize, usize),
     Derived(usize, [usize; 2]),
     NotEdge(usize, usize),
-    /// Negated derived atom in axioms of the last predicate; the plain atom elsewhere.
+    /// Negated derived atom in axioms of the last predicate; the atom without negation in other axioms.
     NotDerived(usize, [usize; 2]),
     NotNot(Box<Condition>),
     Equal(usize, usize),
@@ -61,7 +63,7 @@ fn term_text(number: usize, scope: &Scope) -> String {
     term(number, scope).map_or_else(|object| format!("o{object}"), |variable| VARIABLES[variable].to_owned())
 }
 
-/// Returns all assignments of objects to variables.
+/// Extends a scope by all assignments of objects to the given variables.
 fn each(variables: &[usize], scope: &Scope) -> Vec<Scope> {
     let mut scopes = vec![*scope];
     for variable in variables {
@@ -168,7 +170,7 @@ fn condition() -> impl Strategy<Value = Condition> {
     })
 }
 
-/// Parameters of the head of a predicate.
+/// Returns the variables that are the parameters of a derived predicate's head.
 fn head(predicate: usize) -> Vec<usize> {
     (0..DERIVED[predicate].1).collect()
 }
@@ -238,7 +240,8 @@ proptest! {
     }
 }
 
-/// Task with a derived predicate along a chain of objects.
+/// Returns a task with a derived predicate `p` along a chain of `length` objects. `axiom` is the condition of
+/// `p`.
 fn chain(length: usize, axiom: &str) -> (Domain, Problem) {
     let domain = format!(
         "(define (domain d) (:predicates (next ?x ?y) (end ?x) (on) (p ?x)) (:derived (p ?x) {axiom})
@@ -254,7 +257,7 @@ fn chain(length: usize, axiom: &str) -> (Domain, Problem) {
 
 const JOINED: &str = "(or (and (end ?x) (on)) (exists (?y) (and (next ?x ?y) (p ?y))))";
 
-/// Number of calls of `stop` during the validation of a valid plan.
+/// Returns the number of calls of `stop` during the validation of a valid plan for [`chain`].
 fn polls(length: usize, axiom: &str) -> u64 {
     let (domain, problem) = chain(length, axiom);
     let plan = PlanText::parse(&Source::new("plan", "(switch)")).expect("a plan");
@@ -268,7 +271,7 @@ fn polls(length: usize, axiom: &str) -> u64 {
     count.get()
 }
 
-/// Cubic evaluation would need 64 times as many steps for a chain four times as long.
+/// A cubic evaluation would need 64 times as many steps for a chain four times as long.
 #[test]
 fn a_chain_of_derived_facts_takes_linear_time() {
     let (short, long) = (polls(200, JOINED), polls(800, JOINED));
@@ -290,7 +293,8 @@ fn a_validation_ends_when_stop_returns_true() {
     }
 }
 
-/// Quantifiers over more variables than the call stack has frames, with one object or two per variable.
+/// Tests quantifiers over more variables than the call stack has frames, with one or two objects per
+/// variable.
 #[test]
 fn quantifiers_may_bind_many_variables() {
     let check = |count: usize, objects: &str, condition: &dyn Fn(&str) -> String| {
@@ -318,7 +322,8 @@ fn quantifiers_may_bind_many_variables() {
 const UNIVERSAL: &str =
     "(and (on) (or (end ?x) (exists (?y) (next ?x ?y))) (forall (?y) (imply (next ?x ?y) (p ?y))))";
 
-/// Each instance visits all objects twice: at its first evaluation, and when the missing fact is derived.
+/// Each axiom instance visits all objects twice: at its first evaluation, and when the missing fact is
+/// derived.
 #[test]
 fn a_chain_below_a_universal_quantifier_takes_quadratic_time() {
     let (short, long) = (polls(60, UNIVERSAL), polls(240, UNIVERSAL));

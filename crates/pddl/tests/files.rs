@@ -1,6 +1,6 @@
 //! Parses, checks and prints all available real PDDL files, and parses the printed text again.
 //!
-//! Skipped if the files are absent; they are not part of the project.
+//! The tests are skipped if the files, which are not part of the project, are absent.
 
 #![expect(clippy::print_stdout, reason = "a skipped test says so")]
 
@@ -14,7 +14,8 @@ use metaplan_pddl::{
 
 const REAL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/real/pddl");
 
-/// Expected diagnostics of domains: `CODE:line`, with a tilde for warnings. All other domains have none.
+/// Expected diagnostics of domains: `CODE:line`, with a tilde before warnings. All other domains have no
+/// diagnostics.
 const DOMAINS: [(&str, &str); 16] = [
     ("navigation_planta/domain_sas.pddl", "P134:1 ~P127:59"),
     ("navigation_planta/experiment_combined_scalability/domain_sas_combined.pddl", "P134:1 ~P127:70"),
@@ -97,12 +98,12 @@ const PROBLEMS: [(&str, &str, &str); 35] = [
     ),
     ("suave_metaplan/suave_extended_problem", "suave_metaplan/suave_extended_domain", "~P131:2"),
     ("suave_metaplan/suave_problem", "suave_metaplan/suave_domain", ""),
-    // Their domains are templates, so undeclared names are not reported.
+    // The domains are templates of `OWLToPDDL`, so undeclared names are not reported.
     ("suave_planta/suave_problem", "suave_planta/suave_domain", ""),
     ("suave_planta/suave_problem_extended", "suave_planta/suave_domain_extended", ""),
 ];
 
-/// Expands the short form of a path in `PROBLEMS`.
+/// Expands the abbreviated path of a problem or domain in `PROBLEMS`.
 fn path_of(short: &str) -> String {
     match short.split_once(':') {
         Some((package, file)) => {
@@ -118,7 +119,7 @@ fn source(path: &str) -> Source {
     Source::from_bytes(path, &bytes)
 }
 
-/// Returns the paths of all files below `REAL`; empty if it is absent.
+/// Returns the paths of all files below `REAL`; empty if the folder is absent.
 fn files() -> BTreeSet<String> {
     let mut paths = BTreeSet::new();
     let mut folders = vec![PathBuf::from(REAL)];

@@ -1,5 +1,5 @@
-//! Tests of every construct of the language: it is accepted and printed as written, or refused by name, or
-//! reported with a code.
+//! Tests of every construct of the language. A construct is accepted and printed as written, rejected as
+//! unsupported by its name, or reported with an error code.
 
 use metaplan_pddl::{
     Errors, Severity, Source, parse_domain, parse_problem, print_domain, print_problem, read, render,
@@ -12,7 +12,7 @@ const DOMAIN: &str = "(define (domain d) (:types place dock - place tool) (:cons
 const PROBLEM: &str = "(define (problem p) (:domain d) (:objects a b - place drill - tool)
  (:init (at a) (= (battery) 10) INIT) (:goal GOAL) METRIC)";
 
-/// Domain and problem with one construct inserted at `place`, and otherwise minimal.
+/// Returns a domain and a problem with the construct `what` in the section `place`, otherwise minimal.
 fn texts(place: &str, what: &str) -> (Source, Source) {
     let (mut sections, mut init, mut goal, mut metric) = (String::new(), "", "(at b)", "");
     let truth = "(and )";
@@ -42,7 +42,8 @@ fn texts(place: &str, what: &str) -> (Source, Source) {
     (Source::new("domain", DOMAIN.replace("SECTIONS", &sections)), Source::new("problem", problem))
 }
 
-/// Returns the codes of the errors.
+/// Reads a domain and a problem with the construct `what` in the section `place`. Returns the codes of the
+/// errors.
 fn errors(place: &str, what: &str) -> Vec<&'static str> {
     let (domain, problem) = texts(place, what);
     let diagnostics =
@@ -58,7 +59,7 @@ fn without_space(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ").replace(" )", ")").replace("( ", "(")
 }
 
-/// Constructs that are accepted and printed as written here.
+/// Accepted constructs, which are printed as written here: section and construct.
 const ACCEPTED: [(&str, &str); 94] = [
     ("section", "(:action a :parameters (?x - (either place tool)) :effect (and))"),
     ("section", "(:action a :parameters (?x) :effect (and))"),
@@ -189,7 +190,7 @@ fn every_construct_is_read_and_printed_as_written() {
     }
 }
 
-/// Section, unsupported construct, and part of the message.
+/// Unsupported constructs: section, construct, and part of the error message.
 const REFUSED: [(&str, &str, &str); 11] = [
     (
         "section",
@@ -228,7 +229,7 @@ fn unsupported_constructs_are_refused_by_name() {
     }
 }
 
-/// Section, erroneous construct, and code.
+/// Erroneous constructs: section, construct, and error code.
 const WRONG: [(&str, &str, &str); 43] = [
     ("duration", "(= ?duration =)", "P106"),
     ("precondition", "(> (battery) -)", "P106"),

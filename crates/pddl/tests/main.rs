@@ -1,4 +1,4 @@
-//! Reading, printing and validating PDDL.
+//! Tests of parsing, printing and validating PDDL.
 
 mod advance;
 mod course;

@@ -20,7 +20,7 @@ const PROBLEM: &str = "(define (problem p)
   (:goal (at b)))
 ";
 
-/// Returns the messages if `wrong` replaces the first `right` in the domain or the problem.
+/// Replaces the first `right` in the domain or the problem by `wrong` and returns the rendered messages.
 fn messages(right: &str, wrong: &str) -> String {
     assert!(DOMAIN.contains(right) || PROBLEM.contains(right), "{right}");
     let domain = Source::new("domain.pddl", DOMAIN.replacen(right, wrong, 1));

@@ -1,4 +1,5 @@
-//! Tests of object fluents: their compiled forms, and messages about errors.
+//! Tests of object fluents (functions with objects as values): their compiled forms, and messages about
+//! errors.
 
 use metaplan_pddl::{Severity, Source, parse_problem_of, print_domain, print_problem, read};
 
@@ -13,7 +14,7 @@ const DOMAIN: &str = "(define (domain d) (:requirements :adl :object-fluents :fl
 const PROBLEM: &str = "(define (problem p) (:domain d) (:objects a b - place v w - van t - tool)
  (:init (= (fuel v) 1) INIT) (:goal GOAL) METRIC)";
 
-/// Domain and problem with one construct inserted at `place`.
+/// Returns a domain and a problem with the construct `what` in the section `place`.
 fn texts(place: &str, what: &str) -> (Source, Source) {
     let (mut section, mut init, mut goal, mut metric) = (String::new(), "", "(and )", "");
     let parameters = "(?p ?q - place ?v ?w - van ?t - tool)";
@@ -46,7 +47,7 @@ fn without_space(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ").replace(" )", ")").replace("( ", "(")
 }
 
-/// Section, source text, and expected part of the printed text.
+/// Constructs with object fluents: section, source text, and expected part of the printed text.
 const COMPILED: [(&str, &str, &str); 35] = [
     ("section", "", "(loc ?x - thing ?value1 - place)"),
     ("section", "", "(carrier ?t - tool ?value3 - van) (capital ?value4 - place))"),
@@ -128,7 +129,7 @@ const COMPILED: [(&str, &str, &str); 35] = [
         "(forall (?x - tool) (busy (carrier ?x)))",
         ":precondition (and (forall (?x - tool) (exists (?value5 - van) (carrier ?x ?value5))))",
     ),
-    // Assignments that may give two values to one term.
+    // Assignments that may give two values to one object fluent.
     (
         "effect",
         "(and (assign (loc ?v) ?p) (assign (loc ?w) ?q))",
@@ -203,7 +204,8 @@ fn assignments_that_cannot_differ_add_no_precondition() {
     }
 }
 
-/// Section, erroneous text, code, part of the message, and text at the reported position.
+/// Erroneous constructs: section, source text, error code, part of the message, and text at the reported
+/// position.
 const WRONG: [(&str, &str, &str, &str, &str); 28] = [
     (
         "condition",

@@ -8,7 +8,7 @@ use metaplan_pddl::{Source, read, render};
 
 const OBJECTS: usize = 3;
 
-/// An object, or the variable of an enclosing quantifier by its distance (de Bruijn index).
+/// An object, or a quantified variable by its distance from its quantifier (de Bruijn index).
 #[derive(Debug, Clone, Copy)]
 enum Term {
     Object(usize),
@@ -47,21 +47,21 @@ struct Task {
     plan: Vec<(usize, usize)>,
 }
 
-/// Facts and values. The last object has no value.
+/// Facts of two predicates, and the values of a function. The last object has no value.
 #[derive(Debug, Clone, PartialEq)]
 struct State {
     facts: [[bool; OBJECTS]; 2],
     values: [i64; OBJECTS - 1],
 }
 
-/// Objects in the range of a quantifier: all, or those of the subtype.
+/// Returns the objects over which a quantifier ranges: all objects, or only those of the subtype.
 fn range(of_all: bool) -> std::ops::Range<usize> {
     if of_all { 0..OBJECTS } else { 1..OBJECTS }
 }
 
 impl Term {
-    /// Returns the object. `scope` contains the objects of the variables, outermost first. A variable outside
-    /// of all quantifiers denotes a fixed object.
+    /// Returns the object that the term denotes. `scope` contains the objects of the variables, outermost
+    /// first. A variable outside of all quantifiers denotes a fixed object.
     fn object(self, scope: &[usize]) -> usize {
         match self {
             Self::Object(object) => object,
@@ -79,7 +79,7 @@ impl Term {
     }
 }
 
-/// True, false, or undefined (`None`).
+/// Truth value in three-valued logic: true, false, or undefined (`None`).
 type Truth = Option<bool>;
 
 fn all_of(parts: impl Iterator<Item = Truth>) -> Truth {
@@ -148,7 +148,8 @@ fn variable(of_all: bool, depth: usize) -> String {
 }
 
 impl Effect {
-    /// Applies the effect, evaluated in `before`, to `after`. Returns `None` if a value is undefined.
+    /// Applies the effect to `after`, with conditions and values evaluated in `before`. Returns `None` if a
+    /// value is undefined.
     fn apply(
         &self,
         before: &State,
@@ -191,8 +192,8 @@ impl Effect {
 }
 
 impl Task {
-    /// Executes the plan. Returns the final values, or the number of the step that cannot be executed (from
-    /// 1; 0 for the goal).
+    /// Executes the plan. Returns the final values of the function. On failure, returns the number of the
+    /// step that cannot be executed, from 1, or 0 for the goal.
     fn run(&self) -> Result<[i64; OBJECTS - 1], usize> {
         let mut state = State { facts: self.facts, values: [1; OBJECTS - 1] };
         for (index, (action, object)) in self.plan.iter().enumerate() {
@@ -288,7 +289,8 @@ fn effect() -> impl Strategy<Value = Effect> {
 }
 
 fn task() -> impl Strategy<Value = Task> {
-    // A disjunction with a fact that often holds: otherwise most plans would fail at their first step.
+    // The precondition is a disjunction with facts that often hold; otherwise most plans would fail at their
+    // first step.
     let precondition = condition(true).prop_map(|condition| {
         Condition::Or(vec![
             condition,
@@ -316,7 +318,7 @@ fn check(task: &Task) {
     };
     let plan_tree = PlanText::parse(&Source::new("plan", plan.clone())).expect("the plan can be read");
     let verdict = validate(&domain_tree, &problem_tree, &plan_tree, &Options::default());
-    // Separated in time, the actions have the same effects in concurrent execution.
+    // If the actions are separated in time, they have the same effects in concurrent execution.
     let timed: Vec<_> = plan.lines().enumerate().map(|(index, step)| format!("{index}: {step}\n")).collect();
     let timed = PlanText::parse(&Source::new("timed plan", timed.concat())).expect("the plan can be read");
     let options = Options::default().with_concurrent(true);

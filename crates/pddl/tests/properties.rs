@@ -6,7 +6,7 @@ use metaplan_pddl::{
     Errors, Source, has_errors, parse_domain, parse_problem, print_domain, print_problem, read, render,
 };
 
-/// Name in one of the forms that occur in real files.
+/// Random name in one of the forms that occur in real files.
 fn name() -> impl Strategy<Value = String> {
     prop_oneof![
         "[a-z][a-z0-9_]{0,5}",
@@ -96,7 +96,7 @@ fn condition() -> impl Strategy<Value = String> {
     })
 }
 
-/// Condition with preferences below `and` and `forall` only.
+/// Random condition with preferences, which occur below `and` and `forall` only.
 fn soft_condition() -> impl Strategy<Value = String> {
     let leaf = prop_oneof![
         condition(),
@@ -239,7 +239,7 @@ fn parse_and_print_problem(text: &str) -> String {
     print_problem(&problem.expect("a problem without errors is read"))
 }
 
-/// Modification of a valid text.
+/// Modification of a valid PDDL text.
 #[derive(Debug, Clone)]
 enum Mutation {
     Delete(usize, usize),

@@ -1,8 +1,8 @@
 //! Quirks of real files are accepted, with a warning where a file deviates from the standard. Only undeclared
 //! names are errors.
 //!
-//! Two domains contain the quirks. The larger matrix of minimal pairs and the generated missions are created
-//! by scripts outside of the project; without them these tests are skipped.
+//! Two domains in the repository contain the quirks. A larger matrix of minimal pairs and the generated
+//! missions come from scripts outside of the project; their tests are skipped without the scripts.
 
 #![expect(clippy::print_stdout, reason = "a skipped test says so")]
 
@@ -16,7 +16,7 @@ const TOOLS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/tools"
 
 const MATRIX: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/reference/pddl_quirks.md");
 
-/// Runs one of the scripts. Returns `None` if the script or Python is absent.
+/// Runs one of the scripts outside of the project. Returns `None` if the script or Python is absent.
 fn script(name: &str, arguments: &[&str]) -> Option<()> {
     let path = Path::new(TOOLS).join(name);
     let output = path.exists().then(|| Command::new("python3").arg(&path).args(arguments).output());
@@ -41,7 +41,7 @@ fn file(path: &Path) -> Source {
     Source::from_bytes(path.file_name().unwrap_or_default().to_string_lossy(), &bytes)
 }
 
-/// Returns the codes of the warnings about an accepted pair.
+/// Reads an acceptable domain and problem and returns the codes of the warnings. Panics on errors.
 fn accepted(domain: &Source, problem: &Source) -> Vec<&'static str> {
     match read(domain, problem) {
         Ok((_, _, warnings)) => warnings.iter().map(|warning| warning.code).collect(),
@@ -116,8 +116,8 @@ fn types_decide_which_objects_fit() {
     }
 }
 
-/// Checks that each row of the matrix of quirks has a minimal pair. The matrix lists which other planners
-/// accept each quirk.
+/// Checks that `index` has a minimal pair of files for each row of the matrix of quirks. The matrix lists
+/// which other planners accept each quirk.
 fn check_matrix_rows(index: &str) {
     let Ok(text) = std::fs::read_to_string(MATRIX) else {
         println!("skipped: {MATRIX} is absent");

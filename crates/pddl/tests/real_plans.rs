@@ -1,6 +1,6 @@
 //! Validates hand-made plans for real files.
 //!
-//! Skipped if the files are absent; they are not part of the project.
+//! The tests are skipped if the files, which are not part of the project, are absent.
 
 #![expect(clippy::print_stdout, reason = "a skipped test says so")]
 
@@ -11,7 +11,8 @@ use metaplan_pddl::{Source, read, render};
 
 const REAL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/real/pddl");
 
-/// Checks the result: `time metric`, or the step and the kind of the violation.
+/// Validates a plan and compares the result with `expected`: `time metric`, or the step and the kind of the
+/// violation.
 fn check(domain: &str, problem: &str, plan: &str, concurrent: bool, expected: &str) {
     let source = |path: &str| {
         let bytes = std::fs::read(Path::new(REAL).join(path)).ok()?;

@@ -168,13 +168,14 @@ fn sequential_plans_of_a_temporal_task_are_judged() {
             ("0: (prepare)\n0: (wait) [-1]", "2 duration"),
             ("(prepare)\n(wait)", "2 duration"),
             ("(work)", "1 over_all (warm)"),
-            // Two steps may be adjacent, with rounded times; they may not overlap.
+            // Two steps may be adjacent, with rounded times, but they may not overlap.
             (
                 "0: (prepare)\n0: (work) [3.333]\n3.333: (light) [2]",
                 "valid time=16/3 metric=68/3 (level)=20/3",
             ),
             ("0: (prepare)\n0: (work) [3.333]\n3.3: (light) [2]", "3 overlap"),
-            // Daylight ends before the end of the action; then, before the end of a condition over all.
+            // Daylight ends before the end of the action; in the last case, before the end of a condition
+            // over all.
             ("0: (prepare)\n18: (work) [3.333]", "2 at_end (day)"),
             ("0: (prepare)\n16.666: (work) [3.333]", "valid time=10/3 metric=50/3 (level)=20/3"),
             // The action reads `day` at its end, so the event must not be at the same time.

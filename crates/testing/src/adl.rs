@@ -85,12 +85,12 @@ impl Generator {
         if self.below(3) == 0 { format!("(not {atom})") } else { atom }
     }
 
-    /// Returns a random domain.
+    /// Returns a random domain in PDDL.
     pub fn domain(&mut self) -> String {
         let mut text = String::from(
             "(define (domain d) (:constants o1 o2) (:predicates (p ?x) (q ?x ?y) (r) (d1 ?x) (d2 ?x)) (:functions (n) (total-cost))",
         );
-        // d1 is recursive and positive; d2 may negate it. The axioms are therefore stratified.
+        // d1 depends only on itself, without negation, and d2 may negate d1. The axioms are stratified.
         let seed = self.condition(1, &["?x"], 0);
         let _ = write!(
             text,
@@ -133,7 +133,7 @@ impl Generator {
         text
     }
 
-    /// Returns a random problem for the domain.
+    /// Returns a random problem in PDDL for the domain.
     pub fn problem(&mut self) -> String {
         let mut text =
             String::from("(define (problem p) (:domain d) (:objects o3) (:init (= (n) 1) (= (total-cost) 0)");

@@ -16,8 +16,8 @@ use task::task::{State, Task};
 
 use self::random::Random;
 
-/// Returns a random task of two robots with designs on a map with doors and lamps and with limited charge.
-/// Many actions can be parallel, and many interfere.
+/// Returns the domain and the problem of a random task: two robots with designs on a map with
+/// doors, lamps and limited charge. Many actions can be parallel, and many interfere.
 pub fn fleet(seed: u64) -> (String, String) {
     let mut random = Random(seed);
     let domain = "(define (domain fleet)
@@ -71,7 +71,8 @@ pub fn fleet(seed: u64) -> (String, String) {
     (domain.to_owned(), problem)
 }
 
-/// Returns a random task of robots that carry parcels. Some parcels and some designs are interchangeable.
+/// Returns the domain and the problem of a random task in which robots carry parcels. Some parcels
+/// and some designs are interchangeable.
 pub fn depot(seed: u64) -> (String, String) {
     let mut random = Random(seed);
     let domain = "(define (domain depot)
@@ -113,7 +114,7 @@ pub fn depot(seed: u64) -> (String, String) {
     (domain.to_owned(), problem)
 }
 
-/// Grounds a domain and a problem in PDDL.
+/// Parses and grounds a domain and a problem in PDDL.
 ///
 /// # Panics
 /// Panics if the texts are not a valid task.
@@ -123,7 +124,7 @@ pub fn ground_text((domain, problem): (String, String)) -> Task {
     ground(&domain, &problem, &config).expect("a task")
 }
 
-/// Returns the successors of a state with the cost of each step.
+/// Returns the successors of a state, each with the cost of the step.
 ///
 /// # Panics
 /// Panics on numeric overflow.
@@ -165,8 +166,8 @@ pub fn optimum(task: &Task) -> Option<Int> {
     None
 }
 
-/// For each number of steps from 0 to `max_steps`, returns the minimum cost of a plan with at most that
-/// number of steps.
+/// Returns the minimum cost of a plan with at most n steps, for each n from 0 to `max_steps`.
+/// `None` if there is no such plan.
 pub fn costs_by_steps(task: &Task, max_steps: usize) -> Vec<Option<Int>> {
     let mut best = FxHashMap::from_iter([(task.initial.clone(), 0)]);
     // Only states with a lower cost than before need to be expanded again.

@@ -1,28 +1,30 @@
-//! Random small missions: PDDL text, and the cost of a cheapest plan by dynamic programming.
+//! Random small missions in PDDL, with reference costs of an optimal plan by dynamic programming.
 
 use std::collections::{BTreeMap, BinaryHeap};
 use std::fmt::Write as _;
 
 use super::random::Random;
 
-/// Mission of a robot on a small map.
+/// Random mission of a robot that drives on a small map and chooses a design for each function.
 #[derive(Debug)]
 pub struct Mission {
     waypoints: usize,
-    /// Start, end, length, and minimum safety of a design.
+    /// Corridors between waypoints: start, end, length, and the required safety of the first
+    /// function's design.
     corridors: Vec<(usize, usize, i64, i64)>,
-    /// Designs of each function: energy and time per unit of length, safety, availability.
+    /// Designs of each function: energy per unit of length, time per unit of length, safety, and
+    /// availability.
     functions: Vec<Vec<(i64, i64, i64, bool)>>,
     battery: i64,
     charger: Option<usize>,
-    /// Goal waypoint.
+    /// Waypoint that the robot must reach.
     goal: usize,
-    /// Weights of time and energy.
+    /// Weights of time and of energy in the cost of a plan.
     pub weights: (i64, i64),
 }
 
 impl Mission {
-    /// Returns a random mission.
+    /// Returns the random mission of this seed.
     pub fn random(seed: u64) -> Self {
         let mut random = Random(seed);
         let waypoints = 3 + random.below(4) as usize;
@@ -69,7 +71,8 @@ impl Mission {
         combinations
     }
 
-    /// Returns the minimum cost of a plan, by Dijkstra's algorithm over pairs of waypoint and battery level.
+    /// Returns the minimum cost of a plan, by Dijkstra's algorithm over pairs of waypoint and
+    /// battery level. `None` if there is no plan.
     pub fn oracle(&self) -> Option<i64> {
         let mut best = BTreeMap::from([((0_usize, self.battery), 0_i64)]);
         let mut open = BinaryHeap::from([(std::cmp::Reverse(0), 0, self.battery)]);
@@ -87,7 +90,7 @@ impl Mission {
         None
     }
 
-    /// Returns the successors of a state: cost, waypoint, battery level.
+    /// Returns the successors of a state, each as cost, waypoint and battery level.
     fn next(&self, cost: i64, at: usize, battery: i64) -> Vec<(i64, usize, i64)> {
         let mut next = Vec::new();
         for (from, to, length, safety) in self.corridors.iter().filter(|corridor| corridor.0 == at) {
@@ -95,7 +98,7 @@ impl Mission {
             for designs in self.combinations() {
                 let energy = length * designs.iter().map(|design| design.0).sum::<i64>();
                 let time = length * designs.iter().map(|design| design.1).sum::<i64>();
-                // The first function must be safe enough.
+                // The design of the first function must be safe enough for the corridor.
                 if designs[0].2 >= *safety && energy <= battery {
                     let cost = cost + self.weights.0 * time + self.weights.1 * energy;
                     next.push((cost, *to, battery - energy));
@@ -108,8 +111,8 @@ impl Mission {
         next
     }
 
-    /// For each number of steps from 0 to `max_steps`, returns the minimum cost of a plan with at most that
-    /// number of steps.
+    /// Returns the minimum cost of a plan with at most n steps, for each n from 0 to `max_steps`.
+    /// `None` if there is no such plan.
     pub fn oracle_by_steps(&self, max_steps: usize) -> Vec<Option<i64>> {
         let mut costs = Vec::new();
         let mut reached = BTreeMap::from([((0_usize, self.battery), 0_i64)]);

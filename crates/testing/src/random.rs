@@ -4,7 +4,7 @@
 pub struct Random(pub u64);
 
 impl Random {
-    /// Returns a number from 0 to `limit - 1`.
+    /// Returns a pseudo-random number from 0 to `limit - 1`.
     pub fn below(&mut self, limit: u64) -> i64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut z = self.0;

@@ -1,8 +1,9 @@
-//! Differential test of all front ends and compilations: a mission and the files that `export --to pddl` writes of it have the same
-//! optimum, and a brute-force oracle confirms it.
+//! Differential test of all front ends and compilations. A mission and its export by `export --to pddl` must
+//! have the same optimum, and a brute-force oracle confirms it.
 //!
-//! One of the two is planned with the default thresholds and the other one with [`Thresholds::NONE`]. Without thresholds, tasks that are
-//! small enough for brute force also reach stubborn sets, h² mutexes, landmarks, label trees and all engines of the portfolio.
+//! Either the mission or its export is planned with the default thresholds, and the other with
+//! [`Thresholds::NONE`]. Without thresholds, tasks that are small enough for brute force also reach stubborn
+//! sets, h² mutexes, landmarks, label trees and all engines of the portfolio.
 //!
 //! Some generators and oracles are shared with the planner's own tests in `crates/planner/tests`.
 
@@ -38,14 +39,15 @@ pub struct Sample {
     pub reference: Reference,
 }
 
-/// Result of brute force: the enumerated plans, and the best value among them (`None` if there is no plan).
+/// Result of brute force: which plans were enumerated, and the best value among them (`None` if there is no
+/// plan).
 #[derive(Debug, Clone)]
 pub enum Reference {
     /// All plans were enumerated.
     All(Option<BigRational>),
-    /// All plans up to this value were enumerated; less is better.
+    /// All plans up to this value were enumerated; smaller values are better.
     UpTo(i64, Option<BigRational>),
-    /// Some plans were enumerated.
+    /// Only some plans were enumerated.
     Some(Option<BigRational>),
 }
 
@@ -54,14 +56,14 @@ pub fn whole(value: i64) -> BigRational {
     BigRational::from_integer(value.into())
 }
 
-/// The planner's answer.
+/// The planner's answer: status, cost of the plan, bound on the cost, and steps.
 #[derive(Debug)]
 struct Answer {
     status: Status,
     cost: Option<BigRational>,
     bound: Option<BigRational>,
     steps: Vec<Step>,
-    /// `true` if a limit was reached.
+    /// Whether a limit was reached.
     is_limited: bool,
 }
 
@@ -74,10 +76,11 @@ impl Answer {
 /// A generator of samples; `None` if it has no sample for a seed.
 type Samples = Box<dyn FnMut(u64) -> Option<Sample>>;
 
-/// Number of situations per robot. The knowledge base is read once per robot.
+/// Number of situations per robot. All situations of a robot share its knowledge base, which is read once.
 const SITUATIONS: u64 = 15;
 
-/// Mission of the exported domain and problem (`export --to pddl`), with their texts.
+/// Exports a mission as `export --to pddl` does. Returns the mission of the exported files, and the texts of
+/// domain and problem.
 fn exported(mission: &Mission) -> (Mission, [String; 2]) {
     let (problem, _) = mission.filled().unwrap_or_else(|messages| panic!("{messages:#?}"));
     let (domain, problem) = portable(mission.domain(), &problem);
@@ -88,13 +91,14 @@ fn exported(mission: &Mission) -> (Mission, [String; 2]) {
     (mission.unwrap_or_else(|messages| panic!("{messages:#?}\n{}\n{}", texts[0], texts[1])), texts)
 }
 
-/// Plans a mission. `Err` has the codes of the messages if the mission is refused.
+/// Plans a mission. If the mission is refused, returns the codes of the messages as an error.
 fn plan(mission: &Mission, mode: &Mode, thresholds: Thresholds) -> Result<Answer, String> {
     let (problem, _) = mission.filled().unwrap_or_else(|messages| panic!("{messages:#?}"));
     let limits = Limits::none().with_thresholds(thresholds);
     let limits = match mode {
         Mode::Sequential => limits.with_time(Duration::from_secs(2)),
-        // Some of these tasks are never decided. The memory limit ends the search at the same point on every machine.
+        // Some of these tasks are never decided. The memory limit ends their search at the same point on
+        // every machine.
         Mode::Concurrent(_) => limits.with_time(Duration::from_secs(2)).with_room(1 << 20),
     };
     let codes = |messages: metaplan::Errors| {
@@ -124,7 +128,7 @@ fn plan(mission: &Mission, mode: &Mode, thresholds: Thresholds) -> Result<Answer
     })
 }
 
-/// Describes a claim of `claim` that the plan of `witness` refutes.
+/// Returns a description of a statement in `claim` that the plan of `witness` refutes, if there is one.
 fn refuted(claim: &Answer, witness: &Answer, maximize: bool) -> Option<&'static str> {
     let cost = witness.cost.as_ref()?;
     let is_better = |than: &BigRational| compare(maximize, cost, than).is_lt();
@@ -137,7 +141,7 @@ fn refuted(claim: &Answer, witness: &Answer, maximize: bool) -> Option<&'static 
     claim.bound.as_ref().is_some_and(is_better).then_some("no plan is better than a bound, and one is")
 }
 
-/// Describes a claim that brute force refutes.
+/// Returns a description of a statement in `answer` that brute force refutes, if there is one.
 fn disproved(answer: &Answer, reference: &Reference, maximize: bool) -> Option<&'static str> {
     let (Reference::All(best) | Reference::UpTo(_, best) | Reference::Some(best)) = reference;
     let is_better = |left: &BigRational, right: &BigRational| compare(maximize, left, right).is_lt();
@@ -167,12 +171,12 @@ fn disproved(answer: &Answer, reference: &Reference, maximize: bool) -> Option<&
     }
 }
 
-/// Compares the answers for a mission and its export with each other and with brute force.
+/// Plans a mission and its export, and compares both answers with each other and with brute force.
 fn check(sample: &Sample, about: &str, seed: u64, tally: &mut Tally) {
     tally.tasks += 1;
     let Sample { mission, mode, maximize, reference } = sample;
     let (export, texts) = exported(mission);
-    // The roles alternate, so that both mission and export are planned without thresholds.
+    // The roles alternate, so that the mission and the export are both planned without thresholds.
     let [first, second] = if seed.is_multiple_of(2) {
         [Thresholds::default(), Thresholds::NONE]
     } else {
@@ -213,7 +217,7 @@ fn check(sample: &Sample, about: &str, seed: u64, tally: &mut Tally) {
             fail(kind, "brute force");
         }
     }
-    // Undecided tasks can differ by the time that the engines got, unless no limit was reached.
+    // Answers that are not decided can differ by the time that the engines got, unless no limit was reached.
     if first_answer.is_decided() && second_answer.is_decided() {
         if (first_answer.status, &first_answer.cost) != (second_answer.status, &second_answer.cost) {
             fail("the answers differ", "");
@@ -252,7 +256,7 @@ fn check(sample: &Sample, about: &str, seed: u64, tally: &mut Tally) {
     }
 }
 
-/// Robots with [`SITUATIONS`] situations each.
+/// Returns the generator of robots' missions, with [`SITUATIONS`] situations per robot.
 fn robots(form: impl Fn(u64) -> Form + 'static) -> Samples {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let mut current: Option<(u64, Robot)> = None;
@@ -288,7 +292,7 @@ fn undefined(seed: u64) -> Sample {
     of_texts(&task.domain(), &task.problem(), false, reference)
 }
 
-/// Samples of a front end by its name.
+/// Returns the generator of a front end, given by name.
 fn samples(front: &str) -> Samples {
     match front {
         "explicit form" => robots(|_| Form::Explicit),
@@ -318,7 +322,8 @@ const FRONTS: [&str; 9] = [
     "undefined fluents",
 ];
 
-/// Checks `default` samples (or `ORACLE_TASKS`), of which at least `min_percent` percent must be decided.
+/// Checks `default` samples (or `ORACLE_TASKS`) of a front end. At least `min_percent` percent must be
+/// decided.
 fn run(front: &str, default: u64, min_percent: usize) {
     let (from, tasks) = (setting("ORACLE_FROM", 0), setting("ORACLE_TASKS", default) as usize);
     let (mut samples, mut tally) = (samples(front), Tally::default());
@@ -384,7 +389,7 @@ fn undefined_fluents() {
     run("undefined fluents", 300, 50);
 }
 
-/// 10,000 samples of each front end, or of the front end `ORACLE_FRONT` only.
+/// Checks 10,000 samples of each front end, or only of the front end `ORACLE_FRONT`.
 #[test]
 #[ignore = "takes an hour"]
 fn thousands_of_samples_per_front_end() {

@@ -1,4 +1,5 @@
-//! Arithmetic tasks without a robot: a few numbers and flags, all kinds of numeric effects, metrics of every sign.
+//! Random arithmetic tasks without a robot: a few numbers and flags, all kinds of numeric effects, and
+//! metrics of every sign.
 
 use fastrand::Rng;
 
@@ -16,9 +17,10 @@ struct Builder<'r> {
     fluents: Vec<usize>,
     /// Functions without parameters that no action changes.
     constants: Vec<usize>,
-    /// Two functions of a thing: a static one, and one that actions change.
+    /// Two functions with a thing as their argument: a static one, and one that actions change.
     of_thing: [usize; 2],
-    /// Fluent for metrics. Unless the task is `wild`, it is changed by static amounts only, as the planner requires.
+    /// Fluent for metrics. Unless the task is `wild`, actions change it only by static amounts, as the
+    /// planner requires.
     counted: usize,
     wild: bool,
     flags: Vec<usize>,
@@ -27,7 +29,7 @@ struct Builder<'r> {
     open: usize,
 }
 
-/// Generates a task.
+/// Returns a random arithmetic task.
 pub fn arithmetic(rng: &mut Rng) -> Task {
     let mut builder = Builder::new(rng);
     builder.values();
@@ -91,7 +93,7 @@ impl<'r> Builder<'r> {
         Expr::Function(applied(one_of(self.rng, &self.fluents), &[]))
     }
 
-    /// A static expression: a number, a function, a product or a quotient.
+    /// Returns a random static expression: a number, a function, a product or a quotient.
     fn static_expression(&mut self, thing: Option<Term>) -> Expr {
         match (self.rng.u32(0..8), thing) {
             (0 | 1, Some(thing)) => Expr::Function(applied(self.of_thing[0], &[thing])),
@@ -107,7 +109,7 @@ impl<'r> Builder<'r> {
         }
     }
 
-    /// An expression that is linear in the fluents.
+    /// Returns a random expression that is linear in the fluents.
     fn linear(&mut self, thing: Option<Term>) -> Expr {
         match self.rng.u32(0..8) {
             0 | 1 => self.fluent(),
@@ -187,7 +189,8 @@ impl<'r> Builder<'r> {
                 Effect::Number(_, target, _) => Some(target.clone()),
                 _ => None,
             };
-            // Two effects on one number may contradict each other. That is wanted, but rarely.
+            // Two effects on the same number may contradict each other. Such contradictions are wanted, but
+            // rarely.
             if happening.effects.iter().all(|earlier| target(earlier) != target(&effect))
                 || once_in(self.rng, 6)
             {
@@ -235,7 +238,7 @@ impl<'r> Builder<'r> {
             None => start.effects.push(cost),
         }
         if self.wild && self.rng.bool() {
-            // Wild tasks may have costs that depend on the state.
+            // Tasks with `wild` may have costs that depend on the state.
             let cost = Effect::Number(Change::Increase, applied(self.cost, &[]), self.linear(thing));
             start.effects.push(cost);
         }

@@ -5,7 +5,7 @@ use super::missions::{Builder, DESIGN, PLACE};
 use super::model::{Action, Change, Condition, Effect, Expr, Number, Relation, Term, applied, whole};
 
 impl Builder<'_> {
-    /// Adds conditions on designs and battery.
+    /// Adds conditions on designs and on the battery to an action.
     pub fn demand(&mut self, action: &mut Action, slots: &[(Term, Term)], way: Option<[Term; 2]>) {
         for _ in 0..self.rng.usize(0..3) {
             let expression = self.static_expression(slots, way);
@@ -25,7 +25,7 @@ impl Builder<'_> {
         }
     }
 
-    /// Adds battery consumption and costs.
+    /// Adds battery consumption and costs to an action.
     pub fn use_up(&mut self, action: &mut Action, slots: &[(Term, Term)], way: Option<[Term; 2]>) {
         let names = self.names;
         let used = self.consumption(slots, way);
@@ -47,7 +47,7 @@ impl Builder<'_> {
             effects.push(Effect::Number(Change::Increase, applied(names.energy, &[]), sparse));
         }
         if once_in(self.rng, 4) {
-            // An undefined operand counts only in states where the condition of the effect holds.
+            // The undefined operand matters only in states in which the condition of the effect holds.
             let sparse = Expr::Function(applied(names.range, &[slots[0].1]));
             let low = Expr::Number(self.draw());
             let relation = one_of(self.rng, &[Relation::AtLeast, Relation::AtMost]);
@@ -72,7 +72,8 @@ impl Builder<'_> {
         }
     }
 
-    /// Adds effects whose arguments are a design or a function.
+    /// Adds effects that change or read facts and numbers of the first slot's design and function, with matching
+    /// conditions.
     pub fn touch(&mut self, action: &mut Action, slots: &[(Term, Term)], way: &[Term]) {
         let names = self.names;
         let (function, design) = slots[0];
@@ -117,7 +118,7 @@ impl Builder<'_> {
         }
     }
 
-    /// Records the current design of a function. A replacement has a cost.
+    /// Adds the effects that record the current design of a function. Replacing a design has a cost.
     fn remember(&mut self, action: &mut Action, function: Term, design: Term) {
         let names = self.names;
         action.parameters.push(("old".to_owned(), DESIGN));
@@ -132,7 +133,7 @@ impl Builder<'_> {
         action.start.effects.push(Effect::When(vec![differs], vec![effect]));
     }
 
-    /// A task to perform at a place.
+    /// Returns an action that performs a task at a place.
     pub fn work(&mut self) -> Action {
         let mut action = self.empty("work".to_owned());
         let names = self.names;
@@ -148,7 +149,7 @@ impl Builder<'_> {
         action
     }
 
-    /// An action that assigns a value to the battery, or adds to it if it is low.
+    /// Returns an action that assigns a value to the battery, or adds to the battery if it is low.
     pub fn recharge(&mut self) -> Action {
         let mut action = self.empty("recharge".to_owned());
         let names = self.names;
@@ -172,7 +173,7 @@ impl Builder<'_> {
         action
     }
 
-    /// An action that makes a design available.
+    /// Returns an action that makes a design available.
     pub fn repair(&mut self) -> Action {
         let mut action = self.empty("repair".to_owned());
         let names = self.names;
@@ -188,7 +189,7 @@ impl Builder<'_> {
     pub fn metric(&mut self) -> Option<(bool, Expr)> {
         let names = self.names;
         let weighted = |weight: Number, value: Expr| Expr::Product(vec![Expr::Number(weight), value]);
-        // The planner refuses metrics of a number that an action assigns.
+        // The planner refuses metrics that contain a number that an action assigns.
         let recharged = self.task.actions.iter().any(|action| action.name == "recharge");
         let kinds = if recharged && !once_in(self.rng, 10) { 9 } else { 12 };
         let metric = match self.rng.u32(0..kinds) {

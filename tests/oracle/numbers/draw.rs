@@ -5,7 +5,7 @@ use num_bigint::BigInt;
 
 use super::model::{Number, Relation, decimal, power_of_ten, whole};
 
-/// Distribution of numbers.
+/// Distribution of random numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Style {
     /// 0 to 9.
@@ -31,7 +31,7 @@ pub enum Style {
     Zero,
 }
 
-/// Styles for the numbers of a task.
+/// Returns the styles for the numbers of a task.
 pub fn palette(rng: &mut Rng) -> Vec<Style> {
     use Style::{Binary, Digits, Huge, Positive, Powers, Sensor, Short, Signed, Small, Wide, Zero};
     let kind: &[Style] = match rng.u32(0..20) {
@@ -53,7 +53,7 @@ pub fn palette(rng: &mut Rng) -> Vec<Style> {
     kind.to_vec()
 }
 
-/// A number of a random style of the list.
+/// Returns a number of a random style of the list.
 pub fn number(rng: &mut Rng, styles: &[Style]) -> Number {
     match styles[rng.usize(0..styles.len())] {
         Style::Small => whole(rng.i64(0..10)),
@@ -91,17 +91,17 @@ pub fn once_in(rng: &mut Rng, times: u32) -> bool {
     rng.u32(0..times) == 0
 }
 
-/// A random element of the slice.
+/// Returns a random element of the slice.
 pub fn one_of<T: Clone>(rng: &mut Rng, choices: &[T]) -> T {
     choices[rng.usize(0..choices.len())].clone()
 }
 
-/// A random comparison; equality is rare.
+/// Returns a random comparison operator; equality is rare.
 pub fn relation(rng: &mut Rng) -> Relation {
     if once_in(rng, 8) { Relation::Equal } else { one_of(rng, &Relation::ALL) }
 }
 
-/// A number equal to `value`, or just above or below it.
+/// Returns a number that is equal to `value`, or just above or below it.
 pub fn near(rng: &mut Rng, value: &Number) -> Number {
     let step = match rng.u32(0..8) {
         0..=3 => return value.clone(),

@@ -1,8 +1,9 @@
 //! Enumerates the reachable states up to a limit, with the cost of each step.
 //!
-//! A *counter* is a number that is not read and only increased and decreased. Counters are not part of the state; their changes are
-//! part of the step's cost. Metrics are linear, so this cost does not depend on the values of the counters. Other numbers contribute
-//! their difference to the cost. So the costs of the steps of a plan always add up to its metric (minus the initial value).
+//! A *counter* is a number that nothing reads and that actions only increase and decrease. Counters are not
+//! part of the state; their changes are part of the step's cost. Metrics are linear, so this cost does not
+//! depend on the values of the counters. All other numbers contribute their difference to the cost. So the
+//! costs of the steps of a plan always add up to its metric (minus the initial value).
 
 use std::collections::HashMap;
 
@@ -18,11 +19,11 @@ use super::step::{State, all_hold, execute, number};
 pub struct Edge {
     pub to: usize,
     pub instance: usize,
-    /// Contribution to the metric and to each objective.
+    /// Contribution of the step to the metric and to each objective.
     pub costs: Vec<Number>,
 }
 
-/// Functions that plans are measured by: the metric of the task, then further objectives.
+/// Functions by which plans are measured: the metric of the task, then further objectives.
 pub struct Measures<'g> {
     ground: &'g Ground,
     values: Vec<Measure<'g>>,
@@ -36,7 +37,8 @@ enum Measure<'g> {
 }
 
 impl<'g> Measures<'g> {
-    /// The metric of the task, or the default metric (definition, 9), and the objectives.
+    /// Creates the measures: the metric of the task, or the default metric (definition, 9), and the
+    /// objectives.
     pub fn new(ground: &'g Ground) -> Self {
         let has_durations = ground.instances.iter().any(|instance| !instance.duration.is_zero());
         let metric_measure = match &ground.metric {
@@ -49,13 +51,14 @@ impl<'g> Measures<'g> {
         Self { ground, values, counters: counters(ground) }
     }
 
-    /// The initial state.
+    /// Returns the initial state.
     pub fn initial(&self) -> State {
         let Ground { atoms, numbers, .. } = self.ground;
         State { atoms: atoms.clone(), numbers: numbers.clone(), time: Number::zero() }
     }
 
-    /// Values of all measures in a state that is reached after `steps` steps; `None` if one is undefined.
+    /// Returns the values of all measures in a state that is reached after `steps` steps; `None` if a value
+    /// is undefined.
     pub fn of(&self, state: &State, steps: i64) -> Option<Vec<Number>> {
         let results = self.values.iter().map(|measure| match measure {
             Measure::Expression(value) => number(value, state),
@@ -65,9 +68,10 @@ impl<'g> Measures<'g> {
         results.collect()
     }
 
-    /// State after a step, with counters reset, and the contribution of the step to each measure. `None` if the step is not applicable.
+    /// Returns the state after a step, with counters reset, and the contribution of the step to each measure.
+    /// `None` if the step is not applicable.
     ///
-    /// `old` has the values of the measures in the state `before`.
+    /// `old` contains the values of the measures in the state `before`.
     pub fn step(
         &self,
         instance: &Instance,
@@ -76,7 +80,7 @@ impl<'g> Measures<'g> {
         let mut after = execute(instance, before)?;
         let new = self.of(&after, 1)?;
         let costs = new.into_iter().zip(old).map(|(new, old)| new - old).collect();
-        // Total time is part of the costs, not of the state.
+        // Total time is part of the costs instead of the state.
         after.time = Number::zero();
         for (fluent, counter) in self.counters.iter().enumerate() {
             if *counter {
@@ -86,10 +90,11 @@ impl<'g> Measures<'g> {
         Some((after, costs))
     }
 
-    /// Returns `true` if it is certain from the effects alone that no step lowers a measure (raises it, if `maximize`).
+    /// Returns `true` if the effects alone show that no step lowers a measure (with `maximize`, raises it).
     pub fn never_improves(&self, measure: usize, maximize: bool) -> bool {
         let Measure::Expression(value) = self.values[measure] else { return true };
-        // The weight of a number is the difference of the measure between the unit state and the zero state, as measures are linear.
+        // Measures are linear. So the weight of a number is the difference of the measure between the unit
+        // state and the zero state.
         let zero = State {
             atoms: Vec::new(),
             numbers: vec![Some(Number::zero()); self.counters.len()],
@@ -132,7 +137,7 @@ fn all_acts<'a>(acts: &'a [Act]) -> Vec<&'a Act> {
     acts.iter().flat_map(flattened).collect()
 }
 
-/// For each number, whether it is a counter; see the head of the file.
+/// Returns for each number whether it is a counter; see the head of the file.
 fn counters(ground: &Ground) -> Vec<bool> {
     let mut counters: Vec<bool> = ground.numbers.iter().map(Option::is_some).collect();
     ground.goal.iter().for_each(|test| mark_test(test, &mut counters));
@@ -197,7 +202,7 @@ fn mark(value: &Value, counters: &mut [bool]) {
     }
 }
 
-/// Numbers the distinct states.
+/// Table that numbers the distinct states.
 #[derive(Default)]
 pub struct States {
     pub by_number: Vec<State>,
@@ -206,7 +211,8 @@ pub struct States {
 }
 
 impl States {
-    /// Number of a state, and whether it is new. Total time is not part of the identity.
+    /// Returns the number of a state. The flag is `true` if the state is new. Total time does not distinguish
+    /// states.
     pub fn number(&mut self, state: State) -> (usize, bool) {
         let mut ids = Vec::with_capacity(state.numbers.len());
         // 0 means undefined; distinct numbers have distinct positive ids.
@@ -231,9 +237,9 @@ pub struct Space {
     pub initial: Vec<Number>,
     pub edges: Vec<Vec<Edge>>,
     pub goals: Vec<bool>,
-    /// Least number of steps to each state.
+    /// Minimum number of steps to each state.
     pub depths: Vec<usize>,
-    /// `true` if no budget was exceeded, so that all reachable states are included.
+    /// Whether all reachable states are included, because no budget was exceeded.
     pub complete: bool,
 }
 
@@ -241,7 +247,7 @@ pub struct Space {
 #[derive(Debug, Clone, Copy)]
 pub struct Budget {
     pub states: usize,
-    /// Attempts to execute an instance.
+    /// Maximum number of attempts to execute an instance.
     pub attempts: usize,
 }
 
@@ -280,7 +286,7 @@ pub fn explore(ground: &Ground, measures: &Measures<'_>, budget: Budget) -> Opti
         }
         space.edges.push(edges);
     }
-    // States that were reached but not expanded have no edges.
+    // States that were reached but not expanded get no edges.
     for state in &states.by_number[space.goals.len()..] {
         space.goals.push(all_hold(&ground.goal, state));
         space.edges.push(Vec::new());

@@ -5,11 +5,12 @@ use num_traits::Signed as _;
 use super::explore::Space;
 use super::model::Number;
 
-/// Maximum number of labels.
+/// Maximum number of labels in the search.
 const MAX_LABELS: usize = 4_000;
 
-/// Sorted values of all Pareto-optimal plans. The objectives are the measures after the first one, all minimised. Returns `None` if
-/// the space is incomplete, a step has a negative cost, or there are too many labels.
+/// Returns the values of all Pareto-optimal plans, sorted. The objectives are the measures after the first
+/// one, all minimised. Returns `None` if the space is incomplete, if a step has a negative cost, or if there
+/// are too many labels.
 pub fn front(space: &Space) -> Option<Vec<Vec<Number>>> {
     // The first measure, the metric, is not part of the front.
     let has_negative = |costs: &[Number]| costs[1..].iter().any(Number::is_negative);
@@ -48,7 +49,8 @@ pub fn front(space: &Space) -> Option<Vec<Vec<Number>>> {
     Some(front)
 }
 
-/// Inserts a label unless another one dominates or equals it, and removes the labels that it dominates. Returns `true` if inserted.
+/// Inserts a label unless a present label dominates or equals it. Removes the labels that the new label
+/// dominates. Returns `true` if the label was inserted.
 fn insert(labels: &mut Vec<Vec<Number>>, new: &[Number]) -> bool {
     let dominates = |left: &[Number], right: &[Number]| left.iter().zip(right).all(|(a, b)| a <= b);
     if labels.iter().any(|label| dominates(label, new)) {

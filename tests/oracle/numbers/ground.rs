@@ -1,8 +1,9 @@
-//! Grounding by instantiation: every action with all combinations of objects, with static subexpressions evaluated.
+//! Grounding by instantiation: every action with all combinations of objects, with static subexpressions
+//! evaluated.
 //!
-//! An instance is omitted only if a static conjunct is false or undefined (definition, 2), or if its duration is negative or undefined
-//! (1). No other simplification is made, because the facts and numbers that a condition mentions decide about interference even if
-//! they do not matter for its value (6).
+//! An instance is omitted only if a static conjunct is false or undefined (definition, 2), or if its duration
+//! is negative or undefined (1). No other simplification is made, because the facts and numbers that a
+//! condition mentions decide about interference even if they do not influence its truth value (6).
 
 use std::collections::{HashMap, HashSet};
 
@@ -12,7 +13,7 @@ use super::model::{
     Action, Applied, Change, Condition, Effect, Expr, Happening, Number, Relation, Task, Term,
 };
 
-/// An expression over the numbers of a state.
+/// A ground expression over the numbers of a state.
 #[derive(Debug, Clone)]
 pub enum Value {
     Known(Number),
@@ -26,7 +27,7 @@ pub enum Value {
     Time,
 }
 
-/// A condition over a state.
+/// A ground condition on a state.
 #[derive(Debug, Clone)]
 pub enum Test {
     Known(bool),
@@ -34,11 +35,12 @@ pub enum Test {
     Not(Box<Test>),
     Any(Vec<Test>),
     Compare(Relation, Value, Value),
-    /// Always holds. The number of an open threshold and the expression whose values are recorded.
+    /// Always holds. The fields are the number of an open threshold, and the expression whose values are
+    /// recorded for it.
     Open(usize, Value),
 }
 
-/// An effect on a state.
+/// A ground effect on a state.
 #[derive(Debug, Clone)]
 pub enum Act {
     Add(usize),
@@ -47,7 +49,7 @@ pub enum Act {
     When(Vec<Test>, Vec<Act>),
 }
 
-/// Conditions and effects of one time.
+/// Conditions and effects of the start or the end of an action.
 #[derive(Debug, Clone, Default)]
 pub struct Moment {
     pub tests: Vec<Test>,
@@ -65,7 +67,7 @@ pub struct Instance {
     pub end: Option<Moment>,
 }
 
-/// A ground task. Atoms and numbers that actions change are numbered.
+/// A ground task. The atoms and the numbers that actions change have indices.
 #[derive(Debug, Default)]
 pub struct Ground {
     pub instances: Vec<Instance>,
@@ -76,7 +78,7 @@ pub struct Ground {
     /// Initial values of the numbers; `None` if undefined.
     pub numbers: Vec<Option<Number>>,
     pub metric: Option<Value>,
-    /// Further measures of plans.
+    /// Further measures of plans, in addition to the metric.
     pub objectives: Vec<Value>,
 }
 
@@ -90,7 +92,7 @@ pub struct Grounder<'t> {
     ground: Ground,
 }
 
-/// Grounds a task. Returns `None` beyond `max_instances` instances.
+/// Grounds a task. Returns `None` if there are more than `max_instances` instances.
 pub fn ground(task: &Task, objectives: &[Expr], max_instances: usize) -> Option<Ground> {
     let mut grounder = Grounder {
         task,
@@ -116,7 +118,8 @@ pub fn ground(task: &Task, objectives: &[Expr], max_instances: usize) -> Option<
 }
 
 impl Grounder<'_> {
-    /// Binds the parameters one after another. A false static conjunct ends a branch as soon as its parameters are bound.
+    /// Adds the instances of an action by binding its parameters one after another. A false static conjunct
+    /// ends a branch as soon as its parameters are bound.
     fn instances(&mut self, action: usize, bound: &mut Vec<usize>, max_instances: usize) -> Option<()> {
         let task = self.task;
         let schema: &Action = &task.actions[action];
@@ -138,8 +141,8 @@ impl Grounder<'_> {
         (self.ground.instances.len() <= max_instances).then_some(())
     }
 
-    /// Returns `false` if a static conjunct fails whose last parameter has just been bound. Over-all conditions matter only if the
-    /// duration is positive, so they are evaluated for complete instances only.
+    /// Returns `false` if a static conjunct fails whose last parameter has just been bound. Conditions over
+    /// all matter only if the duration is positive, so they are evaluated only for complete instances.
     fn may_hold(&mut self, schema: &Action, bound: &[usize]) -> bool {
         let end = schema.lasting.as_ref().map_or(&[][..], |lasting| &lasting.end.conditions);
         schema
@@ -194,7 +197,8 @@ impl Grounder<'_> {
         }
     }
 
-    /// Non-static conjuncts. The static ones hold, otherwise the instance would have been omitted.
+    /// Returns the non-static conjuncts. The static conjuncts hold, otherwise the instance would have been
+    /// omitted.
     fn tests(&mut self, conditions: &[Condition], bound: &[usize]) -> Vec<Test> {
         let mut tests = Vec::new();
         for condition in conditions {
@@ -340,7 +344,7 @@ fn key(applied: &Applied, bound: &[usize]) -> (usize, Vec<usize>) {
     (applied.symbol, applied.arguments.iter().map(|term| object(*term, bound)).collect())
 }
 
-/// Position of the last parameter that a condition mentions.
+/// Returns the position of the last parameter that a condition mentions.
 fn greatest(condition: &Condition) -> Option<usize> {
     let last_parameter =
         |applied: &Applied| applied.arguments.iter().filter_map(|term| parameter(*term)).max();

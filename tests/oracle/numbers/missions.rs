@@ -1,7 +1,8 @@
-//! Missions: a robot moves between places and works there, with one to three functions and several designs for each.
+//! Random missions: a robot moves between places and works there, with one to three functions and several
+//! designs for each function.
 //!
-//! Random are the differences between designs, the effects of actions on designs, the consumption and charging of the battery, and the
-//! metric.
+//! The random parts are the differences between designs, the effects of actions on designs, the consumption
+//! and charging of the battery, and the metric.
 
 use fastrand::Rng;
 
@@ -11,12 +12,12 @@ use super::model::{
 };
 use super::tune::{Wishes, tune};
 
-/// Numbers of the types.
+/// Indices of the types.
 pub const PLACE: usize = 0;
 pub const FUNCTION: usize = 1;
 pub const DESIGN: usize = 2;
 
-/// Numbers of the predicates and functions.
+/// Indices of the predicates and functions.
 #[derive(Debug, Clone, Copy)]
 pub struct Names {
     pub at: usize,
@@ -49,21 +50,21 @@ pub struct Builder<'r> {
     pub functions: Vec<usize>,
     pub designs: Vec<usize>,
     pub timed: bool,
-    /// Number of open comparisons.
+    /// Number of comparisons with an open threshold.
     pub open: usize,
-    /// `true` if actions have effects on designs.
+    /// Whether actions have effects on designs.
     pub side_effects: bool,
     pub memory: bool,
     pub fluent_availability: bool,
 }
 
-/// A random mission; once in 150 times with hundreds of designs.
+/// Returns a random mission; one in 150 has hundreds of designs.
 pub fn mission(rng: &mut Rng) -> Task {
     let designs = if once_in(rng, 150) { rng.usize(300..1500) } else { rng.usize(1..7) };
     mission_with(rng, designs)
 }
 
-/// A random mission with the given number of designs of the first function.
+/// Returns a random mission. `designs` is the number of designs of the first function.
 pub fn mission_with(rng: &mut Rng, designs: usize) -> Task {
     let mut builder = Builder::new(rng, designs);
     builder.values();
@@ -127,7 +128,7 @@ impl<'r> Builder<'r> {
             for i in 0..count {
                 let design = task.object(format!("fd{position}_{i}"), DESIGN);
                 task.atoms.push((names.solves, vec![design, *function]));
-                // Rarely, a design solves two functions.
+                // In rare cases, a design solves two functions.
                 if designs < 50 && once_in(rng, 12) {
                     let second_function = one_of(rng, &functions);
                     if second_function != *function {
@@ -177,7 +178,7 @@ impl<'r> Builder<'r> {
         }
         self.task.atoms.push((names.at, vec![self.places[0]]));
         let sparse = once_in(self.rng, 4);
-        // Some designs get the numbers of the previous one, so that they are interchangeable.
+        // Some designs get the numbers of the previous design, so that they are interchangeable.
         let equal = once_in(self.rng, 4);
         let mut previous: Option<[Number; 5]> = None;
         for design in self.designs.clone() {
@@ -209,10 +210,11 @@ impl<'r> Builder<'r> {
         }
     }
 
-    /// Adds one to `max_slots` slots with their parameters and conditions. Returns function and design of each slot.
+    /// Adds one to `max_slots` design slots to an action, with their parameters and conditions. Returns the
+    /// function and the design of each slot.
     pub fn slots(&mut self, action: &mut Action, max_slots: usize) -> Vec<(Term, Term)> {
         let count = self.rng.usize(1..=max_slots.min(self.functions.len()));
-        // Rarely, all constant slots have the same function.
+        // In rare cases, all slots with a constant function have the same function.
         let twice = once_in(self.rng, 10);
         let mut slots = Vec::new();
         for position in 0..count {
@@ -250,7 +252,7 @@ impl<'r> Builder<'r> {
         Action { name, parameters: Vec::new(), start: Happening::default(), lasting }
     }
 
-    /// A static expression over the designs of the slots and the distance.
+    /// Returns a random static expression over the designs of the slots and the distance.
     pub fn static_expression(&mut self, slots: &[(Term, Term)], way: Option<[Term; 2]>) -> Expr {
         let names = self.names;
         let estimation =
@@ -274,7 +276,8 @@ impl<'r> Builder<'r> {
         }
     }
 
-    /// Consumption of an action: usually a sum over all slots, so that each design matters.
+    /// Returns the battery consumption of an action: usually a sum over all slots, so that each design
+    /// matters.
     pub fn consumption(&mut self, slots: &[(Term, Term)], way: Option<[Term; 2]>) -> Expr {
         let usage = |slot: &(Term, Term)| Expr::Function(applied(self.names.usage, &[slot.1]));
         let mut usages: Vec<Expr> = slots.iter().map(usage).collect();
@@ -295,7 +298,7 @@ impl<'r> Builder<'r> {
         Expr::Function(applied(function, &[]))
     }
 
-    /// An action that moves the robot to another place.
+    /// Returns an action that moves the robot to another place.
     fn travel(&mut self, name: String) -> Action {
         let mut action = self.empty(name);
         let names = self.names;
@@ -339,7 +342,7 @@ impl<'r> Builder<'r> {
         }
     }
 
-    /// The effects at the end, or the only effects of an instantaneous action.
+    /// Returns the effects at the end of an action, or the only effects of an instantaneous action.
     pub fn finally(action: &mut Action) -> &mut Vec<Effect> {
         match &mut action.lasting {
             Some(lasting) => &mut lasting.end.effects,

@@ -1,16 +1,16 @@
 //! Tasks as data: typed predicates and functions, actions with and without duration, exact numbers.
 //!
-//! Restricted to the needs of generator B: no derived predicates, no timed initial literals, no quantifiers. `ground` and `step`
-//! define the semantics, `print` the syntax.
+//! The model is restricted to the needs of generator B: no derived predicates, no timed initial literals, no
+//! quantifiers. The modules `ground` and `step` define the semantics, and `print` defines the syntax.
 
 use num_bigint::BigInt;
 use num_rational::BigRational;
 use num_traits::{One as _, Zero as _};
 
-/// An exact number.
+/// An exact rational number.
 pub type Number = BigRational;
 
-/// An integer.
+/// Converts an integer to a number.
 pub fn whole(value: i64) -> Number {
     Number::from_integer(BigInt::from(value))
 }
@@ -29,7 +29,7 @@ pub fn power_of_ten(exponent: usize) -> BigInt {
     BigInt::from(10).pow(u32::try_from(exponent).expect("a small exponent"))
 }
 
-/// Decimal notation of a number, if it has one with at most 200 digits after the point.
+/// Returns the decimal notation of a number, if at most 200 digits after the point suffice.
 pub fn text_of(value: &Number) -> Option<String> {
     let (mut digits, mut power) = (0, BigInt::one());
     while !(&power % value.denom()).is_zero() {
@@ -116,7 +116,8 @@ pub enum Condition {
     Any(Vec<Condition>),
     Same(Term, Term),
     Compare(Relation, Expr, Expr),
-    /// A comparison with the number of an open threshold, which [`super::tune`] chooses among the values that occur.
+    /// A comparison with an open threshold. The last field is the number of the threshold, whose value
+    /// [`super::tune`] chooses.
     Open(Relation, Expr, usize),
 }
 
@@ -139,7 +140,7 @@ pub enum Effect {
     When(Vec<Condition>, Vec<Effect>),
 }
 
-/// Conditions and effects of one time.
+/// Conditions and effects of the start or the end of an action.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Happening {
     pub conditions: Vec<Condition>,
@@ -158,7 +159,7 @@ pub struct Lasting {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Action {
     pub name: String,
-    /// Names and types.
+    /// Names and types of the parameters.
     pub parameters: Vec<(String, usize)>,
     pub start: Happening,
     pub lasting: Option<Lasting>,
@@ -175,7 +176,7 @@ pub struct Symbol {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Task {
     pub types: Vec<String>,
-    /// Names and types.
+    /// Names and types of the objects.
     pub objects: Vec<(String, usize)>,
     pub predicates: Vec<Symbol>,
     pub functions: Vec<Symbol>,
@@ -183,12 +184,12 @@ pub struct Task {
     pub atoms: Vec<(usize, Vec<usize>)>,
     pub values: Vec<(usize, Vec<usize>, Number)>,
     pub goal: Vec<Condition>,
-    /// `true` for maximisation, and the expression.
+    /// Metric: `true` for maximisation, and the expression.
     pub metric: Option<(bool, Expr)>,
 }
 
 impl Task {
-    /// Objects of a type.
+    /// Returns the objects of a type.
     pub fn of_type(&self, kind: usize) -> impl Iterator<Item = usize> + '_ {
         (0..self.objects.len()).filter(move |object| self.objects[*object].1 == kind)
     }
@@ -216,7 +217,7 @@ impl Task {
         self.objects.len() - 1
     }
 
-    /// For each predicate and for each function, whether an action changes it.
+    /// Returns for each predicate and for each function whether an action changes it.
     pub fn changing(&self) -> (Vec<bool>, Vec<bool>) {
         let mut changing = (vec![false; self.predicates.len()], vec![false; self.functions.len()]);
         for action in &self.actions {

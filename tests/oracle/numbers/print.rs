@@ -1,4 +1,4 @@
-//! Prints a task as PDDL: the texts of a domain and a problem.
+//! Prints a task as PDDL: the texts of its domain and its problem.
 
 use std::fmt::Write as _;
 
@@ -7,13 +7,13 @@ use super::model::{
     text_of,
 };
 
-/// Texts of the domain and the problem.
+/// Returns the texts of the domain and the problem.
 pub fn print(task: &Task) -> (String, String) {
     let problem = problem(task);
     (domain(task, &problem), problem)
 }
 
-/// Text of the domain. Unused predicates and functions are not declared.
+/// Returns the text of the domain. Unused predicates and functions are not declared.
 fn domain(task: &Task, problem: &str) -> String {
     let mut actions = String::new();
     for action in &task.actions {
@@ -76,7 +76,7 @@ fn problem(task: &Task) -> String {
     text + ")\n"
 }
 
-/// Text of an objective, which is an expression without parameters.
+/// Returns the text of an objective, which is an expression without parameters.
 pub fn objective(task: &Task, expression: &Expr) -> String {
     Printer { task, parameters: &[] }.expression(expression)
 }
@@ -208,7 +208,7 @@ impl Printer<'_> {
     }
 }
 
-/// Decimal notation if it is finite, otherwise a quotient of integers.
+/// Formats a number as a decimal if it is finite, otherwise as a quotient of integers.
 fn number(value: &Number) -> String {
     text_of(value).unwrap_or_else(|| format!("(/ {} {})", value.numer(), value.denom()))
 }

@@ -13,7 +13,7 @@ pub fn shrink(mut task: Task, fails: &dyn Fn(&Task) -> bool) -> Task {
     }
 }
 
-/// Tasks with one part removed or simplified, large parts first.
+/// Returns the tasks with one part removed or simplified, large parts first.
 fn candidates(task: &Task) -> Vec<Task> {
     let mut candidate_tasks = Vec::new();
     for position in 0..task.actions.len() {
@@ -63,7 +63,7 @@ fn candidates(task: &Task) -> Vec<Task> {
     candidate_tasks
 }
 
-/// All copies of the list with one element removed.
+/// Returns all copies of the list with one element removed.
 fn without_one<T: Clone>(items: &[T]) -> Vec<Vec<T>> {
     let without = |position| {
         let mut remaining = items.to_vec();
@@ -113,7 +113,8 @@ fn smaller_happenings(happening: &Happening) -> Vec<Happening> {
     smaller
 }
 
-/// The task without the values of functions that no action, goal or metric uses, if there are such functions.
+/// Returns the task without the values of functions that no action, goal or metric uses. `None` if there are
+/// no such values.
 fn without_unused(task: &Task) -> Option<Task> {
     let bare = Task { values: Vec::new(), ..task.clone() };
     let (domain, problem) = super::print::print(&bare);
@@ -122,6 +123,6 @@ fn without_unused(task: &Task) -> Option<Task> {
         let name = &task.functions[*function].name;
         [format!("({name} "), format!("({name})")].iter().any(|f| domain.contains(f) || problem.contains(f))
     });
-    // The printed domain of the task without values declares used functions only.
+    // The printed domain of the task without values declares only the used functions.
     (smaller.values.len() < task.values.len()).then_some(smaller)
 }

@@ -1,4 +1,4 @@
-//! Hand-made tasks with hundreds of designs, and with more designs than 16 bits can count.
+//! Hand-made tasks with hundreds of designs, and with more designs than fit into 16 bits.
 
 use std::time::Duration;
 
@@ -8,7 +8,8 @@ use super::model::{Action, Condition, Effect, Expr, Happening, Task, Term, appli
 use super::model::{Change, Number};
 use super::{Budget, Puzzle};
 
-/// A task with one action, one function and `count` designs. Each design costs `step` less than the previous one.
+/// Returns a task with one action, one function and `count` designs. Each design costs `step` less than the
+/// previous design.
 fn many_designs(count: i64, step: &Number) -> Task {
     let types = ["function", "functiondesign"].map(str::to_owned).to_vec();
     let mut task = Task { types, ..Task::default() };
@@ -21,7 +22,7 @@ fn many_designs(count: i64, step: &Number) -> Task {
     for position in 0..count {
         let design = task.object(format!("fd{position}"), 1);
         task.atoms.push((solves, vec![design, function]));
-        // The cheapest design is unavailable, so the last but one is optimal.
+        // The cheapest design is unavailable, so the second-cheapest design is optimal.
         if position + 1 < count {
             task.atoms.push((available, vec![design]));
         }

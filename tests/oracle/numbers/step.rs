@@ -1,4 +1,4 @@
-//! Semantics of one action in a state (definition, 1, 2, 4 and 6).
+//! Semantics of one action in a state (definition, rules 1, 2, 4 and 6).
 
 use num_traits::{One as _, Zero as _};
 
@@ -14,7 +14,7 @@ pub struct State {
     pub time: Number,
 }
 
-/// Value of an expression; `None` if it is undefined.
+/// Returns the value of an expression; `None` if it is undefined.
 pub fn number(value: &Value, state: &State) -> Option<Number> {
     match value {
         Value::Known(value) => Some(value.clone()),
@@ -36,7 +36,8 @@ pub fn number(value: &Value, state: &State) -> Option<Number> {
     }
 }
 
-/// Truth value of a condition; `None` if a comparison in it is undefined, even if the other parts would decide it.
+/// Returns the truth value of a condition. `None` if a comparison in the condition is undefined, even if the
+/// other parts would decide it.
 pub fn holds(test: &Test, state: &State) -> Option<bool> {
     match test {
         Test::Known(holds) => Some(*holds),
@@ -58,12 +59,13 @@ pub fn all_hold(tests: &[Test], state: &State) -> bool {
     tests.iter().all(|test| holds(test, state) == Some(true))
 }
 
-/// State after an action; `None` if the action is not executable.
+/// Returns the state after an action; `None` if the action is not executable.
 pub fn execute(instance: &Instance, state: &State) -> Option<State> {
     let mut after = match &instance.end {
         None => happen(&[&instance.start], state)?,
         Some(end) if instance.duration.is_zero() => {
-            // Duration 0: start and end are one happening, so their conditions are evaluated in one state and they must not interfere.
+            // With duration 0, start and end are one happening: their conditions are evaluated in one state,
+            // and they must not interfere.
             let next_state = happen(&[&instance.start, end], state)?;
             let (start_access, end_access) = (Access::of(&instance.start, state)?, Access::of(end, state)?);
             if start_access.interferes(&end_access) {
@@ -105,7 +107,8 @@ enum Combined {
     Assigned(Number),
 }
 
-/// Evaluates all conditions in the state, then applies all effects at once.
+/// Evaluates the conditions of all moments in the state, then applies all effects at once. Returns `None` if
+/// this is not possible.
 fn happen(moments: &[&Moment], state: &State) -> Option<State> {
     let mut acts = Vec::new();
     for moment in moments {
@@ -125,7 +128,7 @@ fn happen(moments: &[&Moment], state: &State) -> Option<State> {
             Act::Add(_) | Act::When(..) => {}
         }
     }
-    // Deletions come first, so an atom that is added and deleted holds.
+    // Deletions come first, so an atom that is both added and deleted holds.
     for act in &acts {
         if let Act::Add(atom) = act {
             after.atoms[*atom] = true;
@@ -142,7 +145,7 @@ fn happen(moments: &[&Moment], state: &State) -> Option<State> {
     Some(after)
 }
 
-/// Combines an effect with the previous ones on the same number. Returns `None` if they conflict.
+/// Combines an effect with the previous effects on the same number. Returns `None` if they conflict.
 fn combine(
     numbers: &mut Vec<(usize, Combined)>,
     change: Change,
@@ -184,7 +187,7 @@ impl Access {
     fn of(moment: &Moment, state: &State) -> Option<Self> {
         let mut access = Self::default();
         moment.tests.iter().for_each(|test| access.test(test));
-        // Operands count as read even if the effect is not active (6).
+        // Operands count as read even if the effect is not active (definition, rule 6).
         moment.acts.iter().for_each(|act| access.operands(act));
         let mut acts = Vec::new();
         active_acts(&moment.acts, state, &mut acts)?;

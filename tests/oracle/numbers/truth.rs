@@ -1,8 +1,9 @@
-//! Computes the correct answer for a task: the best value with a plan, that there is no plan, or that there is no best value.
+//! Computes the correct answer for a task: the best value with a plan, that there is no plan, or that there
+//! is no best value.
 //!
-//! If the state space is complete: Bellman-Ford on the states from which a goal is reachable, with cycle detection in the tree of
-//! parents (a cycle means negative cost). Otherwise, if no step can improve the metric: Dijkstra's algorithm. Its first plan is optimal
-//! although the state space is not complete.
+//! If the state space is complete, Bellman-Ford runs on the states from which a goal is reachable. Cycle
+//! detection in the tree of parents finds cycles of negative cost. If the state space is incomplete but no
+//! step can improve the metric, Dijkstra's algorithm is used: its first plan is optimal nevertheless.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -18,17 +19,18 @@ use super::step::all_hold;
 /// Value of the metric, with the instances of a plan that attains it.
 pub type ValuedPlan = (Number, Vec<usize>);
 
-/// The correct answer for a task, or the part that the exploration shows.
+/// The correct answer for a task. `Open` means that the exploration does not determine it; the field is the
+/// best plan found.
 #[derive(Debug, Clone)]
 pub enum Outcome {
     Best(ValuedPlan),
     NoPlan,
-    /// There is no best value. The plan has the best value among the plans with fewest steps.
+    /// There is no best value. The plan has the best value among the plans with the fewest steps.
     NoBest(ValuedPlan),
     Open(Option<ValuedPlan>),
 }
 
-/// The answer, with the explored states.
+/// The answer for a task, with the explored states.
 pub struct Explored {
     pub outcome: Outcome,
     pub space: Space,
@@ -49,7 +51,7 @@ pub fn truth(ground: &Ground, maximize: bool, budget: Budget) -> Option<Explored
     Some(Explored { outcome, space })
 }
 
-/// Answer from the explored states.
+/// Determines the answer from the explored states.
 fn by_states(space: &Space, maximize: bool) -> Outcome {
     let useful = leads_to_goal(space);
     if !useful[0] {
@@ -69,7 +71,7 @@ fn by_states(space: &Space, maximize: bool) -> Outcome {
     }
 }
 
-/// For each state, whether a goal is reachable.
+/// Returns for each state whether a goal is reachable from it.
 fn leads_to_goal(space: &Space) -> Vec<bool> {
     let mut predecessors = vec![Vec::new(); space.edges.len()];
     for (from, edges) in space.edges.iter().enumerate() {
@@ -89,11 +91,12 @@ fn leads_to_goal(space: &Space) -> Vec<bool> {
     useful
 }
 
-/// Common denominator and scaled costs of all edges, negated if the metric is maximised.
+/// Returns the common denominator and the scaled costs of all edges, which are negated if the metric is
+/// maximised.
 fn integers(space: &Space, maximize: bool) -> (BigInt, Vec<Vec<BigInt>>) {
     let mut scale = BigInt::one();
     for edge in space.edges.iter().flatten() {
-        // The factor by which the scale lacks this denominator.
+        // Factor that the scale lacks to be a multiple of this denominator.
         let factor = Number::new(scale.clone(), edge.costs[0].denom().clone()).denom().clone();
         scale *= factor;
     }
@@ -106,7 +109,8 @@ fn integers(space: &Space, maximize: bool) -> (BigInt, Vec<Vec<BigInt>>) {
     (scale, costs)
 }
 
-/// Shortest path to a goal by Bellman-Ford; `None` if a cycle of negative cost lies on a path to a goal.
+/// Returns the shortest path to a goal by Bellman-Ford; `None` if a cycle of negative cost lies on a path to
+/// a goal.
 fn shortest(space: &Space, costs: &[Vec<BigInt>], useful: &[bool]) -> Option<(BigInt, Vec<usize>)> {
     let mut distance: Vec<Option<BigInt>> = vec![None; useful.len()];
     let mut parent: Vec<Option<(usize, usize)>> = vec![None; useful.len()];
@@ -168,7 +172,8 @@ fn has_cycle(parent: &[Option<(usize, usize)>]) -> bool {
     false
 }
 
-/// Cheapest plan by Dijkstra's algorithm; `None` if the budget is exceeded or no goal is reachable. Steps must not have negative costs.
+/// Returns the cheapest plan by Dijkstra's algorithm; `None` if the budget is exceeded or no goal is
+/// reachable. Steps must not have negative costs.
 fn dijkstra(ground: &Ground, measures: &Measures<'_>, maximize: bool, budget: Budget) -> Option<ValuedPlan> {
     let mut states = States::default();
     let first = measures.initial();
@@ -214,12 +219,13 @@ fn dijkstra(ground: &Ground, measures: &Measures<'_>, maximize: bool, budget: Bu
     None
 }
 
-/// Least number of steps to a goal.
+/// Returns the minimum number of steps to a goal.
 pub fn fewest_steps(space: &Space) -> Option<usize> {
     (0..space.goals.len()).filter(|state| space.goals[*state]).map(|state| space.depths[state]).min()
 }
 
-/// Best plan with at most `steps` steps among the explored states, by dynamic programming over the number of steps.
+/// Returns the best plan with at most `steps` steps among the explored states, by dynamic programming over
+/// the number of steps.
 pub fn within(space: &Space, maximize: bool, steps: usize) -> Option<ValuedPlan> {
     let better = |candidate: &Number, incumbent: &Number| {
         if maximize { candidate > incumbent } else { candidate < incumbent }

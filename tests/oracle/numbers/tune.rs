@@ -1,7 +1,9 @@
-//! Chooses thresholds and a goal among the values that occur, so that they are hit exactly or missed by a tiny amount.
+//! Chooses thresholds and a goal of a task among the values that occur, so that they are hit exactly or
+//! missed by a tiny amount.
 //!
-//! Random walks execute the actions with all open comparisons taken as true. Each threshold becomes a value that its expression had
-//! when an action was executed, or a neighbouring value. The goal holds, or almost holds, in a reached state.
+//! Random walks execute the actions, with all open comparisons taken as true. Each threshold becomes a value
+//! that its expression had when an action was executed, or a neighbouring value. The goal holds, or almost
+//! holds, in a state that was reached.
 
 use fastrand::Rng;
 
@@ -13,21 +15,21 @@ use super::step::{State, execute, number};
 /// Maximum number of instances of a task for random walks.
 const MAX_INSTANCES: usize = 20_000;
 
-/// Candidates for the goal.
+/// Candidates for conjuncts of the goal.
 pub struct Wishes {
-    /// Atoms. Some of those that hold become conjuncts.
+    /// Atoms. Some of the atoms that hold become conjuncts.
     pub atoms: Vec<(usize, Vec<usize>)>,
-    /// Expressions. Some are compared with the values that they have.
+    /// Expressions. Some of them are compared with the values that they have.
     pub numbers: Vec<Expr>,
 }
 
-/// Replaces open thresholds and chooses the goal.
+/// Replaces the open thresholds of a task and chooses its goal.
 pub fn tune(task: &mut Task, wishes: &Wishes, rng: &mut Rng) {
     let mut task_with_wishes = task.clone();
     task_with_wishes.goal =
         wishes.atoms.iter().map(|(p, objects)| Condition::Holds(ground_atom(*p, objects))).collect();
     let Some(open) = ground(&task_with_wishes, &wishes.numbers, MAX_INSTANCES) else {
-        // Too many instances for random walks: the thresholds are drawn at random.
+        // There are too many instances for random walks, so the thresholds are drawn at random.
         return close(task, &[], rng);
     };
     let mut observed: Vec<Vec<Number>> = Vec::new();
@@ -48,7 +50,8 @@ fn start(ground: &Ground) -> State {
     State { atoms: ground.atoms.clone(), numbers: ground.numbers.clone(), time: whole(0) }
 }
 
-/// Executes up to six random actions and records the values of open comparisons. Returns the final state.
+/// Executes up to six random actions and records in `observed` the values of open comparisons. Returns the
+/// final state.
 fn walk(ground: &Ground, observed: &mut Vec<Vec<Number>>, rng: &mut Rng) -> State {
     let mut state = start(ground);
     let length = rng.usize(1..7);
@@ -73,7 +76,7 @@ fn walk(ground: &Ground, observed: &mut Vec<Vec<Number>>, rng: &mut Rng) -> Stat
     state
 }
 
-/// Replaces open comparisons by comparisons with an observed value.
+/// Replaces each open comparison by a comparison with an observed value.
 fn close(task: &mut Task, observed: &[Vec<Number>], rng: &mut Rng) {
     let mut close_all = |conditions: &mut Vec<Condition>| {
         for condition in conditions {
@@ -100,7 +103,8 @@ fn close(task: &mut Task, observed: &[Vec<Number>], rng: &mut Rng) {
     }
 }
 
-/// A comparison of an expression with a value or a neighbouring value, in one of several equivalent forms.
+/// Returns a comparison of an expression with a value or a neighbouring value, in one of several equivalent
+/// forms.
 fn compare(rng: &mut Rng, relation: Relation, expression: Expr, value: &Number) -> Condition {
     let value = near(rng, value);
     let reversed = match relation {
@@ -137,7 +141,7 @@ fn compare(rng: &mut Rng, relation: Relation, expression: Expr, value: &Number) 
     }
 }
 
-/// Conditions that hold or almost hold in a state.
+/// Returns conditions that hold or almost hold in a state.
 fn goal(wishes: &Wishes, open: &Ground, state: &State, rng: &mut Rng) -> Vec<Condition> {
     let mut goal = Vec::new();
     for ((predicate, objects), test) in wishes.atoms.iter().zip(&open.goal) {

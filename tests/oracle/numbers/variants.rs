@@ -1,4 +1,5 @@
-//! Differential tests of one task: encodings, strategies, solvers, horizons, several objectives. Their claims must agree.
+//! Differential tests of one task with different encodings, strategies, solvers, horizons, and with several
+//! objectives. The claims must agree.
 
 use std::time::{Duration, Instant};
 
@@ -36,7 +37,7 @@ fn thresholds(is_early: bool) -> Thresholds {
     if is_early { Thresholds::NONE } else { Thresholds::default() }
 }
 
-/// Plans with two random configurations, and once with a random horizon.
+/// Plans with two random configurations, and once with a random horizon, and checks the claims.
 pub fn check_variants(puzzle: &Puzzle, case: &Case, rng: &mut Rng, tally: &mut Tally) {
     let Ok((mission, problem)) = read(&case.domain, &case.problem) else { return };
     let Ok(task) = mission.ground(&problem, &[], &Limits::none().with_time(LIMIT)) else { return };
@@ -64,7 +65,7 @@ pub fn check_variants(puzzle: &Puzzle, case: &Case, rng: &mut Rng, tally: &mut T
     tally.planning += started.elapsed();
 }
 
-/// Checks claims about plans of any length.
+/// Checks a solution's claims about plans of any length.
 fn check(puzzle: &Puzzle, case: &Case, solution: &Solution, description: &str, tally: &mut Tally) {
     let mut cost = None;
     if let Some(plan) = &solution.plan {
@@ -105,7 +106,7 @@ fn check(puzzle: &Puzzle, case: &Case, solution: &Solution, description: &str, t
     }
 }
 
-/// Checks claims about plans of at most `horizon` steps.
+/// Checks a solution's claims about plans of at most `horizon` steps.
 fn check_horizon(
     puzzle: &Puzzle,
     case: &Case,
@@ -128,13 +129,14 @@ fn check_horizon(
     }
     let best = within(space, puzzle.maximize(), horizon);
     let reached = config.limits.reached();
-    // Not a failure: the answer for a horizon may be the first plan. The count shows how often.
+    // This is not a failure: the answer for a horizon may be the first plan found. The count shows how often
+    // this happens.
     if best.is_some_and(|(best, _)| space.complete && !reached && rational(&plan.cost) != best) {
         tally.count("NOTE: not the best plan within the horizon");
     }
 }
 
-/// Two or three random objectives.
+/// Returns two or three random objectives.
 pub fn objectives(puzzle: &Puzzle, rng: &mut Rng) -> Vec<Expr> {
     let task = &puzzle.task;
     let mut candidates: Vec<Expr> = Vec::new();
@@ -156,7 +158,8 @@ pub fn objectives(puzzle: &Puzzle, rng: &mut Rng) -> Vec<Expr> {
     candidates
 }
 
-/// Checks plans with several objectives: the first two as a Pareto front, all of them lexicographically.
+/// Checks plans with several objectives: the first two objectives as a Pareto front, and all objectives
+/// lexicographically.
 pub fn check_objectives(puzzle: &Puzzle, expressions: &[Expr], case: &Case, tally: &mut Tally) {
     let Some(expected_points) = front(&puzzle.explored.space) else { return };
     let puzzle_of_pair = Puzzle::new(puzzle.name.clone(), puzzle.task.clone(), &expressions[..2]);
@@ -207,7 +210,8 @@ pub fn check_objectives(puzzle: &Puzzle, expressions: &[Expr], case: &Case, tall
         let is_wrong = match computed.status {
             Status::Optimal => points != pairs,
             Status::Unsolvable => !pairs.is_empty(),
-            // An incomplete front may lack points, but must not contain a point that beats the exact front.
+            // An incomplete front may lack points, but must not contain a point that dominates the exact
+            // front.
             _ => points.iter().any(|point| pairs.iter().all(|best| best[0] > point[0] || best[1] > point[1])),
         };
         if is_wrong {
@@ -228,7 +232,8 @@ pub fn check_validator(puzzle: &Puzzle, case: &Case, rng: &mut Rng, tally: &mut 
     };
     let instances = puzzle.ground.instances.len();
     for _ in 0..4 {
-        // Small changes of a valid plan fail late and for many reasons; random plans would fail at the first step.
+        // Small changes of a valid plan fail late and for many reasons. Random plans would fail at the first
+        // step.
         let mut plan = base_plan.clone();
         plan.truncate(6);
         for _ in 0..rng.usize(1..4) {

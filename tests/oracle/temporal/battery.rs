@@ -1,5 +1,6 @@
-//! Tiny random tasks with a battery that is charged and discharged, where several charging runs can overlap. The number of overlapping
-//! runs of one action that a plan needs depends on the effects that other actions undo.
+//! Tiny random tasks with a battery that is charged and discharged. Several runs of a charging action can
+//! overlap. The number of overlapping runs of one action that a plan needs depends on effects that other
+//! actions undo.
 
 use super::make::{LEVEL, always_true};
 use super::model::{
@@ -31,7 +32,7 @@ fn durative(name: String, length: Q, start: Part, end: Vec<Effect>) -> Action {
     Action { name, parameters: Vec::new(), body }
 }
 
-/// An action that sets the battery to a level at its end, or increases it.
+/// Returns an action that sets the battery to a level at its end, or increases the level.
 fn charge(random: &mut fastrand::Rng, number: usize, unit: Q) -> Action {
     let operation = if random.u8(..10) < 8 { Operation::Assign } else { Operation::Increase };
     let condition = if random.u8(..10) < 7 { always_true() } else { Condition::Atom(atom(random)) };
@@ -40,7 +41,7 @@ fn charge(random: &mut fastrand::Rng, number: usize, unit: Q) -> Action {
     durative(format!("charge{number}"), length, Part { condition, effects: Vec::new() }, effects)
 }
 
-/// An action that requires a battery level and usually discharges the battery at its end.
+/// Returns an action that requires a battery level and usually discharges the battery at its end.
 fn work(random: &mut fastrand::Rng, number: usize, unit: Q) -> Action {
     let mut conditions = vec![at_least(random.i64(0..3))];
     if random.bool() {
@@ -65,7 +66,8 @@ fn work(random: &mut fastrand::Rng, number: usize, unit: Q) -> Action {
     durative(format!("work{number}"), unit * q(random.i64(1..4)), start, end)
 }
 
-/// A chain of actions, each of which requires an effect of the previous one and a full battery, and one charging action.
+/// Returns a chain of actions and a charging action. Each action of the chain requires an effect of the
+/// previous action and a full battery.
 fn chain(random: &mut fastrand::Rng, length: usize, unit: Q) -> Vec<Action> {
     let full = random.i64(1..3);
     let no_condition = Part { condition: always_true(), effects: Vec::new() };
@@ -88,7 +90,8 @@ fn chain(random: &mut fastrand::Rng, length: usize, unit: Q) -> Vec<Action> {
     actions
 }
 
-/// An action that is applicable only until its first run ends, and increases the level. So all runs must begin before one ends.
+/// Returns an action that increases the level and is applicable only until its first run ends. So all runs
+/// must begin before the first one ends.
 fn tank(random: &mut fastrand::Rng, unit: Q) -> Action {
     let open = Atom { predicate: 0, terms: Vec::new() };
     let mut effects = vec![Effect::Delete(open.clone())];
@@ -103,9 +106,9 @@ fn tank(random: &mut fastrand::Rng, unit: Q) -> Action {
     durative("fill".into(), unit * q(random.i64(2..6)), start, effects)
 }
 
-/// A pump that requires a full battery, and a chain of stages that alternately require water and its absence. The charging action
-/// removes water and is usually applicable only until its first run ends. So the number of useful runs depends on effects that the
-/// runs undo themselves.
+/// Returns a pump that requires a full battery, and a chain of stages that alternately require water and no
+/// water. The charging action removes water and is usually applicable only until its first run ends. So the
+/// number of useful runs depends on effects that the runs themselves undo.
 fn vent(random: &mut fastrand::Rng, (stages, length): (usize, i64), unit: Q) -> Vec<Action> {
     let atom = |predicate| Atom { predicate, terms: Vec::new() };
     let full = random.i64(1..3);
@@ -140,11 +143,13 @@ fn vent(random: &mut fastrand::Rng, (stages, length): (usize, i64), unit: Q) -> 
     actions
 }
 
-/// Maximum number of nodes of the oracle; larger for tasks made by [`vent`], where many runs begin.
+/// Maximum number of nodes of the oracle.
 const CAP: usize = 3000;
+/// Maximum number of nodes of the oracle for tasks made by [`vent`], where many runs begin.
 const VENT_CAP: usize = 200_000;
 
-/// A random task with durations in multiples of `unit`, and the maximum number of nodes of its oracle.
+/// Returns a random task with durations in multiples of `unit`, and the maximum number of nodes of its
+/// oracle.
 pub fn make(seed: u64, unit: Q) -> (Task, usize) {
     let random = &mut fastrand::Rng::with_seed(seed);
     let kind = random.u8(..21) / 2;

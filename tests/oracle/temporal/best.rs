@@ -9,7 +9,7 @@ use super::model::{Q, big, q};
 use super::sequence::{Edge, Search};
 use crate::judge::{Step, Truth};
 
-/// Correct answer for a task, or an open one if the search would exceed `cap` nodes.
+/// Returns the correct answer for a task. The answer is open if the search would exceed `cap` nodes.
 pub fn best(world: &World, cap: usize) -> Truth {
     let search = Search::new(world, cap);
     let ends: Vec<usize> = search.goals.iter().map(|(edge, _)| *edge).collect();
@@ -26,11 +26,11 @@ pub fn best(world: &World, cap: usize) -> Truth {
     judged(world, graph.optimum(), search.empty, search.open, &schedule, &|plan| execute(world, plan))
 }
 
-/// A plan: instances with start and duration.
+/// A plan: instances of actions, each with start and duration.
 pub type Schedule = Vec<(usize, Q, Q)>;
 
-/// Answer from the optimal path in a graph of all non-empty plans. `empty` is the value of the empty plan, if it is valid. `open` means
-/// that the graph is incomplete.
+/// Converts the optimal path in a graph of all non-empty plans to an answer. `empty` is the value of the
+/// empty plan, if this plan is valid. `open` means that the graph is incomplete.
 #[allow(clippy::type_complexity)]
 pub fn judged(
     world: &World,
@@ -48,7 +48,7 @@ pub fn judged(
     };
     let witness: (BigRational, Vec<Step>) = match execute(&plan) {
         Ok(value) => (big(value), written(world, &plan)),
-        // An overflow in the oracle leaves the answer open. Any other obstacle is a fault of the oracle.
+        // An overflow in the oracle leaves the answer open. Any other obstacle is an error of the oracle.
         Err(Obstacle::TooLarge) => return Truth::Open(None),
         Err(obstacle) => {
             panic!(
@@ -65,12 +65,12 @@ pub fn judged(
     }
 }
 
-/// Start times for the actions of a path.
+/// Returns exact start times for the actions of a path.
 fn scheduled(search: &Search<'_>, edges: &[usize]) -> Schedule {
     let edges: Vec<&Edge> = edges.iter().map(|edge| &search.edges[*edge]).collect();
     let steps = edges.iter().filter(|edge| edge.step.is_some()).count() as i64;
     let gap = edges.iter().filter_map(|edge| edge.step.and_then(|(_, _, _, gap)| gap)).min();
-    // Strict bounds are satisfied by delays so small that all of them together fit into the least gap.
+    // Strict bounds are satisfied by delays that are so small that their sum fits into the smallest gap.
     let delay = gap.map_or(q(1), |gap| gap / q(steps + 1));
     let last = search.world.events.last().map(|(time, _)| *time);
     let mut clock = q(0);
@@ -90,7 +90,7 @@ fn scheduled(search: &Search<'_>, edges: &[usize]) -> Schedule {
     plan
 }
 
-/// Converts a schedule to steps with names.
+/// Converts a schedule to steps with names of actions and objects.
 pub fn written(world: &World, steps: &[(usize, Q, Q)]) -> Vec<Step> {
     let step = |(instance, start, duration): &(usize, Q, Q)| {
         let (action, objects) = &world.instances[*instance];

@@ -8,13 +8,14 @@ use super::happening::{Atoms, Happening, Obstacle, State, UNDEFINED, World, fit}
 use super::model::{Comparison, Condition, Expression, Q};
 
 impl World {
-    /// Bit set of all ground atoms of a predicate.
+    /// Returns the bit set of all ground atoms of a predicate.
     fn atoms_of(&self, predicate: usize) -> Atoms {
         let count = self.task.objects.len().pow(self.task.predicates[predicate].1 as u32);
         ((1 << count) - 1) << self.atoms[predicate]
     }
 
-    /// For each derived predicate, the atoms and numbers that its axioms mention, directly or through other derived predicates.
+    /// Returns for each derived predicate the atoms and numbers that its axioms mention, directly or through
+    /// other derived predicates.
     pub(super) fn dependencies(&self) -> HashMap<usize, (Atoms, u64)> {
         let mut depends: HashMap<usize, (Atoms, u64)> =
             self.task.axioms.iter().map(|axiom| (axiom.predicate, (0, 0))).collect();
@@ -57,7 +58,7 @@ impl World {
         }
     }
 
-    /// Bit set of all instances of the functions in an expression.
+    /// Returns the bit set of all instances of the functions in an expression.
     fn mentioned_values(&self, expression: &Expression) -> u64 {
         match expression {
             Expression::Number(_) | Expression::Duration(_) => 0,
@@ -71,7 +72,8 @@ impl World {
         }
     }
 
-    /// Atoms of a state including the derived ones, as the least fixpoint of the axioms, stratum by stratum.
+    /// Returns the atoms of a state including the derived atoms, as the least fixpoint of the axioms, stratum
+    /// by stratum.
     pub fn derived(&self, state: &State) -> Result<Atoms, Obstacle> {
         let mut atoms = state.atoms;
         for axiom in &self.task.axioms {
@@ -95,7 +97,7 @@ impl World {
         Ok(atoms)
     }
 
-    /// Truth value of a condition in a state.
+    /// Returns the truth value of a condition in a state. `bound` contains the objects of the variables.
     pub fn holds(&self, condition: &Condition, state: &State, bound: &[usize]) -> Result<bool, Obstacle> {
         let atoms = self.derived(state)?;
         self.holds_with(condition, atoms, state, &mut bound.to_vec())
@@ -158,7 +160,7 @@ impl World {
         Ok(results)
     }
 
-    /// Value of an expression.
+    /// Returns the value of an expression in a state.
     pub fn value(&self, expression: &Expression, state: &State, bound: &[usize]) -> Result<Q, Obstacle> {
         let pair = |left: &Expression, right: &Expression| {
             Ok((self.value(left, state, bound)?, self.value(right, state, bound)?))
@@ -176,7 +178,8 @@ impl World {
         })
     }
 
-    /// Adds the facts and numbers that a condition mentions, even if they do not matter for its value.
+    /// Adds to `reads` the facts and numbers that a condition mentions, even if they do not influence its
+    /// truth value.
     pub(super) fn read(&self, condition: &Condition, bound: &mut Vec<usize>, reads: &mut Happening) {
         match condition {
             Condition::Atom(atom) => match self.depends.get(&atom.predicate) {

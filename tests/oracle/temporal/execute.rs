@@ -1,9 +1,9 @@
-//! Executes sequential plans at exact times, by the definition.
+//! Executes sequential plans at exact times, by the definition of a plan.
 
 use super::happening::{End, Obstacle, State, World, fit};
 use super::model::{Body, Measure, Q, q};
 
-/// Value of a plan, or the reason why it is invalid.
+/// Executes a plan. Returns its value, or the reason why the plan is invalid.
 pub fn execute(world: &World, steps: &[(usize, Q, Q)]) -> Result<Q, Obstacle> {
     let mut run = Run { world, state: world.initial.clone(), applied: 0 };
     let (mut clock, mut total) = (q(0), q(0));
@@ -36,7 +36,7 @@ pub fn execute(world: &World, steps: &[(usize, Q, Q)]) -> Result<Q, Obstacle> {
     value(world, &run.state, total, steps.len())
 }
 
-/// Checks the goal. An undefined goal does not hold.
+/// Checks that the goal holds. An undefined goal does not hold.
 pub fn goal(world: &World, state: &State) -> Result<(), Obstacle> {
     match world.holds(&world.task.goal, state, &[]) {
         Ok(true) => Ok(()),
@@ -45,7 +45,7 @@ pub fn goal(world: &World, state: &State) -> Result<(), Obstacle> {
     }
 }
 
-/// Value of a valid plan by the measure of the task.
+/// Returns the value of a valid plan by the task's measure.
 pub fn value(world: &World, state: &State, time: Q, steps: usize) -> Result<Q, Obstacle> {
     match &world.task.measure {
         Measure::Steps => Ok(q(steps as i64)),
@@ -66,12 +66,12 @@ pub fn value(world: &World, state: &State, time: Q, steps: usize) -> Result<Q, O
 struct Run<'w> {
     world: &'w World,
     state: State,
-    /// Number of events that have been applied.
+    /// Number of events that have already been applied.
     applied: usize,
 }
 
 impl Run<'_> {
-    /// Applies the remaining events up to a time.
+    /// Applies the remaining events up to and including a time.
     fn events(&mut self, until: Q) -> Result<(), Obstacle> {
         while let Some((_, event)) = self.world.events.get(self.applied).filter(|(time, _)| *time <= until) {
             self.state = event.apply(&self.state)?;
@@ -95,7 +95,7 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Checks the over-all condition after the start and after each event before the end.
+    /// Checks the condition over all after the start and after each event before the end.
     fn running(&mut self, instance: usize, end: Q) -> Result<(), Obstacle> {
         let (action, objects) = &self.world.instances[instance];
         let Body::Durative { over_all, .. } = &self.world.task.actions[*action].body else { return Ok(()) };

@@ -6,29 +6,29 @@ use super::model::{Q, q};
 #[derive(Debug, Default)]
 pub struct Graph {
     pub nodes: usize,
-    /// From, to, cost.
+    /// Edges: from, to, cost.
     pub edges: Vec<(usize, usize, Q)>,
-    /// Final steps: the node before, and the cost of the step including all final costs.
+    /// Final steps: the preceding node, and the cost of the step including all final costs.
     pub goals: Vec<(usize, Q)>,
 }
 
-/// A path: edges, and the number of the final step.
+/// A path: numbers of its edges, and the number of the final step.
 pub type Path = (Vec<usize>, usize);
 
 #[derive(Debug)]
 pub enum Optimum {
     /// No goal is reachable.
     None,
-    /// A cycle of negative cost lies on a path to a goal. The field is some path to a goal.
+    /// A cycle of negative cost lies on a path to a goal. The field is any path to a goal.
     Unbounded(Path),
     Best(Q, Path),
 }
 
-/// For each node, the least cost of a path to it, with the last edge.
+/// For each node, the minimum cost of a path to it, with the number of the path's last edge.
 type Distances = Vec<Option<(Q, Option<usize>)>>;
 
 impl Graph {
-    /// Shortest path to a goal.
+    /// Returns the shortest path to a goal.
     pub fn optimum(&self) -> Optimum {
         let useful = self.useful();
         let (distances, cycle) = self.distances(&useful);
@@ -47,7 +47,7 @@ impl Graph {
         }
     }
 
-    /// For each node, whether a goal is reachable from it.
+    /// Returns for each node whether a goal is reachable from it.
     fn useful(&self) -> Vec<bool> {
         let mut useful = vec![false; self.nodes];
         let mut predecessors: Vec<Vec<usize>> = vec![Vec::new(); self.nodes];
@@ -61,7 +61,8 @@ impl Graph {
         useful
     }
 
-    /// Least costs of paths through useful nodes, and whether there is a cycle of negative cost among them.
+    /// Returns the minimum costs of paths through useful nodes. The flag is `true` if these nodes have a
+    /// cycle of negative cost.
     fn distances(&self, useful: &[bool]) -> (Distances, bool) {
         let mut distances: Distances = vec![None; self.nodes];
         distances[0] = useful[0].then_some((q(0), None));
@@ -79,7 +80,8 @@ impl Graph {
             if !changed {
                 return (distances, false);
             }
-            // A cycle formed by the last edges has negative cost. The test is linear, so it runs in every eighth round only.
+            // A cycle formed by the last edges has negative cost. The test takes linear time, so it runs only
+            // in every eighth round.
             if round % 8 == 7 && self.has_cycle(&distances) {
                 break;
             }
@@ -110,7 +112,8 @@ impl Graph {
         edges
     }
 
-    /// Some path to each node. Nodes are numbered as they are discovered, so the first edge to a node comes from one that has a path.
+    /// Returns any path to each node. Nodes are numbered as they are discovered, so the first edge to a node
+    /// comes from a node that already has a path.
     fn shortest(&self) -> Vec<Option<Vec<usize>>> {
         let mut paths: Vec<Option<Vec<usize>>> = vec![None; self.nodes];
         paths[0] = Some(Vec::new());

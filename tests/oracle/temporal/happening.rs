@@ -1,5 +1,6 @@
-//! Semantics of one happening: conditions, `when` conditions and operands are evaluated in the state before it, and all active effects
-//! apply at once. Two happenings interfere depending on the facts and numbers that they read and write.
+//! Semantics of one happening. Conditions, `when` conditions and operands are evaluated in the preceding
+//! state, and all active effects apply at once. Two happenings interfere depending on the facts and numbers
+//! that they read and write.
 
 use std::collections::HashMap;
 
@@ -23,12 +24,12 @@ pub type Atoms = u128;
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct State {
-    /// Atoms of all predicates that are not derived.
+    /// Atoms of all predicates that are not derived and that hold in the state.
     pub atoms: Atoms,
     pub values: Vec<Option<Q>>,
 }
 
-/// Combination of all changes of one number by one happening.
+/// Combination of all changes of a number by one happening.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Change {
     Add(Q),
@@ -36,7 +37,7 @@ pub enum Change {
     Assign(Q),
 }
 
-/// Facts and numbers that a happening reads, and the writes of its active effects.
+/// Facts and numbers that a happening reads, and the changes by its active effects.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Happening {
     pub reads: Atoms,
@@ -50,29 +51,30 @@ pub struct Happening {
 #[derive(Debug)]
 pub struct World {
     pub task: Task,
-    /// Number of the first atom of each predicate.
+    /// Number of the first ground atom of each predicate.
     pub(super) atoms: Vec<usize>,
     /// Number of the first instance of each function.
     pub(super) values: Vec<usize>,
-    /// For each derived predicate, the atoms and numbers that it depends on.
+    /// Atoms and numbers on which each derived predicate depends.
     pub(super) depends: HashMap<usize, (Atoms, u64)>,
-    /// Ground actions: action and arguments.
+    /// Ground actions: number of the action schema, and arguments.
     pub instances: Vec<(usize, Vec<usize>)>,
     pub initial: State,
-    /// Times and effects of the timed initial literals, in order of time.
+    /// Times and changes of the timed initial literals, in order of time.
     pub events: Vec<(Q, Happening)>,
 }
 
-/// The part of an action that happens.
+/// The part of an action that takes place in a happening.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum End {
     Start,
     Finish,
-    /// Start and end together, of an instantaneous action or one of duration 0.
+    /// Start and end together, of an instantaneous action or an action of duration 0.
     Both,
 }
 
-/// Returns the number if numerator and denominator are below 2^30, so that no operation on two such numbers overflows.
+/// Returns the number if its numerator and denominator are below 2^30, so that no operation on two such
+/// numbers overflows.
 pub fn fit(value: Q) -> Result<Q, Obstacle> {
     let limit = 1 << 30;
     if value.numer().abs() < limit && *value.denom() < limit { Ok(value) } else { Err(Obstacle::TooLarge) }
@@ -104,7 +106,7 @@ impl Happening {
         atoms != 0 || reads_changed(self, other) || reads_changed(other, self) || conflicting_changes
     }
 
-    /// State after the happening.
+    /// Returns the state after the happening.
     pub fn apply(&self, state: &State) -> Result<State, Obstacle> {
         let mut after = state.clone();
         after.atoms = (after.atoms & !self.deletes) | self.adds;
@@ -119,7 +121,7 @@ impl Happening {
         Ok(after)
     }
 
-    /// Union of two happenings that do not interfere.
+    /// Returns the union of two happenings, which must not interfere.
     fn joined(mut self, other: Self) -> Result<Self, Obstacle> {
         self.reads |= other.reads;
         self.reads_values |= other.reads_values;
@@ -213,12 +215,12 @@ impl World {
         self.index(self.values[fluent.function], &fluent.terms, bound)
     }
 
-    /// Number of the only instance of a function without arguments.
+    /// Returns the number of the only instance of a function without arguments.
     pub fn value_of(&self, function: usize) -> usize {
         self.values[function]
     }
 
-    /// Happening of a ground action in the state before it. Fails if a condition does not hold.
+    /// Returns the happening of a ground action in the given state. Fails if a condition does not hold.
     pub fn happening(&self, instance: usize, end: End, state: &State) -> Result<Happening, Obstacle> {
         let (action, bound) = &self.instances[instance];
         let action: &Action = &self.task.actions[*action];
@@ -240,7 +242,7 @@ impl World {
         }
     }
 
-    /// A start. It also reads the numbers that determine the duration.
+    /// Returns the happening of a start, which also reads the numbers that determine the duration.
     fn start_happening(
         &self,
         start: &Part,
@@ -274,7 +276,7 @@ impl World {
         Ok(happening)
     }
 
-    /// Adds the reads of an effect, and its writes if it is active.
+    /// Adds the reads of an effect to the happening, and its changes if the effect is active.
     fn effect(
         &self,
         effect: &Effect,
@@ -316,7 +318,8 @@ impl World {
     }
 }
 
-/// Combines the active numeric effects of one happening to one change per number. Fails if they conflict.
+/// Combines the active numeric effects of one happening to one change per number. Fails if the effects
+/// conflict.
 fn combined(effects: &[(usize, Operation, Q)]) -> Result<Vec<(usize, Change)>, Obstacle> {
     let mut changes: Vec<(usize, Change)> = Vec::new();
     for (at, operation, value) in effects {

@@ -8,7 +8,7 @@ use super::model::{
     Q, Task, Term, q,
 };
 
-/// Functions: a number that actions change, a static one, one that may be undefined, and the costs.
+/// Numbers of the functions: one that actions change, a static one, one that may be undefined, and the costs.
 pub(super) const LEVEL: usize = 0;
 pub(super) const LENGTH: usize = 1;
 pub(super) const MAYBE: usize = 2;
@@ -17,7 +17,8 @@ pub(super) const COST: usize = 3;
 /// Frequencies of the features of a task, in percent.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Flavour {
-    /// For concurrent plans, all durations and times of events are multiples of this unit. `None` for sequential plans.
+    /// For concurrent plans, unit of which all durations and times of events are multiples. `None` for
+    /// sequential plans.
     pub(super) unit: Option<Q>,
     pub(super) durative: u8,
     pub(super) conditional: u8,
@@ -30,9 +31,9 @@ pub struct Maker {
     pub(super) random: fastrand::Rng,
     pub(super) flavour: Flavour,
     pub(super) task: Task,
-    /// The predicate between designs and their functions, and the type of the designs.
+    /// The predicate between designs and their functions, and the type of designs, in tasks with designs.
     pub(super) designs: Option<(usize, usize)>,
-    /// The parameter of the current action that is its design.
+    /// Number of the parameter of the current action that is its design.
     slot: Option<usize>,
 }
 
@@ -40,23 +41,23 @@ pub(super) fn constant(value: Q) -> Expression {
     Expression::Number(value)
 }
 
-/// The empty conjunction.
+/// Returns the empty conjunction.
 pub(super) fn always_true() -> Condition {
     Condition::All(Vec::new())
 }
 
 impl Maker {
-    /// A task from a seed; for concurrent plans if `unit` is given.
+    /// Returns the task of a seed; for concurrent plans if `unit` is given.
     pub fn make(seed: u64, unit: Option<Q>) -> Task {
         Self::build(seed, unit, false)
     }
 
-    /// A task from a seed whose actions have design parameters that durations and costs depend on.
+    /// Returns a task whose actions have design parameters, on which durations and costs depend.
     pub fn with_designs(seed: u64) -> Task {
         Self::build(seed, None, true)
     }
 
-    /// Tries derived seeds until a task is small enough.
+    /// Tries seeds derived from `seed` until a task is small enough.
     fn build(seed: u64, unit: Option<Q>, designs: bool) -> Task {
         let seeds = (0..u64::MAX).map(|attempt| seed ^ (attempt << 40));
         let mut small_tasks = seeds.filter_map(|seed| Self::small(seed, unit, designs));
@@ -93,7 +94,8 @@ impl Maker {
             return None;
         }
         maker.fill();
-        // A separate random sequence, so that the other parts of the task do not depend on this feature.
+        // This part has a separate random sequence, so that all other parts of the task do not depend on this
+        // feature.
         maker.random = fastrand::Rng::with_seed(!seed);
         maker.durations_in_effects();
         Some(maker.task)
@@ -174,7 +176,7 @@ impl Maker {
         self.is_derived(predicate) || self.designs.is_some_and(|(solves, _)| solves == predicate)
     }
 
-    /// A random atom. `set` excludes predicates that effects and events must not change.
+    /// Returns a random atom. `set` excludes predicates that effects and events must not change.
     fn atom(&mut self, variables: usize, set: bool) -> Atom {
         let mut predicate = self.random.usize(..self.task.predicates.len());
         while set && self.is_fixed(predicate) {
@@ -187,7 +189,8 @@ impl Maker {
     fn term(&mut self, variables: usize) -> Term {
         if variables > 0 && self.chance(85) {
             let variable = self.random.usize(..variables);
-            // A design parameter in a fact that actions change is not a slot but a side effect. That is wanted, but rarely.
+            // If actions change a fact with a design parameter, the planner cannot treat the parameter as a
+            // design slot. Such side effects are wanted, but rarely.
             if self.slot == Some(variable) && !self.chance(8) {
                 return Term::Object(self.random.usize(..self.task.objects.len()));
             }
@@ -229,7 +232,8 @@ impl Maker {
         Condition::Compare(self.pick(&signs), left, right)
     }
 
-    /// A random condition of at most `depth` nested connectives. `variables` has the types of the bound variables.
+    /// Returns a random condition with at most `depth` nested connectives. `variables` contains the types of
+    /// the bound variables.
     pub(super) fn condition(&mut self, variables: &[usize], depth: usize) -> Condition {
         let count = variables.len();
         let choice = self.random.u8(..100);
@@ -388,12 +392,12 @@ impl Maker {
         Action { name: format!("a{number}"), parameters, body }
     }
 
-    /// Adds effects that depend on the duration.
+    /// Adds effects whose operands depend on the duration of the action.
     fn durations_in_effects(&mut self) {
         for at in 0..self.task.actions.len() {
             let mut action = self.task.actions[at].clone();
             let Body::Durative { duration, start, end, .. } = &mut action.body else { continue };
-            // A duration that actions change is not repeated in effects.
+            // A duration that actions can change is not repeated in effects.
             let is_dynamic = matches!(duration, Expression::Fluent(Fluent { function: LEVEL, .. }));
             if is_dynamic || !self.chance(self.flavour.numeric / 4) {
                 continue;

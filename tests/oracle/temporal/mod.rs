@@ -1,4 +1,4 @@
-//! Generator A: all temporal and logical features, for sequential and concurrent plans.
+//! Generator A: tasks with all temporal and logical features, for sequential and concurrent plans.
 
 mod battery;
 pub mod best;
@@ -29,7 +29,7 @@ const CAP: usize = 400;
 /// Maximum number of nodes of the oracle for concurrent plans.
 const OVERLAP_CAP: usize = 300;
 
-/// Converts steps to a schedule of ground actions.
+/// Converts steps with names to a schedule of ground actions.
 fn schedule_of(world: &World, steps: &[Step]) -> Result<Vec<(usize, Q, Q)>, String> {
     let to_small = |number: &BigRational| {
         let (numerator, denominator) = (number.numer().to_i64(), number.denom().to_i64());
@@ -56,12 +56,12 @@ fn obstacle(obstacle: Obstacle) -> String {
     }
 }
 
-/// The task of a seed; for concurrent plans if `unit` is given.
+/// Returns the task of a seed; for concurrent plans if `unit` is given.
 pub fn sequential_task(seed: u64, unit: Option<Q>) -> Task {
     Maker::make(seed, unit)
 }
 
-/// Separation for the concurrent task of a seed.
+/// Returns the separation for the concurrent task of a seed.
 pub fn concurrent_unit(seed: u64) -> Q {
     let units = [Q::from_integer(1), Q::from_integer(1), Q::new(1, 1000), Q::new(1, 2), Q::from_integer(2)];
     units[(seed % 5) as usize]
@@ -72,7 +72,7 @@ pub fn maximizes(task: &Task) -> bool {
     matches!(task.measure, Measure::Metric { maximize: true, .. })
 }
 
-/// Executor of sequential plans, or of concurrent plans with the given separation.
+/// Returns an executor of sequential plans, or of concurrent plans with the given separation.
 pub fn executor(world: World, unit: Option<Q>) -> Executor {
     Box::new(move |steps| {
         let plan = schedule_of(&world, steps)?;
@@ -84,7 +84,7 @@ pub fn executor(world: World, unit: Option<Q>) -> Executor {
     })
 }
 
-/// A task with its correct answer; for concurrent plans if `unit` is given.
+/// Returns the task of a seed with its correct answer; for concurrent plans if `unit` is given.
 fn case(name: &str, seed: u64, unit: Option<Q>) -> Case {
     case_of(format!("{name}-{seed}"), Maker::make(seed, unit), unit)
 }
@@ -93,13 +93,14 @@ fn case_of(name: String, task: Task, unit: Option<Q>) -> Case {
     case_up_to(if unit.is_none() { CAP } else { OVERLAP_CAP }, name, task, unit)
 }
 
-/// A sequential task with derived predicates, with its correct answer. `None` if the task of the seed has no derived predicate.
+/// Returns a sequential task with derived predicates and its correct answer. `None` if the task of the seed
+/// has no derived predicate.
 pub fn with_derived(seed: u64) -> Option<Case> {
     let task = Maker::make(seed, None);
     (!task.axioms.is_empty()).then(|| case_of(format!("derived-{seed}"), task, None))
 }
 
-/// A task with its correct answer, or an open one if the oracle would exceed `cap` nodes.
+/// Returns a task with its correct answer. The answer is open if the oracle would exceed `cap` nodes.
 fn case_up_to(cap: usize, name: String, task: Task, unit: Option<Q>) -> Case {
     let world = World::new(task);
     let truth = match unit {
@@ -145,7 +146,7 @@ fn batteries_that_are_charged() {
     run(200, case).finish();
 }
 
-/// Kinds and texts of the failures of a task.
+/// Returns the kinds and the texts of the failures of a task.
 fn kinds(task: &Task, unit: Option<Q>) -> (Vec<&'static str>, String) {
     // The oracle panics if its own plan is invalid, which is a failure to be shrunk as well.
     let case = std::panic::catch_unwind(|| case_of("smaller".into(), task.clone(), unit));
@@ -156,7 +157,8 @@ fn kinds(task: &Task, unit: Option<Q>) -> (Vec<&'static str>, String) {
     (tally.failures.iter().map(|failure| failure.kind).collect(), text)
 }
 
-/// Shrinks the failing tasks of the seeds `ORACLE_SEEDS` and prints them. If `ORACLE_OVERLAP` is set, the seeds are of concurrent tasks.
+/// Shrinks the failing tasks of the seeds `ORACLE_SEEDS` and prints them. If `ORACLE_OVERLAP` is set, these
+/// are seeds of concurrent tasks.
 #[test]
 #[ignore = "a tool"]
 #[allow(clippy::print_stdout)]
@@ -167,7 +169,8 @@ fn shrink() {
         let unit = overlap.then(|| concurrent_unit(seed));
         let mut task = Maker::make(seed, unit);
         let (original_kinds, mut text) = kinds(&task, unit);
-        // Any failure of the last kind counts, so the shrunk task may fail for a different reason of the same kind.
+        // Only the kind of the last failure must be preserved, so the shrunk task may fail for a different
+        // reason of this kind.
         let Some(kind) = original_kinds.last() else { continue };
         'less: loop {
             for candidate in shrink::smaller(&task) {

@@ -1,4 +1,4 @@
-//! Lifted temporal tasks and their PDDL texts.
+//! Lifted temporal tasks as data, and their PDDL texts.
 //!
 //! Predicates and functions accept objects of all types. Parameters and quantified variables are typed. A variable is identified by its
 //! nesting depth: first the parameters, then quantified variables from the outermost to the innermost.
@@ -9,16 +9,16 @@ use num_rational::Ratio;
 
 use crate::judge::decimal;
 
-/// Rational number for values and times. Each operation is followed by a check that numerator and denominator are below 2^30, so no
-/// operation overflows.
+/// Rational number for values and times. After each operation, numerator and denominator are checked to be
+/// below 2^30, so no operation overflows.
 pub type Q = Ratio<i64>;
 
-/// Converts an integer.
+/// Converts an integer to a rational number.
 pub fn q(number: i64) -> Q {
     Q::from_integer(number)
 }
 
-/// Converts to arbitrary precision.
+/// Converts a rational number to arbitrary precision.
 pub fn big(number: Q) -> num_rational::BigRational {
     num_rational::BigRational::new((*number.numer()).into(), (*number.denom()).into())
 }
@@ -55,7 +55,7 @@ pub enum Expression {
     Number(Q),
     Fluent(Fluent),
     Sum(Box<Expression>, Box<Expression>),
-    /// `?duration` of the action, with the expression that determines it.
+    /// `?duration` of the action. The field is the expression that determines the duration.
     Duration(Box<Expression>),
     Product(Box<Expression>, Box<Expression>),
     Quotient(Box<Expression>, Box<Expression>),
@@ -70,9 +70,9 @@ pub enum Condition {
     All(Vec<Condition>),
     Any(Vec<Condition>),
     Imply(Box<Condition>, Box<Condition>),
-    /// For each object of a type.
+    /// Holds for each object of a type.
     Forall(usize, Box<Condition>),
-    /// For some object of a type.
+    /// Holds for some object of a type.
     Exists(usize, Box<Condition>),
 }
 
@@ -91,7 +91,7 @@ pub enum Effect {
     Delete(Atom),
     Change(Operation, Fluent, Expression),
     When(Condition, Vec<Effect>),
-    /// For each object of a type.
+    /// Effects for each object of a type.
     Forall(usize, Vec<Effect>),
 }
 
@@ -116,14 +116,14 @@ pub struct Action {
     pub body: Body,
 }
 
-/// A derived predicate with its condition. The first variables are the arguments.
+/// An axiom of a derived predicate. The first variables of the condition are the arguments of the predicate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axiom {
     pub predicate: usize,
     pub condition: Condition,
 }
 
-/// The measure that plans minimise or maximise.
+/// The quantity that plans minimise or maximise.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Measure {
     /// Number of actions (no metric, sequential).
@@ -139,21 +139,22 @@ pub struct Task {
     pub types: usize,
     /// Type of each object.
     pub objects: Vec<usize>,
-    /// Name and arity, including derived predicates.
+    /// Name and arity of each predicate, including derived predicates.
     pub predicates: Vec<(String, usize)>,
     pub functions: Vec<(String, usize)>,
-    /// Derived predicates in the order of their strata.
+    /// Axioms in the order of their strata.
     pub axioms: Vec<Axiom>,
     pub actions: Vec<Action>,
     pub atoms: Vec<Atom>,
     pub values: Vec<(Fluent, Q)>,
-    /// Timed initial literals in order of time, with one entry per time. `true` for atoms that become true.
+    /// Timed initial literals in order of time, with one entry per time. The flag is `true` for atoms that
+    /// become true.
     pub events: Vec<(Q, Vec<(bool, Atom)>)>,
     pub goal: Condition,
     pub measure: Measure,
 }
 
-/// Number in PDDL syntax.
+/// Formats a number in PDDL syntax.
 pub fn number(value: Q) -> String {
     if value < q(0) { format!("(- {})", decimal(&big(-value))) } else { decimal(&big(value)) }
 }
@@ -200,7 +201,7 @@ impl Task {
         }
     }
 
-    /// Text of a condition with `depth` bound variables.
+    /// Formats a condition in which `depth` variables are bound.
     fn condition(&self, condition: &Condition, depth: usize) -> String {
         let list = |word: &str, parts: &[Condition]| {
             let parts: String =
@@ -234,7 +235,7 @@ impl Task {
         }
     }
 
-    /// Text of an effect at a time specifier, which is empty for instantaneous actions.
+    /// Formats an effect with a time specifier, which is empty for instantaneous actions.
     fn effect(&self, effect: &Effect, time: &str, depth: usize) -> String {
         let at = |text: String| if time.is_empty() { text } else { format!("({time} {text})") };
         let list = |parts: &[Effect], depth: usize| {
@@ -307,7 +308,8 @@ impl Task {
         }
     }
 
-    /// Returns `true` if a goal, action or axiom other than its own mentions the predicate, which is the last one.
+    /// Returns `true` if a goal, an action or another axiom mentions the given predicate, which must be the
+    /// last one.
     pub fn domain_uses(&self, predicate: usize) -> bool {
         let name = &self.predicates[predicate].0;
         let mut task_without = self.clone();
@@ -319,7 +321,7 @@ impl Task {
         (actions + &axioms + &self.condition(&self.goal, 0)).contains(&format!("({name}"))
     }
 
-    /// Text of the PDDL domain.
+    /// Returns the text of the PDDL domain.
     pub fn domain(&self) -> String {
         let mut text = "(define (domain d) (:requirements :adl :fluents :durative-actions \
                         :timed-initial-literals :derived-predicates)\n (:types"
@@ -348,7 +350,7 @@ impl Task {
         text + ")\n"
     }
 
-    /// Text of the PDDL problem.
+    /// Returns the text of the PDDL problem.
     pub fn problem(&self) -> String {
         let mut text = "(define (problem p) (:domain d)\n (:objects".to_owned();
         for (object, kind) in self.objects.iter().enumerate() {
@@ -357,7 +359,7 @@ impl Task {
         text += ")\n (:init";
         self.atoms.iter().for_each(|atom| text += &format!(" {}", self.atom(atom)));
         for (fluent, value) in &self.values {
-            // Initial values must be numbers, so a negative one is not written as an expression.
+            // Initial values must be plain numbers, so a negative value is not written as an expression.
             let value = if *value < q(0) { format!("-{}", decimal(&big(-value))) } else { number(*value) };
             let _ = write!(text, " (= {} {value})", self.fluent(fluent));
         }

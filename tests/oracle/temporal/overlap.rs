@@ -26,7 +26,8 @@ use crate::judge::Truth;
 
 const INTERFERES: Obstacle = Obstacle::Blocked("happenings that interfere are too close");
 
-/// Over-all condition of a durative instance, with its arguments.
+/// Returns the condition over all of a durative instance, and its arguments. `None` for an instantaneous
+/// action.
 fn over_all(world: &World, instance: usize) -> Option<(&Condition, &[usize])> {
     let (action, objects) = &world.instances[instance];
     match &world.task.actions[*action].body {
@@ -43,7 +44,7 @@ fn duration(world: &World, instance: usize, state: &State) -> Result<Q, Obstacle
     }
 }
 
-/// Value of a plan, or the reason why it is invalid.
+/// Executes a plan. Returns its value, or the reason why the plan is invalid.
 pub fn execute(world: &World, plan: &[(usize, Q, Q)], separation: Q) -> Result<Q, Obstacle> {
     let mut times: Vec<(Q, usize, End)> = Vec::new();
     for (number, (_, start, length)) in plan.iter().enumerate() {
@@ -69,7 +70,7 @@ pub fn execute(world: &World, plan: &[(usize, Q, Q)], separation: Q) -> Result<Q
         for (_, event) in world.events.iter().filter(|(time, _)| *time == clock) {
             state = event.apply(&state)?;
         }
-        // All happenings of one time are evaluated in the state after the events of that time.
+        // All happenings of one time are evaluated in the state after the events of this time.
         let before = state.clone();
         for (time, number, end) in times.iter().filter(|(time, ..)| *time == clock) {
             let (instance, _, length) = plan[*number];
@@ -104,30 +105,31 @@ pub fn execute(world: &World, plan: &[(usize, Q, Q)], separation: Q) -> Result<Q
     value(world, &state, last, plan.len())
 }
 
-/// Maximum number of starts of one instance at one tick. Beyond it, the result is open.
+/// Maximum number of starts of one instance at one tick. If a plan could need more, the answer is open.
 const MAX_COPIES: usize = 3;
 
-/// State, running instances with their remaining ticks, current tick.
+/// Node of the search: state, running instances with their remaining ticks, and current tick.
 type Node = (State, Vec<(usize, i64)>, i64);
 
 struct Search<'w> {
     world: &'w World,
     unit: Q,
     reduction: Reduction,
-    /// The first tick after all events. Later ticks are equivalent.
+    /// The first tick after all events. Later ticks are equivalent to it.
     late: i64,
     numbers: HashMap<Node, usize>,
     nodes: Vec<Node>,
     graph: Graph,
-    /// Instances that start at the tick of each edge, with their durations in ticks.
+    /// For each edge, the instances that start at its tick, with their durations in ticks.
     starts: Vec<Vec<(usize, i64)>>,
-    /// Instances that start at the tick of each final step.
+    /// For each final step, the instances that start at its tick, with their durations in ticks.
     last_starts: Vec<Vec<(usize, i64)>>,
-    /// `true` if the graph is incomplete.
+    /// Whether the graph is incomplete.
     open: bool,
 }
 
-/// Correct answer for a task whose times are multiples of `unit`, which is also the separation; open beyond `cap` nodes.
+/// Returns the correct answer for a task whose times are multiples of `unit`, which is also the separation.
+/// The answer is open if the search would exceed `cap` nodes.
 pub fn best(world: &World, unit: Q, cap: usize) -> Truth {
     let reduction = Reduction::new(world);
     let late = world.events.last().map_or(0, |(time, _)| (time / unit).to_integer() + 1);
@@ -166,7 +168,7 @@ pub fn best(world: &World, unit: Q, cap: usize) -> Truth {
     judged(world, search.graph.optimum(), empty, search.open, &schedule, &|plan| execute(world, plan, unit))
 }
 
-/// Happenings of one tick, and the instances that run or start at it.
+/// Happenings of one tick, and the instances that run or start at this tick.
 #[derive(Clone)]
 struct Tick {
     happenings: Vec<Happening>,
@@ -201,7 +203,7 @@ impl Search<'_> {
                 current.running.push((instance, remaining));
                 continue;
             }
-            // An action that cannot end makes the node a dead end.
+            // If an action cannot end, the node is a dead end.
             current.ended = true;
             match self.world.happening(instance, End::Finish, &state) {
                 Ok(end) if current.happenings.iter().all(|happening| !happening.interferes(&end)) => {
@@ -214,7 +216,8 @@ impl Search<'_> {
         self.choose(from, &state, 0, &current);
     }
 
-    /// Returns `true` if a happening increases or scales a relevant number, so that repeating it makes a difference.
+    /// Returns `true` if a happening increases or scales a relevant number, so that its repetition makes a
+    /// difference.
     fn is_cumulative(&self, happening: &Happening) -> bool {
         let relative = |change: &Change| {
             matches!(change, Change::Add(by) if *by != q(0))
@@ -245,7 +248,7 @@ impl Search<'_> {
         })
     }
 
-    /// Starts any further instances with numbers from `first` on, in all combinations.
+    /// Starts further instances, with numbers from `first` on, in all combinations.
     fn choose(&mut self, from: usize, state: &State, first: usize, tick: &Tick) {
         for instance in first..self.world.instances.len() {
             let Ok(length) = duration(self.world, instance, state) else { continue };
@@ -286,7 +289,8 @@ impl Search<'_> {
     /// Completes the tick once all starts are chosen: applies its happenings and adds edges to the graph.
     fn finish(&mut self, from: usize, state: &State, tick: &Tick) -> Result<(), Obstacle> {
         let mut after = state.clone();
-        // The events have been applied already. Applying them again is harmless, as nothing at this tick interferes with them.
+        // The events have been applied already. Applying them again is harmless, because nothing at this tick
+        // interferes with them.
         for happening in &tick.happenings {
             after = happening.apply(&after)?;
         }
@@ -306,8 +310,8 @@ impl Search<'_> {
         let number = self.nodes[from].2 + 1;
         let target = self.node((after, running, number));
         let cost = fit(cost + self.reduction.time * self.unit)?;
-        // After all events, a tick that changes nothing leads back to its node. Such an edge matters only if it gains something each
-        // time.
+        // After all events, a tick that changes nothing leads back to its node. Such an edge matters only if
+        // each repetition improves the value.
         if target != from || cost < Q::from_integer(0) {
             self.graph.edges.push((from, target, cost));
             self.starts.push(tick.starts.clone());

@@ -1,4 +1,4 @@
-//! The problem of a random task: initial state, events, goal and measure.
+//! Generates the problem of a random task: initial state, events, goal and measure.
 
 use super::happening::World;
 use super::make::{COST, LENGTH, LEVEL, MAYBE, Maker, always_true, constant};
@@ -49,7 +49,7 @@ impl Maker {
         self.task.values.push((Fluent { function: COST, terms: Vec::new() }, q(0)));
     }
 
-    /// Distinct positive durations of the ground actions in the initial state, sorted.
+    /// Returns the distinct positive durations of the ground actions in the initial state, sorted.
     fn durations(&self) -> Vec<Q> {
         let world = World::new(self.task.clone());
         let duration = |(action, objects): &(usize, Vec<usize>)| match &self.task.actions[*action].body {
@@ -73,7 +73,8 @@ impl Maker {
         }
         let atoms = self.ground_atoms();
         for _ in 0..self.random.usize(1..5) {
-            // Times of events are sums of durations with a small offset, so that events and ends coincide or almost coincide.
+            // The times of events are sums of durations with a small offset, so that events and ends coincide
+            // or almost coincide.
             let mut time = q(0);
             for _ in 0..self.random.usize(..3) {
                 time += if durations.is_empty() {
@@ -182,7 +183,8 @@ impl Maker {
         self.task.actions.push(Action { name: "dear".into(), parameters: Vec::new(), body });
     }
 
-    /// Chooses the measure. There is no metric only if it is clear whether plans are measured by their time.
+    /// Chooses the measure. A task has no metric only if it is clear whether plans are then measured by their
+    /// time.
     pub(super) fn measure(&mut self) {
         let is_durative = |action: &&Action| matches!(action.body, Body::Durative { .. });
         let durative = self.task.actions.iter().filter(is_durative).count();

@@ -1,4 +1,5 @@
-//! Relevance analysis of numbers: those that nothing reads and that only increase or decrease become action costs.
+//! Relevance analysis of numbers: numbers that nothing reads and that only increase or decrease become action
+//! costs.
 
 use super::happening::{Obstacle, State, World, fit};
 use super::model::{Body, Condition, Effect, Expression, Measure, Operation, Q, q};
@@ -8,24 +9,25 @@ use super::model::{Body, Condition, Effect, Expression, Measure, Operation, Q, q
 pub enum Role {
     /// Part of the state.
     Kept,
-    /// Excluded from the state. Its changes are costs, multiplied by its weight in the metric.
+    /// Excluded from the state. Changes of the number are costs, multiplied by the number's weight in the
+    /// metric.
     Cost(Q),
-    /// Excluded from the state, as nothing reads its value. Only whether it is defined matters.
+    /// Excluded from the state, because nothing reads its value. Only whether the number is defined matters.
     Unread,
 }
 
-/// Reduction of states, and the parts of the metric.
+/// Reduction of states to relevant numbers, and the parts of the metric.
 #[derive(Debug)]
 pub struct Reduction {
     roles: Vec<Role>,
-    /// Weight of the total time.
+    /// Weight of the total time in the metric.
     pub time: Q,
-    /// Cost of each action: 1 if plans are measured by their steps.
+    /// Cost of each action: 1 if plans are measured by their number of steps, otherwise 0.
     pub step: Q,
-    /// Weights of the numbers that are part of the state.
+    /// Weights in the metric of the numbers that are part of the state.
     remaining: Vec<(Q, usize)>,
     pub maximize: bool,
-    /// Contribution of the initial values of the other numbers to the metric.
+    /// Contribution of the initial values of the excluded numbers to the metric.
     offset: Q,
 }
 
@@ -62,7 +64,8 @@ fn condition_functions(condition: &Condition, functions: &mut Vec<usize>) {
     }
 }
 
-/// Collects the functions that effects read, and those that effects change other than by increase and decrease.
+/// Collects the functions that effects read, and the functions that effects change other than by increase and
+/// decrease.
 fn effect_functions(effects: &[Effect], read: &mut Vec<usize>, assigned: &mut Vec<usize>) {
     for effect in effects {
         match effect {
@@ -135,7 +138,8 @@ impl Reduction {
         Self { roles, time, step, remaining, maximize, offset }
     }
 
-    /// Removes irrelevant values from a state. Returns the new state, and the contribution of the removed values to the metric.
+    /// Removes irrelevant values from a state. Returns the reduced state, and the contribution of the removed
+    /// values to the metric.
     pub fn reduce(&self, mut state: State) -> Result<(State, Q), Obstacle> {
         let mut cost = q(0);
         for (value, role) in state.values.iter_mut().zip(&self.roles) {
@@ -149,12 +153,13 @@ impl Reduction {
         Ok((state, cost))
     }
 
-    /// Returns `true` if a number is part of the state.
+    /// Returns `true` if a number is part of the reduced state.
     pub fn keeps(&self, at: usize) -> bool {
         self.roles[at] == Role::Kept
     }
 
-    /// Contribution of the state and of the initial values to the metric, in addition to action costs.
+    /// Returns the contribution of the state and of the initial values to the metric. Action costs come in
+    /// addition.
     pub fn remaining_metric(&self, state: &State) -> Result<Q, Obstacle> {
         let mut sum = self.offset;
         for (weight, at) in &self.remaining {

@@ -30,17 +30,18 @@ use super::happening::{End, Obstacle, State, World, fit};
 use super::model::{Body, Q, q};
 use super::reduce::Reduction;
 
-/// Lower bound of a time, and whether it is strict.
+/// Lower bound of a time. The flag is `true` if the bound is strict.
 type Clock = (Q, bool);
-/// State, number of applied events, clock. After the last event the clock is irrelevant and set to 0.
+/// Node of the search: state, number of applied events, and clock. After the last event the clock is
+/// irrelevant and set to 0.
 type Node = (State, usize, Clock);
 
-/// An action or a wait between two nodes.
+/// An action or a wait, which leads from one node to another.
 #[derive(Debug, Clone)]
 pub struct Edge {
     pub from: usize,
     pub to: usize,
-    /// Cost; negated if the metric is maximised.
+    /// Cost of the edge; negated if the metric is maximised.
     pub cost: Q,
     /// Instance, duration, infimum of the start, and an upper limit of the total delay. `None` for waiting.
     pub step: Option<(usize, Q, Clock, Option<Q>)>,
@@ -53,16 +54,16 @@ pub struct Search<'w> {
     pub nodes: Vec<Node>,
     numbers: HashMap<Node, usize>,
     pub edges: Vec<Edge>,
-    /// Edges that reach a goal, with the final cost there.
+    /// Edges that reach a goal, each with the final cost.
     pub goals: Vec<(usize, Q)>,
-    /// Final cost of the empty plan, if it reaches the goal.
+    /// Final cost of the empty plan, if the initial state satisfies the goal.
     pub empty: Option<Q>,
-    /// `true` if the graph is incomplete.
+    /// Whether the graph is incomplete.
     pub open: bool,
 }
 
 impl<'w> Search<'w> {
-    /// Builds the graph, up to `cap` nodes.
+    /// Builds the graph with at most `cap` nodes.
     pub fn new(world: &'w World, cap: usize) -> Self {
         let reduction = Reduction::new(world);
         let mut search = Self {
@@ -117,7 +118,7 @@ impl<'w> Search<'w> {
         self.nodes.len() - 1
     }
 
-    /// Adds all edges out of a node.
+    /// Adds all edges that leave a node.
     fn expand(&mut self, from: usize) {
         let (state, applied, clock) = self.nodes[from].clone();
         if let Some((time, event)) = self.world.events.get(applied) {
@@ -130,12 +131,13 @@ impl<'w> Search<'w> {
             }
         }
         for instance in 0..self.world.instances.len() {
-            // Starts at the event itself and later starts are separate choices.
+            // A start at the event itself and a later start are separate choices.
             let at_event = applied > 0 && applied < self.world.events.len() && !clock.1;
             let event = self.event_time(applied.wrapping_sub(1)).filter(|time| at_event && *time == clock.0);
             let starts = match event {
                 Some(time) => vec![((time, false), Some(time)), ((time, true), None)],
-                // After the last event, a start just after it is as good as one at it, and cannot interfere with it.
+                // After the last event, a start just after the event is as good as a start at it, and cannot
+                // interfere with it.
                 None if applied > 0 && applied == self.world.events.len() => vec![((q(0), true), None)],
                 None => vec![(clock, None)],
             };
@@ -147,7 +149,7 @@ impl<'w> Search<'w> {
         }
     }
 
-    /// Adds edges for an action that starts from `lower` on, or at `point` only.
+    /// Adds the edges of an action that starts at or after `lower`, or exactly at `point` if it is given.
     fn action(
         &mut self,
         from: usize,
@@ -174,7 +176,7 @@ impl<'w> Search<'w> {
             return Ok(());
         }
         let mut state = start_happening.apply(&state)?;
-        // Exclusive upper bound of the start.
+        // The next event is the exclusive upper bound of the start.
         let next = self.event_time(applied);
         if !is_durative {
             let gap = next.map(|next| next - lower.0);
@@ -220,7 +222,7 @@ impl<'w> Search<'w> {
         Ok(())
     }
 
-    /// Adds the edge of an action whose end leads to a state.
+    /// Adds the edge of an action that ends in the given state.
     fn reach(
         &mut self,
         (from, instance, duration): (usize, usize, Q),
@@ -250,8 +252,9 @@ impl<'w> Search<'w> {
 
 const INTERFERES: Obstacle = Obstacle::Blocked("an event at the same time interferes");
 
-/// Infimum of the starts from `lower` on (or at `point`) and before `next` whose ends lie strictly between two events, with the size of
-/// the interval. `None` if it is empty.
+/// Returns the infimum of the starts whose ends lie strictly between two events, with the size of the
+/// interval. The starts are at or after `lower` (or exactly at `point`) and before `next`. `None` if there is
+/// no such start.
 fn start_times(
     lower: Clock,
     point: Option<Q>,

@@ -1,4 +1,4 @@
-//! Tests of recordings after a crash.
+//! Tests of recordings (MCAP files) after a crash of the program.
 
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::Path;
@@ -11,10 +11,10 @@ use serde_json::Value;
 use super::{decision, decisions, input, run};
 use crate::common::root;
 
-/// Timeout for messages to reach the file, generous for busy machines.
+/// Timeout for messages to reach the file, which is generous for busy machines.
 const TIMEOUT: Duration = Duration::from_secs(30);
 
-/// Number of messages of a topic in a file that can be truncated.
+/// Returns the number of messages of a topic that can be read from a file, which may be truncated.
 pub(super) fn count_readable_messages(file: &Path, topic: &str) -> usize {
     let bytes = std::fs::read(file).expect("the file is read");
     let stream = MessageStream::new_with_options(&bytes, Options::IgnoreEndMagic.into());
@@ -22,8 +22,8 @@ pub(super) fn count_readable_messages(file: &Path, topic: &str) -> usize {
     stream.map_while(Result::ok).filter(|message| message.channel.topic == topic).count()
 }
 
-/// Starts a recorded run and sends each line once the previous one is answered, in the order of a replay. Returns when all answers are in
-/// the file.
+/// Starts a recorded run and sends each line once the previous line is answered, as in a replay. Returns the
+/// process and the answers once all answers are in the file.
 fn start_recorded_run(file: &Path) -> (Child, Vec<Value>) {
     let mut child = Command::new(env!("CARGO_BIN_EXE_metaplan"))
         .args(["run", "missions/ugv.toml", "--mcap"])
@@ -78,7 +78,7 @@ fn recordings_of_killed_runs_can_be_replayed() {
     super::others::assert_readable_by_python(&file, input().lines().count());
 }
 
-/// A file that is truncated at any point is read up to its last complete chunk.
+/// A truncated file is read up to its last complete chunk, regardless of the point of truncation.
 #[test]
 fn truncated_recordings_are_read_up_to_the_last_chunk() {
     let directory = tempfile::tempdir().expect("a directory");

@@ -1,4 +1,5 @@
-//! Tests of `metaplan run --mcap`, and of `--events` with MCAP files, by the reference library and other implementations.
+//! Tests of `metaplan run --mcap`, and of `--events` with MCAP files, against the reference library and other
+//! implementations.
 
 mod crash;
 mod others;
@@ -10,7 +11,7 @@ use serde_json::{Value, json};
 
 use crate::common::{Outcome, metaplan_in, root};
 
-/// A run with measurements, a failure, invalid lines, and a ROS 2 diagnostics message.
+/// Input lines of a run: measurements, a failure, invalid lines, and a ROS 2 diagnostics message.
 const EVENTS: [&str; 9] = [
     r#"{"event":"measured","attribute":"ambient_light","value":0.50,"time":1.5}"#,
     r#"{"event":"action_succeeded","action":1}"#,
@@ -28,7 +29,7 @@ fn input() -> String {
     EVENTS.map(|line| line.replace('\n', " ")).join("\n")
 }
 
-/// Answers of a run without times and progress reports.
+/// Returns the answers of a run without times and progress reports.
 fn decisions(outcome: &Outcome) -> Vec<Value> {
     assert_eq!(outcome.status, 0, "{outcome:#?}");
     outcome.stdout.lines().map(decision).filter(|answer| answer["answer"] != "planning").collect()
@@ -45,7 +46,7 @@ fn run(arguments: &[&str], input: &str) -> Outcome {
     metaplan_in(&root(), &command, input)
 }
 
-/// A recorded message: topic, schema, log time, data.
+/// A recorded message: topic, name of the schema, log time, and data.
 type Recorded = (String, String, u64, Vec<u8>);
 
 fn messages(file: &Path) -> Vec<Recorded> {
@@ -59,8 +60,8 @@ fn messages(file: &Path) -> Vec<Recorded> {
     stream.map(message).collect()
 }
 
-/// An encoder of CDR (little-endian): numbers are aligned to their size, counted after the encapsulation header of four octets; strings
-/// have a length prefix and a terminating zero.
+/// Encoder of CDR (little-endian). Numbers are aligned to their size, counted after the encapsulation header
+/// of four octets. Strings have a length prefix and a terminating zero.
 #[derive(Default)]
 struct Cdr(Vec<u8>);
 
@@ -172,7 +173,7 @@ fn replayed_recordings_give_the_same_decisions() {
             original,
             "{form}: a recording of a replay"
         );
-        // Replay from standard input, which is not seekable in general.
+        // The recording is replayed from standard input, which is not seekable in general.
         let bytes = std::fs::File::open(&file).expect("the file");
         let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_metaplan"));
         let output = child.args(["run", "missions/ugv.toml"]).current_dir(root()).stdin(bytes).output();
@@ -235,7 +236,7 @@ fn channels_declare_their_encoding_and_schema() {
     }
 }
 
-/// The message definitions in recordings are the ones of the ROS 2 interfaces.
+/// The message definitions in recordings equal those of the ROS 2 interfaces.
 #[test]
 fn message_definitions_match_the_ros_interfaces() {
     let directory = tempfile::tempdir().expect("a directory");

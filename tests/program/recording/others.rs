@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use super::{decisions, input, run};
 use crate::common::root;
 
-/// Python executable with the packages, if available. Otherwise prints the reason for skipping.
+/// Returns the Python executable with the packages, if available. Otherwise prints the reason for skipping.
 fn python() -> Option<String> {
     let python = std::env::var("METAPLAN_PYTHON").unwrap_or_else(|_| "python3".to_owned());
     let output = Command::new(&python).args(["-c", "import mcap.reader, mcap_ros2.decoder"]).output();
@@ -28,7 +28,7 @@ fn python() -> Option<String> {
     }
 }
 
-/// Output of the script, one JSON value per line.
+/// Runs the peer script and returns its output, one JSON value per line.
 fn peer(python: &str, arguments: &[&str], input: &str) -> Vec<Value> {
     let mut child = Command::new(python)
         .arg(root().join("tests/recording/peer.py"))

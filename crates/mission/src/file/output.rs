@@ -52,7 +52,7 @@ pub fn is_stdout(path: &Path) -> bool {
 /// The file cannot be opened for writing.
 pub fn create(path: &Path) -> io::Result<(File, Pending)> {
     if is_stdout(path) {
-        // Text that was printed before must precede the new content.
+        // Previously printed text must precede the new content.
         io::stdout().flush()?;
         return Ok((stdout()?, Pending::written()));
     }
@@ -69,8 +69,8 @@ pub fn create(path: &Path) -> io::Result<(File, Pending)> {
     let Some(existing) = existing else {
         return Ok(pending(temporary(&target)?, target, None));
     };
-    // Replacement needs write access to the directory only. Opening the file enforces its own
-    // protection as well.
+    // Replacement needs only write access to the directory. Opening the file also enforces its own
+    // write protection.
     let mut writable = OpenOptions::new();
     writable.write(true);
     let old = writable.clone().read(true).open(path).or_else(|_| writable.open(path))?;
@@ -82,12 +82,13 @@ pub fn create(path: &Path) -> io::Result<(File, Pending)> {
     })
 }
 
-/// A written file that is not yet visible under its name.
+/// A written output file that is not yet visible at its final path.
 #[derive(Debug)]
 #[must_use = "a regular file has its content once it is committed"]
 pub struct Pending(Option<(TempPath, PathBuf, Option<InPlace>)>);
 
-/// An existing file to overwrite: always if `is_certain`, otherwise only if replacing it fails.
+/// An existing file to overwrite: always if `is_certain`, otherwise only if the rename over the
+/// file fails.
 #[derive(Debug)]
 struct InPlace {
     old: File,
@@ -95,7 +96,7 @@ struct InPlace {
 }
 
 impl Pending {
-    /// Returns an output that is already complete. Committing it has no effect.
+    /// Creates an output that is already complete; [`Pending::commit`] then has no effect.
     fn written() -> Self {
         Self(None)
     }
@@ -103,7 +104,7 @@ impl Pending {
     /// Moves the content to its final path.
     ///
     /// # Errors
-    /// The file cannot be written. Former content is then unchanged.
+    /// The file cannot be written. An existing file then keeps its former content.
     pub fn commit(self) -> io::Result<()> {
         let Some((temporary, target, existing)) = self.0 else { return Ok(()) };
         // The content must reach the disk before the rename, or a crash could leave an empty file.
@@ -137,14 +138,14 @@ fn overwrite(mut file: File, source: &Path) -> io::Result<()> {
     };
     let written = File::open(source).and_then(|mut source| fill(&mut source));
     if written.is_err() && is_kept {
-        // The result of restoring is ignored, because the first error is the one to report.
+        // A failure to restore is ignored, because the first error is to be reported.
         let _ = fill(&mut &former[..]);
     }
     written
 }
 
-/// Resolves all symbolic links of a path, whose target need not exist. Also returns whether a link
-/// is a descriptor of a process.
+/// Resolves all symbolic links of a path; the target need not exist. The returned flag is `true` if
+/// a link is a file descriptor of a process, as `/dev/fd/3` is.
 fn followed(path: &Path) -> io::Result<(PathBuf, bool)> {
     let (mut path, mut is_descriptor) = (path.to_owned(), false);
     for _ in 0..MAX_LINKS {
@@ -170,7 +171,7 @@ fn temporary(path: &Path) -> io::Result<NamedTempFile> {
     temporary.tempfile_in(directory(path))
 }
 
-/// A directory that is being filled and is not yet visible under its name.
+/// A new directory whose files are being written and that is not yet visible at its final path.
 #[derive(Debug)]
 #[must_use = "the directory has its files once it is committed"]
 pub struct PendingDirectory {
@@ -180,8 +181,8 @@ pub struct PendingDirectory {
     exists: bool,
 }
 
-/// Starts a new directory. The target must be absent or empty. An existing target keeps its mode
-/// and owner, and may be a mount point.
+/// Starts a new directory. The target must be absent or an empty directory. An existing target
+/// keeps its mode and owner, and may be a mount point.
 ///
 /// # Errors
 /// The target is not empty, or cannot be written.
@@ -206,14 +207,15 @@ impl PendingDirectory {
         self.files.path()
     }
 
-    /// Moves the directory to its final path.
+    /// Moves the files to the final path of the directory.
     ///
     /// # Errors
     /// The directory cannot be written.
     pub fn commit(self) -> io::Result<()> {
         if !self.exists {
             std::fs::rename(self.path(), &self.target)?;
-            // The rename has removed the temporary name, so the guard must not delete it.
+            // The rename has removed the temporary name, so the temporary directory must not be
+            // deleted.
             let _ = self.files.keep();
             return Ok(());
         }
@@ -240,7 +242,7 @@ mod system {
         io::stderr().as_fd().try_clone_to_owned().map(File::from)
     }
 
-    /// Returns `true` if the metadata belong to an open file.
+    /// Returns `true` if the metadata belong to the open file `open`.
     pub(super) fn is_same(named: &Metadata, open: Option<File>) -> bool {
         let open = open.and_then(|file| file.metadata().ok());
         open.is_some_and(|open| (named.dev(), named.ino()) == (open.dev(), open.ino()))
@@ -250,7 +252,7 @@ mod system {
         file.nlink() > 1
     }
 
-    /// Gives `file` the owner, the group and the mode of another one.
+    /// Gives `file` the owner, the group and the mode of the file with the metadata `other`.
     pub(super) fn adopt(file: &File, other: &Metadata) -> io::Result<()> {
         let current = file.metadata()?;
         if (current.uid(), current.gid()) != (other.uid(), other.gid()) {

@@ -1,5 +1,5 @@
-//! A knowledge base at run time: OWL documents and rule files in an engine, updated with reports of
-//! the robot.
+//! A knowledge base at run time: OWL documents and rule files in a Datalog engine, updated with
+//! reports of the robot.
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -22,33 +22,34 @@ use crate::knowledge::waiting::Waiting;
 use crate::message::{Errors, Message};
 use crate::planta::Terms;
 
-/// Number of equal names of an individual from which not all of their pairs are listed.
+/// Maximum number of equal names of an individual of which all pairs are listed.
 const MANY_NAMES: usize = 32;
 
 /// Knowledge about a robot: assertions and the facts inferred from them.
 #[derive(Debug, Clone)]
 pub struct Knowledge {
     pub(super) runtime: Runtime,
-    /// Cached queries, kept consistent with `runtime`.
+    /// Cached queries of planning, kept consistent with `runtime`.
     pub(super) catalogue: OnceLock<Arc<Catalogue>>,
-    /// Reports that have had no inferred consequences yet.
+    /// Reports whose inferred consequences are not known yet.
     pub(super) waiting: Waiting,
-    /// State after reading. Shares all unchanged data with `runtime`.
+    /// State after reading the documents. Shares all unchanged data with `runtime`.
     origin: Runtime,
     rule_count: usize,
     warnings: Vec<Message>,
     pub(super) sources: Sources,
-    /// Object names of individuals that replace their local names.
+    /// Object names that replace the local names of individuals, by IRI.
     pub(super) called: Arc<CalledNames>,
     entities: Arc<[(EntityKind, Iri)]>,
     /// Names of all documents, including imported ones.
     documents: Arc<[String]>,
     annotations: Arc<[(Iri, Annotation)]>,
-    /// Translated terminology for a domain in PLANTA's form.
+    /// Translation of the ontology to PDDL, if the documents were read for a domain in PLANTA's
+    /// form, which uses undeclared names of the ontology.
     terms: Option<Arc<Terms>>,
     /// Assertions and axioms of the documents and rule files.
     documented: Arc<ontology::Stated>,
-    /// Assertions, if the engine does not distinguish them from inferred facts.
+    /// Asserted facts, if the engine does not distinguish them from inferred facts.
     stated: Option<Arc<[Fact]>>,
 }
 
@@ -71,8 +72,7 @@ impl Knowledge {
         Self::read_as(sources, Equality::Owl)
     }
 
-    /// Reads documents and rules, as [`Knowledge::read`] does, with the given semantics of
-    /// equality.
+    /// Like [`Knowledge::read`], but with the given semantics of equality between individuals.
     ///
     /// # Errors
     /// All errors of the sources.
@@ -80,8 +80,9 @@ impl Knowledge {
         Self::of_stated(sources, Stated::read(sources, equality)?)
     }
 
-    /// Reads documents and rules for a domain, as [`Knowledge::read`] does. For a domain in
-    /// PLANTA's form, keeps the translated terminology and assumes unique names.
+    /// Like [`Knowledge::read`], but for a given domain text. If the domain is in PLANTA's form, that
+    /// is, uses undeclared names of the ontology, keeps the translation of the ontology to PDDL and
+    /// assumes unique names.
     ///
     /// # Errors
     /// All errors of the sources.
@@ -113,10 +114,10 @@ impl Knowledge {
         })
     }
 
-    /// Creates knowledge without rules, from all facts of a proof, asserted and inferred.
+    /// Creates knowledge without rules from all facts of a proof, both asserted and inferred.
     ///
     /// # Errors
-    /// The facts refer to other symbols.
+    /// A fact refers to a symbol that is not in `symbols`.
     pub fn closed(symbols: Symbols, facts: Vec<Fact>, equality: bool) -> Result<Self, Errors> {
         let program = Program { rules: Vec::new(), equality };
         let engine = Engine::new(symbols, program, facts)
@@ -126,20 +127,20 @@ impl Knowledge {
         Ok(Self::of(runtime, 0, Vec::new(), sources, entities))
     }
 
-    /// Adds to [`Knowledge::closed`] the translated terminology for a domain in PLANTA's form, and
-    /// its asserted facts.
+    /// Sets the translation of the ontology to PDDL, for a domain in PLANTA's form, and the asserted
+    /// facts. Used after [`Knowledge::closed`].
     #[must_use]
     pub fn with_terms(self, terms: Option<Arc<Terms>>, stated: &[Fact]) -> Self {
         Self { terms, stated: Some(stated.into()), ..self }
     }
 
-    /// Returns the translated terminology, if the documents were read for a domain in PLANTA's
-    /// form.
+    /// Returns the translation of the ontology to PDDL, if the documents were read for a domain in
+    /// PLANTA's form.
     pub(crate) fn terms(&self) -> Option<&Arc<Terms>> {
         self.terms.as_ref()
     }
 
-    /// Returns the current assertions.
+    /// Returns the currently asserted facts.
     pub(crate) fn stated(&self) -> Vec<Fact> {
         let engine = self.engine();
         match &self.stated {
@@ -180,12 +181,12 @@ impl Knowledge {
         &self.warnings
     }
 
-    /// Returns the classes, properties and individuals of the documents.
+    /// Returns the classes, properties and individuals that occur in the documents.
     pub fn entities(&self) -> &[(EntityKind, Iri)] {
         &self.entities
     }
 
-    /// Returns the annotations of entities.
+    /// Returns the annotations of entities in the documents: entity and annotation.
     pub fn annotations(&self) -> &[(Iri, Annotation)] {
         &self.annotations
     }
@@ -195,7 +196,7 @@ impl Knowledge {
         &self.sources
     }
 
-    /// Returns the names of the documents: file paths, including those of imported files.
+    /// Returns the names of the documents: file paths, including imported files.
     pub fn documents(&self) -> &[String] {
         &self.documents
     }
@@ -210,7 +211,7 @@ impl Knowledge {
         self.runtime.view().calling(&self.called)
     }
 
-    /// Sets the object names of individuals, by IRI.
+    /// Sets the object names of individuals (object name by IRI), which replace their local names.
     pub(crate) fn call(&mut self, called: CalledNames) {
         self.called = Arc::new(called);
         self.catalogue = OnceLock::new();
@@ -232,12 +233,14 @@ impl Knowledge {
         &mut self.runtime
     }
 
-    /// Returns the cached results of the queries of planning.
+    /// Returns the designs, actions and measured values that planning queries; the results are
+    /// cached.
     pub fn catalogue(&self) -> &Catalogue {
         self.catalogue.get_or_init(|| Arc::new(Catalogue::new(&self.view())))
     }
 
-    /// Updates the query cache after a change of facts, or discards it.
+    /// Updates the query cache after a change of facts. Discards the cache if the change cannot be
+    /// applied to it.
     pub(super) fn follow(&mut self, delta: &Delta) {
         let engine = self.runtime.engine();
         if self.catalogue.get_mut().is_some_and(|own| !Arc::make_mut(own).follow(delta, engine)) {
@@ -245,20 +248,22 @@ impl Knowledge {
         }
     }
 
-    /// Converts the result of an update, after updating the query cache.
+    /// Returns the change of facts of a successful update, after applying the change to the query
+    /// cache. Converts an error to a message.
     fn changed(&mut self, outcome: Result<Delta, ontology::Error>) -> Result<Delta, Message> {
         let delta = outcome.map_err(|error| Message::from_ontology(&error))?;
         self.follow(&delta);
         Ok(delta)
     }
 
-    /// Returns the IRI of the individual with this object name.
+    /// Returns the IRI of the individual to which this object name was given, ignoring case.
     fn called_so(&self, name: &str) -> Option<&str> {
         let is_so = |(_, own): &(&String, &String)| own.eq_ignore_ascii_case(name);
         self.called.iter().find(is_so).map(|(iri, _)| iri.as_str())
     }
 
-    /// Returns the local name of a component, given by IRI, local name or object name.
+    /// Returns the local name of a component, given by IRI, local name or object name. `None` if
+    /// there is no such component.
     pub fn known_component(&self, name: &str) -> Option<String> {
         let name = self.component(name);
         let components = self.runtime.view().components().into_iter().map(|component| component.individual);
@@ -268,8 +273,8 @@ impl Knowledge {
             .map(|component| component.name)
     }
 
-    /// Resolves the name of a component. Object names are considered only if no component has the
-    /// name.
+    /// Resolves an object name to the IRI of its individual. Returns `name` itself if a component
+    /// has this IRI or local name, or if no individual has this object name.
     pub(super) fn component(&self, name: &str) -> String {
         let iri = self.called_so(name).filter(|_| {
             let components = self.runtime.view().components();
@@ -326,9 +331,9 @@ impl Knowledge {
         self.changed(outcome)
     }
 
-    /// Replaces the objectives of the robot. `configuration` has the functions, each with the
-    /// design that grounds it, by their object names. The objective of a function is named
-    /// `o_<function>`. Component statuses are unchanged.
+    /// Replaces the objectives of the robot that are named `o_<function>`. `configuration` lists
+    /// the functions, each with the design that grounds it, by their object names. Component
+    /// statuses are unchanged.
     ///
     /// # Errors
     /// There is no such function or design.
@@ -377,7 +382,8 @@ impl Knowledge {
         Ok(())
     }
 
-    /// Returns the differences between the current assertions and those of the documents, sorted.
+    /// Returns the differences between the current assertions and the assertions of the documents,
+    /// sorted.
     pub fn statements(&self) -> Statements {
         let stated = |runtime: &Runtime| -> BTreeSet<Statement> {
             let engine = runtime.engine();
@@ -391,8 +397,8 @@ impl Knowledge {
         }
     }
 
-    /// Resets the knowledge to the documents and applies the differences. Everything else since
-    /// reading is discarded, such as names of former measured values.
+    /// Resets the knowledge to the documents and applies the differences. All other changes since
+    /// reading are discarded, such as names of former measured values.
     ///
     /// # Errors
     /// Inference exceeds its limits; the knowledge is then unchanged.
@@ -430,10 +436,10 @@ impl Knowledge {
         self.changed(outcome).map(|_| ())
     }
 
-    /// Adds the assertions, axioms and rules of the documents in `asserted` and removes those in
-    /// `retracted`. The result equals the knowledge read from the combined document. A statement
-    /// that occurs in both is kept. Imports of these documents are not followed. Returns the
-    /// warnings, which are also added to [`Knowledge::warnings`].
+    /// Adds the assertions, axioms and rules of the documents in `asserted` and removes those of
+    /// the documents in `retracted`. The result equals the knowledge read from the combined
+    /// document. A statement that occurs in both lists is kept. Imports of these documents are not
+    /// followed. Returns the warnings, which are also added to [`Knowledge::warnings`].
     ///
     /// # Errors
     /// All errors of the documents, a retracted anonymous individual, or exceeded limits of
@@ -444,7 +450,7 @@ impl Knowledge {
             let messages = errors.iter().map(Message::from_ontology).collect();
             Errors::from(quoted(discreet(messages)))
         })?;
-        // Snapshots are restored relative to `origin`, so it must be revised as well.
+        // Snapshots are restored relative to `origin`, so `origin` must be revised as well.
         let (mut runtime, mut origin) = (self.runtime.clone(), self.origin.clone());
         origin.engine_mut().adopt_symbols(self.runtime.engine());
         for runtime in [&mut runtime, &mut origin] {
@@ -462,8 +468,8 @@ impl Knowledge {
         Ok(warnings)
     }
 
-    /// Returns the inferred facts in an order that depends only on the sources. The equality of an
-    /// individual with more than 32 names is listed only by the pairs with its first name.
+    /// Returns the inferred facts in an order that depends only on the sources. If an individual
+    /// has more than 32 equal names, only the pairs with its first name are listed.
     pub fn inferred(&self) -> Vec<Fact> {
         self.engine().inferred_in_brief(MANY_NAMES)
     }
@@ -481,7 +487,7 @@ impl Knowledge {
     }
 }
 
-/// Formats a fact. The membership in an internal group of exclusive individuals is written in
+/// Formats a fact. Membership in an internal group of mutually exclusive individuals is written in
 /// words.
 fn shown(fact: &Fact, symbols: &Symbols) -> String {
     let name = symbols.value(fact.predicate).as_name().unwrap_or_default();

@@ -1,4 +1,4 @@
-//! Cache for the knowledge-base queries of planning, kept across events.
+//! Cache of the knowledge-base queries that planning needs, kept across events.
 //!
 //! Most events change the availability of designs, a measured value or the status of an objective.
 //! These changes are applied incrementally. All other changes rebuild the cache. The cache always
@@ -11,24 +11,25 @@ use ontology::tomasys::{Action, FunctionDesign, Individual, Measurement, View};
 use ontology::vocab::{local_name, pddl_tomasys, tomasys};
 use rules::{Delta, Engine, Fact, Literal, Symbol};
 
-/// Designs, actions and measured values, and the members of queried classes.
+/// Cached designs, actions and measured values, and the members of already queried classes.
 #[derive(Debug, Clone)]
 pub struct Catalogue {
     designs: Vec<FunctionDesign>,
     actions: Vec<Action>,
     measurements: Vec<Measurement>,
-    /// Shared by copies, which is safe because a change of a class replaces the whole cache.
+    /// Members of each queried class. Shared by copies, which is safe because a change of a class
+    /// replaces the whole cache.
     classes: Arc<Mutex<BTreeMap<String, Arc<[Individual]>>>>,
 }
 
 /// Properties that determine the availability of a design.
 const AVAILABILITY: [&str; 3] =
     [tomasys::FD_REALISABILITY, pddl_tomasys::FD_REALISABILITY, tomasys::FD_AVAILABLE];
-/// Properties of an attribute value.
+/// Properties that assign a literal to an attribute value.
 const VALUES: [&str; 2] = [tomasys::HAS_VALUE, pddl_tomasys::QA_HAS_VALUE];
-/// Properties from a design to an estimated value.
+/// Properties that link a design to an estimated attribute value.
 const ESTIMATIONS: [&str; 2] = [tomasys::HAS_QA_ESTIMATION, pddl_tomasys::HAS_QA_ESTIMATION];
-/// Properties that do not affect the cache.
+/// Properties whose facts do not affect the cache.
 const OTHERS: [&str; 12] = [
     tomasys::C_STATUS,
     pddl_tomasys::C_STATUS,
@@ -47,7 +48,7 @@ const OTHERS: [&str; 12] = [
 const OTHER_CLASSES: [&str; 2] = [tomasys::OBJECTIVE, tomasys::FUNCTION_GROUNDING];
 
 impl Catalogue {
-    /// Runs all queries.
+    /// Runs all queries and fills the cache.
     pub(super) fn new(view: &View<'_>) -> Self {
         Self {
             designs: view.function_designs(),
@@ -88,7 +89,7 @@ impl Catalogue {
         members
     }
 
-    /// Applies a change of facts. Returns `false` if the cache must be rebuilt.
+    /// Updates the cache after a change of facts. Returns `false` if the cache must be rebuilt.
     pub(super) fn follow(&mut self, delta: &Delta, engine: &Engine) -> bool {
         delta.insert.iter().chain(&delta.delete).all(|fact| self.follow_fact(fact, engine))
     }
@@ -131,7 +132,7 @@ impl Catalogue {
     }
 }
 
-/// Returns the literal values of a property of an individual.
+/// Returns the literal values that an individual has for a property.
 fn values<'a>(engine: &'a Engine, subject: Symbol, property: &str) -> impl Iterator<Item = &'a Literal> {
     let symbols = engine.symbols();
     let rows: Vec<Symbol> = symbols.find_name(property).map_or_else(Vec::new, |property| {
@@ -148,8 +149,7 @@ mod tests {
 
     use crate::knowledge::{COADAPTATION, Knowledge, Sources};
 
-    /// Applies random reports and objectives, and compares the cache with the view after each of
-    /// them.
+    /// Applies random reports and objectives; after each event, compares the cache with the view.
     #[test]
     fn the_query_cache_equals_the_view_after_every_event() {
         for name in ["ugv", "uuv", "camara_like"] {

@@ -1,8 +1,8 @@
 //! Reports of the robot, including their handling when a rule exceeds its limits.
 //!
-//! An update that exceeds the limits leaves the engine unchanged. The report and all later ones are
-//! then kept as pending. Each new report retries all pending reports in a single update, which is
-//! equivalent to applying the last report on each subject.
+//! An update that exceeds the limits leaves the engine unchanged. The failed report and all later
+//! reports are then kept as pending. Each new report retries all pending reports in a single
+//! update, which is equivalent to applying the last report on each subject.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,16 +13,17 @@ use crate::knowledge::waiting::{Fault, RobotReport, Waiting, fault};
 use crate::message::Message;
 
 impl Knowledge {
-    /// Returns the reason why the consequences are unknown, if inference has failed. No design then
-    /// counts as available.
+    /// Returns the reason why the consequences of pending reports are unknown. `None` unless
+    /// inference has failed. After a failure no design counts as available.
     pub fn fault(&self) -> Option<&Fault> {
         self.waiting.fault.as_ref()
     }
 
-    /// Applies a report. Returns the change of all facts.
+    /// Applies a report about a component, attribute or design. Returns the change of all facts. If
+    /// inference fails, the report is kept as pending and the returned change is empty.
     ///
     /// # Errors
-    /// There is no such component or attribute.
+    /// There is no such component, attribute or design.
     pub fn take(&mut self, name: &str, report: RobotReport) -> Result<Delta, Message> {
         let component = self.component(name);
         let name = if matches!(report, RobotReport::Component(_)) { component.as_str() } else { name };
@@ -48,7 +49,8 @@ impl Knowledge {
         }
     }
 
-    /// Combines several reports into an update, in which later reports take precedence.
+    /// Combines several reports into one update. Of contradictory reports, the later one takes
+    /// precedence.
     fn update(&mut self, reports: &[(String, RobotReport)]) -> Result<Delta, ontology::Error> {
         let engine = self.runtime.engine_mut();
         if let [(name, report)] = reports {
@@ -78,8 +80,8 @@ impl Knowledge {
         Ok(Delta { insert: insert.into_iter().collect(), delete: delete.into_iter().collect() })
     }
 
-    /// Sets the objectives as [`Knowledge::pursue`] does. If the consequences are unknown, defers
-    /// the change.
+    /// Sets the objectives as [`Knowledge::pursue`] does. While the consequences of reports are
+    /// unknown, the objectives are stored and set later.
     ///
     /// # Errors
     /// There is no such function or design.
@@ -99,17 +101,17 @@ impl Knowledge {
         Ok(())
     }
 
-    /// Returns the pending reports, for a snapshot.
+    /// Returns the pending reports and objectives, for a snapshot.
     pub fn waiting(&self) -> &Waiting {
         &self.waiting
     }
 
-    /// Restores the pending reports of a snapshot.
+    /// Restores the pending reports and objectives of a snapshot.
     pub fn set_waiting(&mut self, waiting: Waiting) {
         self.waiting = waiting;
     }
 
-    /// Sets the interrupt that stops later updates.
+    /// Sets the interrupt that can stop inference in later updates.
     pub fn interrupt(&mut self, interrupt: Interrupt) {
         let limits = Limits { interrupt: Some(interrupt), ..self.runtime.engine().limits().clone() };
         self.runtime.engine_mut().set_limits(limits);

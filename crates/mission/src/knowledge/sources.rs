@@ -1,4 +1,4 @@
-//! Sources of a knowledge base: documents and rule files.
+//! Sources of a knowledge base: OWL documents and rule files.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -46,12 +46,12 @@ pub struct Stated {
     /// Number of rules, see [`crate::knowledge::Knowledge::rule_count`].
     pub rule_count: usize,
     pub(super) warnings: Vec<Message>,
-    /// Translated terminology, if the documents were read for a domain in PLANTA's form.
+    /// Translation of the ontology to PDDL, if the documents were read for a domain in PLANTA's form.
     pub terms: Option<Arc<Terms>>,
 }
 
 impl Stated {
-    /// Reads documents and rules.
+    /// Reads documents and rules, without inference.
     ///
     /// # Errors
     /// All errors of the sources.
@@ -59,8 +59,8 @@ impl Stated {
         Self::read_with(sources, |_| (equality, None))
     }
 
-    /// Reads documents and rules for a domain. A domain in PLANTA's form implies unique names, as
-    /// in PDDL.
+    /// Reads documents and rules for the text of a domain, without inference. A domain in PLANTA's
+    /// form implies unique names, as in PDDL.
     ///
     /// # Errors
     /// All errors of the sources.
@@ -102,7 +102,7 @@ impl Stated {
         Ok(Self { symbols, program, facts, ontology, rules, equality, rule_count, warnings, terms })
     }
 
-    /// Adds and removes assertions.
+    /// Adds and removes assertions as recorded in `statements`.
     pub fn change(&mut self, statements: &Statements) {
         let symbols = &mut self.symbols;
         let removed: BTreeSet<Fact> = statements.removed.iter().map(|own| own.intern(symbols)).collect();
@@ -111,7 +111,7 @@ impl Stated {
     }
 }
 
-/// Returns the text of a rule file, or of shipped rules by their name.
+/// Returns the text of a rule file (`-` is standard input), or of shipped rules by their name.
 ///
 /// # Errors
 /// The file cannot be read.
@@ -128,7 +128,7 @@ pub fn rule_text(file: &str) -> Result<String, Message> {
     text.map_err(|error| Message::at("M101", file, None, format!("the file cannot be read: {error}")))
 }
 
-/// Parses the rules of all files together, because a rule may use conclusions of another file.
+/// Parses all rule files together, because a rule may use conclusions of another file.
 fn parse_rule_files(files: &[String], symbols: &mut Symbols) -> Result<Vec<Rule>, Errors> {
     let (mut texts, mut errors) = (Vec::new(), Vec::new());
     for file in files {

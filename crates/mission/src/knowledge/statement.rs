@@ -1,9 +1,10 @@
-//! Assertions by names instead of symbols, for snapshots and certificates.
+//! Assertions that refer to entities by name instead of interned symbol, for snapshots and
+//! certificates.
 
 use rules::{Engine, Fact, Literal, Symbols, Value};
 use serde::{Deserialize, Serialize};
 
-/// An assertion, with names and values in place of symbols.
+/// An assertion with names and literals instead of interned symbols.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Statement {
@@ -23,7 +24,7 @@ pub enum Part {
     Literal(String, String),
 }
 
-/// Differences between current assertions and those of the documents.
+/// Differences between the current assertions and the assertions of the documents.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Statements {

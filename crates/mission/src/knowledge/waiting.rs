@@ -1,4 +1,4 @@
-//! Pending reports, whose consequences are not known yet, and their serialisation.
+//! Pending reports, whose inferred consequences are not known yet, and their serialisation.
 
 use num_rational::BigRational;
 use ontology::tomasys::change::{self, Status};
@@ -20,7 +20,7 @@ pub enum RobotReport {
     Design(bool),
 }
 
-/// Reason why the consequences are unknown.
+/// Reason why the consequences of reports are unknown.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Fault {
     /// `R301` or `R304`, from the rules crate.
@@ -31,13 +31,13 @@ pub struct Fault {
     pub rule: String,
 }
 
-/// Reports and objectives whose consequences are not known yet.
+/// Reports and objectives that wait for inference to succeed.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Waiting {
     pub(super) fault: Option<Fault>,
-    /// Latest report by the name of the component or attribute.
+    /// Latest report on each component, attribute or design, by name.
     pub(super) reports: Vec<(String, RobotReport)>,
-    /// Functions with their designs, if the objectives could not be changed either.
+    /// Objectives that could not be set yet: pairs of function and design.
     pub(super) objectives: Option<Vec<(String, String)>>,
 }
 
@@ -104,7 +104,7 @@ impl Waiting {
         json!([[fault.code, fault.message, fault.rule], reports, self.objectives])
     }
 
-    /// Deserialises the result of [`Waiting::to_record`].
+    /// Deserialises the result of [`Waiting::to_record`]. `None` if the record is malformed.
     pub fn from_record(record: &Value) -> Option<Self> {
         if record.is_null() {
             return Some(Self::default());

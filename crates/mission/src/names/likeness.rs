@@ -1,16 +1,17 @@
-//! Fuzzy matching of names of both sides, by edit distance and common words.
+//! Fuzzy matching of names in the knowledge base and in the problem, by edit distance and common
+//! words.
 
 use std::collections::BTreeMap;
 
 use diagnostics::nearest;
 
-/// Threshold of similarity: half of the words are equal.
+/// Minimum similarity of a matched pair: half of the words are equal.
 const ALIKE: f64 = 0.5;
-/// Maximum number of names in a list; the others are only counted.
+/// Maximum number of names in a list of a message; further names are only counted.
 const SHOWN: usize = 12;
 
-/// Returns pairs of similar names, matched greedily by descending similarity. Each name occurs in
-/// at most one pair.
+/// Returns pairs of similar names, one from each list, matched greedily by descending similarity.
+/// Each name occurs in at most one pair.
 pub(super) fn pairs<'n>(left: &[&'n str], right: &[&'n str]) -> Vec<(&'n str, &'n str)> {
     let mut candidates: Vec<(f64, usize, usize)> = Vec::new();
     for (l, one) in left.iter().enumerate() {
@@ -34,8 +35,8 @@ pub(super) fn pairs<'n>(left: &[&'n str], right: &[&'n str]) -> Vec<(&'n str, &'
 }
 
 /// Returns a similarity from 0 to 1: 1 for names within the edit distance of a typing error,
-/// otherwise the share of common words. A common first word such as `fd` does not count, because it
-/// only names the kind.
+/// otherwise the share of common words. An equal first word such as `fd` does not count, because it
+/// only names the kind of entity.
 fn likeness(one: &str, other: &str) -> f64 {
     if nearest(one, [other]).is_some() {
         return 1.0;
@@ -54,8 +55,8 @@ fn words(name: &str) -> Vec<&str> {
     name.split(['_', '-', '.']).filter(|word| !word.is_empty()).collect()
 }
 
-/// Formats pairs as entries of `[bindings.names]`: a pattern for several pairs with the same
-/// beginnings, otherwise exact entries.
+/// Formats pairs as entries of `[bindings.names]`. Several pairs with the same beginnings become
+/// one pattern; other pairs become exact entries.
 pub(super) fn entries(pairs: &[(&str, &str)]) -> Vec<String> {
     let mut heads: BTreeMap<(&str, &str), usize> = BTreeMap::new();
     let head = |pair: &(&'_ str, &'_ str)| {
@@ -82,13 +83,14 @@ pub(super) fn entries(pairs: &[(&str, &str)]) -> Vec<String> {
     entries
 }
 
-/// Formats a TOML key.
+/// Formats a name as a TOML key, quoted if necessary.
 fn key(name: &str) -> String {
     let bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
     if name.chars().all(bare) { name.to_owned() } else { format!("\"{name}\"") }
 }
 
-/// Length in bytes of the common last words of two names.
+/// Returns the length in bytes of the longest common ending of two names that consists of whole
+/// words.
 fn ending(one: &str, other: &str) -> usize {
     let mut common = 0;
     for ((at, a), (_, b)) in one.char_indices().rev().zip(other.char_indices().rev()) {
@@ -102,7 +104,7 @@ fn ending(one: &str, other: &str) -> usize {
     common
 }
 
-/// Formats names as a list; an empty list is `none`.
+/// Formats names as a list for messages; an empty list becomes `none`.
 pub(super) fn list(names: &[&str]) -> String {
     let listed = names.iter().take(SHOWN).map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
     match names.len() {

@@ -1,14 +1,15 @@
-//! Alignment of the names in the problem with those in the knowledge base: objects without an
+//! Compares the names in the problem with those in the knowledge base: finds objects without an
 //! individual, and designs that the problem never names.
 //!
 //! The problems of Metaplan's own missions name no designs and receive all of them from the
-//! knowledge base. If a problem does name designs, names of a single side suggest that the two were
-//! not made for each other. The availability of a design is stated by the problem if the knowledge
-//! base has neither the design nor its functions.
+//! knowledge base. If a problem does name designs, names that occur only in the problem or only in
+//! the knowledge base suggest that the two files do not belong together. The availability of a
+//! design is stated by the problem if the knowledge base has neither the design nor its functions.
 //!
-//! A function that an action requires can be solved only by a design that both sides know, or by a
-//! design whose availability is stated by the problem. A required function without such a design is
-//! an error, because it makes every plan impossible for a reason that is not about the robot.
+//! A required function can be solved only by a design that occurs in both the problem and the
+//! knowledge base, or by a design whose availability is stated by the problem. A required function
+//! without such a design is an error, because it makes every plan impossible for a reason that is
+//! not about the robot.
 
 use std::collections::BTreeSet;
 
@@ -21,24 +22,25 @@ use crate::binding::Bindings;
 use crate::knowledge::{Catalogue, Knowledge};
 use crate::message::Message;
 
-/// Result of the alignment.
+/// Result of comparing the names in the problem with those in the knowledge base.
 #[derive(Debug, Default)]
 pub(crate) struct Meeting {
     /// Designs whose availability is stated by the problem.
     pub(crate) own: BTreeSet<Name>,
-    /// Errors: functions without a design that both sides know.
+    /// Errors: required functions without a design that occurs in both the problem and the
+    /// knowledge base.
     pub(crate) errors: Vec<Message>,
-    /// Warnings about names of a single side.
+    /// Warnings about names that occur only in the problem or only in the knowledge base.
     pub(crate) warnings: Vec<Message>,
-    /// Designs that the problem never names.
+    /// Designs of the knowledge base that the problem never names.
     pub(crate) never_named: NeverNamed,
 }
 
-/// The IRI of the first design that is never named although other designs are, and the text of the
-/// warning.
+/// Set if the problem names designs, but not all of the knowledge base: the IRI of the first
+/// unnamed design and the text of the warning.
 pub(crate) type NeverNamed = Option<(String, String)>;
 
-/// Aligns the names of both sides.
+/// Compares the names in the PDDL files with those in the knowledge base.
 pub(crate) fn meet(
     (domain, domain_source): (&Domain, &Source),
     (problem, problem_source): (&Problem, &Source),
@@ -81,7 +83,8 @@ struct Finding {
     help: Option<String>,
 }
 
-/// Names of a role without a counterpart on the other side.
+/// Names of a role (such as design or function) that occur only in the problem or only in the
+/// knowledge base.
 enum OneSided {
     /// Objects without individuals, and possibly individuals without objects.
     Objects(Finding),
@@ -99,7 +102,8 @@ struct Comparison<'a> {
 }
 
 impl Comparison<'_> {
-    /// Returns the pairs of a design and a solved function that the problem states.
+    /// Returns the facts of the problem that a design solves a function: design, function, and
+    /// position.
     fn stated(&self) -> Vec<(&Name, &Name, Span)> {
         let solves = self.bindings.solves();
         let pair = |atom| match arguments(atom)[..] {
@@ -111,8 +115,8 @@ impl Comparison<'_> {
         facts(self.problem).filter_map(pair).collect()
     }
 
-    /// Returns the designs that are unknown to the knowledge base and solve no function that it
-    /// knows.
+    /// Returns the designs of the problem that the knowledge base does not have and that solve no
+    /// function of the knowledge base.
     fn own_designs(&self) -> BTreeSet<Name> {
         let (designs, functions) = (self.roles.of(DESIGN), self.roles.of(FUNCTION));
         let stated = self.stated();
@@ -127,8 +131,8 @@ impl Comparison<'_> {
             .collect()
     }
 
-    /// Returns the functions that actions require, with the source location if the problem states
-    /// the requirement.
+    /// Returns the functions that actions require. The position is that of the fact if the problem
+    /// states the requirement, otherwise `None`.
     fn required(&self) -> Vec<(Name, Option<Span>)> {
         let functions = self.roles.of(FUNCTION);
         let mut required: Vec<(Name, Option<Span>)> = Vec::new();
@@ -156,8 +160,8 @@ impl Comparison<'_> {
         required
     }
 
-    /// Returns an error for each required function that no design can solve for lack of a common
-    /// name.
+    /// Returns an error for each required function that no design can solve because the names in
+    /// the problem and the knowledge base differ.
     fn unsolved(&self, own: &BTreeSet<Name>) -> Vec<Finding> {
         let is_availability =
             |declared: &Declaration| self.bindings.is_availability(&declared.identifier.name);
@@ -169,7 +173,7 @@ impl Comparison<'_> {
         required.iter().filter_map(|(function, span)| self.fault(function, *span, own)).collect()
     }
 
-    /// Returns the error for a function if no design can solve it.
+    /// Returns the error that no design can solve a required function, or `None` if a design can.
     fn fault(&self, function: &Name, span: Option<Span>, own: &BTreeSet<Name>) -> Option<Finding> {
         let (designs, functions) = (self.roles.of(DESIGN), self.roles.of(FUNCTION));
         let solutions = self.stated();
@@ -188,7 +192,7 @@ impl Comparison<'_> {
             named(object)
                 || here(&object.name) && (designs.knows(&object.name) || self.is_usable(object, own))
         });
-        // Designs without a stated function may be intended for this function.
+        // Designs for which no solved function is stated may be intended for this function.
         let says_nothing = |object: &&Object| !solutions.iter().any(|(design, ..)| **design == object.name);
         let unknown = || designs.objects.iter().filter(|object| !is_met(object));
         let mut only_here: Vec<&Object> = unknown().filter(|object| here(&object.name)).collect();
@@ -232,15 +236,17 @@ impl Comparison<'_> {
         Some(Finding { in_domain, span, text, help })
     }
 
-    /// Returns `true` if the problem states that a design is available, and may decide on it.
+    /// Returns `true` if the problem decides on the availability of a design and states that the
+    /// design is available. `own` contains the designs on which the problem decides.
     fn is_usable(&self, object: &Object, own: &BTreeSet<Name>) -> bool {
         let mut available =
             facts(self.problem).filter(|atom| self.bindings.is_availability(&atom.predicate.name));
         own.contains(&object.name) && available.any(|atom| arguments(atom) == [&object.name])
     }
 
-    /// Compares the members of a role: objects that the knowledge base does not have, and designs
-    /// that the problem never names.
+    /// Compares the members of a role (such as design or function) in the problem and in the
+    /// knowledge base. Finds objects without an individual, and designs that the problem never
+    /// names.
     fn one_sided(&self, role: &Role, own: &BTreeSet<Name>) -> OneSided {
         let always = [FUNCTION, DESIGN].contains(&role.class.as_str());
         if !always && role.individuals.is_empty() {
@@ -250,7 +256,7 @@ impl Comparison<'_> {
         let unnamed = role.individuals.iter().filter(|individual| !role.has(&Name::new(&individual.name)));
         let unnamed: Vec<_> = match role.class.as_str() {
             // A problem without designs of its own receives all designs from the knowledge base, so
-            // none needs a name.
+            // no design needs to be named.
             DESIGN if role.objects.iter().all(|object| object.in_domain) => Vec::new(),
             DESIGN => unnamed.filter(|design| self.is_of_named_function(&design.iri)).collect(),
             _ => unnamed.collect(),
@@ -285,8 +291,8 @@ impl Comparison<'_> {
         }
     }
 
-    /// Returns `true` if a design solves a function that the problem names, or if the problem names
-    /// no function.
+    /// Returns `true` if the design with this IRI solves a function that the problem names, or if
+    /// the problem names no function.
     fn is_of_named_function(&self, iri: &str) -> bool {
         let functions = self.roles.of(FUNCTION);
         let design = self.known.designs().iter().find(|design| design.individual.iri == iri);
@@ -297,7 +303,7 @@ impl Comparison<'_> {
     }
 }
 
-/// Noun for the members of a class in messages.
+/// Returns the plural noun for the members of a class in messages.
 fn noun(class: &str) -> String {
     match class {
         FUNCTION => "functions".to_owned(),
@@ -307,8 +313,9 @@ fn noun(class: &str) -> String {
     }
 }
 
-/// Suggests entries for similar names. If `all` names belong to one function and a single name
-/// remains on each side, these two are paired as well.
+/// Suggests entries of `[bindings.names]` for similar names. If `all` is `true`, the names belong
+/// to one function; a single remaining name of the knowledge base and a single remaining object are
+/// then paired as well.
 fn suggestion<'n>(known: &[&'n str], here: &[&'n str], all: bool) -> Option<String> {
     let mut matches = pairs(known, here);
     let base_names: Vec<&str> =

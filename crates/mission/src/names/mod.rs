@@ -1,5 +1,5 @@
 //! Names of the knowledge base and names of the problem: resolution of `[bindings.names]` and
-//! alignment.
+//! comparison of the two sets of names.
 //!
 //! An individual and an object are identical if they have the same name, or if `[bindings.names]`
 //! says so. Objects are compared only in *roles* that occur in a knowledge base: functions,

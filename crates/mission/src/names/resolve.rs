@@ -14,14 +14,15 @@ use crate::called::Naming;
 use crate::knowledge::Knowledge;
 use crate::message::{Errors, Message, did_you_mean};
 
-/// Object names of individuals by IRI, and warnings.
+/// Object names of individuals, by IRI, and warnings.
 pub(crate) type Resolved = (CalledNames, Vec<Message>);
 
-/// Computes the object names of individuals. Exact entries take precedence over patterns.
+/// Computes the object names that `[bindings.names]` gives to individuals. Exact entries take
+/// precedence over patterns.
 ///
 /// # Errors
-/// All malformed entries; entries without an individual, without an object or with an object of
-/// another type; and objects that several individuals would share.
+/// All malformed entries; entries without a matching individual, without an object, or with an
+/// object of another type; and objects that several individuals would share.
 pub(crate) fn resolve(
     domain: &Domain,
     problem: &Problem,
@@ -69,7 +70,7 @@ struct Resolving<'a> {
     types: TypeHierarchy,
     individuals: BTreeSet<&'a Individual>,
     objects: BTreeMap<&'a Name, &'a TypedName>,
-    /// The object name of an individual by IRI, and the entry that gives it.
+    /// Object name by the IRI of the individual, with the entry that gives this name.
     called: BTreeMap<&'a str, (String, &'a Naming)>,
     errors: Vec<Message>,
     warnings: Vec<Message>,
@@ -147,7 +148,8 @@ impl<'a> Resolving<'a> {
         }
     }
 
-    /// Returns the object of that name in its original spelling, if its type admits the individual.
+    /// Returns the object `name` in its declared spelling. Returns a description of the error if
+    /// there is no such object or if its type does not admit the individual.
     fn fits(&self, individual: &Individual, name: &str) -> Result<String, String> {
         let Some(object) = self.objects.get(&Name::new(name)) else {
             let names = self.objects.keys().map(|name| name.as_str());
@@ -190,7 +192,7 @@ impl<'a> Resolving<'a> {
         }
     }
 
-    /// Reports objects that several individuals would share.
+    /// Reports object names that several individuals would share.
     fn clashes(&mut self) {
         let mut by_name: BTreeMap<Name, Vec<&Individual>> = BTreeMap::new();
         for individual in &self.individuals {

@@ -1,4 +1,5 @@
-//! Roles of objects and individuals, by which both sides are compared.
+//! Roles of objects and individuals: the classes within which names of the problem and of the
+//! knowledge base are compared.
 //!
 //! A type of the domain that is bound to a class gives its objects the role of that class. If no
 //! type is bound, the roles follow from facts with predicates that are bound to TOMASys: if a fact
@@ -28,7 +29,7 @@ pub(super) struct Object {
     pub(super) in_domain: bool,
 }
 
-/// A class with its individuals and objects.
+/// A class with its individuals in the knowledge base and its objects in the PDDL files.
 #[derive(Debug)]
 pub(super) struct Role {
     /// The local name of the class.
@@ -41,7 +42,7 @@ pub(super) struct Role {
     pub(super) objects: Vec<Object>,
 }
 
-/// The roles of a mission.
+/// All roles of a mission: the classes within which names are compared.
 #[derive(Debug)]
 pub(super) struct Roles {
     roles: Vec<Role>,
@@ -103,7 +104,7 @@ impl Roles {
         self.roles.iter().find(|role| role.class == class).expect("invariant: TOMASys' own roles are there")
     }
 
-    /// Assigns roles to objects by their types.
+    /// Assigns roles to the objects whose types are bound to a class.
     fn place(&mut self, domain: &Domain, problem: &Problem) {
         let types = TypeHierarchy::of(domain);
         let constants = domain.constants.iter().map(|constant| (constant, true));
@@ -116,7 +117,7 @@ impl Roles {
         }
     }
 
-    /// Assigns roles by facts to the objects whose types have no role.
+    /// Assigns roles by facts, for each class to which no type of the domain is bound.
     fn place_by_facts(&mut self, domain: &Domain, problem: &Problem, bindings: &Bindings) {
         let constants = domain.constants.iter().map(|constant| (constant, true));
         let declared: Vec<_> =
@@ -141,12 +142,12 @@ impl Role {
         }
     }
 
-    /// Returns `true` if an object has the role.
+    /// Returns `true` if an object of this name has the role.
     pub(super) fn has(&self, name: &Name) -> bool {
         self.objects.iter().any(|object| object.name == *name)
     }
 
-    /// Returns `true` if the knowledge base has an individual of that name in the class.
+    /// Returns `true` if an individual of the role's class has this name.
     pub(super) fn knows(&self, name: &Name) -> bool {
         self.individuals.iter().any(|individual| Name::new(&individual.name) == *name)
     }
@@ -168,7 +169,7 @@ pub(super) fn arguments(atom: &Atom) -> Vec<&Name> {
     atom.arguments.iter().map(name).collect()
 }
 
-/// Returns the arguments of a fact with the classes to which the fact assigns them.
+/// Returns the arguments of a fact to which its predicate assigns a class, each with this class.
 fn said<'p>(atom: &'p Atom, bindings: &Bindings) -> Vec<(&'static str, &'p Name)> {
     let (predicate, arguments) = (&atom.predicate.name, arguments(atom));
     if bindings.solves().contains(predicate) && arguments.len() == 2 {

@@ -3,13 +3,13 @@
 //!
 //! A domain is plain if it declares no type of function designs. An action that the knowledge base
 //! has as well (`move` as `move` or `a_move`, or by a binding) gets a parameter for the design of
-//! each function that it requires, and conditions: the design solves the function, is available,
-//! and meets the quality bounds of the action (`t:requiresQuality`), in their context if they have
-//! one. A numeric function without parameters that is named like an estimated attribute is replaced
-//! by the sum over the chosen designs. A function that is bound to `reconfigured:ATTRIBUTE` is
-//! replaced by the sum over the designs that were not in use before. The parameters become slots of
-//! the encoding as in the explicit form. Designs are therefore not ground into actions, unless
-//! reconfiguration costs make the designs part of the state.
+//! each function that the action requires. It also gets conditions: the design solves the function,
+//! is available, and meets the quality bounds of the action (`t:requiresQuality`). A quality bound
+//! with a context applies only in this context. A numeric function without parameters that is named
+//! like an estimated attribute is replaced by the sum over the chosen designs. A function that is
+//! bound to `reconfigured:ATTRIBUTE` is replaced by the sum over the designs that were not in use
+//! before. As in an explicit domain, the planner chooses the designs for these parameters without
+//! grounding them into actions, unless reconfiguration costs make the designs part of the state.
 
 mod spoken;
 mod walk;
@@ -33,7 +33,7 @@ const FUNCTION: &str = "function";
 const DESIGN: &str = "functiondesign";
 const SOLVES: &str = "fd_solve_f";
 const AVAILABLE: &str = "fd_available";
-/// Predicate `(p DESIGN FUNCTION)`: the design was chosen last for the function.
+/// Predicate `(p DESIGN FUNCTION)`: the design is the one that was last chosen for the function.
 const AT_WORK: &str = "fd_at_work";
 /// Predicate `(p FUNCTION)`: a design has been chosen for the function.
 const CONFIGURED: &str = "f_configured";
@@ -41,15 +41,17 @@ const CONFIGURED: &str = "f_configured";
 /// Additions of a knowledge base to the actions of a plain domain.
 #[derive(Debug, Clone)]
 pub struct CoAdaptation {
-    /// Requirements by name of the action.
+    /// Requirements of each action, by the name of its schema.
     actions: BTreeMap<Name, Needs>,
-    /// Attributes by the numeric function that is their sum over the chosen designs.
+    /// Maps each numeric function to the attribute whose sum over the chosen designs replaces it.
     chosen: BTreeMap<Name, String>,
-    /// Attributes by the numeric function that is their sum over the changed designs.
+    /// Maps each numeric function to the attribute whose sum over the newly chosen designs replaces
+    /// it.
     changed: BTreeMap<Name, String>,
 }
 
-/// Requirements of an action, and the number of its parameters in the plain domain.
+/// Required functions and quality bounds of an action, and the number of its parameters in the
+/// plain domain.
 #[derive(Debug, Clone)]
 struct Needs {
     functions: Vec<Needed>,
@@ -57,7 +59,7 @@ struct Needs {
     parameters: usize,
 }
 
-/// A required function, with the attributes that are estimated for its designs.
+/// A required function, with the attributes that at least one of its designs has an estimate of.
 #[derive(Debug, Clone)]
 struct Needed {
     name: String,
@@ -65,12 +67,13 @@ struct Needed {
 }
 
 impl CoAdaptation {
-    /// Determines the additions to a domain. Returns `None` if the domain is explicit, or if the
-    /// knowledge base requires nothing of its actions.
+    /// Determines the additions to a domain. Returns `None` if the domain declares a type of
+    /// designs, or if the knowledge base requires no function for its actions.
     ///
     /// # Errors
-    /// Function names that PDDL does not admit, contexts that are not predicates of the domain, and
-    /// reserved names that the domain declares.
+    /// Function names that PDDL does not admit, contexts that are not predicates of the domain,
+    /// reserved names that the domain declares, and uses of functions where newly chosen designs
+    /// cannot be counted.
     pub(super) fn new(
         domain: &Domain,
         problem: &Problem,
@@ -154,8 +157,8 @@ impl CoAdaptation {
         errors
     }
 
-    /// Returns the functions of changed designs that an action uses in durations, conditions or
-    /// effects where changes cannot be counted.
+    /// Returns the functions of newly chosen designs that an action uses where changes of designs
+    /// cannot be counted.
     fn not_counted(&self, action: &Action) -> BTreeSet<Name> {
         let uncounted = RefCell::new(BTreeSet::new());
         let see = |part: &mut Expression| {
@@ -185,12 +188,14 @@ impl CoAdaptation {
         uncounted.into_inner()
     }
 
-    /// Returns the number of parameters of an action in the plain domain.
+    /// Returns the number of parameters of an action in the plain domain. `None` if the action has
+    /// no additions.
     pub(super) fn parameters(&self, action: &str) -> Option<usize> {
         self.actions.get(&Name::new(action)).map(|needs| needs.parameters)
     }
 
-    /// Returns the domain in explicit form.
+    /// Returns the explicit form of a plain domain: actions with parameters, conditions and effects
+    /// for their designs.
     pub(super) fn explicit(&self, domain: &Domain) -> Domain {
         let mut explicit = domain.clone();
         for own in [FUNCTION, DESIGN] {
@@ -206,7 +211,7 @@ impl CoAdaptation {
         let new = functions.into_iter().filter(|name| !declared.contains(&Name::new(name)));
         explicit.constants.extend(new.map(|name| typed(name, FUNCTION)));
         explicit.predicates.extend(self.predicates());
-        // These functions have no value outside of actions, where no designs are chosen.
+        // These functions have no value outside of actions, because no designs are chosen there.
         let stands = |name: &Name| self.chosen.contains_key(name) || self.changed.contains_key(name);
         explicit.functions.retain(|declared| !stands(&declared.identifier.name));
         explicit.functions.extend(self.functions());
@@ -218,8 +223,9 @@ impl CoAdaptation {
         explicit
     }
 
-    /// Adds the facts which designs meet which quality bounds. Bounds do not apply to a function if
-    /// no design of it has an estimation of the attribute.
+    /// Adds to the problem a fact for each design that meets a quality bound. A design that lacks
+    /// an estimate still meets the bound if no design of its functions has an estimate of the
+    /// attribute.
     pub(super) fn fill(&self, problem: &mut Problem, designs: &[FunctionDesign]) {
         for quality in self.quality() {
             for design in designs {
@@ -243,7 +249,7 @@ impl CoAdaptation {
         self.actions.values().flat_map(|needs| &needs.functions)
     }
 
-    /// Returns all quality bounds without duplicates.
+    /// Returns the quality bounds of all actions, without duplicates.
     fn quality(&self) -> Vec<&Quality> {
         let mut bounds: Vec<_> = self.actions.values().flat_map(|needs| &needs.quality).collect();
         bounds.sort_by(|a, b| a.individual.cmp(&b.individual));
@@ -270,7 +276,7 @@ impl CoAdaptation {
         attributes.into_iter().map(|attribute| declaration(&value_of(attribute), &[("fd", DESIGN)])).collect()
     }
 
-    /// Adds to an action the parameters, conditions and effects of its designs.
+    /// Adds the parameters, conditions and effects for the designs of an action.
     fn adapt(&self, action: &mut Action, needs: &Needs, domain: &Domain) {
         let designs: Vec<(Identifier, &Needed)> = needs
             .functions
@@ -321,7 +327,8 @@ impl CoAdaptation {
         }
     }
 
-    /// Replaces functions that are bound to chosen designs by the sum over these designs.
+    /// Replaces a function of chosen designs in a leaf expression by the sum of its attribute over
+    /// `designs`. A function of newly chosen designs becomes 0.
     fn sum(&self, expression: &mut Expression, designs: &[(Identifier, &Needed)]) {
         let Expression::Fluent(fluent) = expression else { return };
         if let Some(attribute) = self.chosen.get(&fluent.predicate.name) {
@@ -334,8 +341,8 @@ impl CoAdaptation {
         }
     }
 
-    /// For each numeric effect that counts changes, adds the conditional effects of the changed
-    /// designs to `out`.
+    /// Handles the numeric effects that use functions of newly chosen designs. Appends to `out` a
+    /// conditional effect for each design, which applies if the design was not in use before.
     fn changes(&self, effect: &Effect, designs: &[(Identifier, &Needed)], out: &mut Vec<Effect>) {
         match effect {
             Effect::And(parts) => parts.iter().for_each(|part| self.changes(part, designs, out)),
@@ -370,7 +377,8 @@ impl CoAdaptation {
         }
     }
 
-    /// Returns the effects by which the designs replace the former designs of their functions.
+    /// Returns the effects that record the chosen design of each function and remove the previously
+    /// chosen one.
     fn starts(&self, designs: &[(Identifier, &Needed)]) -> Vec<Effect> {
         if self.changed.is_empty() {
             return Vec::new();
@@ -393,7 +401,8 @@ impl CoAdaptation {
     }
 }
 
-/// Returns the conditions at the choice of the designs, and those during their use.
+/// Returns two lists of conditions on the designs of an action: those that must hold when the
+/// action starts, and those that must hold during the action.
 fn conditions(
     designs: &[(Identifier, &Needed)],
     needs: &Needs,
@@ -423,15 +432,15 @@ fn conditions(
     (chosen, lasting)
 }
 
-/// Condition that another design of the function was in use.
+/// Returns the condition that `function` was last configured with another design than `design`.
 fn changed(design: &Identifier, function: &str) -> Condition {
     let at_work = Condition::Atom(of_design(AT_WORK, design, Some(function)));
     let configured = Condition::Atom(atom(&Name::new(CONFIGURED), &[function]));
     Condition::And(vec![configured, Condition::Not(Box::new(at_work))])
 }
 
-/// Returns the functions of the domain that are sums over the chosen designs and over the changed
-/// designs, with their attributes.
+/// Returns two maps from numeric functions to attributes: functions that are sums over the chosen
+/// designs, and functions that are sums over the newly chosen designs.
 fn attributes(
     domain: &Domain,
     problem: &Problem,
@@ -471,13 +480,13 @@ fn has_parameter(action: &Action, name: &Name) -> bool {
     action.parameters.iter().any(|parameter| parameter.identifier.name == *name)
 }
 
-/// Name of the predicate that states which designs meet a quality bound.
+/// Returns the name of the predicate that states which designs meet a quality bound.
 fn meets(quality: &Quality) -> Name {
     Name::new(&format!("fd_meets_{}", quality.individual.name))
 }
 
-/// Name of the numeric function that has the value of an attribute for a design. Bindings recognise
-/// it by its prefix.
+/// Returns the name of the numeric function that has the value of an attribute for a design.
+/// Bindings recognise the function by its prefix.
 fn value_of(attribute: &str) -> String {
     format!("fd_{attribute}")
 }
@@ -493,7 +502,8 @@ fn declaration(name: &str, parameters: &[(&str, &str)]) -> Declaration {
     Declaration { identifier: identifier(&Name::new(name)), parameters }
 }
 
-/// Builds an atom of a design variable, and of a function if one is given.
+/// Builds an atom whose first argument is a design variable, and whose second argument is a
+/// function if one is given.
 fn of_design(symbol: &str, design: &Identifier, function: Option<&str>) -> pddl::ast::Atom {
     let mut atom = atom(&Name::new(symbol), function.as_slice());
     atom.arguments.insert(0, Term::Variable(design.clone()));

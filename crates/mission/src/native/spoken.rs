@@ -1,16 +1,18 @@
-//! Translates predicates of the explicit form for the user, whose files do not contain them.
+//! Translates predicates of the explicit form for display, because the user's files do not contain
+//! them.
 
 use pddl::ast::Name;
 
 use super::{CoAdaptation, meets};
 
 impl CoAdaptation {
-    /// Returns `true` if a function is a sum over the chosen designs or over the changed designs.
+    /// Returns `true` if a numeric function is replaced by a sum over the chosen or the newly
+    /// chosen designs.
     pub(crate) fn stands_for_designs(&self, function: &Name) -> bool {
         self.chosen.contains_key(function) || self.changed.contains_key(function)
     }
 
-    /// Rewrites the added predicates of a condition for display.
+    /// Rewrites a condition for display: predicates that co-adaptation has added are replaced.
     pub(crate) fn spoken(&self, condition: &str) -> String {
         let mut text = condition.to_owned();
         for quality in self.quality() {
@@ -24,7 +26,7 @@ impl CoAdaptation {
         text
     }
 
-    /// Returns `true` if a predicate or function was added to the domain of the user.
+    /// Returns `true` if co-adaptation has added a predicate or function to the user's domain.
     pub(crate) fn is_added(&self, name: &Name) -> bool {
         self.predicates().into_iter().chain(self.functions()).any(|own| own.identifier.name == *name)
     }

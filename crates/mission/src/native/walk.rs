@@ -1,4 +1,4 @@
-//! Expressions of effects in which changes of designs are not counted.
+//! Finds expressions of effects in which changes of designs cannot be counted.
 
 use pddl::ast::{Assignment, Effect, Expression, Name};
 

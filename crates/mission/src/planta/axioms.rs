@@ -1,5 +1,5 @@
-//! Translates axioms to derived predicates, for the kinds of axioms that `OWLToPDDL` translates.
-//! The others are reported as left out.
+//! Translates OWL axioms to derived predicates, for the kinds of axioms that `OWLToPDDL`
+//! translates. Other axioms are reported as left out.
 
 use std::collections::BTreeMap;
 
@@ -56,7 +56,7 @@ impl Terms {
         terms
     }
 
-    /// Translates an axiom to a derived predicate.
+    /// Translates an axiom and adds the resulting derived predicates.
     ///
     /// # Errors
     /// The kind of the axiom, if it has no translation.
@@ -127,8 +127,7 @@ impl Terms {
         Ok(())
     }
 
-    /// Adds the derived predicate `head(parameters) ← body(arguments)` with existentially bound
-    /// variables.
+    /// Adds the derived predicate `head(parameters) ← ∃ bound. body(arguments)`.
     fn follows(
         &mut self,
         head: &Iri,
@@ -172,7 +171,7 @@ impl Terms {
     }
 }
 
-/// Kind of an axiom, by its name in the OWL specification.
+/// Returns the name of an axiom's kind in the OWL specification.
 fn kind(axiom: &Axiom) -> &'static str {
     match axiom {
         Axiom::EquivalentClasses(_) => "EquivalentClasses",

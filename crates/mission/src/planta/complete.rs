@@ -11,7 +11,8 @@ use super::terms::Terms;
 use crate::message::Message;
 
 impl Terms {
-    /// Gives numbers the names that the PDDL files use for them.
+    /// Records the names that the PDDL files use for numbers, such as `0.25_decimal`. These names
+    /// take precedence.
     pub(super) fn name_numbers(&mut self, domain: &Domain, problem: &Problem, mentioned: &BTreeSet<Name>) {
         let declared = domain.constants.iter().chain(&problem.objects);
         let declared = declared.map(|object| &object.identifier.name);
@@ -24,7 +25,8 @@ impl Terms {
         self.literals.prefer(literals);
     }
 
-    /// Declares the types of individuals and numbers, and types that only objects refer to.
+    /// Declares the types of individuals and numbers, and types that occur only as types of
+    /// objects.
     pub(super) fn declare_types(
         &self,
         domain: &mut Domain,
@@ -63,8 +65,8 @@ impl Terms {
         }
     }
 
-    /// Declares constants for individuals, for values, and for the numbers in rules and in the PDDL
-    /// files.
+    /// Declares constants for individuals and values, and for the numbers that occur in rules and
+    /// in the PDDL files.
     pub(super) fn declare_constants(
         &self,
         domain: &mut Domain,
@@ -76,7 +78,8 @@ impl Terms {
             domain.constants.iter().map(|constant| constant.identifier.name.clone()).collect();
         for (name, r#type) in &self.constants {
             if declared.insert(name.clone()) {
-                // An object of the problem keeps its own type if the ontology gives it none.
+                // An object of the problem keeps its own type if the ontology gives the individual
+                // none.
                 let object_of_problem = problem.objects.iter().find(|object| object.identifier.name == *name);
                 let r#type = match (r#type, object_of_problem) {
                     (None, Some(object_of_problem)) => object_of_problem.r#type.clone(),
@@ -94,8 +97,8 @@ impl Terms {
         }
     }
 
-    /// Declares the predicates of classes and properties, asserted and inferred, and of numeric
-    /// comparisons.
+    /// Declares the predicates of classes and properties, for asserted and for inferred facts, and
+    /// the predicates of numeric comparisons.
     pub(super) fn declare_predicates(&self, domain: &mut Domain) {
         let mut declared: BTreeSet<Name> =
             domain.predicates.iter().map(|predicate| predicate.identifier.name.clone()).collect();
@@ -110,8 +113,8 @@ impl Terms {
     }
 }
 
-/// Removes objects of the problem with an undeclared type that are also constants of the domain;
-/// the constant takes precedence.
+/// Removes objects of the problem that are also constants of the domain and whose type is
+/// undeclared; the constant takes precedence. Returns warnings.
 pub(super) fn drop_repeated(domain: &Domain, problem: &mut Problem) -> Vec<Message> {
     let hierarchy = TypeHierarchy::of(domain);
     let undeclared_type = |object: &TypedName| {

@@ -1,4 +1,5 @@
-//! PLANTA's form: a domain that uses the conclusions of its knowledge base without declaring them.
+//! PLANTA's form: a domain that uses inferred facts of its knowledge base without declaring their
+//! predicates.
 //!
 //! PLANTA \[1\] describes robots in OWL. Its domains refer to the ontology by names: `(solvesF ?fd
 //! ?f)` for assertions, `(inferred-Fd_realisability ?fd false_boolean)` for assertions and inferred
@@ -32,9 +33,9 @@ use names::{EQUAL, LESS, NUMBER_TYPES, UNGROUND, UNREALISABLE};
 use syntax::{Fact as PddlFact, atom, object};
 pub use terms::Terms;
 
-/// Returns the translated terminology of an ontology if the domain is in PLANTA's form: it uses
+/// Returns the translation of an ontology to PDDL if the domain is in PLANTA's form: it uses
 /// undeclared predicates, and at least one of them is `inferred-…` or has the name of a class or
-/// property.
+/// property. Otherwise returns `None`.
 pub(crate) fn wanted(ontology: &Ontology, domain: &str) -> Option<Terms> {
     let source = Source::new("domain", domain);
     let missing = mentioned::undeclared(&pddl::parse_domain(&source).0?);
@@ -46,18 +47,19 @@ pub(crate) fn wanted(ontology: &Ontology, domain: &str) -> Option<Terms> {
     missing.iter().any(|name| inferred(name) || terms.has(name)).then_some(terms)
 }
 
-/// Completes a domain and a problem in PLANTA's form from a knowledge base.
+/// A domain and a problem in PLANTA's form, completed from a knowledge base.
 #[derive(Debug, Clone)]
 pub(crate) struct Planta {
     terms: Arc<Terms>,
-    /// Type of numbers.
+    /// Type that the domain uses for numbers.
     number: Name,
     /// Predicates of the knowledge base and of numeric comparisons.
     known: HashSet<Name>,
 }
 
 impl Planta {
-    /// Completes a domain. Also returns warnings.
+    /// Completes a domain with types, constants, predicates and axioms from the knowledge base.
+    /// Returns the translation state, the completed domain, and warnings.
     pub(crate) fn new(
         terms: &Arc<Terms>,
         domain: &Domain,
@@ -75,8 +77,7 @@ impl Planta {
         terms_of_mission.declare_types(&mut completed, problem, &number, &mut warnings);
         terms_of_mission.declare_constants(&mut completed, problem, &number, &mentioned.objects);
         terms_of_mission.declare_predicates(&mut completed);
-        // The order of axioms follows the output of `OWLToPDDL`, where those of the domain are
-        // last.
+        // As in the output of `OWLToPDDL`, the axioms of the domain are last.
         let rules = terms_of_mission.derived.iter().cloned().chain(std::mem::take(&mut completed.derived));
         completed.derived = rules.collect();
         let predicates =
@@ -89,7 +90,8 @@ impl Planta {
         &self.known
     }
 
-    /// Returns an error for each predicate that a completed domain uses but nothing declares.
+    /// Returns an error for each predicate that the completed domain uses but that neither the
+    /// domain nor the knowledge base declares.
     pub(crate) fn unknown(completed: &Domain) -> Vec<Message> {
         let declared: Vec<&str> =
             completed.predicates.iter().map(|declared| declared.identifier.name.as_str()).collect();
@@ -103,7 +105,8 @@ impl Planta {
         errors.collect()
     }
 
-    /// Adds the current assertions and the comparisons of numbers to a problem. Returns warnings.
+    /// Adds the asserted facts `stated` and the comparisons of numbers to a problem. Returns
+    /// warnings.
     pub(crate) fn fill(
         &self,
         domain: &Domain,
@@ -130,9 +133,9 @@ impl Planta {
         messages
     }
 
-    /// Replaces the available designs of a filled problem, by asserting that the other designs are
-    /// not realisable. The returned domain no longer infers realisability. `fd_unground` marks a
-    /// function without a design and is no design itself, so it is skipped.
+    /// Sets which designs of a filled problem are available, by asserting that the other designs
+    /// are not realisable. The returned domain no longer infers realisability. `fd_unground` marks
+    /// a function without a design and is no design itself, so it is skipped.
     pub(crate) fn allow<'d>(
         &self,
         domain: &Domain,
@@ -155,13 +158,13 @@ impl Planta {
         domain
     }
 
-    /// Returns `true` if a predicate is of the knowledge base or a numeric comparison.
+    /// Returns `true` if a predicate belongs to the knowledge base or is a numeric comparison.
     fn is_known(&self, predicate: &Name) -> bool {
         self.known.contains(predicate)
     }
 
-    /// Returns the facts of the problem with these predicates. The other facts describe maps and
-    /// tasks and may be very numerous.
+    /// Returns the facts of the problem whose predicates belong to the knowledge base or to numeric
+    /// comparisons. All other facts describe maps and tasks and may be very numerous.
     fn said(&self, problem: &Problem) -> impl Iterator<Item = PddlFact> {
         let is_known = |element: &&InitialElement| match element {
             InitialElement::Fact(atom) => self.is_known(&atom.predicate.name),
@@ -170,12 +173,12 @@ impl Planta {
         problem.init.iter().filter(is_known).filter_map(InitialElement::fact)
     }
 
-    /// Translates assertions to PDDL.
+    /// Translates asserted facts to PDDL.
     fn stated(&self, engine: &Engine, stated: impl Iterator<Item = Fact>) -> impl Iterator<Item = PddlFact> {
         stated.filter_map(|fact| self.fact(&fact, engine))
     }
 
-    /// Translates an assertion to PDDL. Returns `None` if its predicate is not part of the
+    /// Translates an asserted fact to PDDL. Returns `None` if its predicate is not part of the
     /// ontology.
     fn fact(&self, fact: &Fact, engine: &Engine) -> Option<PddlFact> {
         let symbols = engine.symbols();
@@ -187,8 +190,8 @@ impl Planta {
         Some((predicate, fact.arguments.iter().map(name).collect()))
     }
 
-    /// Removes values of functional properties from the problem if the knowledge base has other
-    /// ones.
+    /// Removes the problem's values of functional properties for which the knowledge base has a
+    /// different value. Returns warnings.
     fn replace_values(&self, problem: &mut Problem, facts: &BTreeSet<PddlFact>) -> Vec<Message> {
         let mut warnings = Vec::new();
         problem.init.retain(|element| {
@@ -216,7 +219,8 @@ impl Planta {
         warnings
     }
 
-    /// Returns the comparisons of all numbers, if the domain declares a comparison.
+    /// Returns the facts `lessThan` and `equalTo` that hold for pairs of numbers in `known`. Empty
+    /// if the domain declares neither predicate.
     fn comparisons(domain: &Domain, known: &BTreeSet<Name>) -> Vec<PddlFact> {
         let declared =
             |name: &str| domain.predicates.iter().any(|own| own.identifier.name == Name::new(name));

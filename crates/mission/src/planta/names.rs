@@ -1,7 +1,8 @@
 //! PDDL names of IRIs and literals, following PLANTA's `OWLToPDDL`.
 //!
-//! An entity has the local part of its IRI. An inferred predicate is `inferred-` with this part,
-//! capitalised. A literal is its lexical form, an underscore and the local part of its datatype:
+//! The name of an entity is the local part of its IRI. The name of an inferred predicate is
+//! `inferred-` with this part, capitalised. The name of a literal is its lexical form, an
+//! underscore and the local part of its datatype:
 //! `0.25_decimal`, `FALSE_string`.
 
 use std::collections::HashMap;
@@ -14,35 +15,36 @@ use rules::Literal;
 pub(super) const LESS: &str = "lessThan";
 /// Predicate: two numbers are equal.
 pub(super) const EQUAL: &str = "equalTo";
-/// Derived predicate: an axiom is violated.
+/// Derived predicate that holds if an axiom is violated.
 pub(super) const INCONSISTENT: &str = "inferred-Inconsistent";
-/// Predicate of a design and a boolean: with `false`, the design is not realisable.
+/// Predicate of a design and a boolean. With `false`, the design is not realisable.
 pub(super) const UNREALISABLE: &str = "inferred-Fd_realisability";
-/// Pseudo-design in PLANTA's domains of a function that is not in use.
+/// Pseudo-design in PLANTA's domains that marks a function without a design.
 pub(super) const UNGROUND: &str = "fd_unground";
-/// Type names of numbers in domains. The first is the default, the second is used only by domains
-/// that have no other.
+/// Type names for numbers. The first name is the default; the second name is used only for domains
+/// that use it and not the first.
 pub(super) const NUMBER_TYPES: [&str; 2] = ["numerical-object", "owl-number"];
 
-/// PDDL name of an individual, a class or a property.
+/// Returns the PDDL name of an individual, a class or a property.
 pub(super) fn plain(iri: &str) -> Name {
     Name::new(&spelled(local_name(iri)))
 }
 
-/// PDDL name of the inferred predicate of a class or property.
+/// Returns the PDDL name of the inferred predicate of a class or property, given its plain
+/// predicate.
 pub(super) fn inferred(plain: &Name) -> Name {
     let mut letters = plain.as_str().chars();
     let first = letters.next().map(|first| first.to_uppercase().collect::<String>()).unwrap_or_default();
     Name::new(&format!("inferred-{first}{}", letters.as_str()))
 }
 
-/// PDDL name of a literal.
+/// Returns the PDDL name of a literal, for example `0.25_decimal`.
 pub(super) fn literal(lexical: &str, datatype: Option<&str>) -> Name {
     let datatype = local_name(datatype.unwrap_or(xsd::STRING));
     Name::new(&format!("{}_{datatype}", spelled(lexical)))
 }
 
-/// Replaces characters that PDDL names do not admit.
+/// Replaces characters that PDDL names do not admit by underscores.
 fn spelled(text: &str) -> String {
     let allowed = |letter: char| {
         letter.is_ascii_graphic() && !"()[]{};\"'?:,|`\\".contains(letter) || letter.is_alphanumeric()
@@ -50,7 +52,7 @@ fn spelled(text: &str) -> String {
     text.chars().map(|letter| if allowed(letter) { letter } else { '_' }).collect()
 }
 
-/// Parses a name such as `0.25_decimal` as a number.
+/// Parses a name such as `0.25_decimal` as a number. `None` if the name is not of this form.
 pub(super) fn number(name: &Name) -> Option<Literal> {
     let (lexical, datatype) = name.as_str().rsplit_once('_')?;
     let namespace = &xsd::DECIMAL[..xsd::DECIMAL.len() - local_name(xsd::DECIMAL).len()];
@@ -58,7 +60,7 @@ pub(super) fn number(name: &Name) -> Option<Literal> {
     value.as_rational().is_some().then_some(value)
 }
 
-/// Names of literals by value: `1.50` and `1.5` are equal, so they share an object.
+/// PDDL names of literals by value. `1.50` and `1.5` are equal, so they have the same name.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Literals {
     names: HashMap<Literal, Name>,
@@ -70,7 +72,7 @@ impl Literals {
         self.names.entry(value).or_insert(name);
     }
 
-    /// Gives the names of `others` precedence.
+    /// Adds the names in `others`, which take precedence over the present names.
     pub fn prefer(&mut self, mut others: Self) {
         std::mem::swap(self, &mut others);
         for (value, name) in others.names {

@@ -14,7 +14,7 @@ use super::names::{self, EQUAL, LESS};
 use super::syntax::{atom, axiom, exists, variable};
 use super::terms::{Terms, is_top};
 
-/// Distinct PDDL names for the variables of a rule.
+/// PDDL names for the variables of a rule. Different variables have different names.
 #[derive(Default)]
 struct Variables {
     names: BTreeMap<Iri, String>,
@@ -35,7 +35,7 @@ impl Variables {
     }
 }
 
-/// Translates a rule to derived predicates, one for each atom of its head.
+/// Translates a rule to derived predicates, one for each atom of the rule's head.
 ///
 /// # Errors
 /// The reason why the rule has no translation.
@@ -101,7 +101,7 @@ fn term(argument: &Argument, variables: &mut Variables, terms: &mut Terms) -> Te
     }
 }
 
-/// Translates an atom of a body. Returns `None` if the atom is a tautology.
+/// Translates a body atom of a rule. Returns `None` if the atom is a tautology.
 fn condition(
     stated: &Atom,
     variables: &mut Variables,
@@ -145,7 +145,7 @@ fn condition(
     Ok(Some(condition))
 }
 
-/// Translates a comparison of numbers.
+/// Translates a SWRL built-in that compares two numbers.
 fn comparison(iri: &str, left: &Term, right: &Term) -> Result<Condition, String> {
     let relation = |name: &str, left: &Term, right: &Term| {
         Condition::Atom(atom(Name::new(name), vec![left.clone(), right.clone()]))

@@ -20,12 +20,12 @@ pub(super) fn untyped(names: &[&str]) -> Vec<TypedName> {
     names.iter().map(entry).collect()
 }
 
-/// Binds variables of a condition existentially.
+/// Quantifies a condition existentially over the variables `bound`.
 pub(super) fn exists(bound: &[&str], condition: Condition) -> Condition {
     if bound.is_empty() { condition } else { Condition::Exists(untyped(bound), Box::new(condition)) }
 }
 
-/// Builds a derived predicate.
+/// Builds a derived predicate with untyped parameters.
 pub(super) fn axiom(head: Name, parameters: &[&str], condition: Condition) -> Derived {
     let head = Declaration { identifier: head.into(), parameters: untyped(parameters) };
     Derived { head, condition, span: Span::default() }

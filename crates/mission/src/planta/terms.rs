@@ -16,23 +16,23 @@ use super::names::{self, Literals};
 use super::syntax::{atom, axiom, variable};
 use crate::message::Message;
 
-/// The translated terminology of an ontology.
+/// The terminology of an ontology, translated to PDDL.
 #[derive(Debug, Clone, Default)]
 pub struct Terms {
-    /// Plain and inferred predicates with their arity.
+    /// Arity of each plain and each inferred predicate.
     pub(super) predicates: BTreeMap<Name, usize>,
-    /// Plain predicates of classes and properties.
+    /// Plain predicate of each class and property.
     pub(super) symbols: BTreeMap<Iri, Name>,
     /// Plain predicates of functional data properties.
     pub(super) functional: BTreeSet<Name>,
-    /// Translated axioms and rules.
+    /// Derived predicates, translated from axioms and rules.
     pub(super) derived: Vec<Derived>,
-    /// Constants for individuals and for values other than numbers, with their types if they have
+    /// Constants for individuals and for values other than numbers, each with its type if it has
     /// one.
     pub(super) constants: BTreeMap<Name, Option<Name>>,
-    /// Numbers that occur in rules.
+    /// Names of the numbers that occur in rules.
     pub(super) numbers: BTreeSet<Name>,
-    /// Names of literals.
+    /// PDDL names of literals.
     pub(super) literals: Literals,
     /// Warnings about axioms and rules without a translation.
     pub(super) warnings: Vec<Message>,
@@ -44,22 +44,22 @@ impl Terms {
         self.predicates.contains_key(predicate)
     }
 
-    /// Declares the predicates of classes and properties.
+    /// Declares the plain and inferred predicates of all classes and properties.
     pub(super) fn signature(&mut self, ontology: &Ontology) {
         for (kind, arity) in
             [(EntityKind::Class, 1), (EntityKind::ObjectProperty, 2), (EntityKind::DataProperty, 2)]
         {
             for iri in ontology.entities(kind) {
                 if !is_annotation(iri) && !is_top(iri) {
-                    // A punned name (class and property) is reported below, if an axiom or rule
-                    // uses it.
+                    // A name that is both a class and a property is reported only if an axiom or
+                    // rule uses it.
                     let _ = self.plain(iri, arity);
                 }
             }
         }
     }
 
-    /// Returns the plain predicate of a class or property.
+    /// Returns the plain predicate of a class or property, and declares it if necessary.
     ///
     /// # Errors
     /// Another entity with the same name has another arity.
@@ -74,13 +74,14 @@ impl Terms {
         Ok(name)
     }
 
-    /// Returns the condition that a class or property holds, asserted or inferred.
+    /// Returns the condition that an asserted or inferred fact of a class or property holds for
+    /// `arguments`.
     pub(super) fn inferred(&mut self, iri: &Iri, arguments: Vec<Term>) -> Result<Condition, String> {
         let plain = self.plain(iri, arguments.len())?;
         Ok(Condition::Atom(atom(names::inferred(&plain), arguments)))
     }
 
-    /// Collects the constants: named individuals with their types, and the values of assertions.
+    /// Collects the constants: named individuals with their types, and values in assertions.
     pub(super) fn types(&mut self, ontology: &Ontology) {
         let (mut kinds, mut spelled) = (BTreeMap::new(), BTreeMap::new());
         for annotated in &ontology.axioms {
@@ -114,7 +115,7 @@ impl Terms {
         }
     }
 
-    /// Returns the constant of an individual.
+    /// Returns the constant of an individual, and declares it unless the individual is anonymous.
     pub(super) fn individual(&mut self, iri: &Iri) -> Name {
         let name = names::plain(iri);
         if !iri.starts_with(ANONYMOUS) {
@@ -123,7 +124,8 @@ impl Terms {
         name
     }
 
-    /// Returns the constant of a value. Numbers become constants only if they occur in rules.
+    /// Returns the constant of a literal, and declares it. Numbers are declared only if they occur
+    /// in rules.
     pub(super) fn literal(&mut self, literal: &ontology::Literal, in_rule: bool) -> Name {
         let (datatype, language) = (literal.datatype.as_deref(), literal.language.as_deref());
         let value = Literal::parse(&literal.lexical, datatype, language);
@@ -137,7 +139,7 @@ impl Terms {
         name
     }
 
-    /// Adds the axioms by which asserted facts hold as inferred ones.
+    /// Adds an axiom for each class and property: the inferred predicate holds for asserted facts.
     pub(super) fn lift(&mut self) {
         let plain: BTreeMap<Name, usize> =
             self.symbols.values().map(|name| (name.clone(), self.predicates[name])).collect();

@@ -7,7 +7,7 @@ use crate::print::{signature, type_text};
 use super::soft::is_violation;
 use super::{Checker, Scope, did_you_mean};
 
-/// Namespace of an atom's symbol.
+/// Namespace of the symbol of an atom.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
     Predicate,
@@ -42,7 +42,7 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// Checks the body of a quantifier, with its variables in scope.
+    /// Declares the variables of a quantifier in `scope` while `body` checks the quantified part.
     pub(super) fn quantified(
         &mut self,
         variables: &'a [TypedName],
@@ -183,7 +183,8 @@ impl<'a> Checker<'a> {
     }
 
     fn argument_fits(&self, argument: &ArgumentType<'a>, expected: &TypeExpression) -> bool {
-        // A variable of a wider type is narrowed by the atom. An object has exactly its declared types.
+        // A variable of a wider type is narrowed by the atom. An object has exactly the types of its
+        // declarations.
         match argument {
             ArgumentType::Variable(r#type) => self.symbols.types.overlap(r#type, expected),
             ArgumentType::Object(types) => types.iter().any(|r#type| {
@@ -227,7 +228,7 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// Type of a term; reports undeclared variables and objects.
+    /// Returns the type of a term; reports undeclared variables and objects and returns `None` for them.
     pub(super) fn term(&mut self, term: &'a Term, scope: &Scope<'a>) -> Option<ArgumentType<'a>> {
         match term {
             Term::Variable(Identifier { name, span }) => {
@@ -277,7 +278,7 @@ fn is_object(r#type: &TypeExpression) -> bool {
     r#type.alternatives.iter().all(|alternative| alternative.name.as_str().eq_ignore_ascii_case("object"))
 }
 
-/// Text of a type for messages.
+/// Formats a type for messages.
 fn describe(r#type: &TypeExpression) -> String {
     format!("of type `{}`", type_text(r#type))
 }

@@ -7,7 +7,7 @@ use crate::source::Source;
 
 use super::Checker;
 
-/// Requirement flags of PDDL 1.2 to 3.1, PDDL+ and HDDL, and those that planners accept in addition.
+/// Requirement flags of PDDL 1.2 to 3.1, PDDL+ and HDDL, and further flags that planners accept.
 const REQUIREMENTS: [&str; 31] = [
     "strips",
     "typing",
@@ -187,8 +187,8 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// Warns about an undeclared type in the declaration of a predicate or a function. It restricts nothing;
-    /// generated files contain such types.
+    /// Warns about an undeclared type in the declaration of a predicate or a function. The type restricts
+    /// nothing. Generated files contain such types.
     fn lenient_type(&mut self, r#type: &TypeExpression, noun: &str) {
         for alternative in &r#type.alternatives {
             if !self.symbols.types.contains(&alternative.name) {

@@ -17,16 +17,17 @@ use symbols::Symbols;
 /// Codes of messages about undeclared names.
 const UNDECLARED_CODES: [&str; 5] = ["P120", "P121", "P122", "P123", "P136"];
 
-/// Number of undeclared `inferred-…` predicates from which a domain is regarded as an input of `OWLToPDDL`.
+/// Minimum number of undeclared `inferred-…` predicates for a domain to count as a template of PLANTA's
+/// `OWLToPDDL`.
 const MIN_TEMPLATE_PREDICATES: usize = 3;
 
-/// Checks a domain without a problem.
+/// Checks a domain without a problem. Returns errors and warnings.
 pub fn check_domain(domain: &Domain, source: &Source) -> Vec<Diagnostic> {
     let symbols = Symbols::of(domain, None);
     check_domain_with(domain, source, &symbols).0
 }
 
-/// Checks a domain and a problem against their sources. Messages about the domain come first.
+/// Checks a domain and a problem. Returns errors and warnings. Messages about the domain come first.
 pub fn check(
     domain: &Domain,
     domain_source: &Source,
@@ -54,7 +55,8 @@ pub fn check(
     diagnostics
 }
 
-/// Returns the messages about an objective that is in neither file.
+/// Checks an objective that is given separately from the domain and problem files. Returns its errors and
+/// warnings.
 pub(super) fn objective(
     domain: &Domain,
     problem: &Problem,
@@ -67,7 +69,7 @@ pub(super) fn objective(
     checker.sink.finish()
 }
 
-/// Returns the messages about a domain, and whether it is a template for `OWLToPDDL`.
+/// Returns the messages about a domain, and `true` if the domain is a template for PLANTA's `OWLToPDDL`.
 fn check_domain_with(domain: &Domain, source: &Source, symbols: &Symbols<'_>) -> (Vec<Diagnostic>, bool) {
     let mut checker = Checker::new(symbols, source);
     checker.in_domain = true;
@@ -103,9 +105,10 @@ fn template_message(domain: &Domain, source: &Source, inferred_count: usize) -> 
 struct Checker<'a> {
     symbols: &'a Symbols<'a>,
     sink: Sink<'a>,
-    /// Undeclared predicates that `OWLToPDDL` would add.
+    /// Undeclared predicates `inferred-…`, which PLANTA's `OWLToPDDL` would declare.
     undeclared_inferred: FxHashSet<&'a Name>,
-    /// Whether a domain is checked. It should use only its own constants, not objects of a problem.
+    /// Whether the checked file is the domain. A domain should use only its own constants, not objects of a
+    /// problem.
     in_domain: bool,
     /// Whether `?duration` is defined in the current context.
     in_durative_action: bool,
@@ -121,7 +124,7 @@ impl<'a> Checker<'a> {
         Self { symbols, sink, undeclared_inferred, in_domain: false, in_durative_action: false }
     }
 
-    /// Reports an undeclared name and suggests the most similar declared one.
+    /// Reports an undeclared name and suggests the most similar name among `candidates`.
     fn undeclared<'n>(
         &mut self,
         code: &'static str,
@@ -137,7 +140,7 @@ impl<'a> Checker<'a> {
     }
 }
 
-/// Maximum number of names that are compared for a suggestion.
+/// Maximum number of candidates for a suggestion.
 const MAX_CANDIDATES: usize = 5_000;
 
 fn did_you_mean<'n>(written: &str, candidates: impl IntoIterator<Item = &'n Name>) -> Option<String> {

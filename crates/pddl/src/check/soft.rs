@@ -4,7 +4,7 @@ use crate::ast::{Atom, Constraint, Preference, Term, Trajectory};
 
 use super::{Checker, Scope};
 
-/// Function that counts the violations of a preference.
+/// Name of the function that counts the violations of a preference.
 const IS_VIOLATED: &str = "is-violated";
 
 /// Returns `true` if an atom is `(is-violated …)`.

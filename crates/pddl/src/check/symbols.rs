@@ -8,13 +8,13 @@ use crate::types::TypeHierarchy;
 /// Object or constant.
 #[derive(Debug, Default)]
 pub(super) struct Object<'a> {
-    /// Types of all its declarations.
+    /// Types from all declarations of the object.
     pub(super) types: Vec<&'a TypeExpression>,
-    /// Whether it is a constant of the domain.
+    /// Whether the domain declares the object as a constant.
     pub(super) is_constant: bool,
 }
 
-/// Declarations by name. Of repeated declarations the first one counts.
+/// Declared symbols of a domain and a problem by name. The first of several declarations counts.
 #[derive(Debug)]
 pub(super) struct Symbols<'a> {
     pub(super) types: TypeHierarchy,

@@ -1,4 +1,4 @@
-//! Consistency of assignments to object fluents: conditions under which no term receives two values.
+//! Consistency of assignments to object fluents: conditions under which no object fluent receives two values.
 
 use rustc_hash::FxHashMap;
 
@@ -7,15 +7,16 @@ use crate::ast::{Atom, Condition, EffectTime, Expression, Identifier, Name, Term
 use super::Parser;
 use super::fluents::Assigned;
 
-/// Replacement for each renamed variable.
+/// Maps each renamed variable to its replacement.
 type Renaming = FxHashMap<Name, Identifier>;
 
 impl Parser<'_> {
-    /// Returns the conditions under which no two assignments give different values to one term.
+    /// Returns the conditions under which no two assignments of an action give different values to one object
+    /// fluent.
     pub(super) fn uniqueness_conditions(&mut self, assigned: &[Assigned]) -> Vec<(EffectTime, Condition)> {
         let mut needs = Vec::new();
         for (position, first) in assigned.iter().enumerate() {
-            // Renaming apart: the variables must not capture those of the other assignment.
+            // Renaming apart: the variables must not capture those of the second assignment.
             let first = &if first.variables.is_empty() { first.clone() } else { self.copy(first) };
             if !first.is_functional() {
                 let second = self.copy(first);
@@ -54,8 +55,8 @@ impl Parser<'_> {
 }
 
 impl Assigned {
-    /// Returns `true` if different instances concern different terms: each quantified variable is an
-    /// argument.
+    /// Returns `true` if different instances of the assignment set different terms, that is, if each
+    /// quantified variable is an argument.
     fn is_functional(&self) -> bool {
         let is_argument = |variable: &TypedName| {
             self.arguments.iter().any(
@@ -66,8 +67,8 @@ impl Assigned {
     }
 }
 
-/// Condition that two assignments do not take place together, concern different terms, or assign the same
-/// value. `None` if this holds trivially.
+/// Returns the condition that two assignments do not take place together, set different terms, or assign the
+/// same value. `None` if the condition is trivially true.
 fn consistency(first: &Assigned, second: &Assigned) -> Option<Condition> {
     let equal =
         |left: &Term, right: &Term| Condition::Equal(left.clone(), right.clone(), first.function.span);
@@ -91,7 +92,7 @@ fn consistency(first: &Assigned, second: &Assigned) -> Option<Condition> {
     Some(if variables.is_empty() { need } else { Condition::ForAll(variables, Box::new(need)) })
 }
 
-/// Equality of two terms, if it is statically known.
+/// Returns whether two terms are equal, if this is statically known.
 fn known_equality(left: &Term, right: &Term) -> Option<bool> {
     match (left, right) {
         (Term::Constant(left), Term::Constant(right)) => Some(left.name == right.name),

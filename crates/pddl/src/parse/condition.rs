@@ -114,8 +114,8 @@ fn is_term_pair(left: Item<'_>, right: Item<'_>) -> bool {
     is_term_variable(left) || is_term_variable(right) || (is_name(left) && is_name(right))
 }
 
-/// Returns `true` if a list is `(at start (…))`, `(at end (…))` or `(over all (…))`, and not an atom that
-/// looks similar.
+/// Returns `true` if a list is `(at start (…))`, `(at end (…))` or `(over all (…))`. An atom such as `(at
+/// start)` is not timed.
 pub(super) fn is_timed(item: Item<'_>) -> bool {
     let mut operands = item.rest();
     let (Some(when), Some(body), None) = (operands.next(), operands.next(), operands.next()) else {

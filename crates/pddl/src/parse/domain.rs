@@ -106,7 +106,7 @@ impl Parser<'_> {
         }
     }
 
-    /// Reports a section that is unsupported or unknown.
+    /// Reports a section whose keyword is unsupported or unknown.
     pub(super) fn other_section(&mut self, section: Item<'_>, kind: &str) {
         let keyword = section.head().unwrap_or_default().to_ascii_lowercase();
         let refused = match keyword.as_str() {
@@ -207,7 +207,7 @@ impl Parser<'_> {
         Some(Action { identifier, parameters, body, preferences, span: section.span() })
     }
 
-    /// Returns the name of an action and its keywords with their values. Each keyword is one of `keys`.
+    /// Returns the name of an action and its fields: each keyword, which is one of `keys`, with its value.
     fn action_fields<'t>(
         &mut self,
         section: Item<'t>,

@@ -11,7 +11,7 @@ use super::{Parser, list_start};
 type TimedConditions = Vec<(ConditionTime, Condition)>;
 type TimedEffects = Vec<(EffectTime, Effect)>;
 
-/// Returns the time and the content of `(at start (…))`, `(over all (…))` or `(at end (…))`.
+/// Splits `(at start (…))`, `(over all (…))` or `(at end (…))` into time and content. `None` for other items.
 pub(super) fn timed(item: Item<'_>) -> Option<(ConditionTime, Item<'_>)> {
     if !is_timed(item) {
         return None;
@@ -37,7 +37,7 @@ pub(super) fn is_conjunction(item: Item<'_>) -> bool {
     item.is_headed("and") || (item.is_list() && item.items().next().is_none())
 }
 
-/// Assigns the time to each conjunct.
+/// Appends each conjunct of a condition to `conditions`, with the given time.
 fn spread_condition(time: ConditionTime, condition: Condition, conditions: &mut TimedConditions) {
     match condition {
         Condition::And(parts) => parts.into_iter().for_each(|part| spread_condition(time, part, conditions)),
@@ -45,7 +45,7 @@ fn spread_condition(time: ConditionTime, condition: Condition, conditions: &mut 
     }
 }
 
-/// Assigns the time to each conjunct.
+/// Appends each conjunct of an effect to `effects`, with the given time.
 fn spread_effect(time: EffectTime, effect: Effect, effects: &mut TimedEffects) {
     match effect {
         Effect::And(parts) => parts.into_iter().for_each(|part| spread_effect(time, part, effects)),
@@ -54,7 +54,7 @@ fn spread_effect(time: EffectTime, effect: Effect, effects: &mut TimedEffects) {
 }
 
 impl Parser<'_> {
-    /// Parses `:condition` of a durative action.
+    /// Parses `:condition` of a durative action and appends its conjuncts to `conditions`.
     pub(super) fn timed_conditions(&mut self, item: Item<'_>, conditions: &mut TimedConditions) {
         if is_conjunction(item) {
             for item in item.rest() {
@@ -96,7 +96,7 @@ impl Parser<'_> {
             .help(format!("write {forms}"));
     }
 
-    /// Parses `:effect` of a durative action.
+    /// Parses `:effect` of a durative action and appends its conjuncts to `effects`.
     pub(super) fn timed_effects(&mut self, item: Item<'_>, effects: &mut TimedEffects) {
         if is_conjunction(item) {
             for item in item.rest() {

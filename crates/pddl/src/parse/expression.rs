@@ -31,7 +31,7 @@ fn arithmetic(symbol: &str) -> Option<Arithmetic> {
     })
 }
 
-/// Suggestion for continuous effects.
+/// Help text for continuous effects.
 pub(super) const CONTINUOUS: &str = "numbers change at the start and the end of actions only: `(at end (increase (f) (* 2 ?duration)))` for a rate of 2";
 
 impl Parser<'_> {
@@ -137,7 +137,7 @@ impl Parser<'_> {
         (operands.len() == count).then_some(Expression::Operation(operation, operands, item.span()))
     }
 
-    /// Parses and evaluates an expression without functions, as required in `:init`.
+    /// Parses an expression without functions, as required in `:init`, and returns its value.
     pub(super) fn constant(&mut self, item: Item<'_>) -> Option<BigRational> {
         let expression = self.expression(item)?;
         let value = evaluate(&expression);

@@ -5,28 +5,30 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use crate::ast::{Atom, Condition, Declaration, Domain, EffectTime, Identifier, Name, Span, Term, TypedName};
 use crate::types::TypeHierarchy;
 
-/// Declared object fluents, and those that occur in the part that is being read.
+/// Declared object fluents, and the object-fluent terms of the condition, effect or action that is being
+/// parsed.
 #[derive(Default)]
 pub(super) struct Objects {
     /// Predicates that represent object fluents.
     pub(super) functions: FxHashMap<Name, Declaration>,
     /// Declared types.
     pub(super) types: FxHashSet<Name>,
-    /// Common prefix of new variables, once there is one.
+    /// Common prefix of new variables; `None` before the first one.
     pub(super) prefix: Option<String>,
     /// Number of new variables.
     pub(super) count: usize,
     /// Whether the current context allows terms with object fluents.
     pub(super) is_open: bool,
-    /// Terms of the condition or effect that is being read.
+    /// Object-fluent terms of the condition or effect that is being parsed.
     pub(super) values: Vec<Value>,
-    /// Time of the effect that is being read; `None` in an instantaneous action.
+    /// Time of the effect that is being parsed; `None` in an instantaneous action.
     pub(super) time: Option<EffectTime>,
-    /// Requirements of the current action's effects on the state.
+    /// Conditions that the effects of the current action impose on the state, each with its time.
     pub(super) needs: Vec<(EffectTime, Condition)>,
     /// Assignments to object fluents by the current action.
     pub(super) assigned: Vec<Assigned>,
-    /// Values in `:init`; `None` for `undefined`.
+    /// Values of object fluents in `:init`, by function and arguments, with their positions. `None` for
+    /// `undefined`.
     pub(super) initial: FxHashMap<(Name, Vec<Name>), (Option<Name>, Span)>,
 }
 
@@ -36,7 +38,8 @@ pub(super) struct Value {
     pub(super) atom: Atom,
 }
 
-/// Position in `needs` and `assigned`: later entries belong to the effects read since.
+/// Lengths of `needs` and `assigned` at some point of parsing. Later entries belong to effects parsed after
+/// this point.
 #[derive(Clone, Copy)]
 pub(super) struct Mark {
     pub(super) needs: usize,
@@ -79,7 +82,7 @@ pub(super) struct Assigned {
     pub(super) value: Option<Term>,
     /// Variables of the enclosing quantifiers.
     pub(super) variables: Vec<TypedName>,
-    /// Variables for the values of terms.
+    /// New variables for the values of object-fluent terms within the assignment.
     pub(super) values: Vec<TypedName>,
     /// Conditions of the enclosing `when` effects.
     pub(super) conditions: Vec<Condition>,

@@ -100,7 +100,7 @@ impl Parser<'_> {
     }
 }
 
-/// Returns `true` if `(at a b)` is a timed initial literal and not a fact of a predicate `at`.
+/// Returns `true` if `(at a b)` is a timed initial literal rather than a fact of a predicate named `at`.
 fn is_timed_literal(item: Item<'_>) -> bool {
     let mut operands = item.rest();
     let time = operands.next().and_then(Item::symbol);

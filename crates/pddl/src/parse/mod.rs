@@ -26,20 +26,21 @@ use super::sexp::{self, Item};
 use super::source::Source;
 use fluents::Objects;
 
-/// Parses a domain. In case of errors the tree lacks the unreadable parts. It is absent if the text has no
-/// `(define (domain …) …)`.
+/// Parses a domain. In case of errors the tree lacks the unreadable parts. The tree is absent if the text has
+/// no `(define (domain …) …)`.
 pub fn parse_domain(source: &Source) -> (Option<Domain>, Vec<Diagnostic>) {
     let parsed = domain(source);
     (parsed.tree, parsed.diagnostics)
 }
 
-/// Parses a problem, with the same treatment of errors as [`parse_domain`].
+/// Parses a problem. In case of errors the tree lacks the unreadable parts. The tree is absent if the text
+/// has no `(define (problem …) …)`.
 pub fn parse_problem(source: &Source) -> (Option<Problem>, Vec<Diagnostic>) {
     let parsed = problem(source);
     (parsed.tree, parsed.diagnostics)
 }
 
-/// Parses a problem of a domain that may have object fluents (functions with objects as values).
+/// Parses a problem of a domain that may declare object fluents (functions with objects as values).
 pub fn parse_problem_of(domain: &Domain, source: &Source) -> (Option<Problem>, Vec<Diagnostic>) {
     let parsed = problem_of(domain, source);
     (parsed.tree, parsed.diagnostics)
@@ -65,7 +66,7 @@ pub(super) fn expression(source: &Source) -> Parsed<Expression> {
 pub(super) struct Parsed<T> {
     pub(super) tree: Option<T>,
     pub(super) diagnostics: Vec<Diagnostic>,
-    /// Whether all declarations were read. Only then is an undeclared name an error of its own.
+    /// Whether all declarations were parsed. Otherwise a name may be undeclared because of a syntax error.
     pub(super) declarations_intact: bool,
 }
 
@@ -121,7 +122,7 @@ struct Parser<'s> {
 }
 
 impl Parser<'_> {
-    /// Returns the `(define …)` of a text.
+    /// Returns the `(define …)` of a text and reports everything outside of it.
     fn define<'t>(&mut self, top: sexp::Items<'t>) -> Option<Item<'t>> {
         let mut define = None;
         for item in top {
@@ -160,7 +161,7 @@ impl Parser<'_> {
         Identifier { name: self.name(written), span }
     }
 
-    /// Reads a name. `description` names the expected thing in messages, with its article.
+    /// Parses a name. `description` names the expected construct in messages, with its article.
     fn name_item(&mut self, item: Item<'_>, description: &str) -> Option<Identifier> {
         match item.symbol() {
             Some(symbol) if !symbol.starts_with(['?', ':']) => Some(self.identifier(symbol, item.span())),
@@ -175,7 +176,7 @@ impl Parser<'_> {
         }
     }
 
-    /// Reports a syntax error at the beginning of an item: `description` was expected, the item was found.
+    /// Reports a syntax error at the beginning of an item: `description` was expected instead of the item.
     fn expected(&mut self, item: Item<'_>, description: &str) -> &mut Diagnostic {
         let actual = match item.symbol() {
             Some(symbol) => format!("`{symbol}`"),
@@ -197,7 +198,8 @@ impl Parser<'_> {
         self.sink.error("P113", at_start(item), format!("{construct} are not supported"))
     }
 
-    /// Returns the `N` operands of a list. Any other number is an error that shows the correct form.
+    /// Returns the `N` operands of a list. Any other number of operands is an error that shows the correct
+    /// `form`.
     fn operands<'t, const N: usize>(&mut self, list: Item<'t>, form: &str) -> Option<[Item<'t>; N]> {
         let operands: Vec<_> = list.rest().collect();
         let count = operands.len();
@@ -228,7 +230,7 @@ impl Parser<'_> {
     }
 }
 
-/// Extent to underline for an item: the whole symbol, or the parenthesis and the head of a list.
+/// Returns the extent to underline for an item: the whole symbol, or the parenthesis and the head of a list.
 fn at_start(item: Item<'_>) -> Span {
     if item.is_list() { list_start(item) } else { item.span() }
 }

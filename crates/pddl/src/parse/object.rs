@@ -2,11 +2,12 @@
 //!
 //! `(place-of ?x - tool) - place` becomes a predicate with one more argument: the value. The predicate holds
 //! for at most one value.
-//! - A term in a condition becomes a variable below `exists`.
-//! - A term in an effect becomes a variable below `forall` and `when`.
+//! - An object-fluent term in a condition becomes a variable below `exists`.
+//! - An object-fluent term in an effect becomes a variable below `forall` and `when`.
 //! - An assignment adds the atom with the new value and deletes the atoms with all values. Additions override
 //!   deletions.
-//! - Requirements of an effect on the state become conditions of its action.
+//! - Conditions that an effect imposes on the state, such as the existence of a value, become conditions of
+//!   its action.
 
 use crate::ast::{
     Atom, Condition, ConditionTime, Declaration, Domain, Effect, EffectTime, Identifier, InitialElement,
@@ -102,7 +103,7 @@ impl Parser<'_> {
         let mut r#type = declaration
             .and_then(|declaration| declaration.parameters.last())
             .map_or_else(TypeExpression::default, |parameter| parameter.r#type.clone());
-        // An undeclared type was reported at its occurrence and restricts nothing.
+        // An undeclared type was reported where it is declared for the function; here it restricts nothing.
         r#type.alternatives.retain(|alternative| self.objects.types.contains(&alternative.name));
         r#type.alternatives.iter_mut().for_each(|alternative| alternative.span = span);
         TypedName { identifier: self.new_variable(span), r#type }
@@ -123,7 +124,8 @@ impl Parser<'_> {
         None
     }
 
-    /// Replaces a term by a new variable for its value and records the atom that binds the variable.
+    /// Replaces an object-fluent term by a new variable for its value and records the atom that binds the
+    /// variable.
     pub(super) fn value_of(&mut self, item: Item<'_>) -> Option<Term> {
         if !self.is_object_fluent(item) {
             self.expected(item, "a variable or an object").help(
@@ -147,7 +149,7 @@ impl Parser<'_> {
         Some(term)
     }
 
-    /// Returns the function of a term and its arguments; reports a wrong number of arguments.
+    /// Returns the function and the arguments of an object-fluent term; reports a wrong number of arguments.
     fn object_term(&mut self, item: Item<'_>) -> Option<(Identifier, Vec<Term>)> {
         let function = self.name_item(item.items().next()?, "a function")?;
         let message_count = self.sink.len();
@@ -172,7 +174,7 @@ impl Parser<'_> {
         Some((function, arguments))
     }
 
-    /// Reads an object or a term that denotes one.
+    /// Parses an object, a variable, or an object-fluent term.
     fn object(&mut self, item: Item<'_>) -> Option<Term> {
         let is_number =
             |symbol: &str| literal(symbol) != Literal::Name || symbol.eq_ignore_ascii_case("?duration");
@@ -183,7 +185,8 @@ impl Parser<'_> {
         self.term(item)
     }
 
-    /// Runs a reader that may meet terms. Returns its result and the values that the terms refer to.
+    /// Runs `read`, which may encounter object-fluent terms. Returns its result and the variables and atoms
+    /// for the values of these terms.
     fn with_terms<T>(&mut self, read: impl FnOnce(&mut Self) -> Option<T>) -> Option<(T, Vec<Value>)> {
         let was_open = std::mem::replace(&mut self.objects.is_open, true);
         let outer = std::mem::take(&mut self.objects.values);
@@ -193,8 +196,8 @@ impl Parser<'_> {
         Some((result?, values))
     }
 
-    /// Reads a condition and binds the values of its terms by `exists`. A condition about a missing value is
-    /// therefore false.
+    /// Parses a condition and binds the values of its object-fluent terms by `exists`. A condition about a
+    /// missing value is therefore false.
     pub(super) fn with_values(
         &mut self,
         read: impl FnOnce(&mut Self) -> Option<Condition>,
@@ -208,7 +211,7 @@ impl Parser<'_> {
         Some(Condition::Exists(variables, Box::new(Condition::And(parts))))
     }
 
-    /// Reads `(= (place-of ?x) ?y)`, in either order. `?y` may also be a term or `undefined`.
+    /// Parses `(= (place-of ?x) ?y)`, in either order. `?y` may also be an object-fluent term or `undefined`.
     pub(super) fn equal_objects(&mut self, left: Item<'_>, right: Item<'_>) -> Option<Condition> {
         let (term, value) = if self.is_object_fluent(left) { (left, right) } else { (right, left) };
         if is_undefined(value) {
@@ -250,8 +253,8 @@ impl Parser<'_> {
         Some(effect)
     }
 
-    /// Reads an effect and binds the values of its terms by `forall` and `when`. A missing value makes the
-    /// action inexecutable.
+    /// Parses an effect and binds the values of its object-fluent terms by `forall` and `when`. A missing
+    /// value makes the action inexecutable.
     pub(super) fn for_values(&mut self, read: impl FnOnce(&mut Self) -> Option<Effect>) -> Option<Effect> {
         let mark = self.mark_effects();
         let (effect, values) = self.with_terms(read)?;
@@ -281,7 +284,8 @@ impl Parser<'_> {
         Mark { needs: self.objects.needs.len(), assigned: self.objects.assigned.len() }
     }
 
-    /// Quantifies the requirements of all effects since `mark` over `variables`.
+    /// Quantifies the needs of all effects parsed since `mark` over `variables`. Needs are conditions that
+    /// effects impose on the state.
     pub(super) fn effects_below(&mut self, mark: Mark, variables: &[TypedName]) {
         for (_, need) in &mut self.objects.needs[mark.needs..] {
             let inner = std::mem::replace(need, Condition::And(Vec::new()));
@@ -292,7 +296,8 @@ impl Parser<'_> {
         }
     }
 
-    /// Makes the requirements of all effects since `mark` conditional on `condition`.
+    /// Makes the needs of all effects parsed since `mark` depend on `condition`. Needs are conditions that
+    /// effects impose on the state.
     pub(super) fn effects_when(&mut self, mark: Mark, condition: &Condition) {
         for (_, need) in &mut self.objects.needs[mark.needs..] {
             let inner = std::mem::replace(need, Condition::And(Vec::new()));
@@ -304,7 +309,7 @@ impl Parser<'_> {
     }
 
     /// Returns the conditions that the effects of an action impose: the values that they read exist, and no
-    /// term receives two values.
+    /// object fluent receives two values.
     pub(super) fn needs_of_effects(&mut self) -> Vec<(ConditionTime, Condition)> {
         let mut needs = std::mem::take(&mut self.objects.needs);
         let assigned = std::mem::take(&mut self.objects.assigned);
@@ -352,12 +357,12 @@ fn is_undefined(item: Item<'_>) -> bool {
     item.symbol().is_some_and(|symbol| symbol.eq_ignore_ascii_case(UNDEFINED))
 }
 
-/// Splits values into their variables and the atoms that bind them.
+/// Splits values into their variables and the atoms that bind the variables.
 fn variables_and_atoms(values: Vec<Value>) -> (Vec<TypedName>, Vec<Condition>) {
     values.into_iter().map(|value| (value.variable, Condition::Atom(value.atom))).unzip()
 }
 
-/// Condition that all terms have values.
+/// Returns the condition that each object-fluent term in `values` has a value.
 fn has_value(values: Vec<Value>) -> Condition {
     let (variables, parts) = variables_and_atoms(values);
     Condition::Exists(variables, Box::new(conjunction(parts)))
@@ -367,7 +372,7 @@ fn conjunction(mut parts: Vec<Condition>) -> Condition {
     if parts.len() == 1 { parts.swap_remove(0) } else { Condition::And(parts) }
 }
 
-/// Conjoins a condition with the requirements of the action's effects.
+/// Conjoins a condition with the conditions that the action's effects impose.
 pub(super) fn with_needs(condition: Condition, needs: Vec<Condition>) -> Condition {
     if needs.is_empty() {
         return condition;

@@ -7,7 +7,7 @@ use super::Parser;
 use super::list_start;
 use super::typed::Entries;
 
-/// Sections that a problem has at most once, as far as they were read.
+/// Sections that a problem has at most once, each with its position. `None` for sections not yet parsed.
 #[derive(Default)]
 struct UniqueSections {
     domain: Option<Identifier>,
@@ -106,7 +106,8 @@ impl Parser<'_> {
         self.name_item(item, "a name of a domain")
     }
 
-    /// Parses the goal. An empty goal is true. More than one condition is an error.
+    /// Parses the goal and appends its preferences to `constraints`. An empty goal is true. More than one
+    /// condition is an error.
     fn goal(&mut self, section: Item<'_>, constraints: &mut Vec<Constraint>) -> Option<Condition> {
         let mut items = section.rest();
         match (items.next(), items.next()) {

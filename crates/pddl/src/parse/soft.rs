@@ -127,7 +127,7 @@ impl Parser<'_> {
         self.condition(item)
     }
 
-    /// Like [`Parser::hard`], for the condition of a durative action.
+    /// Parses the mandatory part of a durative action's condition and collects the preferences in `soft`.
     fn hard_timed<'t>(
         &mut self,
         item: Item<'t>,
@@ -166,7 +166,7 @@ impl Parser<'_> {
         Some(RawPreference { variables, time, name: name?, body, whole: item })
     }
 
-    /// Returns the name of a preference, if it has one, and its condition.
+    /// Returns the name of a preference, if it has one, and its unparsed condition.
     pub(super) fn named_preference<'t>(&mut self, item: Item<'t>) -> Option<(Option<Identifier>, Item<'t>)> {
         let mut operands = item.rest();
         match (operands.next(), operands.next(), operands.next()) {

@@ -16,8 +16,8 @@ impl Parser<'_> {
         }
     }
 
-    /// Splits a constraint at conjunctions and quantifiers outside of preferences. `outer` contains the
-    /// variables of the enclosing quantifiers.
+    /// Splits a constraint at conjunctions and quantifiers outside of preferences and appends the parts to
+    /// `constraints`. `outer` contains the variables of the enclosing quantifiers.
     fn constraint(&mut self, item: Item<'_>, outer: &[TypedName], constraints: &mut Vec<Constraint>) {
         if is_conjunction(item) {
             item.rest().for_each(|part| self.constraint(part, outer, constraints));

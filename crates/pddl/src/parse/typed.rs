@@ -15,8 +15,8 @@ pub(super) enum Entries {
 }
 
 impl Parser<'_> {
-    /// Parses the entries of a typed list. A dash that is joined to the following word is read as a separate
-    /// dash.
+    /// Parses the entries of a typed list. A dash that is joined to the following word, as in `-type`, is
+    /// read as a separate dash.
     pub(super) fn typed_list(&mut self, items: Items<'_>, entries: Entries) -> Vec<TypedName> {
         let mut list: Vec<TypedName> = Vec::new();
         let mut untyped_from = 0;
@@ -81,7 +81,7 @@ impl Parser<'_> {
         TypeExpression { alternatives: alternatives.collect() }
     }
 
-    /// Type with the given name. `object` is represented by an empty list of alternatives.
+    /// Returns the type with the given name. `object` is represented by an empty list of alternatives.
     fn named_type(&mut self, name: &str, span: Span) -> TypeExpression {
         if name.eq_ignore_ascii_case("object") {
             return TypeExpression::default();

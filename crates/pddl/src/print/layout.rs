@@ -1,10 +1,10 @@
-//! Pretty printer for nested lists: a list that fits is printed on one line, otherwise each of its items on a
-//! line of its own.
+//! Pretty printer for nested lists. A list that fits is printed on one line; otherwise each of its items is
+//! on a separate line.
 
 /// Maximum line width, in characters.
 const WIDTH: usize = 100;
 
-/// A list or a word.
+/// A list or a word, with its width.
 #[derive(Debug)]
 pub(super) struct Doc {
     /// Text before the opening parenthesis: the keyword of an action, or empty.
@@ -17,7 +17,7 @@ pub(super) struct Doc {
 #[derive(Debug)]
 enum Content {
     Text(String),
-    /// Items, and the number of items that stay on the first line if the list is broken.
+    /// Items, and the number of items that stay on the first line if the list is printed on several lines.
     List(Vec<Doc>, usize),
 }
 
@@ -32,8 +32,8 @@ pub(super) fn text(text: impl Into<String>) -> Doc {
     }
 }
 
-/// Creates the list `(head items…)`. If it is broken, the first `first_line_items` of head and items stay on
-/// the first line.
+/// Creates the list `(head items…)`. If the list is printed on several lines, the first `first_line_items` of
+/// head and items stay on the first line.
 #[expect(clippy::arithmetic_side_effects, reason = "widths of what is written in memory")]
 pub(super) fn list(head: &str, first_line_items: usize, items: impl IntoIterator<Item = Doc>) -> Doc {
     let items: Vec<_> = std::iter::once(text(head)).chain(items).collect();
@@ -43,7 +43,7 @@ pub(super) fn list(head: &str, first_line_items: usize, items: impl IntoIterator
 }
 
 impl Doc {
-    /// Breaks the list: all items except those of the first line are on lines of their own.
+    /// Forces the list onto several lines: each item after the first line gets a separate line.
     pub(super) fn broken(mut self) -> Self {
         self.is_broken = match &self.content {
             Content::Text(_) => false,
@@ -52,7 +52,7 @@ impl Doc {
         self
     }
 
-    /// Puts a keyword before the document.
+    /// Puts a keyword before the opening parenthesis.
     #[expect(clippy::arithmetic_side_effects, reason = "widths of what is written in memory")]
     pub(super) fn after(mut self, keyword: &str) -> Self {
         keyword.clone_into(&mut self.keyword);
@@ -60,7 +60,7 @@ impl Doc {
         self
     }
 
-    /// Text without line breaks.
+    /// Returns the text without line breaks.
     pub(super) fn on_one_line(&self) -> String {
         let mut out = String::new();
         self.write_inline(&mut out);
@@ -114,7 +114,7 @@ impl Doc {
     }
 }
 
-/// Prints the whole text, with a final line break.
+/// Formats the whole document, with a final line break.
 pub(super) fn layout(doc: &Doc) -> String {
     let mut out = String::new();
     doc.write(0, &mut out);

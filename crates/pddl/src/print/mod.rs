@@ -73,7 +73,7 @@ pub(crate) fn constraint_text(constraint: &crate::ast::Constraint) -> String {
     soft::constraint(constraint, false).on_one_line()
 }
 
-/// Prints a declaration: `(at ?x - robot)`.
+/// Formats the declaration of a predicate or function: `(at ?x - robot)`.
 pub(crate) fn signature(declaration: &Declaration) -> String {
     let parameters = typed("?", &declaration.parameters);
     let space = if parameters.is_empty() { "" } else { " " };

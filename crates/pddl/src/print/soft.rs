@@ -1,4 +1,4 @@
-//! Converts preferences and trajectory constraints to lists.
+//! Converts preferences and trajectory constraints to printable lists.
 
 use num_rational::BigRational;
 
@@ -12,7 +12,7 @@ pub(super) fn is_of_goal(constraint: &Constraint) -> bool {
     constraint.preference.is_some() && matches!(constraint.trajectory, Trajectory::AtEnd(_))
 }
 
-/// Combines a condition with preferences.
+/// Returns the conjunction of a condition and preferences; the condition alone if there are no preferences.
 pub(super) fn with(hard: &Condition, soft: impl Iterator<Item = Doc>) -> Doc {
     let mut soft = soft.peekable();
     if soft.peek().is_none() {
@@ -22,13 +22,13 @@ pub(super) fn with(hard: &Condition, soft: impl Iterator<Item = Doc>) -> Doc {
     list("and", 1, parts.iter().map(condition).chain(soft))
 }
 
-/// Section `:constraints`, if there are any.
+/// Returns the section `:constraints`; `None` without constraints.
 pub(super) fn constraints(constraints: &[&Constraint]) -> Option<Doc> {
     let conjunction = list("and", 1, constraints.iter().map(|item| constraint(item, false))).broken();
     (!constraints.is_empty()).then(|| list(":constraints", 2, [conjunction]))
 }
 
-/// Converts a constraint with its quantifiers. In the goal, `at end` is omitted.
+/// Converts a constraint with its quantifiers. With `in_goal`, `at end` is omitted.
 pub(super) fn constraint(constraint: &Constraint, in_goal: bool) -> Doc {
     let body = match (&constraint.trajectory, in_goal) {
         (Trajectory::AtEnd(condition_at_end), true) => condition(condition_at_end),
@@ -41,7 +41,8 @@ pub(super) fn constraint(constraint: &Constraint, in_goal: bool) -> Doc {
     quantified(&constraint.variables, body)
 }
 
-/// Converts a preference of an action with its quantifiers.
+/// Converts a preference of an action with its quantifiers. With `is_timed`, the condition has a time
+/// specifier.
 pub(super) fn preference(preference: &Preference, is_timed: bool) -> Doc {
     let Preference { variables, name, time, condition: body, .. } = preference;
     let body = if is_timed { timed_condition(&(*time, body.clone())) } else { condition(body) };

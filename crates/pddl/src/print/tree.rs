@@ -1,4 +1,4 @@
-//! Converts conditions, effects and expressions to lists.
+//! Converts conditions, effects and expressions to printable lists.
 
 use num_rational::BigRational;
 
@@ -21,7 +21,7 @@ pub(super) fn atom(atom: &Atom) -> Doc {
     list(atom.predicate.name.as_str(), 1, atom.arguments.iter().map(term))
 }
 
-/// Converts a number to a decimal, or to a quotient if it has no finite decimal.
+/// Converts a number to a decimal, or to a quotient if its decimal expansion is infinite.
 pub(super) fn number(value: &BigRational) -> Doc {
     match to_decimal(value) {
         Some(decimal) => text(decimal),

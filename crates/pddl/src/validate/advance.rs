@@ -1,4 +1,4 @@
-//! Computes the changes of a single step, by the same rules as [`validate`](super::validate()).
+//! Computes the state change of a single step, by the same rules as [`validate`](super::validate()).
 //!
 //! Used during execution: the state after each action is the initial state of the remaining problem.
 
@@ -28,7 +28,7 @@ pub struct Advance {
     pub added: Vec<Atom>,
     /// Facts that become false, sorted.
     pub deleted: Vec<Atom>,
-    /// Changed functions, sorted.
+    /// Numeric functions that the step changes, sorted.
     pub values: Vec<ValueChange>,
     /// Duration, in the domain's time unit.
     pub duration: BigRational,
@@ -121,7 +121,7 @@ fn advance_in(world: &World<'_>, step: &PlanStep, forced: bool) -> Result<Advanc
 }
 
 impl Advance {
-    /// Replaces the initial state of a problem by the state after the step.
+    /// Updates the initial state `init` of a problem to the state after the step.
     pub fn apply(&self, init: &mut Vec<InitialElement>) {
         // Negated facts of `:init` must not contradict the added facts.
         init.retain(|element| match element {
@@ -158,8 +158,8 @@ fn is_same(left: &Atom, right: &Atom) -> bool {
         && left.arguments.iter().zip(&right.arguments).all(|(left, right)| name(left) == name(right))
 }
 
-/// Metric value if the plan ended in the initial state of the problem after `total_time`, in the domain's
-/// time unit. `None` without a metric or if the value is undefined.
+/// Returns the metric value if the plan ended in the initial state of the problem after `total_time`, in the
+/// domain's time unit. `None` without a metric or if the value is undefined.
 pub fn metric_after(domain: &Domain, problem: &Problem, total_time: &BigRational) -> Option<BigRational> {
     let reduced = relevant(domain, problem, &[]);
     let world = World::new(domain, reduced.as_ref().unwrap_or(problem), &|| false);
@@ -168,7 +168,8 @@ pub fn metric_after(domain: &Domain, problem: &Problem, total_time: &BigRational
     metric(&world, &execution.state, total_time)
 }
 
-/// Metric value if a plan ended in `state` after `total_time`.
+/// Returns the metric value if a plan ended in `state` after `total_time`. `None` without a metric or if the
+/// value is undefined.
 pub(super) fn metric(world: &World<'_>, state: &State, total_time: &BigRational) -> Option<BigRational> {
     let metric = world.problem.metric.as_ref()?;
     let evaluator = Evaluator { total_time: Some(total_time), ..Evaluator::new(world, state) };
@@ -182,7 +183,7 @@ fn note(changes: &Changes, assigned: &mut FxHashMap<Ground, bool>) {
     }
 }
 
-/// Facts that hold in `state` and not in `other`, sorted.
+/// Returns the facts that hold in `state` but not in `other`, sorted by their text.
 fn facts_only_in(world: &World<'_>, state: &State, other: &State) -> Vec<Atom> {
     let is_new = |predicate: Symbol, arguments: &Arguments| {
         !other.facts.get(&predicate).is_some_and(|tuples| tuples.contains(arguments))

@@ -1,32 +1,34 @@
-//! Groups the axioms of a domain by stratum and finds the atoms that new facts can be joined with.
+//! Groups the axioms of a domain by stratum and finds the body atoms that semi-naive evaluation joins with
+//! new facts.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::ast::{Atom, Condition, Derived, Domain, Name, TypedName};
 use crate::strata::Strata;
 
-/// Axioms of mutually dependent predicates.
+/// Axioms of one stratum. Their predicates may depend on each other, but not through a negation.
 #[derive(Debug, Default)]
 pub(super) struct Stratum<'p> {
     /// Derived predicates of the stratum.
     pub(super) predicates: FxHashSet<&'p Name>,
     pub(super) axioms: Vec<Axiom<'p>>,
-    /// Occurrences of each predicate of the stratum in the conditions of the axioms.
+    /// Body atoms of each predicate of the stratum that new facts can be joined with.
     pub(super) occurrences: FxHashMap<&'p Name, Vec<Occurrence<'p>>>,
 }
 
 #[derive(Debug)]
 pub(super) struct Axiom<'p> {
     pub(super) derived: &'p Derived,
-    /// Parts of the condition, by address, that mention a predicate of the stratum at a position where new
-    /// facts cannot be joined.
+    /// Addresses of the opaque parts of the condition. An opaque part mentions a predicate of the stratum
+    /// where new facts cannot be joined, for example below a negation.
     pub(super) opaque: FxHashSet<*const Condition>,
 }
 
-/// Atom in the condition of an axiom, below conjunctions, disjunctions and existential quantifiers only.
+/// Body atom of an axiom that new facts can be joined with. Only conjunctions, disjunctions and existential
+/// quantifiers enclose the atom.
 #[derive(Debug)]
 pub(super) struct Occurrence<'p> {
-    /// Index of the axiom.
+    /// Index of the axiom in [`Stratum::axioms`].
     pub(super) axiom: usize,
     pub(super) atom: &'p Atom,
     /// Variables of the enclosing quantifiers, outermost first.
@@ -69,7 +71,7 @@ pub(super) fn strata(domain: &Domain) -> Vec<Stratum<'_>> {
     strata
 }
 
-/// Returns all predicates and functions that occur in conditions of axioms.
+/// Returns all predicates and functions that occur in the conditions of axioms.
 pub(super) fn read_by_axioms(domain: &Domain) -> FxHashSet<&Name> {
     let mut names = FxHashSet::default();
     for axiom in &domain.derived {
@@ -92,8 +94,8 @@ struct Walk<'w, 'p> {
 }
 
 impl<'p> Walk<'_, 'p> {
-    /// Records the occurrences of predicates of the stratum. Returns `true` if the condition is opaque: new
-    /// facts cannot be joined with one of them.
+    /// Records the atoms of the stratum's predicates below `condition`. Returns `true` if the condition is
+    /// opaque: it mentions such a predicate where new facts cannot be joined.
     fn visit(&mut self, condition: &'p Condition) -> bool {
         let mut is_opaque = false;
         match condition {
@@ -104,7 +106,7 @@ impl<'p> Walk<'_, 'p> {
                     self.conjunctions.pop();
                 }
             }
-            // A new fact satisfies one disjunct; the others need not be joined.
+            // A new fact satisfies one disjunct; the other disjuncts need not be joined.
             Condition::Or(parts) => parts.iter().for_each(|part| is_opaque |= self.visit(part)),
             Condition::Exists(variables, body) if !self.hides(variables) => {
                 self.variables.push(variables);
@@ -120,7 +122,7 @@ impl<'p> Walk<'_, 'p> {
                 };
                 self.occurrences.entry(&atom.predicate.name).or_default().push(occurrence);
             }
-            // Below negations, implications and universal quantifiers a new fact cannot be joined.
+            // Below a negation, an implication or a universal quantifier, a new fact cannot be joined.
             other => names_in(other, &mut |name| is_opaque |= self.predicates.contains(name)),
         }
         if is_opaque {

@@ -3,10 +3,10 @@
 use std::cell::Cell;
 use std::fmt;
 
-/// Number of loop steps between two calls of the caller's function.
+/// Number of loop steps between two calls of the caller's stop function.
 const STRIDE: u32 = 256;
 
-/// The validation was stopped by its caller and has no verdict.
+/// Error: the caller stopped the validation, so there is no verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Interrupted;
 
@@ -18,7 +18,8 @@ impl fmt::Display for Interrupted {
 
 impl std::error::Error for Interrupted {}
 
-/// The caller's stop condition. Once it holds, all loops end early, and their results are discarded.
+/// Stop condition of the caller. Once the condition holds, all loops end early and their results are
+/// discarded.
 pub(super) struct Budget<'s> {
     stop: &'s dyn Fn() -> bool,
     /// Loop steps until the next call of `stop`.
@@ -49,7 +50,7 @@ impl<'s> Budget<'s> {
         self.is_spent.get()
     }
 
-    /// Returns the result of an execution unless it was interrupted.
+    /// Returns `result`, or an error if the execution that computed `result` was interrupted.
     pub(super) fn check<T>(&self, result: T) -> Result<T, Interrupted> {
         if self.is_spent.get() { Err(Interrupted) } else { Ok(result) }
     }

@@ -1,5 +1,5 @@
-//! Execution of overlapping actions. Simultaneous happenings read the state before them; interfering
-//! happenings must be separated.
+//! Execution of overlapping actions. Simultaneous happenings are evaluated in the preceding state;
+//! interfering happenings must be separated.
 
 use num_rational::BigRational;
 use num_traits::Signed;
@@ -15,16 +15,16 @@ use super::step::Step;
 use super::verdict::{Violation, ViolationKind};
 use crate::number::show_number;
 
-/// A happening less than the separation ago.
+/// An earlier happening whose distance from the current time is less than the separation.
 struct Recent<'e, 'p> {
-    /// `None` for events.
+    /// Step of the action; `None` for events (timed initial literals).
     step: Option<&'e Step<'p>>,
     time: BigRational,
     footprint: Footprint,
 }
 
-/// Executes the steps at their start times. `total_time` becomes the end of the last action. Afterwards all
-/// events up to this time have been applied.
+/// Executes the steps at their start times. Sets `total_time` to the end of the last action and applies all
+/// events (timed initial literals) up to this time.
 pub(super) fn run<'e, 'p>(
     execution: &mut Execution<'e, 'p>,
     steps: &'e [Step<'p>],
@@ -73,11 +73,12 @@ pub(super) fn run<'e, 'p>(
         running = continuing;
         parts.check_separation(execution, &time, &mut recent)?;
         let is_event = parts.happenings.iter().all(|(step, _)| step.is_none());
-        // All happenings were evaluated in the state before; their changes are applied only now.
+        // All happenings were evaluated in the preceding state; their changes are applied only now.
         parts.apply(execution, &time)?;
         execution.record.note(&time, &execution.state, is_event);
         for running in &running {
-            // The interval is open: an action that ends now is no longer running, one that starts now is.
+            // The interval is open. An action that ends now is no longer running; an action that starts now
+            // is running.
             execution.check(running, ConditionTime::OverAll, &time)?;
         }
     }
@@ -93,7 +94,8 @@ pub(super) fn run<'e, 'p>(
     Ok(())
 }
 
-/// Start times of all steps, in descending order.
+/// Returns the steps with their start times, the latest first. A step without a start time, or with a
+/// negative one, is a violation.
 fn starts<'e, 'p>(
     steps: &'e [Step<'p>],
     zero: &BigRational,
@@ -115,21 +117,22 @@ fn starts<'e, 'p>(
     Ok(starts)
 }
 
-/// All happenings at one time.
+/// All happenings at one time, each with its step; `None` for events.
 #[derive(Default)]
 struct Simultaneous<'e, 'p> {
     happenings: Vec<(Option<&'e Step<'p>>, Happening)>,
 }
 
 impl<'e, 'p> Simultaneous<'e, 'p> {
-    /// Checks that the happenings interfere neither with each other nor with recent ones.
+    /// Checks that the happenings interfere neither with each other nor with the `recent` happenings. Adds
+    /// them to `recent`.
     fn check_separation(
         &mut self,
         execution: &Execution<'e, 'p>,
         time: &BigRational,
         recent: &mut Vec<Recent<'e, 'p>>,
     ) -> Result<(), Box<Violation>> {
-        // Older happenings are far enough away.
+        // Only happenings within the separation can violate it.
         recent.retain(|earlier| &earlier.time + &execution.options.tolerance > *time);
         for (step, Happening { footprint, .. }) in &mut self.happenings {
             for earlier in recent.iter() {
@@ -156,7 +159,8 @@ impl<'e, 'p> Simultaneous<'e, 'p> {
     }
 }
 
-/// Checks that a happening does not interfere with a recent one of another action or of an event.
+/// Checks that a happening does not interfere with a recent happening. Two happenings of the same step are
+/// not compared.
 fn check_pair<'p>(
     execution: &Execution<'_, 'p>,
     (step, time, footprint): (Option<&Step<'p>>, &BigRational, &Footprint),

@@ -29,7 +29,7 @@ pub struct Course {
     pub initial: Vec<(String, BigRational)>,
     /// Starts and ends of actions, in chronological order.
     pub moments: Vec<CourseMoment>,
-    /// Bounds in the goal.
+    /// Bounds on numeric functions that the goal imposes.
     pub goal: Vec<NumberBound>,
 }
 
@@ -44,7 +44,8 @@ pub struct CourseMoment {
     pub is_end: bool,
     /// Changed functions with their new values, sorted.
     pub values: Vec<(String, BigRational)>,
-    /// Bounds in the conditions at this moment. At the start they include the conditions over all.
+    /// Bounds on numeric functions that the action's conditions impose at this moment. At the start they
+    /// include the conditions over all.
     pub bounds: Vec<NumberBound>,
     /// Metric value if the plan ended now. `None` without a metric or if the value is undefined. For example,
     /// a metric that counts violated preferences is undefined before the end.
@@ -114,11 +115,13 @@ struct Follower<'e, 'p> {
 }
 
 impl<'e, 'p> Follower<'e, 'p> {
-    /// Starts a step. Returns `None` if the action has already ended because it takes no time.
+    /// Starts a step at its start time, or at the end of the preceding step. Returns `None` if the action
+    /// takes no time and has already ended.
     fn start(&mut self, index: usize, step: &'e Step<'p>) -> Result<Option<Running<'e, 'p>>, Box<Violation>> {
         let time = step.text.start.clone().unwrap_or_else(|| self.clock.clone());
         self.execution.apply_events_until(&time, true);
-        // Prefer the schema whose conditions hold. The effects are shown even if no schema is applicable.
+        // The schema whose conditions hold is preferred. The effects are shown even if no schema is
+        // applicable.
         let checked = self.execution.begin(step, &time);
         let running = checked.or_else(|_| self.execution.begin_anyway(step, &time))?;
         let mut bounds = self.bounds(&running, ConditionTime::AtStart);
@@ -146,13 +149,14 @@ impl<'e, 'p> Follower<'e, 'p> {
         Ok(())
     }
 
-    /// Appends a moment after its effects were applied, together with the metric.
+    /// Appends a moment to the course, with the metric value of the current state.
     fn note(&mut self, moment: CourseMoment) {
         let metric = metric(self.execution.world, &self.execution.state, &moment.time);
         self.course.moments.push(CourseMoment { metric, ..moment });
     }
 
-    /// Applies effects. Returns the changed functions with their new values.
+    /// Applies the effects of an action at its start or its end. Returns the changed functions with their new
+    /// values.
     fn apply_effects(
         &mut self,
         running: &Running<'e, 'p>,
@@ -187,8 +191,8 @@ impl<'e, 'p> Follower<'e, 'p> {
         self.course.goal = bounds;
     }
 
-    /// Collects the comparisons with changeable functions that a condition implies: the condition itself or
-    /// its conjuncts.
+    /// Appends the bounds that a condition imposes on changeable functions. Only the condition itself and its
+    /// conjuncts are considered.
     fn collect_bounds(
         &self,
         evaluator: &Evaluator<'_, 'p>,

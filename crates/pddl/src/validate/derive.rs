@@ -30,22 +30,23 @@ pub(super) fn derive_facts(world: &World<'_>, state: &mut State) {
     }
 }
 
-/// An instance of an axiom with an opaque condition that has not held yet.
+/// An instance of an axiom with an opaque condition. It is re-evaluated until its condition holds.
 struct WaitingInstance {
     axiom: usize,
     arguments: Arguments,
-    /// Number of evaluations. Entries in [`Waiting`] of an earlier evaluation are obsolete.
+    /// Number of evaluations of the instance. Entries in [`Waiting`] with a smaller number are obsolete.
     evaluations: u32,
 }
 
-/// Instances that wait for a fact or for any fact of a predicate: instance number and evaluation number.
+/// Instances to re-evaluate when a given fact, or any fact of a given predicate, is derived. Each entry
+/// consists of the index in [`Closure::instances`] and the evaluation number.
 #[derive(Default)]
 struct Waiting {
     facts: FxHashMap<Ground, Vec<(usize, u32)>>,
     predicates: FxHashMap<Symbol, Vec<(usize, u32)>>,
 }
 
-/// State of the evaluation of one stratum.
+/// State of the semi-naive evaluation of one stratum.
 struct Closure<'c, 'p> {
     world: &'c World<'p>,
     stratum: &'c Stratum<'p>,
@@ -53,7 +54,7 @@ struct Closure<'c, 'p> {
     /// New facts whose consequences have not been derived.
     agenda: Vec<Ground>,
     instances: Vec<WaitingInstance>,
-    /// Number of each instance in `instances`, by axiom and arguments.
+    /// Index in `instances` by axiom and arguments.
     numbers: FxHashMap<(usize, Arguments), usize>,
     waiting: Waiting,
 }
@@ -87,8 +88,8 @@ impl<'p> Closure<'_, 'p> {
         }
     }
 
-    /// Head arguments for which the condition of an axiom holds, ignoring its opaque parts. With a seed, only
-    /// the solutions in which the occurrence matches the given fact.
+    /// Returns the head arguments for which the condition of an axiom holds, ignoring its opaque parts. A
+    /// seed restricts the solutions to those in which the occurrence matches the given fact.
     fn heads(&self, axiom: usize, seed: Option<(&Occurrence<'p>, &Arguments)>) -> Vec<Arguments> {
         let Axiom { derived, opaque } = &self.stratum.axioms[axiom];
         let derived: &'p Derived = derived;
@@ -122,8 +123,8 @@ impl<'p> Closure<'_, 'p> {
         heads
     }
 
-    /// Derives the heads of an axiom. If the condition has opaque parts, each instance is evaluated
-    /// completely first.
+    /// Derives the heads of an axiom. If the condition has opaque parts, a head is derived only after its
+    /// whole condition has been evaluated.
     fn conclude(&mut self, axiom: usize, heads: Vec<Arguments>) {
         let is_opaque = !self.stratum.axioms[axiom].opaque.is_empty();
         for arguments in heads {
@@ -132,7 +133,7 @@ impl<'p> Closure<'_, 'p> {
                 continue;
             }
             let number = self.instances.len();
-            // A known instance is evaluated again only when a missing fact arrives.
+            // An instance that is already registered is evaluated again only when a missing fact arrives.
             if let Entry::Vacant(entry) = self.numbers.entry((axiom, arguments.clone())) {
                 entry.insert(number);
                 self.instances.push(WaitingInstance { axiom, arguments, evaluations: 0 });

@@ -13,7 +13,7 @@ use super::world::{Arguments, State, Symbol, World};
 /// A fact or a function with its arguments.
 pub(super) type Ground = (Symbol, Arguments);
 
-/// Changes of a happening.
+/// Changes of a happening: added facts, deleted facts, and numeric changes.
 #[derive(Debug, Default)]
 pub(super) struct Changes {
     pub(super) added: FxHashSet<Ground>,
@@ -48,7 +48,7 @@ impl From<Undefined> for EffectError {
 }
 
 impl<'p> Evaluator<'_, 'p> {
-    /// Collects the changes of an effect in the current state.
+    /// Adds the changes of an effect, evaluated in the current state, to `changes`.
     pub(super) fn collect(
         &self,
         effect: &'p Effect,
@@ -102,7 +102,8 @@ fn change(kind: Assignment, value: BigRational) -> Result<Change, Undefined> {
 }
 
 impl Changes {
-    /// Combines a change with the earlier changes of the same function.
+    /// Combines a numeric change with the earlier changes of the same function. Returns an error if the
+    /// changes do not commute.
     fn record(&mut self, target: Ground, change: Change) -> Result<(), EffectError> {
         let combined = match (self.numeric.get(&target), change) {
             (None, change) => change,
@@ -121,7 +122,7 @@ impl Changes {
         Ok(())
     }
 
-    /// Adds the changes of another simultaneous action.
+    /// Adds the changes of another simultaneous action. Returns an error if numeric changes do not commute.
     pub(super) fn merge(&mut self, other: Self) -> Result<(), EffectError> {
         self.added.extend(other.added);
         self.deleted.extend(other.deleted);
@@ -130,7 +131,7 @@ impl Changes {
 
     /// Applies the changes to a state. On an error the state remains unchanged.
     pub(super) fn apply(self, world: &World<'_>, state: &mut State) -> Result<(), EffectError> {
-        // Computed first, so that an error leaves the state unchanged.
+        // All values are computed first, so that an error leaves the state unchanged.
         let mut values = Vec::new();
         for (target, change) in self.numeric {
             let old_value = || {
@@ -149,7 +150,7 @@ impl Changes {
         Ok(())
     }
 
-    /// Returns `true` if a fact or a value of one of these predicates and functions changes.
+    /// Returns `true` if the changes concern a fact or value of one of the given predicates and functions.
     pub(super) fn concern(&self, symbols: &FxHashSet<Symbol>) -> bool {
         let facts = self.added.iter().chain(&self.deleted);
         facts.chain(self.numeric.keys()).any(|(symbol, _)| symbols.contains(symbol))
@@ -160,7 +161,8 @@ impl Changes {
         change_facts(self.added, self.deleted, state);
     }
 
-    /// Returns `true` if the changes, when they can be applied, leave the state as it is.
+    /// Returns `true` if applying the changes cannot alter the state: no fact changes, and each numeric
+    /// change adds 0.
     pub(super) fn is_neutral(&self) -> bool {
         let is_zero = |change: &Change| matches!(change, Change::Add(value) if value.is_zero());
         self.added.is_empty() && self.deleted.is_empty() && self.numeric.values().all(is_zero)

@@ -27,11 +27,11 @@ pub(super) enum Undefined {
     Place,
 }
 
-/// Variables of the enclosing action, axiom and quantifiers, innermost last.
+/// Variables of the enclosing action, axiom and quantifiers, the innermost last.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Bindings<'p>(pub(super) Vec<Binding<'p>>);
 
-/// One variable with its type, and its object if it is bound.
+/// A variable with its type, and with its object if it is bound.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Binding<'p> {
     pub(super) variable: &'p Name,
@@ -70,14 +70,15 @@ pub(super) struct Evaluator<'e, 'p> {
     pub(super) duration: Option<&'e BigRational>,
     /// Value of `total-time`, in the metric only.
     pub(super) total_time: Option<&'e BigRational>,
-    /// Subconditions, by address, that count as true in a search for bindings.
+    /// Addresses of subconditions that count as true while [`Evaluator::solve`] searches for bindings.
     pub(super) ignored: Option<&'e FxHashSet<*const Condition>>,
-    /// Recorder of missing facts, if any.
+    /// Records the facts that are missing for the result, if present.
     pub(super) trace: Option<&'e Trace<'e, 'p>>,
 }
 
 impl<'e, 'p> Evaluator<'e, 'p> {
-    /// Evaluator for conditions outside of actions.
+    /// Creates an evaluator for conditions outside of actions, where `?duration` and `total-time` are
+    /// undefined.
     pub(super) fn new(world: &'e World<'p>, state: &'e State) -> Self {
         Self { world, state, duration: None, total_time: None, ignored: None, trace: None }
     }
@@ -94,7 +95,7 @@ impl<'e, 'p> Evaluator<'e, 'p> {
             Condition::Imply(premise, conclusion) => match self.holds(premise, bindings) {
                 Ok(false) => Ok(true),
                 Ok(true) => self.holds(conclusion, bindings),
-                // A true conclusion makes the implication true whatever the premise is.
+                // A true conclusion makes the implication true, regardless of the premise.
                 Err(undefined) => match self.holds(conclusion, bindings) {
                     Ok(true) => Ok(true),
                     _ => Err(undefined),
@@ -165,7 +166,7 @@ impl<'e, 'p> Evaluator<'e, 'p> {
         self.world.each(variables, bindings, &mut |bindings| {
             match self.holds(body, bindings) {
                 Ok(false) => result = Ok(false),
-                // An undefined instance does not end the loop: a later one may be false.
+                // An undefined instance does not end the loop: a later instance may be false.
                 Err(undefined) if result == Ok(true) => result = Err(undefined),
                 Ok(true) | Err(_) => {}
             }
@@ -184,7 +185,7 @@ impl<'e, 'p> Evaluator<'e, 'p> {
         self.declare(variables, bindings);
         let mut result = Ok(false);
         self.solve(vec![body], outer, bindings, &mut |_, undefined| {
-            // An undefined solution does not end the search: a later one may be true.
+            // An undefined solution does not end the search: a later solution may be true.
             result = undefined.map_or(Ok(true), |undefined| Err(undefined.clone()));
             result != Ok(true)
         });
@@ -235,8 +236,8 @@ impl<'e, 'p> Evaluator<'e, 'p> {
 }
 
 impl<'p> World<'p> {
-    /// Calls `visit` for each assignment of objects to variables until it returns `false`. Returns `true` if
-    /// all assignments were visited.
+    /// Calls `visit` for each assignment of objects to variables until `visit` returns `false`. Returns
+    /// `true` if all assignments were visited.
     #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     pub(super) fn each(
         &self,
@@ -244,7 +245,7 @@ impl<'p> World<'p> {
         bindings: &mut Bindings<'p>,
         visit: &mut dyn FnMut(&mut Bindings<'p>) -> bool,
     ) -> bool {
-        // An empty type leaves no assignment.
+        // If a type has no objects, there is no assignment.
         if variables.iter().any(|entry| self.objects_of(&entry.r#type).next().is_none()) {
             return true;
         }

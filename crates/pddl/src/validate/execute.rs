@@ -18,15 +18,16 @@ use super::step::{Instance, Step, unresolved};
 use super::verdict::{Violation, ViolationKind};
 use super::world::{State, World};
 
-/// A partially executed plan.
+/// A partially executed plan: the current state and the pending events.
 #[derive(Debug)]
 pub(super) struct Execution<'e, 'p> {
     pub(super) world: &'e World<'p>,
     pub(super) options: &'e Options,
     pub(super) state: State,
-    /// Future timed initial literals, in descending order of time: the next one is last.
+    /// Future timed initial literals: time, atom, and whether the atom becomes true. Sorted by descending
+    /// time, so the next one is last.
     pub(super) pending: Vec<(BigRational, Ground, bool)>,
-    /// Time and footprint of the last events.
+    /// Time and footprint (read and write sets) of the most recent events.
     pub(super) last_event: Option<(BigRational, Footprint)>,
     pub(super) record: Record,
 }
@@ -58,12 +59,13 @@ impl<'e, 'p> Execution<'e, 'p> {
         Evaluator { duration, ..Evaluator::new(self.world, &self.state) }
     }
 
-    /// Time of the next timed initial literal.
+    /// Time of the next timed initial literal, if any.
     pub(super) fn next_timed(&self) -> Option<&BigRational> {
         self.pending.last().map(|(time, ..)| time)
     }
 
-    /// Starts a step: chooses the first schema whose start conditions hold, and determines the duration.
+    /// Starts a step as an instance of the first schema whose start conditions hold, and determines the
+    /// duration.
     pub(super) fn begin(
         &self,
         step: &'e Step<'p>,
@@ -82,7 +84,7 @@ impl<'e, 'p> Execution<'e, 'p> {
         Err(first_violation.unwrap_or_else(|| unresolved(self.world, step, time)))
     }
 
-    /// Starts a step as the first matching schema, without checking conditions.
+    /// Starts a step as an instance of the first matching schema, without checking its conditions.
     pub(super) fn begin_anyway(
         &self,
         step: &'e Step<'p>,
@@ -103,8 +105,8 @@ impl<'e, 'p> Execution<'e, 'p> {
         time: &BigRational,
     ) -> Result<Running<'e, 'p>, Box<Violation>> {
         let duration = self.duration(step, instance, time)?;
-        // The duration stated in the plan may be rounded. It must not turn a positive duration into zero, or
-        // zero into a positive one.
+        // The duration stated in the plan may be rounded. Rounding must not turn a positive duration into
+        // zero or zero into a positive duration.
         let is_rounded =
             |stated: &&BigRational| is_durative(instance) && stated.is_zero() == duration.is_zero();
         let rounded = step.text.duration.as_ref().filter(is_rounded).unwrap_or(&duration);
@@ -116,7 +118,7 @@ impl<'e, 'p> Execution<'e, 'p> {
     }
 
     /// Determines the duration of a step: the exact value if the domain fixes it, else the value stated in
-    /// the plan. The stated value must satisfy all constraints at start within the tolerance.
+    /// the plan. A stated value must satisfy all duration constraints at start within the tolerance.
     fn duration(
         &self,
         step: &Step<'p>,
@@ -132,7 +134,7 @@ impl<'e, 'p> Execution<'e, 'p> {
             let bound = evaluator
                 .value(&constraint.expression, &instance.bindings)
                 .map_err(|undefined| undefined_violation(step, time, &undefined))?;
-            // An equality determines the exact duration; the stated one may be rounded.
+            // An equality determines the exact duration; the stated duration may be rounded.
             if constraint.operator == Comparison::Equal && exact.is_none() {
                 exact = Some(bound.clone());
             }
@@ -155,7 +157,7 @@ impl<'e, 'p> Execution<'e, 'p> {
         Ok(duration)
     }
 
-    /// Checks a duration against one constraint, within the tolerance.
+    /// Checks that the stated duration satisfies one constraint within the tolerance.
     fn check_duration(
         &self,
         step: &Step<'p>,
@@ -180,7 +182,8 @@ impl<'e, 'p> Execution<'e, 'p> {
         Err(step.violation(time, ViolationKind::Duration, message))
     }
 
-    /// Checks the conditions of an action for start, end or over all.
+    /// Checks the conditions of an action at its start, over all, or at its end. An unsatisfied condition is
+    /// a violation.
     pub(super) fn check(
         &self,
         running: &Running<'e, 'p>,
@@ -215,7 +218,7 @@ impl<'e, 'p> Execution<'e, 'p> {
         let reason =
             undefined.as_ref().map(|reason| format!(": {}", undefined_text(reason))).unwrap_or_default();
         let message = format!("a {role} of {} does not hold{reason}", step.show());
-        // An undefined function is the cause rather than the condition that reads it.
+        // An undefined function is the cause, not the condition that reads the function.
         let kind = if undefined.is_some() { ViolationKind::Undefined } else { kind };
         Err(Box::new(Violation { unmet: missing, ..*step.violation(time, kind, message) }))
     }
@@ -256,7 +259,8 @@ impl<'e, 'p> Execution<'e, 'p> {
         Ok(changes)
     }
 
-    /// Applies changes to the state and recomputes derived facts if the changes concern them.
+    /// Applies the changes of a happening to the state. Recomputes the derived facts if a changed fact or
+    /// function occurs in a condition of an axiom.
     pub(super) fn apply(
         &mut self,
         step: &Step<'p>,

@@ -1,4 +1,5 @@
-//! Explains unsatisfied conditions: the conjuncts that do not hold, with their objects and values.
+//! Explains unsatisfied conditions: returns the conjuncts that do not hold, with their objects and numeric
+//! values.
 
 use num_rational::BigRational;
 
@@ -9,7 +10,8 @@ use super::evaluate::{Bindings, Evaluator, Undefined};
 use super::verdict::Unmet;
 use super::world::World;
 
-/// Returns the conjuncts of a condition that do not hold.
+/// Returns the conjuncts of a condition that do not hold, with the values of the numeric functions that they
+/// read.
 pub(super) fn unmet<'p>(
     evaluator: Evaluator<'_, 'p>,
     condition: &'p Condition,
@@ -48,7 +50,7 @@ pub(super) fn undefined_text(undefined: &Undefined) -> String {
     }
 }
 
-/// Substitutes objects for bound variables. `hidden` contains the variables of inner quantifiers.
+/// Replaces bound variables by their objects. Variables in `hidden`, which inner quantifiers bind, are kept.
 fn substitute(
     condition: &mut Condition,
     world: &World<'_>,

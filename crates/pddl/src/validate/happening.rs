@@ -15,7 +15,7 @@ use super::step::Step;
 use super::verdict::{Violation, ViolationKind};
 use crate::number::show_number;
 
-/// Part of an action that is one happening.
+/// Part of an action that takes place in one happening.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Part {
     Start,
@@ -24,7 +24,7 @@ pub(super) enum Part {
     Whole,
 }
 
-/// Changes and footprint of a happening.
+/// Changes of a happening and its footprint (read and write sets).
 #[derive(Debug, Default)]
 pub(super) struct Happening {
     pub(super) changes: Changes,
@@ -32,15 +32,16 @@ pub(super) struct Happening {
 }
 
 impl Running<'_, '_> {
-    /// First happening of the action.
+    /// Returns the part that the first happening of the action executes: the start, or the whole action if it
+    /// takes no time.
     pub(super) fn first_part(&self) -> Part {
         if is_durative(&self.instance) && !self.duration.is_zero() { Part::Start } else { Part::Whole }
     }
 }
 
 impl<'e, 'p> Execution<'e, 'p> {
-    /// Evaluates a part of an action in the current state and checks the conditions at end. The conditions at
-    /// start must have been checked.
+    /// Computes the changes of a part of an action in the current state. Checks the conditions at end if the
+    /// part includes the end; the caller must have checked the conditions at start.
     pub(super) fn happening(
         &self,
         running: &Running<'e, 'p>,
@@ -74,7 +75,8 @@ impl<'e, 'p> Execution<'e, 'p> {
         Ok(start)
     }
 
-    /// Applies all events before `time`, and with `inclusive` also those at `time`.
+    /// Applies all pending events (timed initial literals) before `time`, and with `inclusive` also those at
+    /// `time`.
     pub(super) fn apply_events_until(&mut self, time: &BigRational, inclusive: bool) {
         let is_due = |next: &BigRational| next < time || (inclusive && next == time);
         while self.next_timed().is_some_and(is_due) {
@@ -82,7 +84,7 @@ impl<'e, 'p> Execution<'e, 'p> {
         }
     }
 
-    /// Applies the events of the next event time.
+    /// Applies all events (timed initial literals) of the next event time.
     pub(super) fn apply_next_timed(&mut self) {
         if let Some((time, event)) = self.take_next_timed() {
             self.apply_events(event.changes);
@@ -91,7 +93,7 @@ impl<'e, 'p> Execution<'e, 'p> {
         }
     }
 
-    /// Applies the facts of events and updates derived facts.
+    /// Applies the facts of events (timed initial literals) and updates the derived facts.
     pub(super) fn apply_events(&mut self, changes: Changes) {
         let concerns_axioms = changes.concern(&self.world.read_by_axioms);
         changes.apply_facts(&mut self.state);
@@ -100,7 +102,8 @@ impl<'e, 'p> Execution<'e, 'p> {
         }
     }
 
-    /// Removes the events of the next event time from the pending ones and returns them as one happening.
+    /// Removes the pending events (timed initial literals) of the next event time and returns them as one
+    /// happening.
     pub(super) fn take_next_timed(&mut self) -> Option<(BigRational, Happening)> {
         let time = self.next_timed()?.clone();
         let mut changes = Changes::default();
@@ -111,7 +114,7 @@ impl<'e, 'p> Execution<'e, 'p> {
             } else {
                 (&mut changes.deleted, &mut changes.added)
             };
-            // A later literal overrides an earlier one about the same atom and time.
+            // A later literal overrides an earlier literal about the same atom and time.
             opposite.remove(&atom);
             target.insert(atom);
         }
@@ -119,7 +122,8 @@ impl<'e, 'p> Execution<'e, 'p> {
         Some((time, Happening { changes, footprint }))
     }
 
-    /// Executes a part of an action in sequence. Events at the same time must not interfere with it.
+    /// Executes a part of an action in sequential execution. Events at the same time are applied first and
+    /// must not interfere with the part.
     pub(super) fn execute(
         &mut self,
         running: &Running<'e, 'p>,
@@ -137,7 +141,7 @@ impl<'e, 'p> Execution<'e, 'p> {
         Ok(())
     }
 
-    /// Violation: an action and an event interfere.
+    /// Returns the violation that an action interferes with a timed initial literal.
     pub(super) fn disturbed(
         &self,
         step: &Step<'p>,

@@ -14,7 +14,7 @@ use super::evaluate::Bindings;
 use super::running::{Running, conditions, effects};
 use super::world::{Symbol, World};
 
-/// Atom or numeric function whose quantified arguments match several objects.
+/// Atom or numeric function that a happening reads. Quantified arguments match several objects.
 #[derive(Debug, Clone)]
 struct Pattern {
     symbol: Symbol,
@@ -58,13 +58,13 @@ pub(super) struct Footprint {
     values_read: Vec<Pattern>,
     added: Vec<Ground>,
     deleted: Vec<Ground>,
-    /// Changed functions with the kind of change (0 assign, 1 add, 2 scale). Two additions commute, and so do
-    /// two scalings.
+    /// Changed functions, each with the kind of change: 0 assign, 1 add, 2 scale. Two additions commute, and
+    /// so do two scalings.
     values_written: Vec<(Ground, u8)>,
 }
 
 impl Footprint {
-    /// Computes the footprint of the start or the end of an action with the given changes.
+    /// Computes the read and write sets of the start or the end of an action, given its changes.
     pub(super) fn of<'p>(
         world: &World<'p>,
         running: &Running<'_, 'p>,
@@ -111,7 +111,7 @@ impl Footprint {
         footprint
     }
 
-    /// Footprint of timed initial literals, which read nothing.
+    /// Returns the footprint of timed initial literals, which read nothing.
     pub(super) fn of_event(changes: &Changes) -> Self {
         let (added, deleted) = (changes.added.iter().cloned(), changes.deleted.iter().cloned());
         Self { added: added.collect(), deleted: deleted.collect(), ..Self::default() }
@@ -126,7 +126,8 @@ impl Footprint {
         self.values_written.extend(other.values_written);
     }
 
-    /// Returns a fact or function because of which the order of the two happenings matters, if any.
+    /// Returns a fact or function because of which the order of the two happenings matters; `None` if they do
+    /// not interfere.
     pub(super) fn interferes(&self, other: &Self) -> Option<Ground> {
         let read_or_deleted = self.disturbs(other).or_else(|| other.disturbs(self));
         read_or_deleted.or_else(|| {
@@ -161,7 +162,7 @@ enum Use<'c> {
     Value(&'c Atom),
 }
 
-/// Callback for each use, with the variables of the enclosing quantifiers.
+/// Callback that receives each read fact or function and the variables of the enclosing quantifiers.
 type OnUse<'f, 'c> = &'f mut dyn FnMut(Use<'c>, &[&'c TypedName]);
 
 fn uses_of_condition<'c>(condition: &'c Condition, hidden: &mut Vec<&'c TypedName>, on_use: OnUse<'_, 'c>) {
@@ -217,7 +218,8 @@ fn pattern(world: &World<'_>, bindings: &Bindings<'_>, atom: &Atom, hidden: &[&T
     Pattern { symbol: world.symbol(&atom.predicate.name), arguments: Some(arguments.collect()) }
 }
 
-/// Adds everything that derived predicates depend on, with all arguments.
+/// Adds all predicates and functions on which the derived predicates among `read` depend. All their instances
+/// count as read.
 fn read_through_axioms(world: &World<'_>, read: Vec<&Name>, into: &mut Footprint) {
     let mut visited: FxHashSet<&Name> = FxHashSet::default();
     let mut todo = read;

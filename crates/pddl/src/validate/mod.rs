@@ -52,11 +52,11 @@ use step::Step;
 use targets::changeable_values;
 use world::{State, World};
 
-/// Maximum number of readings of a plan (choices of a schema for each ambiguous step) that are tried.
+/// Maximum number of tried readings of a plan. A reading chooses one schema for each step that fits several.
 const MAX_READINGS: usize = 4096;
 
-/// Executes a plan. Domain and problem must have passed [`check`](crate::check()); atoms with undeclared
-/// names are false.
+/// Executes a plan and returns the verdict. Domain and problem must have passed [`check`](crate::check());
+/// atoms with undeclared names are false.
 ///
 /// A step whose name and objects fit several schemas can be an instance of any of them. A plan is valid if
 /// some reading of it is valid, and the best reading counts. If there are more than 4,096 readings, each
@@ -65,7 +65,7 @@ pub fn validate(domain: &Domain, problem: &Problem, plan: &PlanText, options: &O
     judge_readings(&World::new(domain, problem, &|| false), plan, options)
 }
 
-/// Executes a plan like [`validate`], unless `stop` returns `true` before the end. `stop` is called every few
+/// Executes a plan like [`validate`], but ends early once `stop` returns `true`. `stop` is called every few
 /// hundred steps of each loop.
 ///
 /// # Errors
@@ -85,7 +85,7 @@ pub fn validate_within(
     world.budget.check(verdict)
 }
 
-/// Returns the verdict on the best reading of a plan.
+/// Executes all readings of a plan and returns the best verdict.
 #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
 fn judge_readings(world: &World<'_>, plan: &PlanText, options: &Options) -> Verdict {
     let steps: Vec<_> =
@@ -123,8 +123,8 @@ fn judge<'p>(world: &World<'p>, steps: &[Step<'p>], options: &Options) -> Verdic
     Verdict { valid: violation.is_none(), total_time, metric, values, violation }
 }
 
-/// Returns `true` if one reading of a plan is better than another. Valid readings come first; then the metric
-/// decides, or the total time if there is no metric.
+/// Returns `true` if `candidate` is better than `incumbent`. Valid plans come first; then the metric decides,
+/// or the total time if there is no metric.
 fn is_better(problem: &Problem, candidate: &Verdict, incumbent: &Verdict) -> bool {
     if !candidate.valid || !incumbent.valid {
         return candidate.valid && !incumbent.valid;

@@ -12,13 +12,13 @@ pub struct Options {
     pub concurrent: bool,
     /// Tolerance, in the domain's time unit; not negative.
     ///
-    /// In sequence, it accommodates rounded plans: the maximum deviation of a stated duration from the exact
-    /// one, and the maximum overlap of a step with the next one.
+    /// In sequential execution, the tolerance accommodates rounded plans. It limits the deviation of a stated
+    /// duration from the exact one, and the overlap of a step with the next step.
     ///
-    /// Concurrently, it is the separation (epsilon): the minimum distance of interfering happenings. A stated
-    /// duration may then deviate by the same amount, but at most by 0.001.
+    /// In concurrent execution, the tolerance is the separation (epsilon): the minimum distance of
+    /// interfering happenings. A stated duration may then deviate by the same amount, but at most by 0.001.
     ///
-    /// The times of events are exact in both cases.
+    /// The times of timed initial literals are exact in both cases.
     pub tolerance: BigRational,
 }
 

@@ -17,7 +17,7 @@ pub struct PlanText {
 /// One action of a plan.
 #[derive(Debug, Clone)]
 pub struct PlanStep {
-    /// Name of the schema. Several schemas may share it.
+    /// Name of the schema. Several schemas may share this name.
     pub action: Name,
     /// Objects for the parameters.
     pub arguments: Vec<Name>,

@@ -7,7 +7,7 @@ use crate::ast::{Constraint, Name};
 
 use super::world::{State, World};
 
-/// State of a trajectory.
+/// A state of the trajectory, with the time at which it begins.
 #[derive(Debug)]
 pub(super) struct Moment {
     pub(super) time: BigRational,
@@ -16,10 +16,10 @@ pub(super) struct Moment {
     is_event: bool,
 }
 
-/// Record of an execution.
+/// Trajectory of an execution, and the violated preferences of its actions.
 #[derive(Debug, Default)]
 pub(super) struct Record {
-    /// States of the trajectory, in order. Empty if there are no constraints.
+    /// States of the trajectory, in order. Empty if the domain and the problem have no constraints.
     pub(super) moments: Vec<Moment>,
     /// Violated preferences of actions, once per violation.
     pub(super) violated: Vec<Name>,
@@ -34,7 +34,7 @@ impl Record {
         record
     }
 
-    /// Appends the state after a happening. Events and a happening at the same time give one state.
+    /// Appends the state after a happening. A happening replaces the state after the events at the same time.
     pub(super) fn note(&mut self, time: &BigRational, state: &State, is_event: bool) {
         // Without constraints nothing is recorded, to save memory.
         let Some(last) = self.moments.last() else { return };

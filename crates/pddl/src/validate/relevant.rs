@@ -1,8 +1,8 @@
 //! Reduces a problem to the facts and values that given actions can read.
 //!
 //! Executing an action interns and indexes the whole initial state. If no condition or effect is quantified
-//! over objects, an action reads only atoms about its own arguments and the constants of the domain. In a map
-//! of 100 arcs and 18 designs this is one value in a thousand.
+//! over objects, an action reads only atoms about its own arguments and the constants of the domain. On a map
+//! with 100 arcs and 18 designs, for example, an action reads one value in a thousand.
 
 use rustc_hash::FxHashSet;
 
@@ -13,7 +13,7 @@ use crate::visit::Node;
 use super::plan::PlanStep;
 
 /// Returns the problem without the facts and values that neither the steps nor the metric can read. Returns
-/// `None` if these cannot be determined.
+/// `None` if the readable facts cannot be determined, for example with axioms.
 pub(super) fn relevant(domain: &Domain, problem: &Problem, steps: &[PlanStep]) -> Option<Problem> {
     // Axioms and constraints can read every fact.
     let is_plain =
@@ -65,7 +65,8 @@ fn name(term: &Term) -> &Name {
     }
 }
 
-/// Returns `true` if the action contains a quantifier or a preference.
+/// Returns `true` if the action contains a quantifier or a preference, and so may read facts about any
+/// object.
 fn reads_all_objects(action: &Action) -> bool {
     let mut is_quantified = false;
     action.body.walk(&mut |node| {
@@ -77,7 +78,7 @@ fn reads_all_objects(action: &Action) -> bool {
     is_quantified || !action.preferences.is_empty()
 }
 
-/// Adds the numeric functions that an action reads or changes.
+/// Appends the numeric functions that an action reads or changes.
 fn fluents_of<'a>(action: &'a Action, fluents: &mut Vec<&'a Atom>) {
     action.body.walk(&mut |node| match node {
         Node::Effect(Effect::Assign(_, target, ..)) => fluents.push(target),

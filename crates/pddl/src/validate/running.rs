@@ -14,7 +14,8 @@ pub(super) struct Running<'e, 'p> {
     pub(super) start: BigRational,
     /// Exact duration, in the domain's time unit.
     pub(super) duration: BigRational,
-    /// End time. It may be based on a rounded duration of the plan.
+    /// End time. Because the plan may state a rounded duration, the end can differ from `start` plus
+    /// `duration`.
     pub(super) end: BigRational,
 }
 
@@ -22,7 +23,7 @@ pub(super) fn is_durative(instance: &Instance<'_>) -> bool {
     matches!(instance.action.body, ActionBody::Durative { .. })
 }
 
-/// Conditions of an action at a time. A precondition counts as a condition at start.
+/// Conditions that an action has at the given time. A precondition counts as a condition at start.
 pub(super) fn conditions<'p>(
     instance: &Instance<'p>,
     when: ConditionTime,
@@ -37,7 +38,8 @@ pub(super) fn conditions<'p>(
     single.into_iter().chain(several)
 }
 
-/// Effects of an action at a time. Effects of an instantaneous action count as effects at start.
+/// Effects that an action has at the given time. Effects of an instantaneous action count as effects at
+/// start.
 pub(super) fn effects<'p>(
     instance: &Instance<'p>,
     when: EffectTime,

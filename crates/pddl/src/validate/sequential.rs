@@ -12,8 +12,8 @@ use super::step::Step;
 use super::verdict::{Violation, ViolationKind};
 use crate::number::show_number;
 
-/// Executes the steps and sums their durations until the first violation. Afterwards all events up to the end
-/// of the last step have been applied.
+/// Executes the steps one after another until the first violation and sums their durations in `total_time`.
+/// Applies all events (timed initial literals) up to the end of the last step.
 pub(super) fn run<'e, 'p>(
     execution: &mut Execution<'e, 'p>,
     steps: &'e [Step<'p>],
@@ -53,8 +53,8 @@ pub(super) fn run<'e, 'p>(
     Ok(())
 }
 
-/// Applies the events between the start and the end of an action, checks the conditions over all, and
-/// executes the end.
+/// Applies the events (timed initial literals) before the end of an action, then executes the end. Checks the conditions
+/// over all in each state in between.
 fn finish<'e, 'p>(
     execution: &mut Execution<'e, 'p>,
     running: &Running<'e, 'p>,

@@ -9,16 +9,16 @@ use crate::ast::{Atom, Condition, Expression, Name, Term, TypedName};
 use super::evaluate::{Bindings, Evaluator, Undefined};
 use super::world::{Arguments, Symbol};
 
-/// Callback for each solution. If the truth of the condition is undefined, it also receives the reason.
+/// Callback for each solution. The callback also receives the reason if the truth of the condition is undefined.
 /// Returns `false` to end the search.
 pub(super) type OnSolution<'f, 'p> = &'f mut dyn FnMut(&Bindings<'p>, Option<&Undefined>) -> bool;
 
-/// Unsolved conditions, and the first undefined condition among the evaluated ones.
+/// Conditions that remain to be solved, and the reason if an evaluated condition was undefined.
 type Goals<'p> = (Vec<&'p Condition>, Option<Undefined>);
 
 /// A branching point of the search, with its untried options.
 struct Branch<'e, 'p> {
-    /// Conditions that remain unsolved, independent of the chosen option.
+    /// Conditions that remain to be solved after any of the options.
     open: Vec<&'p Condition>,
     undefined: Option<Undefined>,
     /// Number of variables declared before the choice.
@@ -49,8 +49,8 @@ impl Branch<'_, '_> {
 }
 
 impl<'e, 'p> Evaluator<'e, 'p> {
-    /// Finds all objects for the unbound variables from position `first` on that satisfy all parts. Returns
-    /// `false` if the search was ended early.
+    /// Calls `on_solution` for each binding of the unbound variables from position `first` on that satisfies
+    /// all `parts`. Returns `false` if the search ended early.
     pub(super) fn solve(
         &self,
         parts: Vec<&'p Condition>,
@@ -131,9 +131,9 @@ impl<'e, 'p> Evaluator<'e, 'p> {
         Some((unsolved, undefined))
     }
 
-    /// Chooses the next branching point: forced objects first, then the atom with the fewest facts, then a
-    /// disjunction, then the first unbound variable. Returns its options with the remaining conditions, or
-    /// `None` if all variables are bound.
+    /// Chooses the next branching point: an object that an equation determines, then the atom with the fewest
+    /// facts, then a disjunction, then the first unbound variable. Returns the options and the remaining
+    /// conditions, or `None` if all variables are bound.
     fn choice(
         &self,
         mut open: Vec<&'p Condition>,
@@ -197,14 +197,14 @@ impl<'e, 'p> Evaluator<'e, 'p> {
         Some((conditions, branch.undefined.clone()))
     }
 
-    /// Number of facts that [`Evaluator::rows`] returns.
+    /// Returns the number of facts that [`Evaluator::rows`] returns for the atom.
     fn row_count(&self, atom: &Atom, bindings: &Bindings<'p>) -> usize {
         let unindexed = || self.state.count(self.world.symbol(&atom.predicate.name));
         self.indexed_rows(atom, bindings).map_or_else(unindexed, <[Arguments]>::len)
     }
 
-    /// Facts that an atom may match. For a fixed predicate, only the facts that contain one of the bound
-    /// arguments at its position.
+    /// Facts that an atom may match. If no plan can change the predicate, only facts that agree with the atom
+    /// in one bound argument are returned.
     fn rows(&self, atom: &Atom, bindings: &Bindings<'p>) -> Box<dyn Iterator<Item = &'e Arguments> + 'e> {
         match self.indexed_rows(atom, bindings) {
             Some(rows) => Box::new(rows.iter()),
@@ -212,8 +212,8 @@ impl<'e, 'p> Evaluator<'e, 'p> {
         }
     }
 
-    /// Facts that contain one of the bound arguments at its position, for the argument with the fewest facts.
-    /// `None` if no argument is bound or if the predicate can change.
+    /// Facts that agree with the atom in one bound argument; the argument with the fewest facts is chosen.
+    /// `None` if no argument is bound or if a plan can change the predicate.
     fn indexed_rows(&self, atom: &Atom, bindings: &Bindings<'p>) -> Option<&'e [Arguments]> {
         let predicate = self.world.symbol(&atom.predicate.name);
         let columns = atom.arguments.iter().enumerate();
@@ -222,7 +222,7 @@ impl<'e, 'p> Evaluator<'e, 'p> {
         rows.min_by_key(|rows| rows.len())
     }
 
-    /// Variable and object that an equation with one unbound side determines.
+    /// Returns the variable and the object that an equation with one unbound side determines.
     fn forced(&self, part: &Condition, bindings: &Bindings<'p>) -> Option<(usize, Symbol)> {
         let Condition::Equal(left, right, _) = part else { return None };
         let unbound = |term: &Term| match term {
@@ -238,8 +238,8 @@ impl<'e, 'p> Evaluator<'e, 'p> {
         }
     }
 
-    /// Unifies an atom with a fact. Returns `false` if they do not match; the variables in `bound` are bound
-    /// even then.
+    /// Unifies an atom with a fact. Appends the positions of newly bound variables to `bound`. Returns
+    /// `false` on a mismatch; these variables remain bound even then.
     pub(super) fn unify(
         &self,
         atom: &Atom,

@@ -1,4 +1,4 @@
-//! Resolves steps of a plan to instances of action schemas.
+//! Resolves the steps of a plan to instances of action schemas.
 
 use diagnostics::nearest;
 use num_rational::BigRational;
@@ -16,7 +16,7 @@ pub(super) struct Step<'p> {
     /// Number of the step in the plan's text, from 1.
     pub(super) number: usize,
     pub(super) text: &'p PlanStep,
-    /// Several instances if schemas share a name and the arguments fit several of them.
+    /// Possible instances: several if schemas share a name and the arguments fit several of them.
     pub(super) instances: Vec<Instance<'p>>,
 }
 
@@ -52,7 +52,7 @@ impl Step<'_> {
     }
 }
 
-/// Finds all schemas that a step can be an instance of. Without any, `instances` is empty.
+/// Finds all schemas that fit the name and the objects of a step. `instances` is empty if no schema fits.
 pub(super) fn resolve<'p>(world: &World<'p>, number: usize, text: &'p PlanStep) -> Step<'p> {
     let objects: Option<Vec<Symbol>> = text.arguments.iter().map(|name| world.object(name)).collect();
     let schemas = world.domain.actions.iter().filter(|action| action.identifier.name == text.action);
@@ -60,8 +60,8 @@ pub(super) fn resolve<'p>(world: &World<'p>, number: usize, text: &'p PlanStep) 
     Step { number, text, instances }
 }
 
-/// Enumerates the choices of one instance for each ambiguous step. Empty if there is only one choice or if
-/// there are more than `limit`.
+/// Returns all readings of a plan: each chooses one instance for every ambiguous step. Empty if there is only
+/// one reading or if there are more than `limit`.
 #[expect(clippy::arithmetic_side_effects, reason = "each step has a way at least")]
 pub(super) fn readings<'p>(steps: &[Step<'p>], limit: usize) -> Vec<Vec<Step<'p>>> {
     let choice_count = |step: &Step<'p>| step.instances.len().max(1);
@@ -93,7 +93,7 @@ fn instantiate<'p>(world: &World<'p>, action: &'p Action, objects: &[Symbol]) ->
     fits.then_some(Instance { action, bindings })
 }
 
-/// Explains why a step is not an instance of any schema.
+/// Returns the violation of a step that is not an instance of any schema, with the reason.
 pub(super) fn unresolved(world: &World<'_>, step: &Step<'_>, time: &BigRational) -> Box<Violation> {
     let name = &step.text.action;
     let mut same_name = world.domain.actions.iter().filter(|action| action.identifier.name == *name);

@@ -9,7 +9,7 @@ use crate::ast::Name;
 use super::world::{Arguments, Symbol};
 
 /// Facts of a stratum that were missing in an evaluation, and predicates of which all facts were read. The
-/// result cannot change before such a fact is derived.
+/// result can change only when one of the missing facts, or a new fact of one of the predicates, is derived.
 #[derive(Debug)]
 pub(super) struct Trace<'e, 'p> {
     stratum: &'e FxHashSet<&'p Name>,
@@ -29,14 +29,14 @@ impl<'e, 'p> Trace<'e, 'p> {
         (self.facts.into_inner(), self.predicates.into_inner())
     }
 
-    /// Records a fact that does not hold.
+    /// Records that a fact does not hold, if its predicate belongs to the stratum.
     pub(super) fn missed(&self, name: &Name, fact: (Symbol, Arguments)) {
         if self.stratum.contains(name) {
             self.facts.borrow_mut().push(fact);
         }
     }
 
-    /// Records that all facts of a predicate are read.
+    /// Records that all facts of a predicate are read, if the predicate belongs to the stratum.
     pub(super) fn read(&self, name: &Name, predicate: Symbol) {
         if self.stratum.contains(name) && !self.predicates.borrow().contains(&predicate) {
             self.predicates.borrow_mut().push(predicate);

@@ -19,7 +19,7 @@ use super::verdict::{Violation, ViolationKind};
 use super::world::World;
 
 impl<'e, 'p> Execution<'e, 'p> {
-    /// Records the preferences of an action that are violated at its start or its end.
+    /// Records the preferences of an action that are violated at the given time: its start or its end.
     pub(super) fn record_preferences(
         &mut self,
         running: &Running<'e, 'p>,
@@ -77,7 +77,7 @@ impl<'e, 'p> Execution<'e, 'p> {
     }
 }
 
-/// Number of violated instances of a preference.
+/// Returns the number of violated instances of a preference.
 fn count_violated<'p>(
     evaluator: &Evaluator<'_, 'p>,
     preference: &'p Preference,
@@ -102,7 +102,7 @@ struct TrajectoryEvaluator<'j, 'p> {
 }
 
 impl<'p> TrajectoryEvaluator<'_, 'p> {
-    /// For each state: whether a condition holds in it.
+    /// Returns for each state of the trajectory whether a condition holds in it.
     fn holds(&self, condition: &'p Condition, bindings: &mut Bindings<'p>) -> Vec<bool> {
         let holds = |moment: &Moment| {
             Evaluator::new(self.world, &moment.state).holds(condition, bindings) == Ok(true)
@@ -122,7 +122,8 @@ impl<'p> TrajectoryEvaluator<'_, 'p> {
             Trajectory::Sometime(body) => self.holds(body, bindings).contains(&true),
             Trajectory::AtMostOnce(body) => {
                 let holds = self.holds(body, bindings);
-                // After the first block of states in which the condition holds, there must be no other one.
+                // After the first block of states in which the condition holds, the condition must not hold
+                // again.
                 let first = holds.iter().position(|holds| *holds).unwrap_or(holds.len());
                 !holds.iter().skip(first).skip_while(|holds| **holds).any(|holds| *holds)
             }
@@ -152,8 +153,8 @@ impl<'p> TrajectoryEvaluator<'_, 'p> {
     }
 }
 
-/// Returns `true` if a condition holds in the state at time `from` and in all later states that `is_included`
-/// selects.
+/// Returns `true` if a condition holds in the state at time `from` and in all later states whose times
+/// satisfy `is_included`.
 fn lasts(
     holds: &[bool],
     times: &[&BigRational],

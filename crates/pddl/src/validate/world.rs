@@ -47,9 +47,9 @@ pub(super) struct World<'p> {
     pub(super) strata: Vec<Stratum<'p>>,
     /// Predicates and functions that occur in conditions of axioms.
     pub(super) read_by_axioms: FxHashSet<Symbol>,
-    /// Predicates that a plan can change, and derived predicates.
+    /// Predicates that actions, timed initial literals or axioms can change.
     changeable: FxHashSet<Symbol>,
-    /// Index of the facts of all other predicates by argument position and object.
+    /// Facts of the fixed predicates, which no plan changes, indexed by argument position and object.
     fixed: FxHashMap<ColumnKey, Vec<Arguments>>,
 }
 
@@ -63,7 +63,7 @@ pub(super) struct State {
 }
 
 impl<'p> World<'p> {
-    /// Interns the names and builds the indices. When `stop` returns `true`, loops end early with meaningless
+    /// Interns the names and builds the indices. Once `stop` returns `true`, loops end early with meaningless
     /// results.
     pub(super) fn new(domain: &'p Domain, problem: &'p Problem, stop: &'p dyn Fn() -> bool) -> Self {
         let mut world = Self {
@@ -110,7 +110,7 @@ impl<'p> World<'p> {
         world
     }
 
-    /// Indexes the initial facts of fixed predicates.
+    /// Indexes the initial facts of fixed predicates, which no plan changes, by argument position and object.
     fn index_fixed(&mut self) {
         let mut fixed: FxHashMap<ColumnKey, Vec<Arguments>> = FxHashMap::default();
         let mut indexed = FxHashSet::default();
@@ -129,7 +129,8 @@ impl<'p> World<'p> {
         self.fixed = fixed;
     }
 
-    /// Facts of a fixed predicate with an object in a column; `None` if the predicate can change.
+    /// Facts of a fixed predicate with the given object at the argument position `column`. `None` if a plan
+    /// can change the predicate.
     pub(super) fn fixed_rows(
         &self,
         predicate: Symbol,
@@ -168,7 +169,7 @@ impl<'p> World<'p> {
         constraint_names.chain(action_preferences.map(|preference| &preference.name)).map(|name| &name.name)
     }
 
-    /// Copy of a state in which `(is-violated NAME)` has its value, for the metric.
+    /// Returns a copy of a state with the values of `(is-violated NAME)`, for the metric.
     pub(super) fn with_violations(&self, violated: &[Name], state: &State) -> State {
         let mut state = state.clone();
         let function = self.symbol(&Name::new(IS_VIOLATED));
@@ -180,7 +181,7 @@ impl<'p> World<'p> {
         state
     }
 
-    /// Symbol of a name. An undeclared name has a symbol that occurs in no fact.
+    /// Returns the symbol of a name. All undeclared names have the same symbol, which occurs in no fact.
     pub(super) fn symbol(&self, name: &Name) -> Symbol {
         self.symbols.get(name).copied().unwrap_or(Symbol(u32::MAX))
     }
@@ -194,7 +195,7 @@ impl<'p> World<'p> {
         self.names.get(symbol.0 as usize).map_or("?", Name::as_str)
     }
 
-    /// Object with the given name.
+    /// Returns the object with the given name, if there is one.
     pub(super) fn object(&self, name: &Name) -> Option<Symbol> {
         self.symbols.get(name).copied().filter(|symbol| self.position.contains_key(symbol))
     }
@@ -236,7 +237,7 @@ impl<'p> World<'p> {
         format!("({})", words.join(" "))
     }
 
-    /// Symbols of an atom without variables.
+    /// Converts an atom without variables to its symbols.
     pub(super) fn ground(&self, atom: &Atom) -> (Symbol, Arguments) {
         let arguments = atom.arguments.iter().map(|term| match term {
             Term::Variable(identifier) | Term::Constant(identifier) => self.symbol(&identifier.name),
@@ -244,7 +245,7 @@ impl<'p> World<'p> {
         (self.symbol(&atom.predicate.name), arguments.collect())
     }
 
-    /// Initial state, without derived facts.
+    /// Returns the initial state, without derived facts.
     pub(super) fn initial_state(&self) -> State {
         let mut state = State::default();
         // `total-cost` starts at 0 unless `:init` sets it.

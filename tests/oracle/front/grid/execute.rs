@@ -4,14 +4,14 @@ use fastrand::Rng;
 
 use super::{Action, Amount, Constraint, Effect, Formula, Moment, State, Task};
 
-/// Index of the number that is added to the metric (`total-cost`).
+/// Index of the number that the metric contains (`total-cost`).
 pub(super) const PAID: usize = 2;
 /// Latest start time of an enumerated action.
 const LAST_START: i64 = 3;
 /// Number of random plans with three actions. Shorter plans are enumerated exhaustively.
 const LONG_PLANS: usize = 200;
 
-/// Start, number of the action, duration.
+/// Step of a plan: start, number of the action, duration.
 type Step = (i64, usize, i64);
 
 impl Formula {
@@ -25,7 +25,7 @@ impl Formula {
         }
     }
 
-    /// Bit sets of the facts and numbers in the formula.
+    /// Returns the facts and the numbers that the formula reads, as bit sets.
     fn reads(&self) -> (u8, u8) {
         match self {
             Self::Fact(fact, _) => (1 << fact, 0),
@@ -44,7 +44,7 @@ impl Amount {
     }
 }
 
-/// Effects of the start or end of an action, with the facts and numbers that it reads. Sets are bit sets.
+/// Effects of the start or the end of an action, and the facts and numbers that it reads. Sets are bit sets.
 #[derive(Debug, Default)]
 struct Happening {
     reads: (u8, u8),
@@ -56,7 +56,7 @@ struct Happening {
 }
 
 impl Happening {
-    /// Start or end of an action with a given duration. Returns `None` if its effects conflict.
+    /// Returns the start or the end of an action with a given duration. `None` if its effects conflict.
     fn new(action: &Action, moment: Moment, duration: i64) -> Option<Self> {
         let mut happening = Self::default();
         for (_, condition) in action.conditions.iter().filter(|(at, _)| *at == moment) {
@@ -92,8 +92,8 @@ impl Happening {
     }
 
     fn interferes(&self, other: &Self) -> bool {
-        // Two happenings interfere if one writes what the other one reads, or if they write one number or fact in different ways. Two
-        // increases commute.
+        // Two happenings interfere if one writes what the other reads, or if both write a number or fact in
+        // different ways. Two increases commute.
         let disturbs = |writer: &Self, reader: &Self| {
             (writer.adds | writer.deletes) & reader.reads.0 != 0
                 || writer.adds & reader.deletes != 0
@@ -117,7 +117,7 @@ impl Task {
         conditions.all(|(_, condition)| condition.holds(state))
     }
 
-    /// Value of a plan; `None` if the plan is invalid.
+    /// Returns the value of a plan; `None` if the plan is invalid.
     fn value(&self, plan: &[Step]) -> Option<i64> {
         let mut times: Vec<i64> =
             plan.iter().flat_map(|(start, _, duration)| [*start, start + duration]).collect();
@@ -127,7 +127,7 @@ impl Task {
         let mut trajectory = vec![(0, state)];
         for time in times {
             let mut happenings: Vec<Happening> = Vec::new();
-            // Conditions of all happenings at a time are evaluated in the state before it.
+            // The conditions of all happenings at a time are evaluated in the state before this time.
             for (start, action, duration) in plan {
                 let schema = &self.actions[*action];
                 for (moment, at) in [(Moment::Start, *start), (Moment::End, start + duration)] {
@@ -149,7 +149,7 @@ impl Task {
             }
             happenings.iter().for_each(|happening| happening.apply(&mut state));
             trajectory.push((time, state));
-            // Over-all conditions must hold in every state from the start until before the end.
+            // Conditions over all must hold in every state from the start until before the end.
             for (start, action, duration) in plan {
                 if *start <= time && time < start + duration && !self.holds(*action, Moment::OverAll, &state)
                 {
@@ -176,7 +176,7 @@ impl Task {
         Some(value)
     }
 
-    /// Least value among the enumerated plans.
+    /// Returns the minimum value among the enumerated plans.
     pub(super) fn best(&self, rng: &mut Rng) -> Option<i64> {
         let mut steps: Vec<Step> = Vec::new();
         for (number, action) in self.actions.iter().enumerate() {

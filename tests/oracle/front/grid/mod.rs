@@ -1,7 +1,8 @@
-//! Concurrent actions with integer times: constraints and preferences of PDDL 3, and chosen durations.
+//! Samples with concurrent actions at integer times: constraints and preferences of PDDL 3, and chosen
+//! durations.
 //!
-//! The oracle executes plans of a few actions by the definitions of PDDL 2.1 and PDDL 3. It enumerates plans with integer times only, so
-//! the optimum can be better than its best plan, but not worse.
+//! The oracle executes plans of a few actions by the definitions of PDDL 2.1 and PDDL 3. It enumerates only
+//! plans with integer times, so the optimum can be better than the oracle's best plan, but not worse.
 
 mod execute;
 
@@ -15,7 +16,7 @@ use super::{Reference, Sample, whole};
 use crate::judge::{Mode, read};
 use execute::PAID;
 
-/// Names of facts and numbers. The third number (`total-cost`) has no entry.
+/// Names of facts and of numbers. The third number (`total-cost`) has no entry.
 const FACTS: [&str; 3] = ["(p)", "(q)", "(h)"];
 const NUMBERS: [&str; 2] = ["(fuel)", "(charge)"];
 
@@ -56,9 +57,9 @@ enum Moment {
 
 #[derive(Debug, Clone)]
 struct Action {
-    /// Least and greatest duration; `None` for an instantaneous action.
+    /// Minimum and maximum duration; `None` for an instantaneous action.
     durations: Option<(i64, i64)>,
-    /// `true` if the duration is also limited by `(charge)` + 1.
+    /// Whether the duration is also limited by `(charge)` + 1.
     is_bounded_by_charge: bool,
     conditions: Vec<(Moment, Formula)>,
     effects: Vec<(Moment, Effect)>,
@@ -73,16 +74,16 @@ struct Constraint {
     is_soft: bool,
 }
 
-/// A task of three actions.
+/// A random task of three actions.
 #[derive(Debug)]
 struct Task {
     actions: [Action; 3],
     initial: State,
     goal: Vec<Formula>,
     constraints: Vec<Constraint>,
-    /// A preference in the goal, with its weight.
+    /// A preference in the goal, with its weight in the metric.
     wish: Option<(Formula, i64)>,
-    /// Weight of the violated soft constraints.
+    /// Weight in the metric of each violated soft constraint.
     weight: i64,
     is_paid: bool,
 }
@@ -115,7 +116,7 @@ impl Effect {
         let number = |number: &usize| if *number == PAID { "(total-cost)" } else { NUMBERS[*number] };
         match self {
             Self::Set(fact, value) => Formula::Fact(*fact, *value).text(),
-            // Covers `decrease`, which is not drawn as an operator of its own.
+            // This case covers `decrease`, which is not drawn as an operator of its own.
             Self::Increase(index, Amount(constant, factor)) if *constant <= 0 && *factor <= 0 => {
                 format!("(decrease {} {})", number(index), Amount(-constant, -factor).text())
             }
@@ -196,7 +197,8 @@ impl Task {
         let (domain, problem) = (self.domain(), self.problem());
         let (mission, _): (Mission, _) =
             read(&domain, &problem).unwrap_or_else(|messages| panic!("{messages:#?}\n{domain}\n{problem}"));
-        // The separation is the unit of the grid, so interfering happenings of a grid plan are far enough apart.
+        // The separation is the unit of the grid, so interfering happenings of a plan with integer times are
+        // far enough apart.
         let separation = BigRational::from_integer(1.into());
         Sample {
             mission,
@@ -236,7 +238,7 @@ fn set(rng: &mut Rng) -> Effect {
     Effect::Set(rng.usize(0..3), rng.u32(0..3) > 0)
 }
 
-/// A task with constraints and preferences of PDDL 3 and fixed durations.
+/// Returns a random task with constraints and preferences of PDDL 3 and fixed durations.
 pub fn trajectories(seed: u64) -> Sample {
     let mut rng = Rng::with_seed(seed);
     let rng = &mut rng;
@@ -289,7 +291,7 @@ pub fn trajectories(seed: u64) -> Sample {
     task.sample(rng)
 }
 
-/// A task with numbers and chosen durations.
+/// Returns a random task with numbers and chosen durations.
 pub fn durations(seed: u64) -> Sample {
     let mut rng = Rng::with_seed(seed);
     let rng = &mut rng;

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::{CHARGING, Design, FULL, Form, Robot, Situation};
 
-/// Actions of the explicit form that select and replace designs.
+/// Actions of the explicit form that choose and replace designs.
 const CHANGES: &str = "(:derived (unset ?f - function) (not (exists (?d - functiondesign) (at_work ?d ?f))))
    (:action set :parameters (?f - function ?d - functiondesign)
       :precondition (and (unset ?f) (fd_solve_f ?d ?f) (fd_available ?d)) :effect (at_work ?d ?f))
@@ -13,7 +13,8 @@ const CHANGES: &str = "(:derived (unset ?f - function) (not (exists (?d - functi
       :effect (and (not (at_work ?old ?f)) (at_work ?new ?f) (increase (total-cost) (change ?new))))\n";
 
 impl Robot {
-    /// Knowledge base as Turtle. In the renamed form, functions and designs get the prefix `k`, which the name map removes.
+    /// Returns the knowledge base as Turtle. In the renamed form, functions and designs get the prefix `k`,
+    /// which the name map removes.
     pub(super) fn document(
         form: Form,
         functions: usize,
@@ -96,7 +97,7 @@ impl Robot {
         text
     }
 
-    /// Replaces the names in a PDDL text by those of the form.
+    /// Replaces names in a PDDL text as the form of the mission requires.
     pub(super) fn renamed(&self, text: &str) -> String {
         let names: &[(&str, &str)] = match self.form {
             Form::Explicit | Form::Native => return text.to_owned(),

@@ -1,8 +1,10 @@
-//! Robots: missions with a knowledge base, in the explicit form, in the native form with contexts, and with bindings and name maps.
+//! Samples of robots' missions with a knowledge base: in the explicit form, in the native form with contexts,
+//! and with bindings and name maps.
 //!
-//! A robot with a battery moves over a map. Moving requires one or two functions. Their designs differ in slowness, energy and safety,
-//! require components and visibility, and a change of design can have a price. The oracle is Dijkstra's algorithm over place, battery
-//! and current designs, written from the documentation of plain domains and bindings.
+//! A robot with a battery moves over a map. Moving requires one or two functions. Their designs differ in
+//! slowness, energy and safety, and require components and visibility. A change of design can have a price.
+//! The oracle is Dijkstra's algorithm over place, battery and current designs, written from the documentation
+//! of plain domains and bindings.
 
 mod files;
 
@@ -22,7 +24,7 @@ use crate::judge::Mode;
 
 /// Charge of a full battery.
 const FULL: i64 = 12;
-/// Price of charging, or its duration.
+/// Price of charging, or its duration in timed missions.
 const CHARGING: i64 = 5;
 const PLACES: usize = 4;
 
@@ -33,9 +35,9 @@ pub enum Form {
     Explicit,
     /// The domain does not mention designs.
     Native,
-    /// Explicit, with other names for types, predicates and functions.
+    /// Explicit form with other names for types, predicates and functions.
     Renamed,
-    /// Native, with other names for functions and actions.
+    /// Native form with other names for functions and actions.
     NativeBound,
 }
 
@@ -56,9 +58,9 @@ struct Design {
     energy: i64,
     safety: Option<i64>,
     change: i64,
-    /// Required component.
+    /// Component that the design requires, if any.
     component: Option<usize>,
-    /// Lower limit on the visibility with which the design can be used.
+    /// Minimum visibility with which the design can be used, if any.
     visibility: Option<i64>,
 }
 
@@ -68,15 +70,15 @@ pub struct Robot {
     form: Form,
     functions: usize,
     designs: Vec<Design>,
-    /// Lower limit on the safety of a design on narrow ways.
+    /// Minimum safety of a design on narrow ways.
     safety: i64,
-    /// Upper limit on the energy of each design at quiet places.
+    /// Maximum energy of each design at quiet places, if any.
     quiet: Option<i64>,
-    /// Upper limit on the slowness of each design at all places.
+    /// Maximum slowness of each design at all places, if any.
     quick: Option<i64>,
-    /// `true` if a change of design has a price.
+    /// Whether a change of design has a price.
     reconfiguration: bool,
-    /// `true` if moving takes time; the metric then contains the total time.
+    /// Whether moving takes time. The metric then contains the total time.
     is_timed: bool,
     knowledge: Knowledge,
 }
@@ -84,7 +86,7 @@ pub struct Robot {
 /// Initial situation of a mission.
 #[derive(Debug)]
 struct Situation {
-    /// For each pair of places: `true` for a narrow way, and the length.
+    /// For each connected pair of places: `true` for a narrow way, and the length.
     ways: BTreeMap<(usize, usize), (bool, i64)>,
     quiet: BTreeSet<usize>,
     charger: usize,
@@ -128,9 +130,9 @@ impl Robot {
         Self { form, functions, designs, safety, quiet, quick, reconfiguration, is_timed, knowledge }
     }
 
-    /// The robot's mission in a random situation.
+    /// Returns the robot's mission in a random situation, with the result of brute force.
     pub fn sample(&self, seed: u64) -> Sample {
-        // The situation must not repeat the random numbers of the robot, so the seed is changed.
+        // The random numbers of the situation must differ from those of the robot, so the seed is changed.
         let mut rng = Rng::with_seed(seed ^ 0x0b07);
         let situation = Situation::new(&mut rng);
         let (domain, problem) = self.files(&situation);
@@ -195,7 +197,8 @@ impl Robot {
         bindings.naming(names)
     }
 
-    /// Combinations of designs, one per function, with which the robot can leave `from` on a way of the given kind.
+    /// Returns the combinations of designs, one per function, with which the robot can leave `from` on a
+    /// narrow or wide way.
     fn configurations(&self, situation: &Situation, from: usize, is_narrow: bool) -> Vec<Vec<usize>> {
         let is_suitable = |design: &Design| {
             let has_component =
@@ -225,9 +228,9 @@ impl Robot {
         combinations
     }
 
-    /// Least cost of a plan.
+    /// Returns the minimum cost of a plan. `None` if there is no plan.
     fn best(&self, situation: &Situation) -> Option<i64> {
-        /// Place, battery, and current design of each function.
+        /// State of the search: place, battery, and current design of each function.
         type Node = (usize, i64, Vec<Option<usize>>);
         let start: Node = (0, situation.battery, vec![None; self.functions]);
         let mut open = BinaryHeap::from([Reverse((0, start))]);
