@@ -44,8 +44,8 @@ pub enum SearchOutcome<N = Int> {
     Optimal(GroundPlan<N>),
     /// Proof that no plan exists: every reachable state was expanded or is dominated.
     None,
-    /// No proof: the best plan found. Returned if a limit was reached, or (with `None`) if the
-    /// search proved that no plan is cheaper than the external incumbent.
+    /// No proof. Contains the best plan found if a limit was reached. Contains `None` if no plan was found,
+    /// or if the search proved that no plan is cheaper than an external incumbent.
     Unknown(Option<GroundPlan<N>>),
 }
 
