@@ -53,8 +53,8 @@ impl<'a> Planner<'a> {
         Self { domain, problem, grounding, config, report: Box::new(|_| ControlFlow::Continue(())) }
     }
 
-    /// Sets a time limit, counted from now and including grounding. At the limit, the best plan found so far
-    /// is returned.
+    /// Sets a time limit, counted from now and including grounding. At the limit, the best known plan is
+    /// returned.
     #[must_use]
     pub fn time_limit(self, time: Duration) -> Self {
         let limits = self.config.limits.clone().with_time(time);
@@ -100,7 +100,7 @@ impl<'a> Planner<'a> {
     }
 
     /// Calls `report` for every better plan and lower bound. If `report` returns `Break`, planning ends with
-    /// the best plan found so far.
+    /// the best known plan.
     #[must_use]
     pub fn on_improvement(mut self, report: impl FnMut(&Improvement) -> ControlFlow<()> + 'a) -> Self {
         self.report = Box::new(report);

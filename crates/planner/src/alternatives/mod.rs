@@ -28,8 +28,8 @@ use paths::{End, Paths};
 pub use choices::{Alternatives, Forced};
 
 /// Searches for at most `most` cheapest plans other than the plan of an optimal solution. Plans with fewer
-/// steps come first. At a limit, returns the plans found so far. Returns `None` if the solution is not
-/// optimal.
+/// steps come first. At a limit, returns the plans that were found before. Returns `None` if the solution is
+/// not optimal.
 pub fn alternatives(task: &Task, solution: &Solution, most: usize, config: &Config) -> Option<Alternatives> {
     let first = solution.ground.as_ref().filter(|_| solution.status == Status::Optimal)?;
     let context = Context::new(task, &config.limits);

@@ -19,7 +19,7 @@ use crate::optimize::sat_budget::{FORMULA_LIMIT, SatBudget};
 pub(super) struct HorizonSchedule {
     /// Horizons whose formulas are not decided yet.
     open: Vec<usize>,
-    /// Next longer horizon, or `None` if there is none.
+    /// Next longer horizon; `None` after the last horizon.
     next: Option<usize>,
     /// Upper bound on the number of steps of a shortest plan, or the configured horizon if it is smaller.
     most: usize,

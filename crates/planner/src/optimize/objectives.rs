@@ -144,7 +144,7 @@ fn in_order(
         swap_objective(&mut narrowed, *objective);
         let solution = optimize(&narrowed, config, report);
         let Some(plan) = &solution.ground else {
-            // The best plan so far remains valid, but its optimality under the remaining objectives is not
+            // The best known plan remains valid, but its optimality under the remaining objectives is not
             // proved.
             let partial = best.map(|solution| Solution { status: Status::Feasible, proof: None, ..solution });
             return finish(context, partial.unwrap_or(solution));

@@ -34,8 +34,8 @@ pub(super) fn solve(mut run: Run<'_>) -> Solution {
     }
 }
 
-/// Runs heuristic search, which ignores the horizon. If its plan is longer than the horizon or there is none,
-/// solves formulas.
+/// Runs heuristic search, which ignores the horizon. If its plan is longer than the horizon or no plan is
+/// found, solves formulas.
 fn solve_within(mut run: Run<'_>, bounds: &Bounds, lower: Int, horizon: usize) -> Solution {
     let started = Instant::now();
     let outcome = search(run.context(), bounds);

@@ -217,8 +217,8 @@ fn choose(
     chosen.unwrap_or((None, GroundPlan { steps: Vec::new(), cost: 0 }))
 }
 
-/// Returns the greatest pair of changes that is lexicographically less than the given pair, or `None` if
-/// there is none.
+/// Returns the greatest pair of changes that is lexicographically less than the given pair, or `None` for (0,
+/// 0).
 #[expect(clippy::arithmetic_side_effects, reason = "those that are 0 are told apart")]
 fn fewer((departures, reconfigurations): plan_tiebreak::Changes) -> Option<plan_tiebreak::Changes> {
     match (departures, reconfigurations) {

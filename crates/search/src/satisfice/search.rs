@@ -60,7 +60,7 @@ pub(super) struct Search<N> {
     /// Reached landmarks of each state, as a bitset of `LandmarkStatus::stride` words.
     reached: Vec<u64>,
     open: AlternatingOpenList<u64>,
-    /// Lowest value of each heuristic so far.
+    /// Lowest value of each heuristic among the evaluated states.
     best: [u32; 2],
     /// `true` if states were pruned because a number overflowed or their cost reached the limit.
     pub(super) incomplete: bool,

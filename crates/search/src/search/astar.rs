@@ -104,7 +104,7 @@ pub struct AStar<'a, N, E> {
     pub(super) lazy_heuristic: Option<Box<dyn LazyHeuristic<N>>>,
     /// Stubborn-set pruning, if enabled.
     pub(super) pruning: Option<StubbornSetPruning>,
-    /// Work units done so far, without those of the lazy heuristic.
+    /// Work units already done, without those of the lazy heuristic.
     own_work: u64,
     /// Number of searches that share the memory limit.
     sharing: usize,
@@ -273,7 +273,7 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         None
     }
 
-    /// Returns the work units done so far. They are deterministic and do not measure time.
+    /// Returns the work units already done. They are deterministic and do not measure time.
     pub(super) fn work(&self) -> u64 {
         self.own_work.saturating_add(self.lazy_heuristic.as_ref().map_or(0, |sharper| sharper.work()))
     }

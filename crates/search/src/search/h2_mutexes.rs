@@ -434,8 +434,7 @@ mod tests {
         check_all(60..2_000);
     }
 
-    /// A robot stands below three tiles in a column. It paints neighbouring tiles and cannot enter painted
-    /// tiles.
+    /// A robot is below three tiles in a column. It paints neighbouring tiles and cannot enter painted tiles.
     #[test]
     fn painting_oneself_in_is_a_dead_end() {
         let domain = "(define (domain tiles) (:predicates (at ?t) (clear ?t) (painted ?t) (above ?a ?b))

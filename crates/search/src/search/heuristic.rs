@@ -28,7 +28,7 @@ pub trait LazyHeuristic<N> {
     /// Returns the heuristic value of a state, or `None` if the goal is proved unreachable.
     fn estimate(&mut self, state: &State<N>) -> Option<N>;
 
-    /// Returns the work units done so far.
+    /// Returns the work units already done.
     fn work(&self) -> u64;
 }
 

@@ -217,7 +217,7 @@ fn middle(labels: &[u32], criteria: &impl Criteria) -> Option<(usize, u32)> {
 }
 
 /// Returns the median of a column. If the median equals the worst number, returns the worst of the better
-/// numbers, or `None` if there are none.
+/// numbers, or `None` if all numbers are equal.
 fn median(criterion: usize, mut column: Vec<u32>, criteria: &impl Criteria) -> Option<u32> {
     column.sort_by(|one, other| {
         match (criteria.is_as_good(criterion, *one, *other), criteria.is_as_good(criterion, *other, *one)) {

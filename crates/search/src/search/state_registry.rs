@@ -69,7 +69,7 @@ struct Node {
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum NodeStatus {
     Open,
-    /// Not dominated, and the lazy heuristic has been evaluated.
+    /// Open, not dominated, and the lazy heuristic has been evaluated.
     Closer,
     Dominated,
 }

@@ -11,7 +11,7 @@
 //! |---|---|---|
 //! | `relaxed_reachability` | `Lifted`, slots | `RelaxedReachability`: instances of schemas, atoms that can hold |
 //! | `instantiate` | the `World` of these instances and atoms | `GroundTask`: operators, rules and a goal over atoms |
-//! | `derived` | derived atoms that are constant or have a single rule | their truth values, or the rule body in place of the atom |
+//! | `derived` | constant derived atoms, and those with a single rule | truth values, or the rule bodies in their place |
 //! | `metric` | metrics | operator costs and objectives |
 //! | `prune` | operators and rules | the relevant and reachable ones, or the reason why the goal is unreachable |
 //! | `finalize` | `GroundTask` | `Task`: finite-domain variables for atoms, integers for rationals |

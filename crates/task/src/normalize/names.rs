@@ -27,7 +27,7 @@ pub(super) struct Scope {
     variables: Vec<Name>,
     /// Terms of each variable name in scope; the innermost declaration comes last.
     terms: FxHashMap<Name, Vec<Term>>,
-    /// Number of variables bound so far, including those that are out of scope.
+    /// Total number of bound variables, including those that are out of scope.
     pub(super) bound: u32,
     /// Meaning of `?duration` in the current action.
     pub(super) duration: Duration,

@@ -97,7 +97,7 @@ words! { PlannerPart, "part of the planner": Search = "search", Satisficing = "s
 pub struct Moment {
     /// Time since the start of the optimiser.
     pub time: Duration,
-    /// Metric of the best known plan, or `None` if there is none yet.
+    /// Metric of the best known plan; `None` before a plan is found.
     pub cost: Option<Exact>,
     /// Lower bound on the metric of every plan.
     pub lower_bound: Exact,

@@ -28,7 +28,7 @@ use crate::task::{Argument, ForbiddenCombinations};
 pub(super) struct Instantiation<'a> {
     pub(super) world: World<'a>,
     pub(super) definitions: Definitions,
-    /// Timed events of the task, or `None` if there are none.
+    /// Timed events of the task; `None` for a task without timed events.
     pub(super) timeline: Option<Timeline>,
 }
 
