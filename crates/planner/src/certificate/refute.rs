@@ -17,7 +17,7 @@ const REFERENCE_WIDTH: usize = 32;
 
 /// Output streams for the parts of a refutation.
 pub struct Outputs<'o> {
-    /// Formula in DIMACS.
+    /// Formula in DIMACS format.
     pub formula: &'o mut dyn Write,
     /// Legend: one line for each variable, with its number and meaning.
     pub legend: &'o mut dyn Write,

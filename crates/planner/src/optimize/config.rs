@@ -12,7 +12,7 @@ pub enum Strategy {
     /// The strategy that is usually faster.
     #[default]
     Auto,
-    /// Linear search: finds increasingly cheaper plans until the formula is unsatisfiable.
+    /// Linear search: finds cheaper and cheaper plans until the formula is unsatisfiable.
     Tighten,
     /// Core-guided search: unsatisfiable cores raise the lower bound until a plan with this cost exists.
     /// Without an upper bound on the number of steps of a cheapest plan, this strategy equals `Tighten`.

@@ -1,4 +1,4 @@
-//! Linear SAT-UNSAT search: one solver finds increasingly cheaper plans until the formula is unsatisfiable.
+//! Linear SAT-UNSAT search: one solver finds cheaper and cheaper plans until the formula is unsatisfiable.
 
 use encodings::encode::Encoding;
 use encodings::sat::Answer;

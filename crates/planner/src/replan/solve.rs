@@ -144,7 +144,7 @@ fn old_plan(task: &Task, state: &State, query: &Query<'_>, old: &[Option<GroundS
     Some(GroundPlan { steps, cost })
 }
 
-/// A plan for a query that may not be optimal.
+/// A plan for the query; it need not be optimal.
 #[derive(Clone)]
 struct Candidate {
     first: Option<usize>,

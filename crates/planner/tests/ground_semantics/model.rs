@@ -43,7 +43,7 @@ pub enum Range {
     Object,
     Thing,
     Part,
-    /// `(either part tool)`
+    /// The union type `(either part tool)`.
     Either,
 }
 

@@ -69,7 +69,7 @@ pub(super) fn resources(
 }
 
 /// Returns the minimum consumption of an operator, or `Some(None)` if the operator may replenish the
-/// resource. Returns `None` if the operator may lower the variable below 0, so that the variable is no
+/// resource. Returns `None` if the operator may lower the variable below 0, so that the variable is not a
 /// resource.
 #[allow(clippy::option_option)]
 #[expect(

@@ -371,7 +371,7 @@ fn has(words: &[u64], landmark: u32) -> bool {
     words[(landmark >> 6) as usize] >> (landmark & 63) & 1 == 1
 }
 
-/// Adds the successors `further` to every landmark that is ordered before `landmark`.
+/// Adds the landmarks in `further` to the successors of every landmark that is ordered before `landmark`.
 fn join(reach: &mut [Vec<u64>], landmark: u32, further: &[u64]) {
     for successors in reach.iter_mut().filter(|successors| has(successors, landmark)) {
         for (word, more) in successors.iter_mut().zip(further) {

@@ -58,7 +58,7 @@ pub enum StepResult<N> {
     Ended,
 }
 
-/// A resumable sequence of searches for increasingly cheaper plans.
+/// A resumable sequence of searches for cheaper and cheaper plans.
 pub struct Satisficer<'a, N> {
     known: SearchContext<'a, N>,
     limits: &'a Limits,

@@ -18,7 +18,7 @@ use task::task::{Fact, Operator, OperatorId, Task, VariableId};
 const MAX_FACTS: usize = 8_000;
 /// Limit on the work of the fixpoint computation, as the number of visited bitset words (about 0.5 s).
 const MAX_WORK: usize = 400_000_000;
-/// Maximum number of rounds. In each round, forward and backward analysis prune with each other's results.
+/// Maximum number of rounds of forward and backward h² analysis, which prune with each other's results.
 const MAX_ROUNDS: usize = 4;
 
 /// A bitset of facts, or one such bitset for each fact.

@@ -151,8 +151,8 @@ pub struct Operator<N = Int> {
     pub others: Vec<Quantity<N>>,
     /// Duration in the task's time unit.
     pub duration: Quantity<N>,
-    /// End of the wait if the operator is a wait, as task time since the start of the plan; `None` for an
-    /// action.
+    /// End of the wait if the operator is a wait, in the task's time unit since the start of the plan; `None`
+    /// for an action.
     pub wait: Option<N>,
     /// Earliest start and end, in the task's time unit since the start of the plan.
     pub timing: Timing<N>,

@@ -28,7 +28,7 @@ pub enum Slot {
     /// A quantified variable and its candidate objects. All occurrences of the variable match the same
     /// object.
     Each(u32, Arc<[ObjectId]>),
-    /// Any object: an unbound parameter.
+    /// Any object, for an unbound parameter.
     Any,
 }
 

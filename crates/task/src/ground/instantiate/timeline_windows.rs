@@ -207,7 +207,7 @@ impl<'t> TimelineWindow<'t> {
         (self.end == End::AtEvent).then(|| &self.timeline.events[self.to - 1].1[..])
     }
 
-    /// Returns the changes of the auxiliary time atoms: the phase advances, and the last step is no wait.
+    /// Returns the changes of the auxiliary time atoms: the phase advances, and the last step is not a wait.
     pub(super) fn changes(&self) -> Vec<(AtomId, bool)> {
         let phases = &self.timeline.phases;
         let mut changes = vec![(self.timeline.waited, false)];
