@@ -1,4 +1,4 @@
-//! Anytime planning: prints every improvement, the proof, and the plan in the standard format.
+//! Anytime planning: prints every improvement, then the proof and the plan in the standard format.
 //!
 //! `cargo run -p metaplan-planner --example anytime -- DOMAIN PROBLEM`
 #![expect(clippy::print_stdout, reason = "an example prints")]

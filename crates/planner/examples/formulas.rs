@@ -1,8 +1,8 @@
-//! Plans with the SAT solver alone and prints its statistics:
-//! `formulas DOMAIN PROBLEM SOLVER STRATEGY SECONDS`.
+//! Plans with the SAT solver only, and prints its statistics. Usage: `formulas DOMAIN PROBLEM SOLVER STRATEGY
+//! SECONDS`.
 //!
-//! One line: status, cost, lower bound, steps, calls of the solver, conflicts, seconds. For
-//! measuring strategies.
+//! Prints one line with the status, cost, lower bound, steps, number of solver calls, conflicts and seconds.
+//! Used to compare strategies.
 
 #![allow(clippy::print_stdout)]
 

@@ -1,15 +1,17 @@
-//! Design selection without a plan, for functions that compete for components or share budgets.
+//! Optimal selection of designs without a plan, for functions that compete for components or share budgets.
 //!
-//! The best assignment serves as many functions as possible, then violates the fewest requirements, then has
-//! the greatest sum of utilities. Ties go to the earlier designs of earlier functions. The three criteria
-//! form one integer, the worth: one more function outweighs all requirements, and one requirement outweighs
-//! all utilities. A component that only one design can use is a budget of one.
+//! The best assignment serves as many functions as possible, then violates the fewest requirements, and then
+//! has the greatest sum of utilities. Ties are broken in favour of earlier designs of earlier functions. The
+//! three criteria are combined into one integer, the worth: an additional served function outweighs all
+//! requirements, and one requirement outweighs all utilities. A component that only one design can use is
+//! modelled as a budget of 1.
 //!
-//! The algorithm is dynamic programming over the functions with dominance: a partial assignment is dropped
-//! if another one has at least its worth and uses no more of any budget. It is also dropped if no completion
-//! keeps a budget, or if its upper bound does not exceed the best known worth. The upper bound is a
-//! Lagrangian relaxation of the budgets, valid for any multipliers \[1\]. Subgradients find good multipliers
-//! in floating-point numbers \[2\]; rounding them keeps the bound exact.
+//! The algorithm is dynamic programming over the functions with dominance pruning. A partial assignment is
+//! pruned in three cases: another partial assignment has at least its worth and consumes no more of any
+//! budget; no completion respects the budgets; or an upper bound on its completions is less than the best
+//! known worth. The upper bound is a Lagrangian relaxation of the budgets, which is valid for any multipliers
+//! \[1\]. A subgradient method computes good multipliers in floating-point arithmetic \[2\]. They are then
+//! rounded, and the bound is evaluated exactly.
 //!
 //! - \[1\] H. Everett: Generalized Lagrange Multiplier Method for Solving Problems of Optimum Allocation of
 //!   Resources, Operations Research 11(3), 1963.
@@ -25,36 +27,38 @@ use num_traits::{One as _, Signed as _, ToPrimitive as _, Zero as _};
 
 use task::limits::{Interrupted, Limits};
 
-/// Number of subgradient iterations.
+/// Maximum number of subgradient iterations.
 const ROUNDS: usize = 300;
-/// Multipliers are fractions with this power of two as denominator.
+/// Number of fractional bits of the Lagrangian multipliers.
 const PRICE_BITS: i32 = 40;
 
-/// A design of a function.
+/// A design that a function can use.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct DesignChoice {
-    /// Number of the function's requirements that the design misses.
+    /// Number of the function's requirements that the design violates.
     pub missed: usize,
-    /// Utility; larger is better.
+    /// Utility of the design; higher is better.
     pub utility: BigRational,
-    /// Consumption of each budget.
+    /// Consumption of each budget by the design.
     pub demands: Vec<BigRational>,
-    /// Components that at most one chosen design can use, numbered by the caller.
+    /// Exclusive components that the design uses, numbered by the caller. At most one selected design may use
+    /// each component.
     pub components: BTreeSet<usize>,
 }
 
-/// A design for each function that can be served.
+/// An assignment of designs to functions.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Assignment {
-    /// Index of the design in the function's list; `None` if the function is not served.
+    /// For each function: the index of its selected design, or `None` if the function is not served.
     pub designs: Vec<Option<usize>>,
-    /// Sum of the utilities.
+    /// Sum of the utilities of the selected designs.
     pub utility: BigRational,
-    /// Whether the assignment is proved optimal; otherwise a limit was reached.
+    /// `true` if the assignment is proved optimal; `false` if a limit was reached before.
     pub optimal: bool,
 }
 
-/// Computes the best assignment under budgets. Of equal assignments, earlier designs are preferred.
+/// Computes the best assignment of designs to functions that respects the budgets. Among equally good
+/// assignments, earlier designs are preferred.
 pub fn configure(functions: &[Vec<DesignChoice>], budgets: &[BigRational], limits: &Limits) -> Assignment {
     let problem = Problem::new(functions, budgets);
     let (prices, incumbent) = problem.prices();
@@ -70,7 +74,7 @@ pub fn configure(functions: &[Vec<DesignChoice>], budgets: &[BigRational], limit
     Assignment { designs, utility, optimal }
 }
 
-/// A design in integers.
+/// A design with its numbers scaled to integers.
 struct Item {
     worth: BigInt,
     demands: Vec<BigInt>,
@@ -78,13 +82,14 @@ struct Item {
 
 struct Problem {
     functions: Vec<Vec<Item>>,
-    /// Budgets of the caller, followed by one budget per component.
+    /// Budgets of the caller, followed by one budget for each component.
     budgets: Vec<BigInt>,
-    /// Per function: least consumption of each budget by it and later ones; then a final entry.
+    /// For each function: the minimum consumption of each budget by this and all later functions. A final
+    /// entry is 0.
     least: Vec<Vec<BigInt>>,
 }
 
-/// A partial assignment.
+/// A partial assignment: selected designs of the first functions.
 #[derive(Clone, Default)]
 struct Label {
     designs: Vec<Option<usize>>,
@@ -103,20 +108,21 @@ impl Label {
         label
     }
 
-    /// Returns `true` if every completion of `other` is feasible for `self`.
+    /// Returns `true` if every completion of `other` that respects the budgets is also possible for `self`,
+    /// i.e. `self` consumes no more of any budget.
     fn is_as_free(&self, other: &Self) -> bool {
         self.spent.iter().zip(&other.spent).all(|(left, right)| left <= right)
     }
 }
 
-/// Lagrangian multipliers of the budgets in units of 2^-`PRICE_BITS`, and the resulting bounds.
+/// Lagrangian multipliers of the budgets in units of 2^-`PRICE_BITS`, and the resulting upper bounds.
 struct LagrangeMultipliers {
     each: Vec<BigInt>,
-    /// Per function: bound for it and all later functions. One more entry for the end.
+    /// For each function: upper bound on the worth of this and all later functions. A final entry is 0.
     after: Vec<BigInt>,
 }
 
-/// Numbers as integers with a common scale, and the scale.
+/// Multiplies the numbers by their least common denominator. Returns the integers and the denominator.
 fn scaled<'a>(numbers: impl Iterator<Item = &'a BigRational> + Clone) -> (Vec<BigInt>, BigInt) {
     let scale = numbers.clone().fold(BigInt::one(), |scale, number| scale.lcm(number.denom()));
     (numbers.map(|number| (number * &scale).to_integer()).collect(), scale)
@@ -126,7 +132,7 @@ impl Problem {
     fn new(functions: &[Vec<DesignChoice>], budgets: &[BigRational]) -> Self {
         let all_designs = || functions.iter().flatten();
         let (utilities, _) = scaled(all_designs().map(|design| &design.utility));
-        // Utilities may be negative: a requirement outweighs any difference of two sums of them.
+        // Utilities may be negative. A requirement outweighs the difference of any two sums of utilities.
         let requirement: BigInt = utilities.iter().map(BigInt::abs).sum::<BigInt>() * 2 + 1;
         let function = &requirement * all_designs().map(|design| BigInt::from(design.missed)).sum::<BigInt>()
             + &requirement;
@@ -178,14 +184,16 @@ impl Problem {
         Label { spent: vec![BigInt::zero(); self.budgets.len()], ..Label::default() }
     }
 
-    /// Returns `true` if some choice for the functions from index `from` on keeps the budgets.
+    /// Returns `true` if, for each budget separately, the functions from index `from` on can stay within the
+    /// budget.
     fn fits(&self, label: &Label, from: usize) -> bool {
         let Some(least) = self.least.get(from) else { return true };
         let ahead = label.spent.iter().zip(least).map(|(spent, least)| spent + least);
         ahead.zip(&self.budgets).all(|(spent, budget)| spent <= *budget)
     }
 
-    /// Assigns to each function the first design that fits, in an order of preference.
+    /// Assigns to each function the design with the highest preference that fits the budgets. If the result
+    /// violates a budget, no function is served.
     fn greedy(&self, preference: impl Fn(&Item) -> f64) -> Label {
         let mut label = self.nothing();
         for (at, designs) in self.functions.iter().enumerate() {
@@ -196,14 +204,15 @@ impl Problem {
             let feasible = extended.find(|new| self.fits(new, at.saturating_add(1)));
             label = feasible.unwrap_or_else(|| label.with(None, None));
         }
-        // A later function with negative demand may be unserved, so feasibility is checked again.
+        // A later function with negative consumption may not be served, so feasibility is checked again.
         if self.fits(&label, self.functions.len()) {
             return label;
         }
         self.functions.iter().fold(self.nothing(), |label, _| label.with(None, None))
     }
 
-    /// Good multipliers by subgradient ascent, and the best assignment found on the way.
+    /// Computes good multipliers by subgradient ascent. Also returns the best assignment found during the
+    /// ascent.
     #[expect(clippy::cast_possible_truncation, reason = "rounding is meant; bounds hold for whatever prices")]
     fn prices(&self) -> (LagrangeMultipliers, Label) {
         let float = |number: &BigInt| number.to_f64().unwrap_or(f64::MAX);
@@ -263,14 +272,15 @@ impl Problem {
         (LagrangeMultipliers { each, after }, incumbent)
     }
 
-    /// Upper bound on the worth of completions of a label, in units of 2^-`PRICE_BITS`.
+    /// Returns an upper bound on the worth of all completions of a label, in units of 2^-`PRICE_BITS`. The
+    /// functions from index `from` on are not assigned yet.
     fn bound(&self, label: &Label, from: usize, prices: &LagrangeMultipliers) -> BigInt {
         let slack = self.budgets.iter().zip(&label.spent).map(|(budget, spent)| budget - spent);
         let paid: BigInt = slack.zip(&prices.each).map(|(slack, price)| slack * price).sum();
         (&label.worth << PRICE_BITS) + paid + prices.after.get(from).cloned().unwrap_or_default()
     }
 
-    /// Finds the best assignment, given a feasible one.
+    /// Finds the best assignment. `incumbent` is a feasible assignment, whose worth is used for pruning.
     fn search(
         &self,
         prices: &LagrangeMultipliers,
@@ -292,14 +302,14 @@ impl Problem {
                     if is_hopeless || next.iter().any(is_worse) {
                         continue;
                     }
-                    // Of equally good labels the older one is kept, which is preferred.
+                    // Of equally good labels, the older one is preferred and kept.
                     next.retain(|old| old.worth >= new.worth || !new.is_as_free(old));
                     next.push(new);
                 }
             }
             labels = next;
         }
-        // Labels are generated in the order of preference, so the first of equal ones wins.
+        // Labels are generated in order of preference, so the first of several best labels is preferred.
         let best =
             labels.into_iter().reduce(|best, label| if label.worth > best.worth { label } else { best });
         Ok(best.map_or_else(|| incumbent.designs.clone(), |best| best.designs))
@@ -317,10 +327,11 @@ mod tests {
         BigRational::from_integer(value.into())
     }
 
-    /// Number of served functions, missed requirements, and utility.
+    /// Quality of an assignment: number of served functions, number of violated requirements, and utility.
     type Worth = (usize, std::cmp::Reverse<usize>, BigRational);
 
-    /// Enumerates all assignments, preferred ones first, and returns the first optimal one.
+    /// Enumerates all assignments in order of preference. Returns the quality and the designs of the first
+    /// optimal assignment.
     fn by_enumeration(
         functions: &[Vec<DesignChoice>],
         budgets: &[BigRational],
@@ -380,7 +391,7 @@ mod tests {
         for round in 0..3000 {
             let (functions, budgets) = random(&mut draw);
             let chosen = configure(&functions, &budgets, &Limits::none());
-            // With a negative budget nothing is chosen at all.
+            // If a budget is negative, `configure` selects no design.
             if budgets.iter().any(|budget| *budget < BigRational::zero()) {
                 continue;
             }
@@ -396,7 +407,8 @@ mod tests {
         assert!((300..2700).contains(&partly), "the choices are of one kind: {partly}");
     }
 
-    /// Numbers as in sensor data and spreadsheets: 16 digits, huge and tiny ones mixed.
+    /// Tests numbers as in sensor data and spreadsheets: 16 digits, with very large and very small numbers
+    /// mixed.
     #[test]
     fn assignments_are_exact_for_numbers_of_any_magnitude() {
         let mut draw = Random(11);
@@ -423,7 +435,7 @@ mod tests {
                     (0..=draw.below(3)).map(|_| design(&mut draw)).collect()
                 })
                 .collect();
-            // Budgets that are just enough, or too small by the least amount.
+            // Budgets that just suffice, or are too small by a minimal amount.
             let sufficient: BigRational = functions
                 .iter()
                 .filter_map(|designs| designs.first())
@@ -442,7 +454,8 @@ mod tests {
         }
     }
 
-    /// Multiple-choice knapsack by dynamic programming over amounts.
+    /// Solves the multiple-choice knapsack problem by dynamic programming over amounts. Returns the number of
+    /// served functions and the utility.
     fn by_amounts(functions: &[Vec<(i64, usize)>], budget: usize) -> (usize, i64) {
         let mut best = vec![(0, 0); budget + 1];
         for designs in functions {

@@ -1,7 +1,7 @@
-//! Proved optimal plans of PDDL tasks: a portfolio of heuristic search and SAT, lists of
-//! objectives, alternatives, replanning, certificates.
+//! Finds plans of PDDL tasks and proves their optimality: a portfolio of heuristic search and SAT, multiple
+//! objectives, alternative plans, replanning, and certificates.
 //!
-//! Absent: OWL. Availability of designs arrives as facts of the problem.
+//! Absent: OWL. The availability of designs is part of the problem as facts.
 
 #![warn(
     clippy::cast_possible_truncation,
@@ -52,7 +52,7 @@ pub use task::{CODES, Error, Errors, File, Place};
 pub use temporal::{TemporalTask, ground_concurrent, optimize_concurrent};
 pub use {num_rational::BigRational, pddl};
 
-/// The example of the README is compiled and run with the tests.
+/// Compiles and runs the example of the README as a test.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

@@ -1,4 +1,4 @@
-//! The builder `Planner`: from a domain and a problem to a plan in one call.
+//! The builder `Planner`: computes a plan for a domain and a problem in one call.
 
 use std::fmt;
 use std::ops::ControlFlow;
@@ -14,11 +14,11 @@ use task::plan::solution::{Improvement, Solution};
 use crate::exact::{ground_exact, optimize_exact};
 use crate::optimize::{Config, Front, lexicographic, pareto};
 
-/// Callback for improved plans and bounds.
+/// Callback for better plans and bounds. Planning ends if it returns `Break`.
 type Report<'a> = dyn FnMut(&Improvement) -> ControlFlow<()> + 'a;
 
-/// Plans for a domain and a problem that have passed [`pddl::check()`]; those returned by
-/// [`pddl::read`] have.
+/// Builder that computes plans for a domain and a problem. Both must have passed [`pddl::check()`], for
+/// example as results of [`pddl::read`].
 ///
 /// ```
 /// use std::time::Duration;
@@ -47,27 +47,28 @@ pub struct Planner<'a> {
 }
 
 impl<'a> Planner<'a> {
-    /// Creates a planner without limits that reports nothing.
+    /// Creates a planner with default options, without limits and without a callback.
     pub fn new(domain: &'a Domain, problem: &'a Problem) -> Self {
         let (grounding, config) = (GroundConfig::default(), Config::default());
         Self { domain, problem, grounding, config, report: Box::new(|_| ControlFlow::Continue(())) }
     }
 
-    /// Returns the incumbent after this time, counted from now and including grounding.
+    /// Sets a time limit, counted from now and including grounding. At the limit, the best known plan is
+    /// returned.
     #[must_use]
     pub fn time_limit(self, time: Duration) -> Self {
         let limits = self.config.limits.clone().with_time(time);
         self.limits(limits)
     }
 
-    /// Limits the memory of searches, by their own estimates; the default is 2 GiB.
+    /// Limits the memory of searches in bytes, according to their own estimates. The default is 2 GiB.
     #[must_use]
     pub fn memory_limit(self, bytes: usize) -> Self {
         let limits = self.config.limits.clone().with_room(bytes);
         self.limits(limits)
     }
 
-    /// Sets the limits. [`Limits::interrupt`] is a flag that another thread can set.
+    /// Sets the limits. Another thread can interrupt planning by setting the flag [`Limits::interrupt`].
     #[must_use]
     pub fn limits(mut self, limits: Limits) -> Self {
         self.grounding.limits = limits.clone();
@@ -90,29 +91,29 @@ impl<'a> Planner<'a> {
         self
     }
 
-    /// Sets the objectives, the most important first; they replace the metric of the problem.
-    /// [`pddl::read_objective`] parses them.
+    /// Sets the objectives in lexicographic order, the most important first. They replace the metric of the
+    /// problem. [`pddl::read_objective`] parses objectives.
     #[must_use]
     pub fn objectives(mut self, objectives: impl IntoIterator<Item = Metric>) -> Self {
         self.grounding.objectives = objectives.into_iter().collect();
         self
     }
 
-    /// Calls `report` for every better plan and bound. If it returns `Break`, planning ends with
-    /// the incumbent.
+    /// Calls `report` for every better plan and lower bound. If `report` returns `Break`, planning ends with
+    /// the best known plan.
     #[must_use]
     pub fn on_improvement(mut self, report: impl FnMut(&Improvement) -> ControlFlow<()> + 'a) -> Self {
         self.report = Box::new(report);
         self
     }
 
-    /// Computes a sequential plan, optimal by the first objective, among those by the second, and
-    /// so on. Numbers may have any size: a task that overflows machine integers is solved in exact
-    /// rationals, which is slower.
+    /// Computes a sequential plan that is lexicographically optimal: optimal by the first objective, among
+    /// these plans optimal by the second, and so on. Numbers may have any size. If they overflow machine
+    /// integers, the task is solved in exact rationals, which is slower and supports only one objective.
     ///
     /// # Errors
-    /// Fails with every unsupported construct and its place, or if a limit is reached before the
-    /// task is ground. A plan that is not proved optimal, or no plan, is not an error: see
+    /// Returns all unsupported constructs with their source locations, or an error if a limit is reached
+    /// during grounding. It is not an error if a plan is not proved optimal or no plan is found: see
     /// [`Solution::status`].
     pub fn plan(mut self) -> Result<Solution, Errors> {
         match ground(self.domain, self.problem, &self.grounding) {
@@ -120,7 +121,7 @@ impl<'a> Planner<'a> {
                 let (config, mut hear) = (self.config.clone(), self.hear());
                 Ok(lexicographic(&task, &config, &mut hear).solution)
             }
-            // Exact rationals can only help if machine integers are the sole problem.
+            // Exact rationals are useful only if overflows are the sole problem.
             Err(errors) if errors.iter().all(|error| matches!(error, Error::Overflow { .. })) => {
                 if self.grounding.objectives.len() > 1 {
                     return Err(errors);
@@ -132,18 +133,18 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// Computes the Pareto front of two objectives, with one plan for each pair of values.
+    /// Computes the Pareto front of the first two objectives, with one plan for each pair of values.
     ///
     /// # Errors
-    /// As [`Planner::plan`].
+    /// See [`Planner::plan`]. Tasks that overflow machine integers are also an error.
     pub fn pareto(mut self) -> Result<Front, Errors> {
         let task = ground(self.domain, self.problem, &self.grounding)?;
         let (config, mut hear) = (self.config.clone(), self.hear());
         Ok(pareto(&task, &config, &mut hear))
     }
 
-    /// Adapter from the optimizer's reports to the callback. Sets the interrupt flag if the
-    /// callback breaks.
+    /// Returns a function that passes the optimizer's reports to the callback. It sets the interrupt flag if
+    /// the callback returns `Break`.
     fn hear(&mut self) -> impl FnMut(Improvement) {
         let flag = self.config.limits.interrupt();
         let report = &mut self.report;

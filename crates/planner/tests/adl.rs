@@ -1,6 +1,6 @@
-//! Plans with conditional effects, derived predicates, quantifiers and disjunctions: known optima,
-//! and random tasks on which the quick search and the SAT solver alone must agree. (The semantics of
-//! ground tasks is checked elsewhere, against an interpreter of the files.)
+//! Plans with conditional effects, derived predicates, quantifiers and disjunctions: tasks with known optima,
+//! and random tasks on which heuristic search and the SAT solver must agree. (Other tests compare the ground
+//! tasks with an interpreter of the files.)
 
 use metaplan_planner::{Config, Engine, GroundConfig, Solution, Status, ground, optimize};
 use testing::adl::Generator;
@@ -9,11 +9,11 @@ use testing::random::Random;
 use crate::tally::limits;
 use pddl::{Source, read};
 
-/// Engines, each with the number of states that A\* stores before the other parts of the planner start.
+/// Engines, each with the number of states that A\* stores before the other components of the planner start.
 const WAYS: [(Engine, usize); 5] =
     [(Engine::Auto, 20_000), (Engine::Auto, 30), (Engine::Auto, 1), (Engine::Search, 1), (Engine::Sat, 0)];
 
-/// Solves a task with an engine and a head start, see [`WAYS`].
+/// Solves a task with an engine and a head start in stored states, see [`WAYS`].
 fn solve(domain: &str, problem: &str, engine: Engine, head_start: usize) -> Solution {
     let (domain, problem, _) = read(&Source::new("domain", domain), &Source::new("problem", problem))
         .unwrap_or_else(|errors| panic!("{errors:?}\n{domain}\n{problem}"));
@@ -24,7 +24,7 @@ fn solve(domain: &str, problem: &str, engine: Engine, head_start: usize) -> Solu
     optimize(&task, &config, &mut |_| {})
 }
 
-/// Checks that all engines find the cost; `None` means that no plan exists.
+/// Checks that every engine finds a plan with the expected cost; `None` means that no plan exists.
 fn check(name: &str, domain: &str, problem: &str, expected: Option<&str>) {
     for (engine, head_start) in WAYS {
         let solution = solve(domain, problem, engine, head_start);
@@ -51,7 +51,7 @@ const BRIEFCASE: &str = "(define (domain briefcase)
 
 #[test]
 fn conditional_and_universal_effects() {
-    // Carry a there (1 + 2) and b back (1 + 3), four times a hand in the briefcase.
+    // An optimal plan carries a there (1 + 2) and b back (1 + 3), and handles the briefcase four times.
     let problem = |goal: &str| {
         format!(
             "(define (problem p) (:domain briefcase) (:objects home office - place a b - item)
@@ -93,15 +93,15 @@ fn derived_predicates_and_numbers_in_disjunctions() {
     let check = |name, goal, expected| check(name, NETWORK, &problem(goal), expected);
     check("a path", "(reaches a c)", Some("1"));
     check("a cycle", "(reaches a a)", Some("2"));
-    // The second line to a needs power.
+    // The second edge to a requires power, because a is no longer isolated.
     check("in twice", "(and (up b a) (up c a))", Some("7"));
-    // Two up and down again are no more than nothing.
+    // The goal holds initially, so the empty plan is optimal.
     check("isolated", "(forall (?x - node) (isolated ?x))", Some("0"));
     check("one but not back", "(and (reaches a c) (not (reaches c a)) (reaches b c))", Some("2"));
     check("never", "(and (reaches a b) (isolated b))", None);
 }
 
-/// Two clocks of which one gains on the other by less than a double tells apart from nothing.
+/// The speeds of two clocks differ by less than floating-point numbers can represent.
 #[test]
 fn differences_that_no_double_holds_count() {
     let domain = "(define (domain clocks) (:functions (fast) (slow) (total-cost))
@@ -132,9 +132,9 @@ fn durative_actions_with_cases() {
             "(define (problem p) (:domain rooms) (:init (= (heat) 0) {init}) (:goal (done)) (:metric minimize (total-time)))"
         )
     };
-    // In the dark the light goes on as the robot enters.
+    // In the dark, the light is switched on when the robot enters.
     check("dark", DURATIVE, &problem("(dark)"), Some("2"));
-    // Else it must be warm: the second heating finds it at 2.
+    // Otherwise it must be warm. The second heating finds the temperature at 2.
     check("cold", DURATIVE, &problem(""), Some("8"));
     check("inside", DURATIVE, &problem("(dark) (inside)"), None);
 }
@@ -192,8 +192,8 @@ fn numbers_below_zero_do_no_harm_where_nothing_is_used() {
     check("dug", &digging, &problem("1"), Some("2"));
 }
 
-/// Plans of at most this many steps are compared: the solver alone has no proof that there is no
-/// plan of any length.
+/// Maximum number of steps of compared plans. The SAT solver cannot prove that there is no plan of any
+/// length.
 const HORIZON: usize = 4;
 
 fn agree(seeds: std::ops::Range<u64>) {

@@ -1,5 +1,5 @@
-//! Certificates of generated missions: true claims are accepted, false claims and changed
-//! certificates are rejected.
+//! Certificates of random missions: true claims must be accepted; false claims and changed certificates must
+//! be rejected.
 
 #[allow(dead_code, reason = "another suite uses the rest")]
 use certificate::{Faithful, check as check_argument, faithful, verification_conditions, witness};
@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use testing::missions::Mission;
 use testing::random::Random;
 
-/// The files of a mission.
+/// Returns the domain and the problem of a random mission.
 fn files(seed: u64) -> (Domain, Problem) {
     let mission = Mission::random(seed);
     let (domain, problem) = (mission.domain(), mission.problem());
@@ -20,7 +20,7 @@ fn files(seed: u64) -> (Domain, Problem) {
     (domain, problem)
 }
 
-/// The certificate of a mission, and the least cost (`None` if there is no plan).
+/// Returns the certificate of a random mission and its optimal cost (`None` if there is no plan).
 fn certified(seed: u64) -> (Certificate, Option<BigRational>) {
     let mission = Mission::random(seed);
     let (domain, problem) = files(seed);
@@ -34,12 +34,12 @@ fn certified(seed: u64) -> (Certificate, Option<BigRational>) {
     (certificate.unwrap_or_else(|| panic!("seed {seed}: no certificate")), cost)
 }
 
-/// False claims: a higher least cost, and unsolvability.
+/// Returns two false claims: a higher optimal cost, and unsolvability.
 fn false_claims(cost: &BigRational) -> [Option<BigRational>; 2] {
     [Some(cost + BigRational::from_integer(1.into())), None]
 }
 
-/// Result of the grounding check of a written task against the files of a mission.
+/// Returns the result of comparing a task of a certificate with the files of a mission.
 fn compared((domain, problem): &(Domain, Problem), task: &str) -> Faithful {
     match witness(domain, problem, task, &|| false) {
         Ok(witness) => faithful(domain, problem, task, &witness, &|| false),
@@ -65,7 +65,8 @@ fn the_truth_is_accepted_and_nothing_else() {
     (0..150).for_each(check);
 }
 
-/// Changes a value somewhere: a number, null or a flag becomes another, an element goes or comes twice.
+/// Changes a random value in a document: replaces a number, null or flag by another, or removes or doubles an
+/// element.
 fn mutate(value: &mut Value, random: &mut Random) {
     match value {
         Value::Array(elements) if !elements.is_empty() => {
@@ -94,7 +95,8 @@ fn mutate(value: &mut Value, random: &mut Random) {
     }
 }
 
-/// Checks that a changed argument proves no false claim, and that a changed task fails the grounding check.
+/// Checks that a changed argument proves no false claim, and that a changed task fails the comparison with
+/// the files.
 fn withstands(seed: u64, mutants: usize) {
     let (certificate, cost) = certified(seed);
     let files = files(seed);
@@ -112,7 +114,7 @@ fn withstands(seed: u64, mutants: usize) {
         }
         let mut mutant = written.clone();
         mutate(&mut mutant, &mut random);
-        // A mutant that passes the grounding check must not prove a false claim.
+        // A changed task that passes the comparison must not prove a false claim.
         let written = mutant.to_string();
         let stands = matches!(compared(&files, &written), Faithful::Yes { .. });
         for claim in cost.iter().flat_map(false_claims).chain([cost.clone()]) {
@@ -130,8 +132,8 @@ fn changed_arguments_prove_nothing_that_is_false() {
     (200..230).for_each(|seed| withstands(seed, 40));
 }
 
-/// Ambiguous tasks prove nothing: a number that an operator changes twice, a number with two
-/// factors, a design that is not there.
+/// Ambiguous tasks prove nothing: an operator that changes a number twice, a number with two coefficients in
+/// an expression, and a design that does not exist.
 #[test]
 fn tasks_that_can_be_read_in_two_ways_are_refused() {
     let (mut twice, mut factors, mut designs) = (0, 0, 0);
@@ -176,7 +178,7 @@ fn tasks_that_can_be_read_in_two_ways_are_refused() {
     assert!(twice > 0 && factors > 0 && designs > 0, "{twice}, {factors}, {designs}");
 }
 
-/// An instance that leaves everything as it is has no operator, and needs none.
+/// An action instance that changes nothing has no operator and needs none.
 #[test]
 fn instances_without_effect_need_no_operator() {
     let domain = "(define (domain d) (:requirements :typing :action-costs)
@@ -197,11 +199,12 @@ fn instances_without_effect_need_no_operator() {
     let solution = optimize(&task, &Config::default(), &mut |_| {});
     let certificate = certify(&task, &solution, &Limits::none()).expect("a certificate");
     let found = compared(&(domain, problem), &certificate.task);
-    // Two designs to themselves, two places to themselves.
+    // The idle instances exchange a design for itself (two instances) or move from a place to itself (two
+    // instances).
     assert!(matches!(found, Faithful::Yes { instances: 8, idle: 4, .. }), "{found:?}");
 }
 
-/// Answers of the SMT solver to the verification conditions of a claim.
+/// Returns the results of an SMT solver for the verification conditions of a claim.
 fn answers(solver: &str, certificate: &Certificate, claim: Option<&BigRational>) -> Vec<String> {
     let conditions = verification_conditions(&certificate.task, &certificate.argument, claim);
     let conditions = conditions.expect("documents").expect("no derived variables");
@@ -211,8 +214,8 @@ fn answers(solver: &str, certificate: &Certificate, claim: Option<&BigRational>)
     String::from_utf8_lossy(&output.stdout).lines().map(str::to_owned).collect()
 }
 
-/// Needs an SMT solver that reads SMT-LIB 2, named by `METAPLAN_SMT`, such as Z3
-/// (`python3 -m venv z3; z3/bin/pip install z3-solver`, then `METAPLAN_SMT=z3/bin/z3`).
+/// The environment variable `METAPLAN_SMT` must name an SMT solver that reads SMT-LIB 2, such as Z3 (`python3
+/// -m venv z3; z3/bin/pip install z3-solver`, then `METAPLAN_SMT=z3/bin/z3`).
 #[test]
 #[ignore = "needs an SMT solver"]
 fn an_smt_solver_accepts_the_truth_and_nothing_else() {

@@ -1,6 +1,6 @@
-//! Plans whose actions overlap: known optima, among them tasks that no sequence of actions solves,
-//! and random tasks on which the planner must agree with the validator run on every plan of up to
-//! three actions over a grid of times.
+//! Plans with overlapping actions: tasks with known optima, including tasks without a sequential plan, and
+//! random tasks. On the latter, the planner must agree with the validator applied to all plans of up to three
+//! actions over a grid of times.
 
 use std::fmt::Write as _;
 
@@ -40,7 +40,7 @@ pub fn written(plan: &Plan) -> String {
     text
 }
 
-/// Metric of a plan by the validator, or the reason why the plan is invalid.
+/// Returns the metric of a plan according to the validator, or the reason why the plan is invalid.
 pub fn metric(
     domain: &Domain,
     problem: &Problem,
@@ -57,7 +57,8 @@ pub fn metric(
     }
 }
 
-/// Checks the metric and the lines of the plan; `None` means a proof that there is no plan.
+/// Checks the metric and the text of the plan. `None` means that the planner must prove that there is no
+/// plan.
 pub fn check(
     name: &str,
     domain: &str,
@@ -83,7 +84,7 @@ pub fn check(
     assert_eq!(shown, expected, "{name}");
 }
 
-/// Fox and Long's example: a fuse is mended by the light of a match.
+/// Example of Fox and Long: a fuse is mended by the light of a match.
 const MATCH: &str = "(define (domain match) (:requirements :durative-actions :typing)
   (:types match fuse) (:predicates (light) (handfree) (unused ?m - match) (mended ?f - fuse))
   (:durative-action light :parameters (?m - match) :duration (= ?duration 5)
@@ -106,18 +107,18 @@ fn required_concurrency() {
     let two = ["0: (light m1) [5]", "0: (mend f1) [2]", "2.001: (mend f2) [2]"];
     let goal = "(mended f1) (mended f2)";
     check("two fuses", MATCH, &problem("m1 - match f1 f2 - fuse", goal), (1, 1000), Some(("5", &two)));
-    // The light is on in the open interval from 0 to 5: three times two do not fit.
+    // The light is on in the open interval from 0 to 5, which is too short for three actions of duration 2.
     let goal = "(mended f1) (mended f2) (mended f3)";
     check("three fuses", MATCH, &problem("m1 - match f1 f2 f3 - fuse", goal), (1, 1000), None);
-    // Nor does the second one if hands have to be still for half a unit.
+    // The second fuse cannot be mended either if the hands must rest for half a unit.
     let goal = "(mended f1) (mended f2)";
     let half = ["0: (light m1) [5]", "0: (mend f1) [2]", "2.5: (mend f2) [2]"];
     check("half", MATCH, &problem("m1 - match f1 f2 - fuse", goal), (1, 2), Some(("5", &half)));
     check("too far apart", MATCH, &problem("m1 - match f1 f2 - fuse", goal), (2, 1), None);
 }
 
-/// Cushing et al. (2007), figure 3: what is needed holds at the end of one action only in the midst
-/// of another one.
+/// Figure 3 of Cushing et al. (2007): the end of one action needs a fact that holds only during another
+/// action.
 const WINDOW: &str = "(define (domain window) (:requirements :durative-actions)
   (:predicates (p) (q) (r) (s))
   (:durative-action a :parameters () :duration (= ?duration 10)
@@ -127,8 +128,8 @@ const WINDOW: &str = "(define (domain window) (:requirements :durative-actions)
 
 #[test]
 fn actions_start_between_other_happenings() {
-    // The end of the long action must lie within the short one, so the short one starts when
-    // nothing else happens.
+    // The end of the long action must lie within the short action, so the short action does not start
+    // together with any happening.
     let problem = "(define (problem w) (:domain window) (:init) (:goal (and (q) (r))))";
     let plan = ["0: (a) [10]", "7.001: (b) [3]"];
     check("window", WINDOW, problem, (1, 1000), Some(("10.001", &plan)));
@@ -149,16 +150,16 @@ fn windows_of_timed_initial_literals() {
     let window = "(at 3 (open)) (at 8 (not (open)))";
     let plan = ["0: (tell) [6]", "3: (work) [4]"];
     check("both fit", domain, &problem(window, both), (1, 1000), Some(("7", &plan)));
-    // A condition over all is about the open interval: the window may close when the action ends,
-    // but no earlier.
+    // An over-all condition refers to the open interval. The window may close when the action ends, but not
+    // earlier.
     let closes = |time: &str| problem(&format!("(at 3 (open)) (at {time} (not (open)))"), "(done)");
     check("closes at the end", domain, &closes("7"), (1, 1000), Some(("7", &["3: (work) [4]"])));
     check("closes before the end", domain, &closes("6.999"), (1, 1000), None);
     let late = "(at 2 (open)) (at 5 (not (open))) (at 9 (open))";
-    // Its end reads a fact that the event at 9 changes.
+    // The end of the action reads a fact that the event at 9 changes.
     let plan = ["3.001: (tell) [6]", "9: (work) [4]"];
     check("the second window", domain, &problem(late, both), (1, 1000), Some(("13", &plan)));
-    // A plan lasts until its last action ends; later events do not take place.
+    // A plan ends with its last action; later events do not occur.
     let problem = problem("(open) (at 5 (open)) (at 20 (not (open)))", "(done) (open)");
     check("before it closes", domain, &problem, (1, 1000), Some(("4", &["0: (work) [4]"])));
 }
@@ -177,7 +178,7 @@ fn a_plan_waits_for_timed_literals() {
 
 #[test]
 fn conditions_that_happenings_keep_up_together() {
-    // Two changes at the same time: neither can come first.
+    // Both changes occur simultaneously, so neither can be the first.
     let domain = "(define (domain d) (:requirements :durative-actions :disjunctive-preconditions)
       (:predicates (p) (q) (r) (s) (done) (d1) (d2))
       (:durative-action hold :parameters () :duration (= ?duration 5)
@@ -211,12 +212,12 @@ fn functions_have_one_design_at_a_time() {
         )
     };
     let one = "(fd_solve_f fast f) (fd_solve_f slow f)";
-    // Different designs one after another, or the same one for both: 2 + 3 or 5 or 6.
+    // Either different designs in sequence (2 + 3), or equal designs for both actions (5 or 6).
     let text = problem("f", one, "(total-time)");
     let (parsed, filled) = parse(domain, &text);
     let plan = solve(&parsed, &filled, &rational(1, 1000)).plan.expect("a plan");
     assert_eq!(plan.cost.to_string(), "5", "{}", written(&plan));
-    // With a function each, each place has its best design.
+    // With one function for each place, each action uses its best design.
     let two = "(fd_solve_f fast f) (fd_solve_f slow g)";
     let plan = ["0: (look a f fast) [2]", "0: (look b g slow) [3]"];
     check("two functions", domain, &problem("f g", two, "(total-time)"), (1, 1000), Some(("3", &plan)));
@@ -247,7 +248,7 @@ fn effect(random: &mut Random) -> String {
     }
 }
 
-/// Conditions or effects, each at one of some times.
+/// Generates a conjunction of conditions or effects, each at a random time specifier.
 fn timed(random: &mut Random, times: &[&str], most: u64, part: fn(&mut Random) -> String) -> String {
     let mut text = String::from("(and");
     for _ in 0..=random.below(most) {
@@ -257,7 +258,7 @@ fn timed(random: &mut Random, times: &[&str], most: u64, part: fn(&mut Random) -
     text + ")"
 }
 
-/// A task and the data for brute force.
+/// A random task, and the data that the brute-force search needs.
 struct Sample {
     durations: [i64; 3],
     domain: String,
@@ -320,11 +321,11 @@ fn sample(random: &mut Random) -> Sample {
     Sample { durations, domain, problem }
 }
 
-/// The last start that brute force tries. With a separation of one unit all times of a best plan
-/// are whole numbers.
+/// Latest start that the brute-force search tries. With a separation of one unit, all times of a best plan
+/// are integers.
 const LAST: i128 = 7;
 
-/// The least metric of valid plans of up to three actions.
+/// Returns the minimum metric of valid plans with up to three actions.
 fn brute_force(task: &Sample, domain: &Domain, problem: &Problem) -> Option<BigRational> {
     let separation = rational(1, 1);
     let mut best: Option<BigRational> = None;
@@ -345,7 +346,7 @@ fn brute_force(task: &Sample, domain: &Domain, problem: &Problem) -> Option<BigR
         let (from, after) = plan.last().copied().unwrap_or((0, 0));
         for start in from..=LAST {
             for action in 0..3 {
-                // The same action at the same time is another one.
+                // Several instances of one action may start at the same time.
                 if (start, action) >= (from, after) {
                     let mut longer = plan.clone();
                     longer.push((start, action));
@@ -357,7 +358,7 @@ fn brute_force(task: &Sample, domain: &Domain, problem: &Problem) -> Option<BigR
     best
 }
 
-/// Checks a task; false if nothing is proved.
+/// Compares the planner with brute force on a random task. Returns `false` if the planner proves nothing.
 fn agree(seed: u64) -> bool {
     let task = sample(&mut Random(seed));
     let (domain, problem) = parse(&task.domain, &task.problem);
@@ -365,7 +366,7 @@ fn agree(seed: u64) -> bool {
     let separation = rational(1, 1);
     let ground = ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation)
         .unwrap_or_else(|errors| panic!("{errors:?}"));
-    // Numbers can grow without bound.
+    // Numbers can grow without bound, so the time is limited.
     let limits = Limits::none().with_time(std::time::Duration::from_secs(2));
     let solution = optimize_concurrent(&ground, &limits, &mut |_| {});
     let context = || format!("seed {seed}\n{}\n{}", task.domain, task.problem);
@@ -389,7 +390,7 @@ fn agree(seed: u64) -> bool {
     true
 }
 
-/// All tasks, of which few may stay undecided.
+/// Checks random tasks, of which only a few may stay undecided.
 fn all_agree(seeds: std::ops::Range<u64>) {
     let count = seeds.end - seeds.start;
     let undecided = seeds.filter(|seed| !agree(*seed)).count() as u64;
@@ -419,7 +420,8 @@ const ROBOTS: &str = "(define (domain robots) (:requirements :durative-actions :
     :condition (and (at start (robot_at ?r ?p)) (over all (robot_at ?r ?p)) (at start (wanted ?p)))
     :effect (and (at end (seen ?p)))))";
 
-/// Robots on a grid that look at some places and go somewhere, as many as there are robots of each.
+/// Generates a problem with `count` robots on a grid of `side` × `side` places. Each robot must reach a
+/// place, and `looks` places must be seen.
 fn robots(count: u64, side: u64, looks: u64, seed: u64) -> String {
     let mut random = Random(seed);
     let places = side * side;
@@ -450,7 +452,7 @@ fn robots(count: u64, side: u64, looks: u64, seed: u64) -> String {
     format!("{text}) (:goal (and{goal})) (:metric minimize (total-time)))")
 }
 
-/// Prints the result proved in ten seconds.
+/// Prints the result that is proved within ten seconds.
 #[test]
 #[ignore = "a measurement"]
 #[allow(clippy::print_stdout)]

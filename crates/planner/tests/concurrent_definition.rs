@@ -1,5 +1,5 @@
-//! Limit cases of the definition of overlapping actions (in the head of `validate`): the makespans
-//! and the unsolvability that the planner proves. The validator checks each plan.
+//! Boundary cases of the semantics of overlapping actions (see the head of `validate`): makespans and
+//! unsolvability that the planner must prove. The validator checks each plan.
 
 use std::fs::read_to_string;
 use std::path::Path;
@@ -12,7 +12,8 @@ use pddl::{Source, read};
 
 const NONE: &str = "none";
 
-/// Proved result of a task with a separation of a thousandth: the least metric, or that there is no plan.
+/// Returns the proved result of a task with a separation of 1/1000: the minimum metric, or that there is no
+/// plan.
 fn proved(domain: &str, problem: &str) -> String {
     let read = read(&Source::new("domain", domain), &Source::new("problem", problem));
     let (domain, problem, _) = read.unwrap_or_else(|errors| panic!("{errors:?}\n{domain}\n{problem}"));
@@ -43,7 +44,7 @@ fn proved(domain: &str, problem: &str) -> String {
     plan.cost.to_string()
 }
 
-/// A durative action.
+/// Returns the text of a durative action.
 fn durative(name: &str, duration: &str, condition: &str, effect: &str) -> String {
     format!(
         "(:durative-action {name} :parameters () :duration (= ?duration {duration})
@@ -51,7 +52,8 @@ fn durative(name: &str, duration: &str, condition: &str, effect: &str) -> String
     )
 }
 
-/// Checks the proved result for actions over the atoms `p`, `q`, `r`, `g` and the number `x` (2).
+/// Checks the proved result of a task over the atoms `p`, `q`, `r`, `g` and the number `x`, which is
+/// initially 2.
 fn check(actions: &[String], init: &str, goal: &str, expected: &str) {
     let domain =
         format!("(define (domain d) (:predicates (p) (q) (r) (g)) (:functions (x))\n{})", actions.concat());
@@ -66,10 +68,11 @@ fn over_all_is_about_the_open_interval() {
     check(&[a()], "(p) (at 1.999 (not (p)))", "(g)", NONE);
     check(&[a()], "(at 3 (p))", "(g)", "5");
     check(&[a()], "(p) (at 0 (not (p)))", "(g)", NONE);
-    // The event achieves the goal `(not (p))` at the end of the action, where the condition over all
-    // no longer applies.
+    // The event makes the goal `(not (p))` true at the end of the action, when the over-all condition no
+    // longer applies.
     check(&[a()], "(p) (at 2 (not (p)))", "(g) (not (p))", "2");
-    // The event and the start of `b` preserve the condition over all only if they happen together.
+    // The over-all condition stays true only if the event, which deletes p, and the start of `b`, which
+    // deletes q, are simultaneous.
     let both = durative("a", "4", "(over all (or (and (p) (q)) (and (not (p)) (not (q)))))", "(at end (g))");
     let helps = || durative("b", "1", "", "(at start (not (q)))");
     check(&[both.clone(), helps()], "(p) (q) (at 2 (not (p)))", "(g)", "4");
@@ -78,17 +81,17 @@ fn over_all_is_about_the_open_interval() {
 
 #[test]
 fn events_that_interfere_lie_apart() {
-    // The start reads the fact that the event adds, so it happens strictly after the event.
+    // The start reads the fact that the event adds, so it must be strictly after the event.
     check(&[durative("a", "2", "(at start (p))", "(at end (g))")], "(at 5 (p))", "(g)", "7.001");
-    // The end deletes the fact that the event adds, so the separation must lie between them.
+    // The end deletes the fact that the event adds, so they must be separated.
     let deletes = || durative("a", "2", "", "(at end (g)) (at end (not (p)))");
     check(&[deletes()], "(at 2 (p))", "(g)", "2.001");
     check(&[deletes()], "(at 2.001 (p))", "(g)", "2");
     check(&[deletes()], "(at 2.0009 (p))", "(g)", "2.0019");
     check(&[deletes()], "(at 1.9995 (p))", "(g)", "2.0005");
     check(&[deletes()], "(at 1.999 (p))", "(g)", "2");
-    // The end reads the fact that the second event deletes, so it happens before that event. The start
-    // happens after the first event.
+    // The end reads the fact that the second event deletes, so it must precede this event. The start must
+    // follow the first event.
     let reads = || durative("a", "2", "(at start (q)) (at end (p))", "(at end (g))");
     check(&[reads()], "(p) (at 1 (q)) (at 3.002 (not (p)))", "(g)", "3.001");
     check(&[reads()], "(p) (at 1 (q)) (at 3.0019 (not (p)))", "(g)", NONE);
@@ -136,7 +139,7 @@ fn a_plan_ends_with_its_last_action() {
     check(&[a()], "(p) (at 0 (not (p)))", "(p)", NONE);
     check(&[a()], "(at 7 (q))", "(q)", "7");
     check(&[], "(at 7 (q))", "(q)", NONE);
-    // An action that changes nothing that matters, or nothing at all, ends a plan as well.
+    // A plan may also end with an action that changes nothing relevant, or nothing at all.
     let instantaneous = |effect: &str| format!("(:action a :parameters () :effect {effect})");
     for effect in ["(r)", "(and)", "(when (p) (p))", "(not (p))"] {
         check(&[instantaneous(effect)], "(at 7 (q))", "(q)", "7");
@@ -169,14 +172,14 @@ fn one_number_is_assigned_the_same_value_twice() {
         let effect = format!("({time} (assign (x) 1)) ({time} (assign (x) 2)) (at end (g))");
         check(&[durative("a", "3", "", &effect)], "", "(g)", NONE);
     }
-    // The assignments of different actions interfere.
+    // Assignments by different actions interfere.
     let assigns = |name: &str, atom: &str| {
         durative(name, "3", "", &format!("(at end (assign (x) 1)) (at end ({atom}))"))
     };
     check(&[assigns("a", "g"), assigns("b", "p")], "", "(g) (p)", "3.001");
 }
 
-/// The value that the start of `a` sets and its end requires may change in between and be restored.
+/// A value that the start of `a` sets and its end requires may be changed and restored in between.
 #[test]
 fn a_value_is_left_during_an_action_and_taken_again() {
     let domain = "(define (domain f2) (:requirements :durative-actions) (:predicates (i) (x) (y) (g) (h))
@@ -190,8 +193,8 @@ fn a_value_is_left_during_an_action_and_taken_again() {
     assert_eq!(proved(domain, problem), "10");
 }
 
-/// A landing waits for the approach, which comes by itself, and then the plane is on the ground
-/// until the end.
+/// A landing must wait for the approach, which an event makes true. It then occupies the runway until its
+/// end.
 #[test]
 fn an_action_that_waits_for_an_event_keeps_the_separation() {
     let domain = "(define (domain airport) (:predicates (approach) (free) (landed) (cleared) (gone))
@@ -210,7 +213,7 @@ fn an_action_that_waits_for_an_event_keeps_the_separation() {
     assert_eq!(proved(domain, &problem("6")), "9.002");
 }
 
-/// Tasks from the literature, with the results by the definition.
+/// Tasks from the literature, with their results according to the semantics.
 #[test]
 #[allow(clippy::print_stderr)]
 fn tasks_that_were_answered_wrongly() {
@@ -219,7 +222,8 @@ fn tasks_that_were_answered_wrongly() {
         ("field/soundness/B4-over-all-event-at-end/domain.pddl", "problem.pddl", "2"),
         ("field/soundness/B4-over-all-event-at-end/domain-dear.pddl", "problem.pddl", "2"),
         ("field/soundness/random/conc-14/d.pddl", "p.pddl", "1"),
-        // The literal at 1 deletes what the end at 1 adds, so the action waits for the other one.
+        // The event at 1 deletes the fact that the end at 1 adds, so the action must be delayed until the
+        // next event.
         ("field/soundness/random/conc-30012/d.pddl", "p.pddl", "4.001"),
         ("field/soundness/random/e4.pddl", "p.pddl", "50"),
         ("real/ipc/temporal/vscode-Airport-domain.pddl/domain.pddl", "1plane.pddl", "52.001"),

@@ -1,6 +1,6 @@
-//! Durations that the planner chooses: known optima, and random tasks on which no plan over a grid
-//! of times and durations, executed by the validator, is better than what is found, or exists where
-//! none is claimed to.
+//! Durations that the planner chooses: tasks with known optima, and random tasks. On the latter, the
+//! validator executes all plans over a grid of times and durations. None of them may be better than the
+//! planner's plan or contradict a claim of unsolvability.
 
 use std::fmt::Write as _;
 
@@ -24,7 +24,7 @@ pub fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
     (domain, problem)
 }
 
-/// Best plan by the planner; its claims are checked by the validator.
+/// Returns the best plan that the planner finds. The validator checks its claims.
 pub fn solve(domain: &Domain, problem: &Problem, separation: &BigRational, limits: &Limits) -> Solution {
     let task = ground_concurrent(domain, problem, &GroundConfig::default(), separation)
         .unwrap_or_else(|errors| panic!("{errors:?}"));
@@ -46,7 +46,7 @@ pub fn written(plan: &Plan) -> String {
     text
 }
 
-/// Metric of a plan by the validator, or the reason why the plan is invalid.
+/// Returns the metric of a plan according to the validator, or the reason why the plan is invalid.
 pub fn metric(
     domain: &Domain,
     problem: &Problem,
@@ -63,7 +63,7 @@ pub fn metric(
     }
 }
 
-/// The status, the metric and the lines of the plan, with a separation of a thousandth.
+/// Checks the status, the metric and the text of the plan, with a separation of 1/1000.
 fn check(name: &str, domain: &str, problem: &str, expected: (Status, Option<&str>, &[&str])) {
     let (domain, problem) = parse(domain, problem);
     let solution = solve(&domain, &problem, &rational(1, 1000), &Limits::none());
@@ -80,7 +80,7 @@ fn durative(name: &str, duration: &str, condition: &str, effect: &str) -> String
     )
 }
 
-/// Actions over some atoms and numbers.
+/// Returns the text of a domain with some atoms, numbers and the given actions.
 fn domain(actions: &[String]) -> String {
     format!(
         "(define (domain d) (:predicates (p) (q) (g) (h) (busy))
@@ -115,7 +115,7 @@ fn as_much_is_charged_as_is_needed() {
     let time = "(total-time)";
     let lines = ["0: (load) [3.5]", "3.501: (drive) [3]"];
     check("once", &both, &problem("", "(g)", time), (Status::Optimal, Some("6.501"), &lines));
-    // Ten is the most at once.
+    // A single run charges at most 20 units (10 units of time at rate 2), so two runs are needed.
     let far = domain(&[charge, drive.replace('7', "25")]);
     let solution = {
         let (domain, problem) = parse(&far, &problem("", "(g)", time));
@@ -182,7 +182,7 @@ fn a_match_burns_as_long_as_it_is_needed_and_no_longer_than_it_can() {
 
 #[test]
 fn bounds_may_be_numbers_that_actions_change() {
-    // No longer than the charge lasts, which another action raises.
+    // The duration is bounded by the charge, which another action increases.
     let run = durative(
         "run",
         "(and (>= ?duration 1) (<= ?duration (/ (charge) 2)))",
@@ -211,7 +211,7 @@ fn bounds_may_be_numbers_that_actions_change() {
     );
 }
 
-/// Plans are written in decimals, and have to be valid as they are written.
+/// Plans are written with decimals and must be valid as written.
 #[test]
 fn durations_are_decimals() {
     let load = durative(
@@ -224,7 +224,7 @@ fn durations_are_decimals() {
     let (domain, problem) = parse(&all, &problem("(q)", "(g) (>= (charge) 5)", "(total-time)"));
     let solution = solve(&domain, &problem, &rational(1, 1000), &Limits::none());
     let plan = solution.plan.expect("a plan");
-    // A third more costs less than a millionth: that there is nothing in between is not claimed.
+    // The optimum would be 10/3. Plans are written in decimals and rounded up, so optimality is not claimed.
     assert_eq!((solution.status, plan.cost.to_string()), (Status::Feasible, "3.333334".to_owned()));
     assert_eq!(solution.lower_bound.map(|bound| bound.to_string()), Some("10/3".to_owned()));
 }
@@ -246,7 +246,7 @@ fn more_than_a_number_is_a_little_more() {
     assert_eq!(solve(&domain, &problem, &rational(1, 1000), &limits).status, Status::Unknown);
 }
 
-/// The planner does not search durations below the separation, and claims nothing about such plans.
+/// The planner does not consider durations below the separation and claims nothing about such plans.
 #[test]
 fn no_action_is_shorter_than_the_separation() {
     for (bounds, status) in [
@@ -265,7 +265,7 @@ fn no_action_is_shorter_than_the_separation() {
     }
 }
 
-/// A boiler must be warm enough all along, and cools when it is used.
+/// A boiler must stay warm enough throughout, and cools when it is used.
 #[test]
 fn conditions_over_all_may_depend_on_durations() {
     let heat = durative(
@@ -283,7 +283,7 @@ fn conditions_over_all_may_depend_on_durations() {
     let all = domain(&[heat, draw]);
     let (domain, problem) = parse(&all, &problem("", "(g)", "(total-cost)"));
     let solution = solve(&domain, &problem, &rational(1, 1000), &Limits::none().with_room(1 << 22));
-    // Of a condition over all that several happenings can keep up nothing is claimed.
+    // If several happenings can maintain an over-all condition, the planner claims nothing.
     let cost = solution.plan.as_ref().map(|plan| plan.cost.to_string());
     assert_eq!((solution.status, cost.as_deref()), (Status::Feasible, Some("8.75")));
 }
@@ -321,7 +321,8 @@ fn timed(random: &mut Random, times: &[&str], part: &mut dyn FnMut(&mut Random) 
     parts.collect::<Vec<_>>().join(" ")
 }
 
-/// A random task of three actions, and how long each may take: nothing for one that is instantaneous.
+/// Generates a random task with three actions. Also returns the possible durations of each action; the list
+/// is empty for an instantaneous action.
 fn sample(random: &mut Random) -> (String, String, [Vec<i128>; 3]) {
     let mut durations = [const { Vec::new() }; 3];
     let mut actions = Vec::new();
@@ -367,11 +368,11 @@ fn sample(random: &mut Random) -> (String, String, [Vec<i128>; 3]) {
     (domain(&actions), problem, durations)
 }
 
-/// The last start that brute force tries.
+/// Latest start that the brute-force search tries.
 const LAST: i128 = 4;
 
-/// The least metric of valid plans of up to three actions that start and last whole units, which
-/// are the separation.
+/// Returns the minimum metric of valid plans with up to three actions. All starts and durations are multiples
+/// of the separation.
 fn brute_force(durations: &[Vec<i128>; 3], domain: &Domain, problem: &Problem) -> Option<BigRational> {
     let separation = rational(1, 1);
     let mut best: Option<BigRational> = None;
@@ -404,7 +405,7 @@ fn brute_force(durations: &[Vec<i128>; 3], domain: &Domain, problem: &Problem) -
     best
 }
 
-/// Compares a solution with brute force. Returns `true` if the planner decided the task.
+/// Compares the planner with brute force on a random task. Returns `true` if the planner decided the task.
 fn agree(seed: u64) -> bool {
     let (domain, problem, durations) = sample(&mut Random(seed));
     let (read_domain, read_problem) = parse(&domain, &problem);

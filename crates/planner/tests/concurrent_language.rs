@@ -1,5 +1,5 @@
-//! Overlapping actions with state-dependent durations or effects, and with bounded durations: plans
-//! and claims.
+//! Overlapping actions with state-dependent durations or effects, and with bounded durations: tests of plans
+//! and of claims.
 
 use metaplan_planner::{GroundConfig, Limits, PlannerPart, Status, ground_concurrent, optimize_concurrent};
 use num_bigint::BigInt;
@@ -7,7 +7,8 @@ use num_rational::BigRational;
 use pddl::validate::{Options, PlanText, validate};
 use pddl::{Source, read};
 
-/// The metric of the plan that is found with a separation of a thousandth, which the validator has executed.
+/// Checks the status and the metric of the plan that is found with a separation of 1/1000. The validator
+/// executes the plan.
 fn check(actions: &str, init: &str, goal: &str, expected: (Status, Option<&str>)) {
     let domain =
         format!("(define (domain d) (:predicates (p) (q) (g) (on ?x)) (:functions (fuel) (log)) {actions})");
@@ -43,7 +44,7 @@ fn durative(name: &str, duration: &str, condition: &str, effect: &str) -> String
     )
 }
 
-/// A start, or an end, in each way in which the condition of an effect on a number can turn out.
+/// Starts and ends with a conditional numeric effect, for each truth value of its condition.
 #[test]
 fn effects_on_numbers_have_conditions() {
     let light = durative("light", "(= ?duration 1)", "", "(at end (p))");
@@ -61,7 +62,7 @@ fn a_duration_is_that_of_the_state_at_the_start() {
     let fill =
         || durative("fill", "(= ?duration (- 10 (fuel)))", "", "(at end (assign (fuel) 10)) (at end (g))");
     check(&fill(), "", "(g)", (Status::Optimal, Some("6")));
-    // It may pay to have more before.
+    // It may be cheaper to have more fuel before.
     let pour = durative(
         "pour",
         "(= ?duration 1)",
@@ -69,7 +70,7 @@ fn a_duration_is_that_of_the_state_at_the_start() {
         "(at start (increase (fuel) 5)) (at start (not (q)))",
     );
     check(&[fill(), pour.clone()].concat(), "(q)", "(g)", (Status::Optimal, Some("1.001")));
-    // `?duration` at the end has its value from the start, even if the state has changed.
+    // At the end, `?duration` has its value from the start, even if the state has changed.
     let counted = || {
         durative(
             "fill",
@@ -81,13 +82,14 @@ fn a_duration_is_that_of_the_state_at_the_start() {
     let drained = "(at start (assign (fuel) 0)) (at end (p))";
     let drain = durative("drain", "(= ?duration 1)", "", drained);
     check(&[counted(), drain.clone()].concat(), "", "(g) (p) (>= (log) 6)", (Status::Optimal, Some("6")));
-    // Two runs at once count twice.
+    // Two simultaneous runs count twice.
     check(&[counted(), drain.clone()].concat(), "", "(g) (p) (>= (log) 10)", (Status::Optimal, Some("6")));
     let once = counted()
         .replace("(and )", "(at start (not (q)))")
         .replace("(at end (g))", "(at start (q)) (at end (g))");
     check(&[once, drain].concat(), "", "(g) (p) (>= (log) 10)", (Status::Optimal, Some("10.001")));
-    // One that takes no time is one happening, whose end must not change what its duration rests on.
+    // An action of duration 0 is a single happening. Its end must not change a number on which its duration
+    // depends.
     check(&fill().replace("10", "4"), "", "(g)", (Status::Unsolvable, None));
     let counts = durative("counts", "(= ?duration (- 4 (fuel)))", "", "(at end (g))");
     check(&[counts, pour].concat(), "(q)", "(g)", (Status::Optimal, Some("0")));
@@ -101,7 +103,7 @@ fn a_state_dependent_duration_may_have_a_static_divisor() {
     };
     check(&fill("4"), "", "(g)", (Status::Optimal, Some("1.5")));
     check(&fill("0.15"), "", "(g)", (Status::Optimal, Some("40")));
-    // By what it is divided, its time depends on, and not the number itself.
+    // The duration depends on the divisor, but not on the number itself.
     let pour = durative(
         "pour",
         "(= ?duration 1)",
@@ -118,7 +120,7 @@ fn conditional_numeric_effects_are_planned_without_a_proof() {
     let asks =
         |effect: &str| durative("asks", "(= ?duration 1)", "", &format!("(at end (when (p) {effect}))"));
     check(&[asks("(g)"), helps.clone()].concat(), "", "(g)", (Status::Feasible, Some("2")));
-    // That no plan exists does not rest on the times here.
+    // The proof of unsolvability does not depend on times.
     check(&asks("(g)"), "", "(g)", (Status::Unsolvable, None));
     let each = "(:durative-action each :parameters () :duration (= ?duration 3) :condition ()
                   :effect (at end (forall (?x) (when (on ?x) (not (on ?x))))))";
@@ -187,7 +189,7 @@ fn search_statistics_and_history_are_recorded() {
     );
     assert!(statistics.history.is_sorted_by_key(|moment| moment.time));
     assert!(statistics.history.iter().all(|moment| moment.time <= statistics.search));
-    // In as little room the search for a plan soon finds what A* does not.
+    // With little memory, the satisficing search soon finds a plan that A* does not find.
     let (solution, _) = tower(18);
     assert_eq!(solution.statistics.found_by, Some(PlannerPart::Satisficing));
     assert!(solution.statistics.history.iter().any(|moment| moment.cost.is_some()));

@@ -1,4 +1,4 @@
-//! Actions that overlap with themselves: plans and claims.
+//! Actions that overlap with other runs of the same action: tests of plans and of claims.
 
 use crate::concurrent::{check, metric, parse, rational, solve, written};
 
@@ -19,26 +19,26 @@ fn actions_overlap_with_themselves() {
                :condition (and {condition}) :effect (and {effect}))"
         ))
     };
-    // What is added counts twice, also at one time.
+    // Simultaneous increases by several runs count separately.
     let own = react("", "(at end (increase (y) 1))");
     let plan = ["0: (react) [5]", "0: (react) [5]", "0: (react) [5]"];
     check("at one time", &own, &problem("(>= (y) 3)"), (1, 1000), Some(("5", &plan)));
-    // Starts that read a number that they change keep the separation, and there is enough for two of them.
+    // Starts that read a number that they change must be separated. The amount suffices for two runs.
     let own = react("(at start (>= (x) 1))", "(at start (decrease (x) 1)) (at end (increase (y) 1))");
     let plan = ["0: (react) [5]", "0.001: (react) [5]"];
     check("apart", &own, &problem("(>= (y) 2)"), (1, 1000), Some(("5.001", &plan)));
     check("too little", &own, &problem("(>= (y) 3)"), (1, 1000), None);
-    // A second run cannot start: its start needs the fact that the first one has deleted.
+    // A second run cannot start, because its start requires the fact that the first run has deleted.
     let own =
         react("(at start (ready))", "(at start (not (ready))) (at end (ready)) (at end (increase (y) 1))");
     let plan = ["0: (react) [5]", "5.001: (react) [5]"];
     check("taken", &own, &problem("(>= (y) 2)"), (1, 1000), Some(("10.001", &plan)));
-    // All runs begin before one ends.
+    // All runs start before one of them ends.
     let own = react("(at start (ready))", "(at end (not (ready))) (at end (increase (y) 1))");
     let plan = ["0: (react) [5]", "0: (react) [5]", "0: (react) [5]"];
     check("before the first end", &own, &problem("(>= (y) 3)"), (1, 1000), Some(("5", &plan)));
-    // What an end brings about is used up, and the end of a run that started a little later brings
-    // it about again.
+    // The fact that the end of a run adds is consumed. The end of a second run, which started slightly later,
+    // adds it again.
     let own = domain(
         "(:durative-action charge :parameters () :duration (= ?duration 10) :condition () :effect (at end (p)))
          (:durative-action use :parameters () :duration (= ?duration 6)
@@ -48,8 +48,8 @@ fn actions_overlap_with_themselves() {
     );
     let plan = ["0: (charge) [10]", "0.002: (charge) [10]", "10.001: (spend) [7]", "10.003: (use) [6]"];
     check("used up", &own, &problem("(q) (r)"), (1, 1000), Some(("17.001", &plan)));
-    // The light is on until the first run ends, and each run needs it all along: two of them start
-    // and end together, or not at all.
+    // The light is on until the first run ends, and each run needs it throughout. Two runs must therefore
+    // start and end together.
     let own = domain(
         "(:durative-action light :parameters () :duration (= ?duration 5)
            :condition (over all (p)) :effect (and (at start (p)) (at end (not (p)))))
@@ -58,8 +58,8 @@ fn actions_overlap_with_themselves() {
     check("light", &own, &problem("(q)"), (1, 1000), None);
 }
 
-/// A battery that is charged, and actions that need it: `first` and then `second`, each of which
-/// takes one unit of it when it ends.
+/// A battery is charged by overlapping runs. `first`, `second` and `third` must be executed in this order,
+/// and each consumes one unit at its end.
 #[test]
 fn a_battery_can_be_charged_by_overlapping_runs() {
     let domain = |others: &str| {
@@ -84,7 +84,8 @@ fn a_battery_can_be_charged_by_overlapping_runs() {
             "(define (problem p) (:domain d) (:init (= (battery) 0)) (:goal (and {goal})) (:metric minimize (total-time)))"
         )
     };
-    // Each one undoes once what an end has charged; three runs are under way at a time.
+    // Each of the three actions consumes the effect of one run of `charge`; the three runs of `charge`
+    // overlap.
     let plan = [
         "0: (charge) [10]",
         "1.002: (charge) [10]",
@@ -94,7 +95,7 @@ fn a_battery_can_be_charged_by_overlapping_runs() {
         "12.005: (third) [1]",
     ];
     check("three", &domain(""), &problem("(r)"), (1, 1000), Some(("13.005", &plan)));
-    // One undoes it twice, since what it is good for is undone in between.
+    // `first` is executed twice, because `undo` deletes its effect in between.
     let undo = "(:durative-action undo :parameters () :duration (= ?duration 1)
       :condition (at start (p)) :effect (and (at end (not (p))) (at end (r))))";
     let plan = [
@@ -109,8 +110,8 @@ fn a_battery_can_be_charged_by_overlapping_runs() {
 
 #[test]
 fn runs_whose_duration_the_state_decides() {
-    // The second run takes longer, for the number has grown: all the same it may start while the
-    // first one is under way.
+    // The second run takes longer, because the number has grown. It may still start while the first run is
+    // active.
     let domain =
         "(define (domain d) (:requirements :durative-actions) (:predicates (go)) (:functions (x) (y))
       (:durative-action react :parameters () :duration (= ?duration (x))
@@ -121,6 +122,6 @@ fn runs_whose_duration_the_state_decides() {
     let separation = rational(1, 1000);
     let solution = solve(&domain, &problem, &separation);
     let plan = solution.plan.expect("a plan");
-    // Two runs at 0, and the number grows when they have begun.
+    // Two runs start at 0, and the number grows after their starts.
     assert_eq!(metric(&domain, &problem, &written(&plan), &separation), Ok(rational(5, 1)));
 }

@@ -1,6 +1,6 @@
-//! Preferences, and constraints on trajectories and times, where actions overlap: known answers,
-//! and random tasks on which plans over a grid of times, executed by the validator, are no better
-//! than what is found.
+//! Preferences and constraints on trajectories and times with overlapping actions: tasks with known results,
+//! and random tasks. On the latter, no plan over a grid of times that the validator accepts may be better
+//! than the planner's plan.
 
 use std::fmt::Write as _;
 use std::time::{Duration, Instant};
@@ -13,7 +13,8 @@ use num_bigint::BigInt;
 use num_rational::BigRational;
 use pddl::ast::{Domain, Problem};
 
-/// Interfering happenings lie half a unit apart; plans of brute force have whole times.
+/// Minimum time between interfering happenings: half a unit. Plans of the brute-force search have integer
+/// times.
 fn separation() -> BigRational {
     BigRational::new(BigInt::from(1), BigInt::from(2))
 }
@@ -26,7 +27,7 @@ const DOMAIN: &str = "(define (domain d) (:predicates (p) (q) (r))
   (:durative-action light :parameters () :duration (= ?duration 2)
     :condition (at start (not (q))) :effect (and (at start (q)) (at end (not (q))))))";
 
-/// The status, the metric and the plan for constraints, by metric.
+/// Checks the status, the metric and the plan for a task with these constraints.
 fn check(constraints: &str, goal: &str, metric: &str, expected: (Status, Option<&str>, &[&str])) {
     let problem = format!(
         "(define (problem n) (:domain d) (:init) (:goal (and {goal})) (:constraints (and {constraints})) {metric})"
@@ -44,7 +45,7 @@ fn wishes_for_the_end_are_weighed_and_proved() {
     let metric = |weight: &str| format!("(:metric minimize (+ (total-time) (* {weight} (is-violated w))))");
     let wish = "(preference w (at end (p)))";
     let raise = ["0: (raise) [3]"];
-    // Three units of time are worth it, or not.
+    // Satisfying the preference takes three units of time, which may or may not be worth its weight.
     check(wish, "", &metric("4"), (Status::Optimal, Some("3"), &raise));
     check(wish, "", &metric("2"), (Status::Optimal, Some("2"), &[]));
     check("(preference w (at end (not (p))))", "(p)", &metric("2"), (Status::Optimal, Some("5"), &raise));
@@ -58,12 +59,13 @@ fn wishes_for_the_end_are_weighed_and_proved() {
 fn constraints_are_kept() {
     let time = "(:metric minimize (total-time))";
     check("(sometime (q))", "(p)", time, (Status::Optimal, Some("3"), &["0: (raise) [3]", "0: (light) [2]"]));
-    // The light goes off when p holds already.
+    // The light action must wait until p is true.
     let later = ["0: (raise) [3]", "3.5: (light) [2]"];
     check("(sometime (q)) (always (imply (q) (p)))", "(p)", time, (Status::Feasible, Some("5.5"), &later));
 }
 
-/// Of which object an action is, it does not read.
+/// A monitor condition that depends only on the objects of an action is not a read, so it does not separate
+/// happenings.
 #[test]
 fn an_action_with_objects_may_note_that_it_was_there() {
     let domain = "(define (domain d) (:predicates (on ?x) (off ?x))
@@ -86,11 +88,11 @@ fn times_are_kept() {
     check("(within 3 (p))", "(p)", time, (Status::Feasible, Some("3"), raise));
     check("(within 2.5 (p))", "(p)", time, (Status::Unknown, None, &[]));
     check("(hold-after 3 (p))", "", time, (Status::Feasible, Some("3"), raise));
-    // The state of time 3 is the one that is reached then.
+    // The state of time 3 includes the effects at time 3.
     check("(hold-during 0 3 (not (p)))", "(p)", time, (Status::Feasible, Some("3"), raise));
     let later = &["1: (raise) [3]"][..];
     check("(hold-during 1 4 (not (p)))", "(p)", time, (Status::Feasible, Some("4"), later));
-    // What is violated is counted.
+    // A violated preference adds its weight to the metric.
     let weighed = "(:metric minimize (+ (total-time) (* 2 (is-violated w))))";
     check("(preference w (within 2 (p)))", "(p)", weighed, (Status::Feasible, Some("5"), raise));
     check("(preference w (within 3 (p)))", "(p)", weighed, (Status::Feasible, Some("3"), raise));
@@ -99,7 +101,7 @@ fn times_are_kept() {
 
 #[test]
 fn a_plan_without_cost_is_optimal() {
-    // The search is incomplete here, but no plan costs less than 0.
+    // The search is incomplete here, but no plan can cost less than 0.
     let wish = "(preference w (always (imply (q) (p)))) (sometime (q))";
     let metric = "(:metric minimize (is-violated w))";
     let lines = ["0: (raise) [3]", "3.5: (light) [2]"];
@@ -112,7 +114,7 @@ fn deadlines_are_checked_on_the_times_of_the_plan() {
     let time = "(:metric minimize (total-time))";
     let both = ["0: (raise) [3]", "0: (light) [2]"];
     check(&soon("3"), "(p)", time, (Status::Feasible, Some("3"), &both));
-    // It is delayed until no further action has to follow.
+    // The light action is delayed until p is true, so that no deadline is pending.
     let late = ["0: (raise) [3]", "3.5: (light) [2]"];
     check(&soon("1"), "(p)", time, (Status::Feasible, Some("5.5"), &late));
     let weighed = "(:metric minimize (+ (total-time) (* 2 (is-violated w))))";
@@ -151,7 +153,7 @@ fn trajectory(random: &mut Random) -> String {
     }
 }
 
-/// A random task of three actions, and how long each takes.
+/// Generates a random task with three actions, and returns the duration of each action.
 fn sample(random: &mut Random) -> (String, String, [i128; 3]) {
     let mut domain = "(define (domain d) (:predicates (p) (q) (h))".to_owned();
     let mut durations = [0; 3];
@@ -199,11 +201,11 @@ fn sample(random: &mut Random) -> (String, String, [i128; 3]) {
     (domain, problem, durations)
 }
 
-/// The last start that brute force tries.
+/// Latest start that the brute-force search tries.
 const LAST: i128 = 5;
 
-/// The least metric of valid plans of up to three actions that start at whole times: of all, and of
-/// those with no two happenings at one time.
+/// Returns the minimum metric of valid plans with up to three actions that start at integer times: over all
+/// plans, and over the plans without simultaneous happenings.
 fn brute_force(durations: [i128; 3], domain: &Domain, problem: &Problem) -> [Option<BigRational>; 2] {
     let mut best = [None, None];
     let mut open: Vec<Vec<(i128, usize)>> = vec![Vec::new()];
@@ -234,7 +236,8 @@ fn brute_force(durations: [i128; 3], domain: &Domain, problem: &Problem) -> [Opt
     best
 }
 
-/// Compares with brute force. Whether a plan was found, and whether it is proved to be the best.
+/// Compares the planner with brute force on a random task. Returns whether a plan was found, and whether it
+/// is proved optimal.
 fn agree(seed: u64) -> (bool, bool) {
     let (domain, problem, durations) = sample(&mut Random(seed));
     let (read_domain, read_problem) = parse(&domain, &problem);
@@ -258,7 +261,7 @@ fn agree(seed: u64) -> (bool, bool) {
         }
         _ => {}
     }
-    // What has no two happenings at one time is not left out.
+    // The planner must be at least as good as the best plan without simultaneous happenings.
     let prefers = domain.contains("preference");
     if is_over
         && !prefers

@@ -1,5 +1,5 @@
-//! Many designs, dependent designs, and expressions over designs and fluents together: claims must agree
-//! with the definition of a plan, evaluated by hand for each task.
+//! Tasks with many designs, dependent designs, and expressions that combine designs and fluents. Claims must
+//! agree with results computed by hand from the definition of a plan.
 
 use std::fmt::Write as _;
 
@@ -13,7 +13,7 @@ fn solve(domain: &str, problem: &str) -> Solution {
     optimize(&task, &Config::default(), &mut |_| {})
 }
 
-/// A plan's cost and its steps, as written.
+/// Returns the cost and the steps of the plan as text.
 fn answer(solution: &Solution) -> Option<(String, Vec<String>)> {
     let plan = solution.plan.as_ref()?;
     let step = |step: &metaplan_planner::Step| {
@@ -28,8 +28,8 @@ fn found(cost: &str, steps: &[&str]) -> Option<(String, Vec<String>)> {
     Some((cost.to_owned(), steps.iter().map(|step| (*step).to_owned()).collect()))
 }
 
-/// `count` designs, of which each solves `f1` and `f2`; `value` writes what is known of the design
-/// with an index.
+/// Returns a problem with `count` designs, each of which solves `f1` and `f2`. `value` returns the facts
+/// about the design with an index.
 fn designs(count: usize, value: impl Fn(usize) -> String) -> String {
     let mut text = String::from("(define (problem p) (:domain d) (:objects");
     for index in 0..count {
@@ -43,7 +43,7 @@ fn designs(count: usize, value: impl Fn(usize) -> String) -> String {
     text
 }
 
-/// Two functions with different designs; only the last one of 400 uses little.
+/// Two functions need different designs, and only the last of 400 designs consumes little.
 #[test]
 fn no_combination_of_many_designs_is_forgotten() {
     let domain = "(define (domain d) (:requirements :typing :fluents :equality :negative-preconditions)
@@ -56,7 +56,7 @@ fn no_combination_of_many_designs_is_forgotten() {
       (:action sleep :parameters () :precondition () :effect (and (done) (increase (total-cost) 50))))";
     let value = |index| format!("(= (use d{index}) {})", if index == 399 { 1 } else { 100 });
     let problem = designs(400, value);
-    // Without the other way there is nothing that a plan could fall back on.
+    // Without the alternative action, there is no other plan.
     let without = domain.split("(:action sleep").next().map(|text| format!("{text})")).unwrap_or_default();
     for domain in [domain, &without] {
         let solution = solve(domain, &problem);
@@ -65,7 +65,7 @@ fn no_combination_of_many_designs_is_forgotten() {
     }
 }
 
-/// A design that solves another design: its function is not known before that one is chosen.
+/// A design that solves another design: its function is known only after the other design is selected.
 #[test]
 fn a_function_may_be_a_design_itself() {
     let action = |name: &str, solves: &str, cost: u32| {
@@ -90,7 +90,7 @@ fn a_function_may_be_a_design_itself() {
         let solution = solve(&domain, problem);
         assert_eq!(answer(&solution), found("1", &["go o1 o2 o3"]), "{chain}: {solution:?}");
     }
-    // Each the function of the other.
+    // Each design is the function of the other design.
     let domain = format!(
         "(define (domain d) (:requirements :fluents) (:predicates (fd_solve_f ?x ?y) (g)) (:functions (total-cost)) {})",
         action("go", "(fd_solve_f ?a ?b) (fd_solve_f ?b ?a)", 1)
@@ -124,16 +124,16 @@ fn factors_of_a_design_and_of_a_fluent_may_meet() {
         assert_eq!(answer(&solution), expected, "{precondition} {effect}: {solution:?}");
         assert!(matches!(solution.status, Status::Optimal | Status::Unsolvable), "{solution:?}");
     };
-    // 10 - 2 * 1 * 3 = 4 with a, and 10 - 3 * 2 * 3 < 4 with b, which costs more.
+    // 10 - 2 * 1 * 3 = 4 with design a; 10 - 3 * 2 * 3 < 4 with design b, which costs more.
     check("", "(decrease (bat) (* (f ?d) (* (g ?d) (x))))", Some(("2", &["run a", "fin"])));
-    // 0 with a; with b the battery is charged.
+    // The consumption is 0 with design a; design b charges the battery.
     check("", "(decrease (bat) (* (* (f ?d) (x)) (- 1 (g ?d))))", None);
-    // a needs x to grow, runs twice then; b costs 3 each time.
+    // With design a, x must grow before run is applied twice. Design b costs 3 each time.
     let twice: &[&str] = &["grow", "run a", "run a", "fin"];
     check("(>= (/ (x) (speed ?d)) 3)", "(decrease (bat) 3)", Some(("5", twice)));
     check("(>= (x) (* 3 (speed ?d)))", "(decrease (bat) 3)", Some(("5", twice)));
     check("(or (>= (x) (* 3 (speed ?d))) (>= (f ?d) (x)))", "(decrease (bat) 3)", Some(("5", twice)));
-    // 10 - 3 * 2, 10 - 3 * 1.
+    // The remaining amounts are 10 - 3 * 2 and 10 - 3 * 1.
     check("", "(decrease (bat) (* (x) (speed ?d)))", Some(("2", &["run a", "fin"])));
 }
 
@@ -145,7 +145,7 @@ fn falling_costs(count: usize) -> (String, String) {
     (domain.to_owned(), designs(count, |index| format!("(= (cost d{index}) {})", 1_000_000 - index)))
 }
 
-/// Designs are numbered beyond 16 bits.
+/// There are more designs than 16 bits can number.
 #[test]
 #[ignore = "takes 10 s in debug"]
 fn the_best_of_66_000_designs_is_found() {

@@ -1,6 +1,5 @@
-//! Tasks whose numbers no scale makes integers: random ones against all sequences of actions,
-//! executed in big rationals by the definition of their effects, and cases of known cost. The
-//! validator executes every plan.
+//! Tasks whose numbers have no common integer scale. Random tasks are compared with all sequences of actions,
+//! executed in big rationals; other tasks have known costs. The validator executes every plan.
 
 #![allow(clippy::format_collect, clippy::print_stderr)]
 
@@ -24,14 +23,14 @@ fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
     (domain, problem)
 }
 
-/// The number that a decimal writes.
+/// Parses a decimal number.
 fn number(decimal: &str) -> BigRational {
     let (whole, fraction) = decimal.split_once('.').unwrap_or((decimal, ""));
     let digits: BigInt = format!("{whole}{fraction}").parse().expect("digits");
     BigRational::new(digits, BigInt::from(10).pow(fraction.len() as u32))
 }
 
-/// Cost of a plan by the validator. Returns `None` if the plan is invalid.
+/// Returns the cost of a plan according to the validator, or `None` if the plan is invalid.
 fn metric(domain: &Domain, problem: &Problem, plan: &Plan) -> Option<BigRational> {
     let steps = plan.steps.iter().map(|step| PlanStep {
         action: Name::new(&step.action),
@@ -54,7 +53,7 @@ fn exact(domain: &Domain, problem: &Problem, horizon: Option<usize>) -> Solution
     solution
 }
 
-/// Whether the task is refused for the size of its numbers.
+/// Returns `true` if integer grounding rejects the task because its numbers are too large.
 fn too_large(domain: &Domain, problem: &Problem) -> bool {
     match ground(domain, problem, &GroundConfig::default()) {
         Ok(_) => false,
@@ -69,7 +68,7 @@ fn too_large(domain: &Domain, problem: &Problem) -> bool {
 const STEPS: usize = 4;
 const NUMBERS: [&str; 2] = ["x", "y"];
 
-/// Effect on a number.
+/// Effect on a number in a random model.
 #[derive(Debug, Clone)]
 enum Change {
     ScaleUp(String),
@@ -92,7 +91,7 @@ struct Action {
     sets: (usize, bool),
     compares: Option<(usize, Comparison, String)>,
     changes: [Option<Change>; 2],
-    /// A product over a divisor, and whether it is a reward.
+    /// Three factors, a divisor, and whether the result is a reward.
     cost: ([String; 3], String, bool),
 }
 
@@ -284,7 +283,7 @@ impl Model {
         (domain, problem)
     }
 
-    /// Least cost of a plan, by number of actions.
+    /// Returns the minimum cost of a plan, for each number of actions.
     fn oracle(&self) -> Vec<Option<BigRational>> {
         let mut layer: HashMap<Moment, BigRational> = HashMap::new();
         let [x, y] = &self.initial;
@@ -312,8 +311,8 @@ impl Model {
     }
 }
 
-/// Compares the answer for a model with all of its plans; whether its numbers are too large for
-/// integers, and whether it has a plan.
+/// Compares the planner with all plans of a random model. Returns whether the numbers are too large for
+/// integers, and whether there is a plan.
 fn check(seed: u64, rewards: bool, horizon: Option<usize>) -> (bool, bool) {
     let model = Model::random(seed, rewards);
     let (domain_text, problem_text) = model.text();
@@ -377,7 +376,7 @@ fn many_random_tasks_have_the_cost_of_all_sequences() {
     check_all(1_000..20_000);
 }
 
-/// The answer for a task that integers cannot hold: its cost, if there is a plan.
+/// Checks the result for a task whose numbers exceed integers: its cost, or `None` if there is no plan.
 fn known(name: &str, domain: &str, problem: &str, expected: Option<&str>) -> Solution {
     let (domain, problem) = parse(domain, problem);
     assert!(too_large(&domain, &problem), "{name}");
@@ -439,7 +438,7 @@ fn effects_may_scale_by_fractions() {
     let tenth = domain("(increase (level) (* 0.1 (level)))");
     // 1.1^7 < 2 < 1.1^8.
     known("growth", &tenth, &problem("(= (level) 1)", "(> (level) 2)"), Some("0.8"));
-    // It never becomes 0, which is not known before its digits are too many.
+    // The level never becomes 0, but its digits become too many before this is proved.
     let (domain, problem) = parse(&halve, &problem("(= (level) 1024)", "(<= (level) 0)"));
     let solution = exact(&domain, &problem, None);
     assert_eq!((solution.status, solution.plan), (Status::Unknown, None));
@@ -474,8 +473,8 @@ fn times_may_be_quotients_of_measured_speeds() {
     assert!(plan.cost.to_rational().is_positive());
 }
 
-/// A random task that was answered with "no plan" once: an effect that contradicts itself removed
-/// the whole action.
+/// A random task that was once reported as unsolvable: an effect that contradicts itself had removed the
+/// whole action.
 #[test]
 fn a_task_of_another_generator_has_its_plan() {
     let directory =

@@ -1,7 +1,8 @@
-//! Speed of reading and grounding compared with the translator of Fast Downward, and size of the ground task.
+//! Compares the speed of reading and grounding with the translator of Fast Downward, and measures the size of
+//! ground tasks.
 //!
-//! Times are CPU times of this thread and of the translator's process, so that other work on the
-//! machine disturbs little.
+//! Times are CPU times of this thread and of the translator's process, so other work on the machine has
+//! little influence.
 
 #![expect(clippy::print_stdout, reason = "measurements are shown")]
 
@@ -14,13 +15,13 @@ use pddl::{Source, read};
 
 const TOOL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/tools/gen_ratpa.py");
 
-/// CPU time of this thread in seconds; nothing where the system does not say.
+/// Returns the CPU time of this thread in seconds, or `None` if the system does not provide it.
 fn cpu_time() -> Option<f64> {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
     Some(text.split_whitespace().next()?.parse::<f64>().ok()? / 1e9)
 }
 
-/// Result of `work`, and its CPU time in seconds.
+/// Returns the result of `work` and its CPU time in seconds.
 fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
     let before = cpu_time().unwrap_or_default();
     let result = work();
@@ -33,7 +34,7 @@ fn task(domain: String, problem: String) -> Task {
     ground(&domain, &problem, &GroundConfig::default()).unwrap_or_else(|errors| panic!("{errors:?}"))
 }
 
-/// A ring of places; moving takes `k` functions of `m` designs each.
+/// Generates a ring of places. Moving requires `k` functions with `m` designs each.
 fn ring(places: usize, k: usize, m: usize) -> (String, String) {
     let all = |part: &dyn Fn(usize) -> String| (0..k).map(part).collect::<Vec<_>>().join(" ");
     let energy = all(&|i| format!("(energy ?fd{i})"));
@@ -86,7 +87,7 @@ fn ground_size_is_linear_in_the_number_of_functions() {
             let (domain, problem) = ring(12, k, 6);
             let task = task(domain, problem);
             assert_eq!(task.operator_count(), 12, "k = {k}");
-            // The length of the debug text approximates the size in memory.
+            // The length of the debug text approximates the memory use.
             format!("{task:?}").len()
         })
         .collect();
@@ -96,7 +97,7 @@ fn ground_size_is_linear_in_the_number_of_functions() {
     assert!(most.zip(least).is_some_and(|(most, least)| most * 10 <= least * 11), "{sizes:?}");
 }
 
-/// A problem of about `bytes` bytes, with facts and values as generators write them.
+/// Generates a problem of about `bytes` bytes, with facts and values as generators write them.
 fn large_problem(bytes: usize) -> String {
     let mut text = String::from("(define (problem large) (:domain d)\n  (:objects");
     let places = 1000;
@@ -140,7 +141,8 @@ fn ten_megabytes_are_read_in_less_than_a_second() {
     assert!(with_check < 1.0, "{with_check} s");
 }
 
-/// Runs the translator; its CPU seconds, or nothing if it does not end in time.
+/// Runs the translator of Fast Downward. Returns its CPU time in seconds, or `None` if it does not finish in
+/// time.
 fn translator(python: &str, directory: &Path, name: &str) -> Option<f64> {
     let script = "import resource, subprocess, sys
 command = [sys.executable, '-m', 'fast_downward.translate', *sys.argv[1:3]]
@@ -163,9 +165,9 @@ print(used.ru_utime + used.ru_stime)";
     seconds
 }
 
-/// The largest instances, for which the factor is asserted, and smaller ones for comparison. Needs
-/// a Python with the translator (`python3 -m venv peers; peers/bin/pip install up-fast-downward`),
-/// named by `METAPLAN_PEERS=peers/bin/python`.
+/// Tests the largest instances, for which the speed-up is asserted, and smaller instances for comparison. The
+/// environment variable `METAPLAN_PEERS` must name a Python with the translator (`python3 -m venv peers;
+/// peers/bin/pip install up-fast-downward`, then `METAPLAN_PEERS=peers/bin/python`).
 #[test]
 #[ignore = "measures beside a peer; in release"]
 fn reading_and_grounding_compared_with_the_translator_of_fast_downward() {
@@ -202,7 +204,7 @@ fn reading_and_grounding_compared_with_the_translator_of_fast_downward() {
         let text =
             |kind: &str| std::fs::read_to_string(folder.join(format!("{name}.{kind}.pddl"))).expect("a file");
         let (domain, problem) = (text("domain"), text("problem"));
-        // Small ones several times: the system counts in ticks.
+        // Small problems are repeated, because the system measures time in ticks.
         let runs = if problem.len() < 200_000 { 100 } else { 1 };
         let again = || (1..runs).for_each(|_| drop(task(domain.clone(), problem.clone())));
         let (task, seconds) = timed(|| {

@@ -1,5 +1,5 @@
-//! Costs, times and numbers that grow beyond their types while actions are executed: nothing
-//! panics, and nothing is claimed that is not so.
+//! Costs, times and numbers that exceed their types while actions are executed: nothing may panic, and no
+//! false claim may result.
 
 use std::fmt::Write as _;
 use std::time::Duration;
@@ -13,7 +13,7 @@ use num_rational::BigRational;
 use pddl::ast::{Direction, Domain, Problem};
 use pddl::{Source, read, read_objective};
 
-/// Nearly the largest number of a task, 2^118. Multiples of it overflow 128 bits.
+/// A number close to the limit of 2^118 for numbers of a task. Multiples of it overflow 128 bits.
 const LARGE: &str = "330000000000000000000000000000000000";
 const MANY: usize = 520;
 
@@ -33,12 +33,12 @@ fn solve(task: &Task) -> Solution {
     optimize(task, &Config::default().with_limits(limits), &mut |_| {})
 }
 
-/// A number as the files write it.
+/// Returns `times * LARGE` in the unit of the PDDL files.
 fn large(times: usize) -> BigRational {
     BigRational::from_integer(LARGE.parse::<BigInt>().expect("a number") * BigInt::from(times))
 }
 
-/// A robot that has to go to the end of a corridor with `places` places; each move has the cost
+/// Returns a task in which a robot must move through a corridor with `places` places. Each move has the cost
 /// effect `cost`.
 fn corridor(places: usize, cost: &str, metric: &str) -> Task {
     let domain = format!(
@@ -84,7 +84,7 @@ fn the_metric_of_a_situation_is_exact_however_large_it_is() {
 
 #[test]
 fn shares_of_costs_are_ordered_however_large_their_sum_is() {
-    // Two robots, each with many ways to its goal that cost the same.
+    // Two robots, each with many routes of equal cost to its goal.
     let domain = "(define (domain d) (:requirements :typing :action-costs) (:types place robot)
         (:predicates (at ?r - robot ?p - place) (next ?p ?q - place)) (:functions (total-cost) (cost ?p - place))
         (:action move :parameters (?r - robot ?p ?q - place) :precondition (and (at ?r ?p) (next ?p ?q))
@@ -106,7 +106,7 @@ fn shares_of_costs_are_ordered_however_large_their_sum_is() {
     assert_eq!(solution.plan.expect("a plan").cost.to_rational(), cost);
 }
 
-/// Work that has to be done many times.
+/// A domain in which work must be done many times.
 const WORK: &str = "(define (domain d) (:requirements :durative-actions :numeric-fluents :action-costs)
     (:functions (done) (total-cost) (long))
     (:durative-action work :parameters () :duration (= ?duration (long)) :condition (at start (>= (done) 0))
@@ -145,7 +145,7 @@ fn an_objective_whose_sum_does_not_fit_is_shown_and_not_proved() {
 
 #[test]
 fn the_least_number_of_the_type_is_too_large_as_well() {
-    // From 2^112 to 2^124, the greatest admitted number, and then to -2^127.
+    // The number grows from 2^112 to 2^124, the greatest admitted number, and then becomes -2^127.
     let domain =
         "(define (domain d) (:requirements :numeric-fluents) (:predicates (a) (b) (c)) (:functions (x))
         (:action grow :parameters () :precondition (a) :effect (and (not (a)) (b) (scale-up (x) 4096)))

@@ -1,4 +1,4 @@
-//! A limit ends every stage soon, and never becomes an answer.
+//! Limits must end every stage soon, and must never lead to a false answer.
 #![expect(clippy::print_stdout, reason = "times are what some of these tests are for")]
 
 use std::fmt::Write as _;
@@ -14,7 +14,8 @@ fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
     (domain, problem)
 }
 
-/// Robots that carry parcels about on a ring, with functions of equal designs; each may rest without end.
+/// Generates a task with robots that transport parcels on a ring, and functions with equal designs. Robots
+/// may rest arbitrarily often.
 fn depot(places: usize, parcels: usize, designs: usize) -> (Domain, Problem) {
     let domain = "(define (domain depot) (:requirements :typing :fluents :equality :negative-preconditions)
       (:types place parcel design function) (:constants f1 f2 - function)
@@ -54,7 +55,8 @@ fn depot(places: usize, parcels: usize, designs: usize) -> (Domain, Problem) {
     parse(domain, &text)
 }
 
-/// Grounds and plans; the status, if the task could be ground in time, and the whole time.
+/// Grounds and plans under a time limit. Returns the status, or `None` if grounding was not finished, and the
+/// total time.
 fn run(domain: &Domain, problem: &Problem, limit: Duration, engine: Engine) -> (Option<Status>, Duration) {
     let started = Instant::now();
     let limits = Limits::none().with_time(limit);
@@ -74,13 +76,13 @@ fn run(domain: &Domain, problem: &Problem, limit: Duration, engine: Engine) -> (
     (Some(solution.status), started.elapsed())
 }
 
-/// The task is solvable, so no time limit may lead to the answer that it is unsolvable.
+/// The task is solvable, so it must never be reported as unsolvable, whatever the time limit is.
 #[test]
 fn wherever_time_is_up_there_is_no_false_answer() {
     let (domain, problem) = depot(4, 2, 3);
     let mut ended = 0;
     for engine in [Engine::Auto, Engine::Sat] {
-        // Steps of a fifth: from before grounding to after the proof.
+        // The time limit increases by a fifth each time, from before the end of grounding to after the proof.
         let mut microseconds = 100.0_f64;
         while microseconds < 3e6 {
             let limit = Duration::from_secs_f64(microseconds / 1e6);

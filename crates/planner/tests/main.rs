@@ -1,4 +1,4 @@
-//! The planner through its public functions: tasks, plans, proofs, and rejected constructs.
+//! Tests of the planner through its public interface: tasks, plans, proofs, and rejected constructs.
 
 mod adl;
 mod certificate;

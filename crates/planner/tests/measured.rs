@@ -1,5 +1,5 @@
-//! Metrics over fluents whose changes depend on the state: plans are found, measured as the
-//! validator measures them, and none is called the best.
+//! Metrics over fluents with state-dependent changes: plans must be found and measured as the validator
+//! measures them, but not be reported as optimal.
 
 use metaplan_planner::{
     Config, GroundConfig, Limits, Plan, Solution, Status, ground, ground_concurrent, lexicographic, optimize,
@@ -19,8 +19,8 @@ fn text(plan: &Plan) -> String {
     lines.collect()
 }
 
-/// Checks that a plan is valid, has the metric that the validator has, and that its steps add up to
-/// it from what it is at first.
+/// Checks that a plan is valid, that its metric agrees with the validator, and that the costs of its steps
+/// sum to the metric minus its initial value `at_first`.
 fn judge((domain, problem): (&Domain, &Problem), concurrent: bool, solution: &Solution, at_first: i64) {
     assert_eq!(solution.status, Status::Feasible, "{solution:?}");
     assert!(solution.proof.is_none() && solution.lower_bound.is_none(), "{solution:?}");
@@ -35,7 +35,7 @@ fn judge((domain, problem): (&Domain, &Problem), concurrent: bool, solution: &So
     assert_eq!(steps + BigRational::from_integer(at_first.into()), plan.cost.to_rational(), "{text}");
 }
 
-/// Each purchase costs as much as the remaining demand.
+/// A domain in which each purchase costs the price times the remaining demand.
 const MARKET: &str = "(define (domain market) (:types good shop)
   (:predicates (sells ?s - shop ?g - good) (at ?s - shop) (road ?a - shop ?b - shop) (done ?g - good))
   (:functions (price ?s - shop ?g - good) (wanted ?g - good) (spent) (fame))
@@ -69,7 +69,7 @@ fn plans_one_after_another_have_the_metric_of_their_end() {
         let solution =
             optimize(&task, &Config::default(), &mut |_| panic!("it is not a bound of the metric"));
         let plan = solution.plan.as_ref().expect("a plan");
-        // 1 at first, 12 for g, 2 for the way, and 7.5 for h.
+        // The metric is 1 initially; g costs 12, the route 2, and h 7.5.
         assert_eq!(plan.cost.to_string(), expected, "{metric}");
         let at_first = plan.cost.to_rational()
             - plan.steps.iter().map(|step| step.cost.to_rational()).sum::<BigRational>();

@@ -1,5 +1,5 @@
-//! Numbers that add to each other by fractions, stored as multiples of themselves: the same answers
-//! as in exact rationals, which know no multiples.
+//! Numbers that are added to each other with fractional coefficients, so that grounding stores multiples of
+//! them. The results must equal those with exact rationals, which store no multiples.
 
 use metaplan_planner::{
     Config, Engine, GroundConfig, Status, ground, ground_exact, optimize, optimize_exact,
@@ -15,7 +15,7 @@ fn action(random: &mut Random, number: usize) -> String {
     let pick = |random: &mut Random, below: usize| random.below(below as u64) as usize;
     let target = pick(random, FLUENTS.len());
     let factor = FACTORS[pick(random, FACTORS.len())];
-    // What is read comes before what is changed, so that fractions do not go in a circle.
+    // A fluent only reads earlier fluents, so the fractional dependencies have no cycle.
     let value = if target > 0 && pick(random, 4) > 0 {
         let (read, constant) = (FLUENTS[pick(random, target)], pick(random, 3));
         format!("(+ (* {factor} ({read})) {constant})")
@@ -33,7 +33,8 @@ fn action(random: &mut Random, number: usize) -> String {
     )
 }
 
-/// Whether the task in integers stores multiples, and has a plan.
+/// Compares both kinds of numbers on a random task. Returns whether the integer task stores multiples, and
+/// whether there is a plan.
 fn compare(seed: u64) -> (bool, bool) {
     let mut random = Random(seed);
     let actions: String = (0..4).map(|number| action(&mut random, number)).collect();

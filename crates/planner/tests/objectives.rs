@@ -1,4 +1,4 @@
-//! Several objectives and the choice among equals, against enumeration of all plans of small missions.
+//! Multiple objectives and tie-breaking, compared with an enumeration of all plans of small missions.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -8,17 +8,18 @@ use pddl::ast::{Direction, Metric};
 use pddl::{Source, read, read_objective};
 use testing::random::Random;
 
-/// Waypoints with corridors, and two functions with designs; every move costs time and energy by its designs.
+/// A mission with waypoints, corridors and two functions. Every move costs time and energy that depend on the
+/// designs.
 #[derive(Debug)]
 struct Mission {
     waypoints: usize,
-    /// From, to, length, in the order of the problem file.
+    /// Corridors as (from, to, length), in the order of the problem file.
     corridors: Vec<(usize, usize, i64)>,
-    /// For each function, time and energy of its designs for each unit of length.
+    /// For each function: time and energy per unit of length of each design.
     designs: [Vec<(i64, i64)>; 2],
 }
 
-/// A plan by waypoints and designs, with its time and its energy.
+/// A plan as a list of waypoints and designs, with its time and energy.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 struct Way {
     stations: Vec<usize>,
@@ -44,7 +45,7 @@ impl Mission {
         Self { waypoints, corridors, designs: [designs(), designs()] }
     }
 
-    /// All plans from the first waypoint to the last that visit none twice.
+    /// Returns all plans from the first to the last waypoint that visit no waypoint twice.
     fn ways(&self) -> Vec<Way> {
         let start = Way { stations: vec![0], designs: Vec::new(), time: 0, energy: 0 };
         let (mut open, mut found) = (vec![start], Vec::new());
@@ -72,7 +73,8 @@ impl Mission {
         found
     }
 
-    /// The names of waypoints and designs, `order` being how they sort.
+    /// Returns the texts of domain and problem. If `reversed`, the names of waypoints and designs sort in
+    /// reverse order.
     fn text(&self, reversed: bool) -> (String, String) {
         let domain = "(define (domain d) (:types place function design)
           (:predicates (at ?p - place) (way ?a ?b - place) (fd_solve_f ?d - design ?f - function))
@@ -186,7 +188,7 @@ fn ties_are_broken_in_order_and_names_play_no_part() {
         let mission = Mission::random(seed);
         let ways = mission.ways();
         let key = |way: &Way| (way.time, way.stations.len(), changes(&way.designs));
-        // Operators are in the order of their arguments, that is of stations; designs come after them.
+        // Operators are ordered by their arguments, i.e. by waypoints; designs are compared afterwards.
         let order = |way: &Way| {
             let steps = way.stations.windows(2).zip(&way.designs);
             steps.map(|(stations, designs)| (stations.to_vec(), *designs)).collect::<Vec<_>>()

@@ -1,5 +1,5 @@
-//! Cheapest plans of generated missions against an oracle that shares nothing with the planner:
-//! Dijkstra over the explicit states of the mission, from which the PDDL text is generated, too.
+//! Compares cheapest plans of generated missions with an independent oracle: Dijkstra's algorithm over the
+//! explicit states of the mission, from which the PDDL text is also generated.
 
 use metaplan_planner::{Backend, Config, Engine, GroundConfig, Proof, Status, Strategy, ground, optimize};
 use testing::missions::Mission;
@@ -7,8 +7,8 @@ use testing::missions::Mission;
 use crate::tally::limits;
 use pddl::{Source, read};
 
-/// Checks the answer for a mission. The SAT solver alone cannot decide missions without a plan or
-/// with a free metric.
+/// Checks the result for a random mission. The SAT solver alone cannot decide missions without a plan or with
+/// cost-free cycles.
 fn check(seed: u64, (engine, head_start): (Engine, usize), backend: &Backend, strategy: Strategy) {
     let mission = Mission::random(seed);
     let (domain, problem) = (mission.domain(), mission.problem());

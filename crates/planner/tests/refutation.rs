@@ -1,5 +1,5 @@
-//! Formulas of generated missions, and their refutations: there is one for the truth, none for what
-//! is false, and what is changed is noticed.
+//! Formulas of generated missions and their refutations: a true claim has a refutation, a false claim has
+//! none, and changes of the files are detected.
 
 #[allow(dead_code, reason = "another suite uses the rest")]
 use std::cell::RefCell;
@@ -15,7 +15,7 @@ use pddl::{Source, read};
 use testing::missions::Mission;
 use testing::random::Random;
 
-/// Certificate of a mission and its least cost. Returns `None` if there is no plan.
+/// Returns the certificate of a random mission and its optimal cost, or `None` if there is no plan.
 fn certified(seed: u64) -> Option<(Certificate, BigRational)> {
     let mission = Mission::random(seed);
     let cost = BigRational::from_integer(mission.oracle()?.into());
@@ -27,7 +27,7 @@ fn certified(seed: u64) -> Option<(Certificate, BigRational)> {
     Some((certify(&task, &solution, &Limits::none()).expect("a certificate"), cost))
 }
 
-/// A file in memory.
+/// A file in memory that implements `Write`.
 #[derive(Clone, Default)]
 struct Memory(Rc<RefCell<Vec<u8>>>);
 
@@ -47,7 +47,7 @@ impl Write for Memory {
     }
 }
 
-/// Formula, legend, proof and hints.
+/// The files of a refutation: formula, legend, proof and hints.
 type Files = [String; 4];
 
 fn refutation(
@@ -71,7 +71,7 @@ fn refutation(
     Ok((steps, files.map(|file| file.text())))
 }
 
-/// Verdicts on formula, proof and steps.
+/// Returns the results of checking the formula, the proof and the number of steps.
 fn verdicts(
     certificate: &Certificate,
     claim: &BigRational,
@@ -95,7 +95,7 @@ fn check(seed: u64, by: StepBound) {
         Ok((steps, files)) => {
             let found = verdicts(&certificate, &cost, steps, &files);
             assert!(found.iter().all(Result::is_ok), "seed {seed}: {found:?}");
-            // The claim that plans cost more: another formula, which has a model.
+            // The formula of the claim that all plans cost more differs, and it has a model.
             let found = verdicts(&certificate, &more, steps, &files);
             assert!(found.iter().any(Result::is_err), "seed {seed}: {found:?}");
             if let Some(fewer) = steps.checked_sub(1) {
@@ -130,7 +130,7 @@ fn there_are_refutations_of_many_false_claims_only() {
     (1_000..3_000).for_each(|seed| check(seed, StepBound::Spent));
 }
 
-/// A text with a word or a line changed.
+/// Returns a text in which a word or a line is changed.
 fn mutate(text: &str, random: &mut Random) -> String {
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
     let line = random.below(lines.len() as u64) as usize;
@@ -153,8 +153,8 @@ fn mutate(text: &str, random: &mut Random) -> String {
     lines.join("\n") + "\n"
 }
 
-/// A changed formula or legend is not the task's; a changed proof proves nothing that is false, and
-/// nothing at all once it is cut off.
+/// A changed formula or legend must not be accepted for the task. A changed proof must prove nothing false,
+/// and a truncated proof nothing at all.
 #[test]
 fn changed_refutations_are_rejected() {
     for seed in 0..40 {

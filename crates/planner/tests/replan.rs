@@ -1,4 +1,5 @@
-//! The replanner against planning from scratch: the same plan, for random changes of state and availability.
+//! Compares the replanner with planning from scratch: both must return equal plans after random changes of
+//! state and availability.
 
 #![allow(clippy::format_collect)]
 #![expect(clippy::print_stdout, reason = "times are what one of these tests is for")]
@@ -36,8 +37,8 @@ fn words(atom: &Atom) -> Vec<String> {
     std::iter::once(atom.predicate.name.to_string()).chain(atom.arguments.iter().map(term)).collect()
 }
 
-/// Changeable parts of a mission: names of its position predicate, places and designs, and the
-/// battery's capacity.
+/// Parts of a mission that can change: its position predicate, its places and designs, and the battery
+/// capacity.
 struct Changes {
     at: &'static str,
     places: Vec<String>,
@@ -64,7 +65,7 @@ impl Changes {
         Self { at, places: of_type(place), designs: of_type(design), capacity }
     }
 
-    /// Something happens to the robot.
+    /// Applies a random change to the problem.
     fn happen(&self, problem: &mut Problem, random: &mut Random) {
         match random.below(5) {
             0 => {
@@ -75,7 +76,7 @@ impl Changes {
                 problem.init.push(InitialElement::Fact(atom(&format!("{} {place}", self.at))));
             }
             1 => {
-                // Tenths, so that the numbers of the task have another unit.
+                // Tenths, so that the numbers have another scale than the task.
                 let value = BigRational::new((random.below(10 * self.capacity as u64 + 1)).into(), 10.into());
                 for element in &mut problem.init {
                     if let InitialElement::Value(function, known, _) = element
@@ -127,7 +128,7 @@ fn live_with(
     };
     let mut told = Vec::new();
     let found = replanner.plan_aloud(&query, &mut |progress| told.push(progress));
-    // Progress reports must agree with the final result.
+    // Progress reports must be consistent with the final result.
     if let ReplanOutcome::Optimal { metric, .. } = &found {
         for progress in told {
             let dearest = progress.metric.as_ref();
@@ -143,7 +144,7 @@ fn new(domain: &Domain, problem: &Problem) -> Replanner {
     Replanner::new(domain, problem, &available, &GroundConfig::default()).expect("the domain is suited")
 }
 
-/// Both answers are the same plan, or both report that none exists.
+/// Checks that both results have equal plans, or that both report that no plan exists.
 fn compare(expected: &Solution, found: &ReplanOutcome, context: &dyn Fn() -> String) {
     match (&expected.plan, found) {
         (Some(plan), ReplanOutcome::Optimal { steps, metric, .. }) => {
@@ -161,8 +162,8 @@ fn compare(expected: &Solution, found: &ReplanOutcome, context: &dyn Fn() -> Str
     }
 }
 
-/// Applies changes to a mission one by one, each answered in both ways. Returns how often it had to
-/// be ground again.
+/// Applies changes to a mission one by one, and replans after each in both ways. Returns the number of times
+/// that the mission had to be grounded again.
 fn check(seed: u64, changes: usize) -> usize {
     let mission = Mission::random(seed);
     let (domain, mut problem) = parse(&mission.domain(), &mission.problem());
@@ -210,8 +211,8 @@ fn named(steps: &[metaplan_planner::Step]) -> Named {
     steps.iter().map(|step| (step.action.clone(), step.arguments.clone())).collect()
 }
 
-/// After a change the plan that stays close to the old one is a best one with fewest steps, and of
-/// all of those, as the SAT solver enumerates them, none has more steps of the old one.
+/// After a change, the plan that stays close to the old plan must be optimal with the fewest steps. No
+/// optimal plan of this length, as enumerated with the SAT solver, may share more steps with the old plan.
 fn check_close(seed: u64) {
     let mission = Mission::random(seed);
     let (domain, mut problem) = parse(&mission.domain(), &mission.problem());
@@ -266,7 +267,7 @@ fn plans_stay_close_to_the_old_one() {
         panic!("no plan")
     };
     let old = named(&old);
-    // Both designs are as good; in the order of the model the other one comes first.
+    // Both designs are equally good. The other design comes first in model order.
     problem.init.push(InitialElement::Fact(atom("fd_available left")));
     let limits = Limits::none();
     let plan = |replanner: &mut Replanner, close_to: Option<&[(String, Vec<String>)]>| {
@@ -285,8 +286,7 @@ fn plans_stay_close_to_the_old_one() {
     assert_eq!(plan(&mut replanner, Some(&old)), old);
 }
 
-/// Switches that a robot turns on, in an order of its own, with a limit that has been reached
-/// before it begins.
+/// A robot turns on switches in its own order. The time limit is reached before replanning begins.
 #[test]
 fn the_old_plan_serves_when_time_is_up() {
     let domain = "(define (domain robot) (:types switch design function)
@@ -316,7 +316,7 @@ fn the_old_plan_serves_when_time_is_up() {
     let found = ask(&mut replanner, &problem, Some(&old));
     let ReplanOutcome::Feasible { first: None, steps, metric } = found else { panic!("{found:?}") };
     assert_eq!((named(&steps), metric), (old.clone(), BigRational::from_integer(14.into())));
-    // Where it is not a plan any more, it does not serve.
+    // If the old plan is no longer valid, it must not be returned.
     problem.init.push(InitialElement::Fact(atom("on s3")));
     assert_eq!(ask(&mut replanner, &problem, Some(&old)), ReplanOutcome::Unknown);
     assert!(
@@ -324,7 +324,7 @@ fn the_old_plan_serves_when_time_is_up() {
     );
 }
 
-/// Checks that the blocking set is minimal: alone it makes the mission unsolvable, and no proper part does.
+/// Checks that the blocking set is minimal: it makes the mission unsolvable, and no proper subset does.
 fn check_blocking(seed: u64) -> bool {
     let mission = Mission::random(seed);
     let (domain, mut problem) = parse(&mission.domain(), &mission.problem());
@@ -390,7 +390,7 @@ fn a_reconfiguration_at_the_last_step_counts() {
 
 const TOOL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/tools/gen_ratpa.py");
 
-/// A generated map with a battery.
+/// Returns a generated map with a battery.
 fn generated(waypoints: usize, designs: usize, functions: usize) -> Option<(Domain, Problem)> {
     let directory = Path::new(env!("CARGO_TARGET_TMPDIR"));
     let arguments = ["--family", "ugv", "--seed", "1", "--metric", "weighted", "--enc", "n", "--name", "map"];
@@ -403,7 +403,7 @@ fn generated(waypoints: usize, designs: usize, functions: usize) -> Option<(Doma
     command.output().ok()?.status.success().then(|| parse(&read("domain"), &read("problem")))
 }
 
-/// CPU time of the thread in milliseconds.
+/// Returns the CPU time of the thread in milliseconds.
 fn used() -> f64 {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").expect("Linux tells");
     text.split(' ').next().and_then(|first| first.parse::<f64>().ok()).expect("nanoseconds") / 1e6
@@ -454,8 +454,8 @@ fn replanning_time_compared_with_planning_from_scratch() {
     }
 }
 
-/// A state in which two atoms hold that exclude each other in the mission, though they are values
-/// of different variables.
+/// In this state, two atoms hold that are mutually exclusive in the mission, although they are values of
+/// different variables.
 #[test]
 fn a_state_that_violates_a_mutex_group_is_ground_again() {
     let moves = [("t1", "c", "a"), ("x1", "a", "b"), ("x2", "b", "a"), ("u1", "c", "d"), ("u2", "d", "e")];

@@ -1,4 +1,5 @@
-//! Statuses of edge cases: empty plans, unsolvable tasks, cycles without cost, metrics without an optimum.
+//! Statuses in edge cases: empty plans, unsolvable tasks, cycles without cost, and metrics without an
+//! optimum.
 
 use metaplan_planner::{
     Backend, Config, GroundConfig, MetricUnbounded, Proof, Status, StepSemantics, ground, optimize,
@@ -15,8 +16,8 @@ const DOMAIN: &str = "(define (domain d)
   (:action flip :parameters () :precondition (not (on)) :effect (on))
   (:action flop :parameters () :precondition (on) :effect (not (on))))";
 
-/// Status, cost and steps of the answer, with and without the quick search, by every solver and in
-/// all semantics.
+/// Checks the status, the cost and the number of steps of the result, with and without heuristic search, for
+/// every solver and all step semantics.
 fn check(name: &str, init: &str, goal: &str, metric: &str, expected: (Status, Option<&str>, Option<usize>)) {
     let problem = format!(
         "(define (problem p) (:domain d) (:objects a b c - place)
@@ -46,7 +47,7 @@ fn check(name: &str, init: &str, goal: &str, metric: &str, expected: (Status, Op
 
 const COST: &str = "(:metric minimize (total-cost))";
 const WAYS: &str = "(way a b) (= (length a b) 2) (way b c) (= (length b c) 3)";
-/// There and back for nothing.
+/// A cycle between a and b that costs nothing.
 const FREE: &str = "(way a b) (= (length a b) 0) (way b a) (= (length b a) 0) (way b c) (= (length b c) 3)";
 
 #[test]
@@ -80,7 +81,7 @@ fn a_metric_without_a_best_value_is_read_with_bounds() {
         "(define (problem p) (:domain d) (:objects a - place)
           (:init (at a) (= (total-cost) 0) (= (reward) 0) (= (fuel) 2)) (:goal (on)) {metric})"
     );
-    // That burning ends is not what the planner sees of the metric; waving does not end.
+    // The planner does not detect that burning cannot be repeated forever; waving can.
     let waving = DOMAIN.replace(
         "(:action flip",
         "(:action wave :parameters () :precondition () :effect (increase (reward) 1)) (:action flip",
@@ -107,14 +108,13 @@ fn proofs_name_their_reason() {
         read(&Source::new("domain", DOMAIN), &Source::new("problem", problem)).expect("PDDL");
     let task = ground(&domain, &problem, &GroundConfig::default()).expect("a task");
     let solution = optimize(&task, &Config::default(), &mut |_| {});
-    // The projection to the place is exact here, so its cost to go is the cost.
+    // The projection to the place is exact here, so its goal distance equals the cost.
     assert_eq!(solution.proof, Some(Proof::Bound));
     let within = Config::default().with_horizon(1);
     assert_eq!(optimize(&task, &within, &mut |_| {}).status, Status::UnsolvableWithinHorizon);
 }
 
-/// Changes of one number at one time that contradict each other leave an action inapplicable, as
-/// the validator has it.
+/// Simultaneous contradictory changes of a number make an action inapplicable, as in the validator.
 #[test]
 fn contradictory_changes_leave_an_action_inapplicable() {
     let solve = |effect: &str| {
@@ -136,7 +136,7 @@ fn contradictory_changes_leave_an_action_inapplicable() {
     assert_eq!(solve("(assign (x) 5) (assign (x) 5)"), Ok(Some(1)));
     assert_eq!(solve("(increase (x) 5) (decrease (x) 6)"), Ok(Some(1)));
     assert_eq!(solve("(scale-up (x) 5) (scale-down (x) 6)"), Ok(Some(1)));
-    // Where it depends on the state, what is lit matters.
+    // If the contradiction depends on the state, the truth of `lit` matters.
     assert_eq!(solve("(assign (x) 5) (when (not (lit)) (increase (x) 1))"), Ok(Some(2)));
     assert_eq!(solve("(assign (x) 5) (assign (x) (+ (x) 3))"), Err(1));
 }

@@ -1,17 +1,18 @@
-//! Random tasks against an oracle: which are refused with reason, and how many are proved.
+//! Statistics of random tasks that are compared with an oracle: rejected tasks, and tasks with a proof.
 
 use std::time::Duration;
 
 use metaplan_planner::{Config, GroundConfig, Limits, Solution, Status, Thresholds, ground, optimize};
 use pddl::ast::{Domain, Problem};
 
-/// Limits with which, where others have their turns at once, everything else begins at once, too.
+/// Returns limits for a head start. With a head start of 1, all optional parts of the search are used from
+/// the start.
 pub fn limits(head_start: usize) -> Limits {
     let thresholds = if head_start == 1 { Thresholds::NONE } else { Thresholds::default() };
     Limits::none().with_thresholds(thresholds)
 }
 
-/// Solution of a task. Returns `None` if the planner rejects the task, for which only `reason` is admitted.
+/// Solves a task. Returns `None` if the planner rejects the task; `reason` is the only admitted reason.
 pub fn solve(domain: &Domain, problem: &Problem, reason: &str) -> Option<Solution> {
     let task = match ground(domain, problem, &GroundConfig::default()) {
         Ok(task) => task,
@@ -25,7 +26,7 @@ pub fn solve(domain: &Domain, problem: &Problem, reason: &str) -> Option<Solutio
     Some(optimize(&task, &Config::default().with_limits(limits), &mut |_| {}))
 }
 
-/// Number of tasks that were decided.
+/// Number of tested tasks, and of tasks that were decided.
 pub struct Tally {
     seeds: u64,
     proved: u64,
@@ -33,7 +34,7 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// Reads the number of seeds from `METAPLAN_SEEDS`; the default is 300.
+    /// Creates an empty statistic. The number of seeds is read from `METAPLAN_SEEDS`; the default is 300.
     pub fn new() -> Self {
         let seeds = std::env::var("METAPLAN_SEEDS").map_or(300, |text| text.parse().expect("a number"));
         Self { seeds, proved: 0, unsolvable: 0 }
@@ -48,8 +49,8 @@ impl Tally {
         self.unsolvable += u64::from(solution.status == Status::Unsolvable);
     }
 
-    /// Checks that the test is meaningful: a quarter of the tasks is proved optimal, and one in
-    /// `one_in` unsolvable.
+    /// Checks that the test is meaningful: a quarter of the tasks must be proved optimal, and one in `one_in`
+    /// tasks must be proved unsolvable.
     pub fn check(&self, one_in: u64) {
         let Self { seeds, proved, unsolvable } = self;
         assert!(

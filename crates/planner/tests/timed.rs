@@ -1,5 +1,5 @@
-//! Plans with timed initial literals: known optima, and random tasks on which the planner must
-//! agree with the validator run on every sequence of up to three actions.
+//! Plans with timed initial literals: tasks with known optima, and random tasks. On the latter, the planner
+//! must agree with the validator applied to all sequences of up to three actions.
 
 use std::fmt::Write as _;
 
@@ -16,7 +16,8 @@ fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
     (domain, problem)
 }
 
-/// Cheapest plan. Returns `None` if it is proved that no plan exists. `Engine::Sat` is the SAT solver alone.
+/// Returns a cheapest plan, or `None` if it is proved that no plan exists. `Engine::Sat` uses only the SAT
+/// solver.
 fn plan(domain: &Domain, problem: &Problem, engine: Engine) -> Option<Plan> {
     let task =
         ground(domain, problem, &GroundConfig::default()).unwrap_or_else(|errors| panic!("{errors:?}"));
@@ -43,7 +44,7 @@ fn written(plan: &Plan) -> String {
     text
 }
 
-/// Metric of a plan by the validator. Returns `None` if the plan is invalid.
+/// Returns the metric of a plan according to the validator, or `None` if the plan is invalid.
 fn metric(domain: &Domain, problem: &Problem, text: &str) -> Option<String> {
     let plan =
         PlanText::parse(&Source::new("plan", text)).unwrap_or_else(|errors| panic!("{errors:?}\n{text}"));
@@ -52,7 +53,7 @@ fn metric(domain: &Domain, problem: &Problem, text: &str) -> Option<String> {
     verdict.valid.then(|| value.to_string())
 }
 
-/// The cost, and the times at which the actions start.
+/// Checks the cost of the plan and the start times of its actions.
 fn check(name: &str, domain: &str, problem: &str, expected: Option<(&str, &[&str])>) {
     let (domain, problem) = parse(domain, problem);
     let found = plan(&domain, &problem, Engine::Auto);
@@ -129,8 +130,8 @@ fn literal(random: &mut Random) -> String {
 
 #[test]
 fn a_wait_is_no_step_of_a_plan() {
-    // Without a metric plans are measured by their length: two actions and a wait are shorter than
-    // three actions.
+    // Without a metric, the number of actions is minimised. Two actions and a wait are shorter than three
+    // actions.
     let domain =
         "(define (domain d) (:requirements :timed-initial-literals) (:predicates (at-b) (at-c) (at-d) (gate))
       (:action to-b :parameters () :precondition (and) :effect (at-b))
@@ -151,7 +152,7 @@ fn a_wait_is_no_step_of_a_plan() {
     }
 }
 
-/// Conditions or effects, each at one of some times.
+/// Generates a conjunction of conditions or effects, each at a random time specifier.
 fn timed(random: &mut Random, times: &[&str], most: u64) -> String {
     let mut text = String::from("(and");
     for _ in 0..=random.below(most) {
@@ -161,7 +162,7 @@ fn timed(random: &mut Random, times: &[&str], most: u64) -> String {
     text + ")"
 }
 
-/// A task and the data for brute force.
+/// A random task, and the data that the brute-force search needs.
 struct Sample {
     durations: [i64; 3],
     events: Vec<i64>,
@@ -207,9 +208,9 @@ fn sample(random: &mut Random) -> Sample {
     Sample { durations, events, domain, problem }
 }
 
-/// The least cost of valid plans of up to three actions. All times of the files are integers; so an
-/// action that can start at all at some time can start as soon as the last has ended, or so that it
-/// starts or ends with an event or half a unit later. Times are doubled.
+/// Returns the minimum cost of valid plans with up to three actions. All times in the files are integers. An
+/// action that is possible at some time is therefore also possible directly after the previous action, or
+/// such that it starts or ends at an event or half a unit later. Times are doubled.
 fn brute_force(task: &Sample, domain: &Domain, problem: &Problem) -> Option<i64> {
     let mut best = None;
     let mut open: Vec<(i64, String, usize)> = vec![(0, String::new(), 0)];

@@ -1,14 +1,14 @@
-//! The validator compared with that of the unified planning framework for plans with times: on the
-//! real files that the framework can read, with cheapest plans and with plans that were changed in
-//! one place.
+//! Compares the validator with that of the Unified Planning Framework on plans with times. The files are real
+//! files that the framework can read. The plans are cheapest plans and plans that differ from them in one
+//! place.
 //!
-//! The framework knows neither the mutex rule of PDDL 2.1 nor, where an action has no effect at its
-//! start, what holds over all of it just after its start. So what it rejects is to be rejected, and
-//! what it accepts may be rejected for these two reasons only.
+//! The framework ignores the mutex rule of PDDL 2.1. If an action has no effect at its start, the framework
+//! also ignores its over-all condition directly after the start. The validator must reject every plan that
+//! the framework rejects, and may reject further plans only for these two reasons.
 //!
-//! Needs a Python with the framework
-//! (`python3 -m venv peers; peers/bin/pip install unified-planning`), named by
-//! `METAPLAN_PEERS=peers/bin/python`. The files are not part of the project.
+//! The environment variable `METAPLAN_PEERS` must name a Python with the framework (`python3 -m venv peers;
+//! peers/bin/pip install unified-planning`, then `METAPLAN_PEERS=peers/bin/python`). The files are not part
+//! of the project.
 
 #![expect(clippy::print_stdout, reason = "figures are shown")]
 
@@ -25,7 +25,7 @@ use pddl::{Source, print_domain, print_problem, read};
 
 const REAL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/real/pddl");
 
-/// The domains and problems that the framework reads.
+/// Domains and problems that the framework can read.
 const PAIRS: [(&str, &str); 8] = [
     ("domain_expert_test_pddl_domain_charging", "domain_expert_test_pddl_problem_charging"),
     ("domain_expert_test_pddl_domain_simple", "domain_expert_test_pddl_problem_simple_1"),
@@ -37,7 +37,7 @@ const PAIRS: [(&str, &str); 8] = [
     ("suave_extended_metaplan_domain", "suave_extended_metaplan_problem"),
 ];
 
-/// Reads a domain, a problem and plans, and prints a verdict for each plan.
+/// Python program that reads a domain, a problem and plans, and prints a verdict for each plan.
 const PEER: &str = "import sys
 from unified_planning.exceptions import UPTypeError, UPUsageError
 from unified_planning.engines.plan_validator import TimeTriggeredPlanValidator
@@ -54,7 +54,7 @@ for text in open(sys.argv[3]).read().split('---\\n'):
         valid = False
     print('valid' if valid else 'invalid')";
 
-/// A step: its start in thousandths, its words, and its duration in thousandths.
+/// A step: start in thousandths, name and arguments, and duration in thousandths.
 type Timed = (i128, Vec<String>, Option<i128>);
 
 fn file(name: &str) -> PathBuf {
@@ -74,7 +74,7 @@ fn text(plan: &[Timed]) -> String {
     plan.iter().map(line).collect()
 }
 
-/// Cheapest plan with slightly separated steps; empty if the planner finds no plan.
+/// Returns a cheapest plan with small gaps between its steps, or an empty plan if the planner finds none.
 fn plan(domain: &Domain, problem: &Problem) -> Vec<Timed> {
     let steps: Vec<(Vec<String>, Exact)> = ground(domain, problem, &GroundConfig::default())
         .ok()
@@ -99,7 +99,7 @@ fn plan(domain: &Domain, problem: &Problem) -> Vec<Timed> {
     timed
 }
 
-/// The plan with one thing changed, chosen by a number.
+/// Returns the plan with a single change, which `number` determines.
 fn changed(plan: &[Timed], objects: &[String], number: usize) -> Vec<Timed> {
     let mut plan = plan.to_vec();
     let place = number / 7 % plan.len();
@@ -111,8 +111,8 @@ fn changed(plan: &[Timed], objects: &[String], number: usize) -> Vec<Timed> {
             plan.push((start + duration.unwrap_or_default() + 5, words, duration));
         }
         2 => plan.truncate(place),
-        // Earlier, so that it overlaps or comes before what it needs; sometimes at the same time as
-        // the one before.
+        // The step starts earlier, so that it overlaps with or precedes an action that it needs. Sometimes it
+        // starts together with the previous step.
         3 => {
             plan[place].0 = if place > 0 && some == 0 { plan[place - 1].0 } else { plan[place].0 * some / 4 }
         }
@@ -147,7 +147,7 @@ fn verdicts_on_real_files_are_those_of_the_unified_planning_framework() {
         let name = problem.name.name.to_string();
         let objects: Vec<String> =
             problem.objects.iter().map(|object| object.identifier.name.to_string()).collect();
-        // The framework does not take an empty plan for one with times.
+        // The framework does not treat an empty plan as a plan with times.
         let changed = (0..70).map(|number| changed(&best, &objects, number * 3));
         let plans: Vec<_> =
             std::iter::once(best.clone()).chain(changed).filter(|plan| !plan.is_empty()).collect();

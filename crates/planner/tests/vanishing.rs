@@ -1,13 +1,13 @@
-//! Actions that must not vanish: missing cases, designs and values remove only the actions that need them.
+//! Actions that must not be lost: a missing case, design or value may remove only the actions that need it.
 //!
-//! Each of these was answered with a false "no plan exists" or a false optimum once. What is right
-//! follows from the definition in `validate`, which also executes the expected plan.
+//! The planner once answered each of these tasks with a false "no plan exists" or a false optimum. The
+//! correct result follows from the semantics in `validate`, which also executes the expected plan.
 
 use metaplan_planner::{Config, GroundConfig, Status, ground, optimize};
 use pddl::validate::{Options, PlanText, validate};
 use pddl::{Source, read};
 
-/// Expected result: the metric and a plan with this metric, no plan, or a rejection with a code.
+/// Expected result: the metric and a plan with this metric, no plan, or a rejection with an error code.
 enum Expected {
     Optimal(&'static str, &'static str),
     Unsolvable,
@@ -42,8 +42,8 @@ fn check(name: &str, domain: &str, problem: &str, expected: &Expected) {
     }
 }
 
-/// An action of duration 2 with these start effects in addition to `(q)`, and one of duration 100
-/// that also reaches the goal.
+/// Returns a domain with two actions. The first has duration 2 and the given start effects in addition to
+/// `(q)`; the second has duration 100 and also achieves the goal.
 fn conditional(effects: &str) -> String {
     format!(
         "(define (domain d) (:requirements :durative-actions :fluents :conditional-effects) (:predicates (p) (q) (r)) (:functions (f) (g) (h))
@@ -76,7 +76,7 @@ fn a_case_that_cannot_be_takes_only_itself() {
     ] {
         check(name, &conditional(effects), FLAT, &Optimal("2", "0: (a) [2]"));
     }
-    // Where the condition holds the action cannot be executed.
+    // In states in which the condition holds, the action cannot be executed.
     let held = FLAT.replace("(:init", "(:init (p)");
     let both = conditional("(at start (increase (f) 5)) (when (at start (p)) (at start (assign (f) 0)))");
     check("the condition holds", &both, &held, &Optimal("100", "0: (dear) [100]"));

@@ -1,4 +1,4 @@
-//! Admissibility and consistency of the heuristics.
+//! Checks that the heuristics are admissible and consistent.
 
 use metaplan_search::bounds::Bounds;
 use task::context::Context;
@@ -6,9 +6,8 @@ use task::limits::Limits;
 use testing::missions::Mission;
 use testing::{depot, fleet, ground_text, successors};
 
-/// Checks that heuristic values are consistent and 0 at the goal, so they are lower bounds. Returns
-/// whether cost partitioning over several projections gives a higher value of the initial state
-/// than any projection alone.
+/// Checks that heuristic values are consistent and 0 at goal states, so that they are lower bounds. Returns
+/// `true` if cost partitioning yields a higher value of the initial state than every single projection.
 fn check_estimates(text: &(String, String)) -> bool {
     let task = ground_text(text.clone());
     if task.unreachable.is_some() {

@@ -1,6 +1,6 @@
-//! Error codes of this crate with meaning, cause and remedy.
+//! Error codes of the grounding stage, each with its meaning, cause and remedy.
 
-/// Codes in ascending order, each with meaning, cause and remedy.
+/// Error codes in ascending order. Each entry is `[code, meaning, cause, remedy]`.
 pub const CODES: &[[&str; 4]] = &[
     [
         "E301",

@@ -1,10 +1,10 @@
-//! The ground task with its limits, shared by all stages after grounding.
+//! The ground task and the planning limits, which all stages after grounding share.
 
 use crate::limits::Limits;
 use crate::number::Int;
 use crate::task::Task;
 
-/// The ground task and the limits of planning.
+/// Reference to the ground task and the planning limits.
 #[derive(Debug)]
 pub struct Context<'a, N = Int> {
     pub task: &'a Task<N>,

@@ -1,4 +1,4 @@
-//! Errors between a checked PDDL task and its ground task, each with a stable code.
+//! Errors that occur between a checked PDDL task and its ground task. Each has a stable code.
 
 use crate::limits::Interrupted;
 use pddl::ast::Span;
@@ -17,18 +17,18 @@ pub enum File {
 pub struct Place {
     /// The file.
     pub file: File,
-    /// Text range.
+    /// Text range in the file.
     pub span: Span,
 }
 
-/// All errors of a task.
+/// All errors found in a task.
 pub type Errors = diagnostics::Errors<Error>;
 
 /// Reason why a task cannot be grounded or encoded.
 #[derive(Debug, Clone, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A construct that the planner does not support, although the parser and the validator may.
+    /// A construct that the planner does not support, although it can be parsed and possibly validated.
     #[error("{construct} cannot be planned with: {instead}")]
     Unsupported {
         /// The construct in the file.
@@ -56,26 +56,26 @@ pub enum Error {
         /// Source location.
         place: Place,
     },
-    /// A product or quotient that is not linear in the fluents.
+    /// A product or quotient that is not linear in the numeric fluents that actions change.
     #[error("the expression is not linear in the fluents that actions change")]
     NonLinear {
         /// Source location.
         place: Place,
     },
-    /// A number that exceeds the exact integer arithmetic of the encoder.
+    /// A number that exceeds the exact integer arithmetic of the planner.
     #[error(
         "{what}: a number exceeds 2^118 after scaling to integers, or has fractions that no scale makes integers"
     )]
     Overflow {
-        /// Description of the quantity.
+        /// Description of the quantity that contains the number.
         what: String,
-        /// The action or the metric that contains the number, if known.
+        /// The action or metric that contains the number, if known.
         place: Option<Place>,
     },
     /// A limit was reached before grounding was complete.
     #[error("a limit was reached while grounding")]
     Interrupted,
-    /// A rule of the relaxed reachability program that the rule engine rejects.
+    /// A rule of the relaxed reachability program that the Datalog engine rejects.
     #[error("grounding: {0}")]
     Rules(String),
 }
@@ -98,7 +98,7 @@ impl Error {
         Self::Overflow { what: what.to_owned(), place: None }
     }
 
-    /// Adds a location to an overflow error without one; returns other errors unchanged.
+    /// Adds a name and, if none is set, a location to an overflow error. Returns other errors unchanged.
     #[must_use]
     pub fn within(self, name: &str, place: Option<Place>) -> Self {
         match self {
@@ -109,7 +109,7 @@ impl Error {
         }
     }
 
-    /// Returns `true` if a fluent is read that has no initial value.
+    /// Returns `true` if the error is a numeric fluent that is read but has no initial value.
     pub fn is_value_missing(&self) -> bool {
         matches!(self, Self::NoValue { .. })
     }
@@ -126,7 +126,7 @@ impl Error {
         }
     }
 
-    /// Returns the source location, if there is one.
+    /// Returns the source location of the error, or `None` if it has none.
     pub fn place(&self) -> Option<Place> {
         match self {
             Self::Unsupported { place, .. }

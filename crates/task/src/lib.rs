@@ -1,8 +1,9 @@
-//! PDDL to a lifted task, and a lifted task to a ground task: normalization, compilation of language features, grounding, plans.
+//! Converts a PDDL task to a lifted task and further to a ground task: normalization, compilation of language
+//! features, grounding, and plans.
 //!
 //! Modules in the order of the pipeline: syntax tree (crate `pddl`) → `normalize` → `lifted` → `ground` → `task` → `plan`.
 //!
-//! Absent: search, SAT and OWL. Availability of designs arrives as facts of the problem.
+//! Absent: search, SAT and OWL. The availability of designs is part of the problem as facts.
 
 #![allow(missing_docs, reason = "an interface of the workspace; names say what fields hold")]
 #![warn(

@@ -1,9 +1,9 @@
-//! Limits of a computation: a deadline, an interrupt flag, and the memory of a search.
+//! Limits of a computation: a deadline, an interrupt flag, and the memory limit of a search.
 //!
-//! Ctrl-C sets the flag, and so does the memory limit of the process. Long loops iterate through [`Limits::watch`]
-//! or call [`LimitPoll::beat`]. Both check the deadline and the flag and return [`Interrupted`] at a limit, which
-//! callers propagate with `?`: an interrupted function has no result that could be mistaken for an answer. So the
-//! compiler checks that every caller stops. Searches compare their own memory with [`Limits::room`].
+//! Ctrl-C sets the flag, and so does the memory limit of the process. Long loops iterate through
+//! [`Limits::watch`] or call [`LimitPoll::beat`]. Both check the deadline and the flag, and return
+//! [`Interrupted`] at a limit. Callers propagate this error with `?`, so an interrupted function never
+//! returns a partial result as an answer. Searches compare their estimated memory with [`Limits::room`].
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -13,19 +13,19 @@ use rules::Interrupt;
 
 use crate::thresholds::Thresholds;
 
-/// The limits of one planning run. Clones share the flag.
+/// The limits of one planning run. Clones share the interrupt flag.
 #[derive(Debug, Clone, Default)]
 pub struct Limits {
     deadline: Option<Instant>,
-    /// Time from the start to the deadline.
+    /// Time limit as a duration, from which the deadline was computed.
     time: Duration,
     interrupt: Arc<AtomicBool>,
     room: Option<usize>,
     thresholds: Thresholds,
 }
 
-/// Time after the deadline in which an answer can be completed, in addition to a tenth of the time limit. It is shorter than the 0.2 s
-/// that a command may take, since the process has to start and to print.
+/// Time for completing an answer after the deadline, in addition to a tenth of the time limit. It is shorter
+/// than the 0.2 s tolerance of a command, because the process must also start and print.
 const GRACE: Duration = Duration::from_millis(120);
 
 /// Default memory limit of a search in bytes.
@@ -37,7 +37,7 @@ impl Limits {
         Self::default()
     }
 
-    /// Sets the deadline to this long from now.
+    /// Sets the deadline to `time` from now.
     #[must_use]
     pub fn with_time(mut self, time: Duration) -> Self {
         self.deadline = Instant::now().checked_add(time);
@@ -45,8 +45,8 @@ impl Limits {
         self
     }
 
-    /// Returns the same limits with half of the remaining time, so that time remains for a later task. The flag is
-    /// shared.
+    /// Returns limits with half of the remaining time, so that time remains for a later computation. The
+    /// interrupt flag is shared.
     #[must_use]
     pub fn half(&self) -> Self {
         let remaining = self.deadline.map(|deadline| deadline.saturating_duration_since(Instant::now()));
@@ -56,7 +56,8 @@ impl Limits {
         }
     }
 
-    /// Returns the same limits with a deadline at most this long from now.
+    /// Returns limits with the earlier of two deadlines: the current one, and `time` from now. The interrupt
+    /// flag is shared.
     #[must_use]
     pub fn within(&self, time: Duration) -> Self {
         let limits = self.clone().with_time(time);
@@ -66,8 +67,9 @@ impl Limits {
         }
     }
 
-    /// Returns limits for the completion of an answer. The deadline is later by a tenth of the time
-    /// limit and a constant grace period. The flag is new, and the memory limit is the default.
+    /// Returns limits for completing an answer after the deadline. The new deadline is later by a tenth of
+    /// the time limit and a constant grace period. The interrupt flag is new, and the memory limit is the
+    /// default.
     #[must_use]
     pub fn extended(&self) -> Self {
         let grace = self.time.mul_f64(0.1).saturating_add(GRACE);
@@ -75,14 +77,14 @@ impl Limits {
         Self { deadline, time: self.time, ..Self::default() }
     }
 
-    /// Sets the memory limit of a search, in bytes of its own estimate.
+    /// Sets the memory limit of a search in bytes. Searches compare it with their own estimate.
     #[must_use]
     pub fn with_room(mut self, bytes: usize) -> Self {
         self.room = Some(bytes);
         self
     }
 
-    /// Overrides the task sizes from which parts of the search are active.
+    /// Sets the task sizes from which optional parts of the search are used.
     #[doc(hidden)]
     #[must_use]
     pub fn with_thresholds(mut self, thresholds: Thresholds) -> Self {
@@ -90,7 +92,7 @@ impl Limits {
         self
     }
 
-    /// Returns the task sizes from which parts of the search are active.
+    /// Returns the task sizes from which optional parts of the search are used.
     pub fn thresholds(&self) -> &Thresholds {
         &self.thresholds
     }
@@ -113,12 +115,12 @@ impl Limits {
         if self.reached() { Err(Interrupted) } else { Ok(()) }
     }
 
-    /// Iterates over the items while no limit is reached, then yields a single error and ends.
+    /// Iterates over the items until a limit is reached; then yields a single error and ends.
     pub fn watch<I: IntoIterator>(&self, items: I) -> LimitedIter<'_, I::IntoIter> {
         LimitedIter { items: items.into_iter(), pulse: self.pulse(), is_over: false }
     }
 
-    /// Returns a poll of the limits for loops without an iterator.
+    /// Returns a poll that checks the limits in loops without an iterator.
     pub fn pulse(&self) -> LimitPoll<'_> {
         LimitPoll { limits: self, left: 0, stride: 1, last: None }
     }
@@ -130,7 +132,7 @@ impl Limits {
     }
 }
 
-/// Stops a rule engine at the limits.
+/// Converts limits to the interrupt callback of the Datalog engine.
 impl From<&Limits> for Interrupt {
     fn from(limits: &Limits) -> Self {
         let limits = limits.clone();
@@ -138,12 +140,12 @@ impl From<&Limits> for Interrupt {
     }
 }
 
-/// A limit was reached, so the computation has no result.
+/// Error: a limit was reached, so the computation has no result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Interrupted;
 
-/// Polls the limits at an adaptive stride: on every beat if beats are slow, rarely if the clock
-/// would cost more than the beats.
+/// Polls the limits with an adaptive stride. Slow loops check the clock at every beat; fast loops check it
+/// rarely, because reading the clock would dominate the loop.
 #[derive(Debug)]
 pub struct LimitPoll<'a> {
     limits: &'a Limits,
@@ -159,7 +161,7 @@ const LONGEST_STRIDE: u32 = 1 << 14;
 const POLL_INTERVAL: Duration = Duration::from_millis(2);
 
 impl LimitPoll<'_> {
-    /// Counts a beat and checks the limits if the stride has passed.
+    /// Counts one loop iteration; checks the limits if enough iterations have passed since the last check.
     ///
     /// # Errors
     /// [`Interrupted`] if a limit is reached.
@@ -190,7 +192,7 @@ impl LimitPoll<'_> {
     }
 }
 
-/// Items under limits; see [`Limits::watch`].
+/// Iterator that ends with an error at a limit; see [`Limits::watch`].
 #[derive(Debug)]
 pub struct LimitedIter<'a, I> {
     items: I,
@@ -224,7 +226,7 @@ mod tests {
         let mut watched = limits.watch(0..);
         assert_eq!(watched.next(), Some(Ok(0)));
         limits.interrupt().store(true, Ordering::Relaxed);
-        // The flag may be noticed only after a stride; then a single error follows.
+        // The flag may be noticed only after a stride of items. A single error follows.
         let results: Vec<_> = watched.collect();
         assert_eq!(results.iter().filter(|item| item.is_err()).count(), 1);
         assert_eq!(results.last(), Some(&Err(Interrupted)));

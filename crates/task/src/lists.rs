@@ -1,11 +1,11 @@
-//! A list of lists of numbers in one allocation.
+//! A list of lists of numbers, stored in one allocation.
 
 use crate::number::dense;
 
-/// Lists of numbers, stored consecutively.
+/// Lists of numbers, stored one after another.
 #[derive(Debug, Clone, Default)]
 pub struct Lists {
-    /// End of each list.
+    /// End position of each list in `items`.
     ends: Vec<u32>,
     items: Vec<u32>,
 }
@@ -16,11 +16,12 @@ impl Lists {
         self.ends.push(dense(self.items.len()));
     }
 
-    /// Number of lists.
+    /// Returns the number of lists.
     pub fn count(&self) -> usize {
         self.ends.len()
     }
 
+    /// Returns the list at an index.
     pub fn of(&self, index: u32) -> &[u32] {
         let index = index as usize;
         let start = index.checked_sub(1).map_or(0, |before| self.ends[before]);
@@ -31,7 +32,8 @@ impl Lists {
         (0..dense(self.count())).map(|index| self.of(index))
     }
 
-    /// Returns for each number below `count` the indices of the lists that contain it.
+    /// Returns the inverse relation: list i of the result contains the indices of all lists that contain i,
+    /// for each i below `count`.
     #[must_use]
     pub fn inverse(&self, count: usize) -> Self {
         let mut ends = vec![0_u32; count];

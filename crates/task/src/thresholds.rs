@@ -1,36 +1,36 @@
-//! Task sizes at which parts of a search begin.
+//! Task sizes from which optional parts of a search are used.
 
-/// Sizes from which optional parts of the search are active. Answers do not depend on them. Tests
-/// lower them, so that small tasks, whose answers are known by brute force, reach every pruning.
+/// Sizes from which optional parts of the search are used. The planner's answers do not depend on them. Tests
+/// lower the sizes, so that small tasks, whose answers are known by brute force, exercise every pruning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Thresholds {
-    /// Number of stored states without a plan after which A\* is joined by a greedy search, and
-    /// then by stubborn sets, object symmetries and landmarks, if no other component takes turns
-    /// with it. `Config::head_start` of the planner is the corresponding number for the planner as
-    /// a whole.
+    /// Number of stored states without a plan after which additional components support A\*: first a greedy
+    /// search, then stubborn sets, object symmetries and landmarks. Applies only if no other component
+    /// alternates with A\*. `Config::head_start` of the planner is the corresponding number for the whole
+    /// planner.
     pub states: usize,
-    /// Number of stored states at which A\* first compares its progress with the available memory.
+    /// Number of stored states at which A\* first estimates whether its memory will suffice.
     pub progress: usize,
-    /// Work, in work units, after which the lagging search gets half of its share.
+    /// Work, in work units, after which the search component that lags behind gets only half of its share.
     pub behind: u64,
-    /// Number of states after which stubborn sets are disabled if they prune too little.
+    /// Number of states after which stubborn sets are disabled if they have pruned too little.
     pub stubborn: u64,
     /// Number of evaluated states after which the satisficing search computes h² mutexes.
     pub pairs: u64,
-    /// Number of non-dominated labels above which a front is stored as a tree, and above which a
-    /// leaf of this tree is split.
+    /// Number of non-dominated labels above which a Pareto front is stored as a tree. Also the limit on the
+    /// number of labels in a leaf of this tree.
     pub front: usize,
-    /// Number of labels at which the graph of all optimal plans is first searched for alternatives.
+    /// Number of labels after which the graph of all optimal plans is first searched for alternative plans.
     pub alternatives: usize,
-    /// Number of nodes after which the greedy search and the search for sequential plans take turns
-    /// with the exact temporal search.
+    /// Number of nodes after which the greedy search and the search for sequential plans alternate with the
+    /// exact temporal search.
     pub concurrent: usize,
-    /// Length of the first turn of the greedy search in nodes; turns of the other searches are
+    /// Number of nodes in the first turn of the greedy search. The turns of the other searches are
     /// proportional.
     pub turn: usize,
-    /// Number of sequences after which the exhaustive search with chosen durations takes turns with
-    /// others, and length of its first turn.
+    /// Number of sequences after which the exhaustive search with chosen durations alternates with other
+    /// searches. Also the length of its first turn.
     pub chosen: u64,
 }
 
@@ -52,7 +52,7 @@ impl Default for Thresholds {
 }
 
 impl Thresholds {
-    /// All parts are active from the start, and stubborn sets are never disabled.
+    /// Thresholds with which all parts are used from the start, and stubborn sets are never disabled.
     pub const NONE: Self = Self {
         states: 0,
         progress: 0,

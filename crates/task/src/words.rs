@@ -1,6 +1,6 @@
-//! Names of the variants of enumerations, in text and in documents.
+//! Words that name the variants of enumerations in text and in serialised documents.
 
-/// Error about a word that names no variant.
+/// Error: a word that names no variant of an enumeration.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("unknown {what} `{word}`: it must be one of {}", .known.join(", "))]
 pub struct UnknownWord {
@@ -15,13 +15,13 @@ impl UnknownWord {
     }
 }
 
-/// Implements `as_str`, `Display`, `FromStr`, `Serialize` and `Deserialize` by the words of the
-/// variants.
+/// Implements `as_str`, `Display`, `FromStr`, `Serialize` and `Deserialize` for an enumeration, with one word
+/// for each variant.
 #[macro_export]
 macro_rules! words {
     ($type:ident, $what:literal: $($variant:ident = $word:literal),+ $(,)?) => {
         impl $type {
-            /// Returns the stable word of the variant.
+            /// Returns the stable word that names the variant.
             pub fn as_str(self) -> &'static str {
                 match self { $(Self::$variant => $word),+ }
             }

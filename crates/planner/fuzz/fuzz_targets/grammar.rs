@@ -1,6 +1,6 @@
-//! Generated domains and problems are read without errors, printed and read again as the same
-//! trees, and ground or rejected. With some words deleted, doubled or exchanged, they are read
-//! without a crash.
+//! Fuzz target: generates domains and problems. The reader must accept them, printing and reading must yield
+//! equal trees, and grounding must succeed or return errors. Texts with some words deleted, doubled or
+//! exchanged must be read without a crash.
 
 #![no_main]
 
@@ -23,7 +23,7 @@ use libfuzzer_sys::fuzz_target;
 use pddl::{Source, read, render};
 use metaplan_planner::{GroundConfig, ground};
 
-/// Words with a meaning in PDDL or in the generated files.
+/// Words that have a meaning in PDDL or occur in the generated files.
 const WORDS: [&str; 28] = [
     "(",
     ")",
@@ -55,7 +55,7 @@ const WORDS: [&str; 28] = [
     "((((",
 ];
 
-/// Copy of the text with a few words changed, controlled by the input bytes.
+/// Returns a copy of the text in which a few words are changed. The input bytes determine the changes.
 fn mutated(text: &str, bytes: &mut &[u8]) -> String {
     let spaced = text.replace('(', " ( ").replace(')', " ) ");
     let mut words: Vec<&str> = spaced.split_whitespace().collect();

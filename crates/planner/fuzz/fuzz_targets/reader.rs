@@ -1,5 +1,6 @@
-//! Arbitrary bytes as a domain, a problem and a plan: the reader returns messages, or trees that
-//! print and read back as the same trees. A byte that occurs in no text separates the three files.
+//! Fuzz target: reads arbitrary bytes as a domain, a problem and a plan. The reader must return errors, or
+//! trees that are equal after printing and reading. The three files are separated by a byte that occurs in no
+//! text.
 
 #![no_main]
 
@@ -9,7 +10,7 @@ use pddl::{
 };
 use pddl::validate::PlanText;
 
-/// Debug text of a tree, without source positions.
+/// Returns the debug text of a syntax tree without source positions.
 fn bare(tree: &impl std::fmt::Debug) -> String {
     let text = format!("{tree:?}");
     let mut parts = text.split("Span { start: ");

@@ -1,5 +1,5 @@
-//! Generated plans for generated tasks: the validator judges them as a naive interpreter does, also
-//! concurrently where the steps lie apart; arbitrary plan text is validated or rejected.
+//! Fuzz target: generates tasks and plans. The validator must agree with a naive interpreter, also on
+//! concurrent plans whose steps do not overlap. Arbitrary plan text must be validated or rejected.
 
 #![no_main]
 

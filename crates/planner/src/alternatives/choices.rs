@@ -1,4 +1,4 @@
-//! Other cheapest plans that are known, and the choices that all cheapest plans share.
+//! The result of a search for alternative cheapest plans, and the choices that all cheapest plans share.
 
 use task::lifted::ObjectId;
 use task::number::dense;
@@ -6,34 +6,34 @@ use task::plan::Plan;
 use task::plan::ground::GroundStep;
 use task::task::{Argument, Task};
 
-/// Other cheapest plans of a task, and the choices that every cheapest plan makes.
+/// Cheapest plans other than the first plan, and the choices that all cheapest plans share.
 ///
-/// Idle actions are not counted: they cost nothing, and neither the goal, the metric nor an action
-/// that is not idle depends on their effects. Grounding removes them. A plan stays a plan with the
-/// same cost if they are removed from it.
+/// Idle actions are ignored: they cost nothing, and neither the goal, the metric nor a non-idle action
+/// depends on their effects. Grounding removes idle actions. Removing them from a plan yields a plan of equal
+/// cost.
 #[derive(Debug, Clone)]
 pub struct Alternatives {
-    /// Plans with the cost of the first plan, without the first plan itself.
+    /// Cheapest plans other than the first plan.
     pub plans: Vec<Plan>,
-    /// Whether it is proved that there are no others, idle actions apart.
+    /// `true` if it is proved that there are no other cheapest plans, except by adding idle actions.
     pub complete: bool,
-    /// For each step of the first plan, the choices that every cheapest plan without idle actions
-    /// makes at that step. `None` if a limit was reached, if cheapest plans may be longer than the
-    /// longest one that was searched for, if the task has waits, or if only an external solver
-    /// claims the result.
+    /// For each step of the first plan: the choices that every cheapest plan without idle actions makes at
+    /// this step. `None` in any of these cases: a limit was reached, cheapest plans may have more steps than
+    /// were searched, the task has waits, or the result depends on an unverified external solver.
     pub forced: Option<Vec<Forced>>,
 }
 
-/// Choices at a step that are the same in every cheapest plan.
+/// Choices at one step that every cheapest plan makes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Forced {
-    /// Whether the action is the same, designs among its arguments apart.
+    /// `true` if every cheapest plan has the same action at this step, ignoring designs among its arguments.
     pub action: bool,
-    /// The functions whose design is the same.
+    /// Names of the functions for which every cheapest plan selects the same design at this step.
     pub functions: Vec<String>,
 }
 
-/// A choice of the first plan: an operator at a step, or the design of one of its slots (by position).
+/// A choice of the first plan: the operator of a step (if `slot` is `None`), or the design of one of its
+/// slots.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Choice {
     pub(super) step: usize,
@@ -41,7 +41,7 @@ pub(super) struct Choice {
 }
 
 impl Choice {
-    /// All choices of a plan.
+    /// Returns all choices of a plan.
     pub(super) fn all(plan: &[GroundStep]) -> Vec<Self> {
         let choices = plan.iter().enumerate().flat_map(|(step, content)| {
             let slots = (0..dense(content.choice.len())).map(Some);
@@ -51,8 +51,8 @@ impl Choice {
     }
 }
 
-/// Returns `true` if both steps have the same operator, or, with a slot, if `other` also uses the
-/// design that `one` has in that slot.
+/// Without a slot, returns `true` if both steps have the same operator. With a slot, returns `true` if
+/// `second` also uses the slot and design that `first` has at this position.
 pub(super) fn shares(task: &Task, first: &GroundStep, second: &GroundStep, slot: Option<u32>) -> bool {
     match slot {
         None => second.operator == first.operator,
@@ -63,13 +63,13 @@ pub(super) fn shares(task: &Task, first: &GroundStep, second: &GroundStep, slot:
     }
 }
 
-/// Slot and design in the task's numbering.
+/// Returns the slot of the task and the index of the selected design, for a slot position of a step.
 fn design(task: &Task, step: &GroundStep, position: usize) -> (usize, u32) {
     let usage = &task.operators[step.operator.index()].slots[position];
     (usage.slot.index(), usage.designs[step.choice[position] as usize])
 }
 
-/// Names of the choices that all cheapest plans make, for each step of the first plan.
+/// Converts shared choices to names, for each step of the first plan.
 pub(super) fn forced(task: &Task, first: &[GroundStep], choices: &[Choice]) -> Vec<Forced> {
     let of_step = |(at, step): (usize, &GroundStep)| {
         let is_shared = |slot: Option<u32>| choices.contains(&Choice { step: at, slot });

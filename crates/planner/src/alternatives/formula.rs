@@ -1,12 +1,12 @@
-//! Further cheapest plans by the SAT solver.
+//! Enumerates further cheapest plans with the SAT solver.
 //!
-//! The formula "a plan that costs at most the optimum", with as many steps as such a plan can have, is solved
-//! repeatedly. Each time, the plans found before are excluded.
+//! The formula describes the plans with at most the optimal cost, and has as many steps as such plans can
+//! have. It is solved repeatedly; each time, the plans found before are excluded.
 //!
-//! The choices that every cheapest plan makes are the backbone of that formula \[1\]. The solver is
-//! queried for a plan that differs from the first one in at least one of the remaining candidates.
-//! Such a plan rules out the candidates in which it differs; unsatisfiability proves that all
-//! remaining candidates are shared. Equal designs or objects count as different here.
+//! The choices that all cheapest plans share are the backbone of this formula \[1\]. Candidates are the
+//! choices of the first plan. The solver is queried for a plan that differs from the first plan in at least
+//! one candidate. If there is such a plan, the candidates in which it differs are removed. If the query is
+//! unsatisfiable, all remaining candidates are shared. Interchangeable designs or objects count as different.
 //!
 //! \[1\] J. Marques-Silva, M. Janota, I. Lynce: On computing backbones of propositional theories, ECAI 2010.
 
@@ -21,8 +21,8 @@ use task::task::Task;
 use crate::alternatives::choices::{Alternatives, Choice, forced, shares};
 use crate::optimize::Config;
 
-/// Searches for at most `most` cheapest plans other than `first`. Returns `None` if the formula
-/// cannot be built within the limits.
+/// Searches for at most `max_plans` cheapest plans other than `first`. Returns `None` if the formula cannot
+/// be built within the limits.
 pub(super) fn by_formula(
     context: Context<'_>,
     bounds: &Bounds,
@@ -33,7 +33,7 @@ pub(super) fn by_formula(
     let task = context.task;
     let window = bounds.window(context, Some(first.cost), config.horizon).ok()?;
     let is_complete = window.steps.is_some_and(|steps| steps <= window.allowed.len());
-    // An external solver's claim that a formula is unsatisfiable has not been verified.
+    // Unsatisfiability reported by an external solver is not verified.
     let complete = is_complete && !matches!(config.backend, Backend::Program { .. });
     let allowed = if is_complete || config.horizon.is_some() {
         window.allowed
@@ -56,10 +56,10 @@ pub(super) fn by_formula(
     let plan =
         |steps: &[GroundStep]| decode(context, &GroundPlan { steps: steps.to_vec(), cost: first.cost });
     let mut sequences = vec![first.steps.clone()];
-    // Plans that differ only in waits are one plan for the reader.
+    // Plans that differ only in waits are equal for users.
     let mut plans = vec![plan(&first.steps)];
     let mut exhausted = false;
-    // Literal that excludes the known plans while it is assumed.
+    // Assumption literal that activates the exclusion of the known plans.
     let exclusion = run.encoding.formula.fresh(VariableMeaning::Others);
     while plans.len() <= max_plans && !exhausted {
         if let Some(last_plan) = sequences.last() {
@@ -77,7 +77,7 @@ pub(super) fn by_formula(
             _ => break,
         }
     }
-    // Where there are waits, one action is several operators, at one place or another.
+    // With waits, several operators represent one action, and actions can have different positions.
     let has_waits = task.operators.iter().any(|operator| operator.wait.is_some());
     let choices = if complete && !has_waits { run.forced(&first.steps, &sequences) } else { None };
     let forced = choices.map(|choices| forced(task, &first.steps, &choices));
@@ -92,14 +92,14 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// Adds a clause that excludes a plan if `literal` holds.
+    /// Adds a clause that excludes a plan if `literal` is true.
     fn exclude(&mut self, plan: &[GroundStep], literal: Lit) {
         let mut clause = self.encoding.blocking_clause(plan);
         clause.push(!literal);
         self.solver.add_clause(&clause);
     }
 
-    /// Solves the formula under assumptions, and decodes the plan.
+    /// Solves the formula under assumptions. If it is satisfiable, also returns the decoded plan.
     fn solve(&mut self, assumptions: &[Lit]) -> (Answer, Option<Vec<GroundStep>>) {
         let answer = self.solver.solve(assumptions);
         if answer != Answer::Satisfiable {
@@ -111,8 +111,8 @@ impl Run<'_> {
         (answer, is_plan.then_some(steps))
     }
 
-    /// Choices of the first plan that all cheapest plans make. The plans in `known` narrow the
-    /// candidates before the first query. Returns `None` if the solver gives no answer.
+    /// Returns the choices of the first plan that all cheapest plans share. The plans in `known` reduce the
+    /// candidates before the first query. Returns `None` if the solver reaches a limit.
     fn forced(&mut self, first: &[GroundStep], known: &[Vec<GroundStep>]) -> Option<Vec<Choice>> {
         let mut choices = Choice::all(first);
         for plan in known {

@@ -1,15 +1,14 @@
-//! Graph of all cheapest plans: the states that such plans pass through, and the steps between them.
+//! Graph of all cheapest plans: the states through which these plans pass, and the steps between the states.
 //!
-//! A cheapest plan reaches each of its states at the least cost at which that state can be reached.
-//! So each state is expanded once, and every path from the initial state to a goal is a cheapest
-//! plan. K\* and its successors represent top-k plans in this way \[1\].
+//! A cheapest plan reaches each of its states at the minimum cost of reaching this state. Each state is
+//! therefore expanded once, and every path from the initial state to a goal state is a cheapest plan. K\* and
+//! related algorithms represent top-k plans in this way \[1\].
 //!
-//! If resources distinguish many states, expanding every state whose estimate admits a cheapest
-//! plan is too much work. So a label-setting search comes first. Each of its labels represents all
-//! states that cost no less and have no more of any resource. If no path in *its* graph leads from
-//! a label to the goal, no cheapest plan passes through a state that the label represents. The
-//! second search distinguishes all states, and expands only those that the first search has not
-//! ruled out.
+//! If many states differ only in resources, expanding all of them is too much work. A label-setting search
+//! therefore comes first. Each of its labels represents all states that cost at least as much and have at
+//! most as much of each resource. If no path in the label graph leads from a label to the goal, no cheapest
+//! plan passes through a state that the label represents. The second search distinguishes all states and
+//! expands only those that the first search does not exclude.
 //!
 //! \[1\] J. Lee, M. Katz, S. Sohrabi: On K* search for top-k planning, 2023; H. Aljazzar, S. Leue:
 //! K*: a heuristic search algorithm for finding the k shortest paths, Artificial Intelligence 175,
@@ -32,41 +31,41 @@ use task::plan::ground::GroundStep;
 use task::task::number::TaskNumber;
 use task::task::{OperatorId, State, Task};
 
-/// Upper limit on the combinations of designs of one operator.
+/// Maximum number of combinations of designs of one operator.
 const MAX_CHOICES: usize = 20_000;
 
-/// A step from one label to another.
+/// An edge of the graph: a step from one label to another.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Edge {
     pub(super) from: u32,
     pub(super) to: u32,
-    /// A position in [`Graph::steps`].
+    /// Index in [`Graph::steps`].
     pub(super) step: u32,
 }
 
-/// States with the steps between them.
+/// Graph of labels (states) and the steps between them.
 pub(super) struct Graph {
-    /// Ascending by [`Edge::from`], and then by step.
+    /// Edges in ascending order of [`Edge::from`], and then of their steps.
     pub(super) edges: Vec<Edge>,
-    /// Each step once.
+    /// Distinct steps.
     pub(super) steps: Vec<GroundStep>,
-    /// By label: whether it satisfies the goal at the cost of a cheapest plan.
+    /// For each label: whether it satisfies the goal and its cost is that of a cheapest plan.
     pub(super) goals: Vec<bool>,
-    /// By label: whether a goal can be reached from it.
+    /// For each label: whether a goal label can be reached from it.
     pub(super) alive: Vec<bool>,
-    /// Whether every cheapest plan is a path.
+    /// `true` if every cheapest plan is a path of the graph.
     pub(super) is_complete: bool,
-    /// Whether every path to a goal is a plan, because each label represents a single state.
+    /// `true` if every path to a goal label is a plan, because each label represents a single state.
     pub(super) is_exact: bool,
 }
 
-/// Label of the initial state, from which every graph grows.
+/// Index of the label of the initial state.
 pub(super) const ROOT: u32 = 0;
 
-/// Predicate on an unfinished graph: returns `true` if it contains enough plans.
+/// Predicate on an unfinished graph. Returns `true` if the graph already contains enough plans.
 pub(super) type IsEnough<'e> = dyn FnMut(&Graph) -> bool + 'e;
 
-/// Graph of the plans that cost `cost`, which must be the cost of a cheapest plan. Returns `None`
+/// Builds the graph of all plans with cost `cost`, which must be the cost of a cheapest plan. Returns `None`
 /// if an operator has too many combinations of designs, or a negative cost.
 pub(super) fn cheapest(
     context: Context<'_>,
@@ -77,7 +76,7 @@ pub(super) fn cheapest(
     let search = Search::new(context, bounds, cost)?;
     let guide = Labels::comparing(context.task);
     let (guide, graph) = search.explore(guide, None, &mut |_| false)?;
-    // The second search would reach the same limit.
+    // The second search would reach the same limit as the first.
     if !graph.is_complete {
         return Some(graph);
     }
@@ -86,36 +85,37 @@ pub(super) fn cheapest(
     Some(graph)
 }
 
-/// Key of comparable labels: their finite-domain values, and the numbers that are not compared.
+/// Key of comparable labels: the values of the basic variables, and the numbers that are not compared.
 type Place = (Box<[u32]>, Box<[Int]>);
 
-/// Labels: states with the costs at which they were reached.
+/// Labels of a search: states, each with the cost of the path by which it was reached.
 struct Labels {
     all: Vec<(State, Int)>,
     places: FxHashMap<Place, Vec<u32>>,
-    /// Positions of the numbers that are compared, with their directions. All other numbers are part of the
-    /// [`Place`].
+    /// Indices of the numeric variables that are compared, with their directions. All other numbers are part
+    /// of the [`Place`].
     compared: Vec<(usize, Polarity)>,
     basic: usize,
 }
 
-/// Relation of a state to the known labels.
+/// Relation of a state to the existing labels.
 enum Known {
-    /// A label costs less, and is no worse in any compared number.
+    /// Another label costs less and is no worse in any compared number.
     Beaten,
-    /// A label costs the same, and is no worse in any compared number.
+    /// Another label has equal cost and is no worse in any compared number.
     Covered(u32),
     New,
 }
 
 impl Labels {
-    /// Creates labels each of which also represents the states that are no better in any compared number.
+    /// Creates an empty set of labels in which a label also represents all states that are no better in any
+    /// compared number.
     fn comparing(task: &Task) -> Self {
         let asked = directions(task).into_iter().enumerate();
         Self::new(task, asked.filter(|(_, asked)| !(asked.up && asked.down)).collect())
     }
 
-    /// Creates labels each of which represents a single state.
+    /// Creates an empty set of labels in which each label represents a single state.
     fn exact(task: &Task) -> Self {
         Self::new(task, Vec::new())
     }
@@ -137,7 +137,7 @@ impl Labels {
         })
     }
 
-    /// Labels that are no worse than a state, each with whether it is cheaper.
+    /// Returns the labels that are no worse than a state, each with `true` if its cost is lower.
     fn no_worse<'l>(
         &'l self,
         place: &Place,
@@ -170,7 +170,8 @@ impl Labels {
     }
 }
 
-/// Combinations of designs of an operator, with their costs. `None` if there are too many.
+/// Combinations of designs of an operator, with their costs; `None` if there are too many. Computed at first
+/// use.
 type Choices = OnceCell<Option<CostedCombinations<Int>>>;
 
 struct Search<'a> {
@@ -179,12 +180,13 @@ struct Search<'a> {
     cost: Int,
     index: SuccessorGenerator,
     monotone: bool,
-    /// By operator: the undominated combinations, and all combinations.
+    /// For each operator: the non-dominated combinations of designs.
     best: Vec<Choices>,
+    /// For each operator: all combinations of designs.
     all: Vec<Choices>,
 }
 
-/// Reason why an expansion has ended early.
+/// Reason why an expansion ended early.
 enum Stopped {
     /// An operator has too many combinations of designs.
     TooMany,
@@ -198,15 +200,15 @@ impl From<Interrupted> for Stopped {
     }
 }
 
-/// A graph under construction.
+/// A graph that is being built.
 struct Growth {
     labels: Labels,
     edges: Vec<Edge>,
     steps: Vec<GroundStep>,
     numbers: FxHashMap<GroundStep, u32>,
     goals: Vec<bool>,
-    /// Open list: the estimate for the whole plan (0 in the second search), the cost (the highest
-    /// first), and the label.
+    /// Open list. Keys are the estimated cost of the whole plan (0 in the second search) and then the highest
+    /// path cost; the last field is the label.
     open: BinaryHeap<Reverse<(Int, Reverse<Int>, u32)>>,
     is_complete: bool,
 }
@@ -233,7 +235,7 @@ impl Growth {
         Graph { edges, steps, goals, alive, is_complete: self.is_complete, is_exact }
     }
 
-    /// Approximate memory use, in bytes.
+    /// Returns the approximate memory use in bytes.
     fn bytes(&self) -> usize {
         let label = self.labels.all.first().map_or(0, |(state, _)| {
             let words = state.values.len().saturating_mul(8);
@@ -244,7 +246,7 @@ impl Growth {
     }
 }
 
-/// By label: whether a goal can be reached from it.
+/// Returns, for each label, whether a goal label can be reached from it.
 fn alive(edges: &[Edge], goals: &[bool]) -> Vec<bool> {
     let mut before: Vec<u32> = (0..dense(edges.len())).collect();
     before.sort_by_key(|position| edges[*position as usize].to);
@@ -274,11 +276,10 @@ impl<'a> Search<'a> {
         Some(Self { context, bounds, cost, index, monotone, best: choices(), all: choices() })
     }
 
-    /// Grows a graph from the initial state until it is complete, a limit is reached, or
-    /// `is_enough` returns `true`. Returns `None` if an operator has too many combinations of
-    /// designs. With a guide (the labels of the first search, and whether a goal can be reached
-    /// from each of them), every label is a single state, and the states that a dead label of the
-    /// guide represents are omitted.
+    /// Builds a graph from the initial state until it is complete, a limit is reached, or `is_enough` returns
+    /// `true`. Returns `None` if an operator has too many combinations of designs. The optional `guide` holds
+    /// the labels of the first search, and whether a goal can be reached from each of them. With a guide,
+    /// every label represents a single state, and states that the guide excludes are omitted.
     fn explore(
         &self,
         labels: Labels,
@@ -343,7 +344,7 @@ impl<'a> Search<'a> {
             } else {
                 pareto_optimal_combinations(operator, self.monotone, false, limits)?
             };
-            // The cell is empty, so this cannot fail.
+            // The cell is empty, so setting it cannot fail.
             let _ = cell.set(combinations);
         }
         cell.get().and_then(Option::as_ref).ok_or(Stopped::TooMany)
@@ -378,8 +379,8 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// Label of a state that was reached at some cost, added if necessary. Returns `None` if no
-    /// cheapest plan reaches the state at this cost.
+    /// Returns the label of a state that was reached at this cost, and adds the label if it is new. Returns
+    /// `None` if no cheapest plan reaches the state at this cost.
     fn reach(
         &self,
         growth: &mut Growth,
@@ -399,14 +400,14 @@ impl<'a> Search<'a> {
         }
         growth.goals.push(cost == self.cost && self.context.task.is_goal(&state));
         let id = growth.labels.add(place, state, cost);
-        // The second search expands costly states first, so that it reaches some goals early.
+        // The second search expands states with high cost first, so that it soon reaches goal states.
         let first = if guide.is_some() { 0 } else { estimate };
         growth.open.push(Reverse((first, Reverse(cost), id)));
         Some(id)
     }
 }
 
-/// Returns `true` if the first search shows that no cheapest plan reaches the state at this cost.
+/// Returns `true` if the first search proves that no cheapest plan reaches the state at this cost.
 fn is_ruled_out((labels, alive): (&Labels, &[bool]), state: &State, cost: Int) -> bool {
     let place = labels.place(state);
     labels.no_worse(&place, state, cost).any(|(id, is_cheaper)| is_cheaper || !alive[id as usize])

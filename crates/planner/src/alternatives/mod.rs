@@ -1,9 +1,8 @@
-//! Further cheapest plans, and the choices that all of them share.
+//! Enumerates further cheapest plans, and finds the choices that all cheapest plans share.
 //!
-//! `graph` searches for all states that cheapest plans pass through, and the steps between them.
-//! `paths` lists the plans of that graph. Where search does not apply or is disabled, `formula`
-//! queries the SAT solver for one plan after the other. Equal designs or objects count as different
-//! here.
+//! `graph` computes all states through which cheapest plans pass, and the steps between them. `paths`
+//! enumerates the plans in this graph. If graph search is not applicable or disabled, `formula` queries the
+//! SAT solver for one plan after another. Interchangeable designs or objects count as different.
 
 mod choices;
 mod formula;
@@ -28,9 +27,9 @@ use paths::{End, Paths};
 
 pub use choices::{Alternatives, Forced};
 
-/// Searches for at most `most` cheapest plans other than that of an optimal solution, those with
-/// the fewest steps first. At a limit, returns the plans found until then. Returns `None` if the
-/// solution is not optimal.
+/// Searches for at most `most` cheapest plans other than the plan of an optimal solution. Plans with fewer
+/// steps come first. At a limit, returns the plans that were found before. Returns `None` if the solution is
+/// not optimal.
 pub fn alternatives(task: &Task, solution: &Solution, most: usize, config: &Config) -> Option<Alternatives> {
     let first = solution.ground.as_ref().filter(|_| solution.status == Status::Optimal)?;
     let context = Context::new(task, &config.limits);
@@ -44,13 +43,14 @@ pub fn alternatives(task: &Task, solution: &Solution, most: usize, config: &Conf
     by_graph.or_else(|| by_formula(context, &bounds, first, most, config)).or(Some(unknown))
 }
 
-/// Other cheapest plans by graph search. Returns `None` if the task does not suit the search.
+/// Searches for other cheapest plans in the graph of all cheapest plans. Returns `None` if graph search is
+/// not applicable to the task.
 fn by_graph(context: Context<'_>, bounds: &Bounds, first: &GroundPlan, most: usize) -> Option<Alternatives> {
     let task = context.task;
     let mut is_enough = |graph: &Graph| List::new(context, first, most, graph).0.is_full();
     let graph = cheapest(context, bounds, first.cost, &mut is_enough)?;
     let (list, end) = List::new(context, first, most, &graph);
-    // Where there are waits, one action is several operators, at one place or another.
+    // With waits, several operators represent one action, and actions can have different positions.
     let has_waits = task.operators.iter().any(|operator| operator.wait.is_some());
     let is_known = graph.is_complete && graph.is_exact && !has_waits;
     let forced = is_known.then(|| forced(task, &first.steps, &shared(task, &first.steps, &graph)));
@@ -58,19 +58,20 @@ fn by_graph(context: Context<'_>, bounds: &Bounds, first: &GroundPlan, most: usi
     Some(Alternatives { plans: list.plans, complete, forced })
 }
 
-/// Decoded plans other than the first one. Plans that differ only in waits are one plan.
+/// Decoded plans other than the first plan. Plans that differ only in waits are listed once.
 struct List {
     plans: Vec<Plan>,
     most: usize,
 }
 
 impl List {
-    /// Lists the plans of a graph, and returns whether there may be others.
+    /// Lists the plans of a graph. Also returns whether there may be further plans.
     fn new(context: Context<'_>, first: &GroundPlan, most: usize, graph: &Graph) -> (Self, End) {
         let mut list = Self { plans: Vec::new(), most };
         let first_plan = decode(context, first);
         let end = Paths::new(graph).each(&mut |steps| {
-            // If a label represents several states, some paths need more of a resource than is available.
+            // If a label represents several states, some paths are not plans, because a resource does not
+            // suffice.
             if !graph.is_exact && replay(context.task, &steps).is_none_or(|(_, cost)| cost != first.cost) {
                 return true;
             }
@@ -90,7 +91,7 @@ impl List {
     }
 }
 
-/// Choices of a plan that all cheapest plans make.
+/// Returns the choices of a plan that all cheapest plans share.
 fn shared(task: &Task, first: &[GroundStep], graph: &Graph) -> Vec<Choice> {
     let layers = Paths::new(graph).layers(first.len());
     let mut choices = Choice::all(first);

@@ -1,15 +1,15 @@
-//! Paths in the graph of all cheapest plans: those with the fewest steps first, and of these in the
-//! order of the model.
+//! Enumerates the paths in the graph of all cheapest plans. Shorter paths come first; paths of equal length
+//! are in model order.
 
 use rustc_hash::FxHashSet;
 use task::plan::ground::GroundStep;
 
 use crate::alternatives::graph::{Edge, Graph, ROOT};
 
-/// Upper limit on the number of edges that are followed.
+/// Maximum number of edges that an enumeration follows.
 const MAX_WORK: usize = 2_000_000;
 
-/// Result of an enumeration.
+/// Outcome of an enumeration of paths.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum End {
     /// There are no further paths.
@@ -18,17 +18,17 @@ pub(super) enum End {
     Stopped,
 }
 
-/// Paths of a graph, one after another.
+/// Enumerator of the paths of a graph.
 pub(super) struct Paths<'g> {
     graph: &'g Graph,
-    /// By label, the position of its first edge; at the end, the number of edges.
+    /// Index of the first edge of each label, followed by the number of edges.
     first: Vec<usize>,
-    /// Labels with a number of steps such that no path of that length leads from the label to a goal.
+    /// Pairs of a label and a length, such that no path of this length leads from the label to a goal.
     dead: FxHashSet<(u32, usize)>,
     work: usize,
 }
 
-/// A label on the path, and its edges that have not been followed.
+/// A label on the current path, and the index of its next edge to follow.
 struct Branch {
     label: u32,
     next: usize,
@@ -47,14 +47,14 @@ impl<'g> Paths<'g> {
         Self { graph, first, dead: FxHashSet::default(), work: MAX_WORK }
     }
 
-    /// Edges of a label to labels from which a goal can be reached.
+    /// Returns the edges of a label that lead to labels from which a goal can be reached.
     pub(super) fn edges(&self, label: u32) -> impl Iterator<Item = &'g Edge> + use<'_, 'g> {
         let (from, to) = (self.first[label as usize], self.first[(label as usize).saturating_add(1)]);
         self.graph.edges[from..to].iter().filter(|edge| self.graph.alive[edge.to as usize])
     }
 
-    /// Visits the paths. Stops early if `visit` returns `false`, or if [`MAX_WORK`] edges were
-    /// followed.
+    /// Calls `visit` with each path, in order of length. Stops early if `visit` returns `false` or the limit
+    /// of [`MAX_WORK`] edges is reached.
     pub(super) fn each(&mut self, visit: &mut dyn FnMut(Vec<GroundStep>) -> bool) -> End {
         if !self.graph.alive.first().is_some_and(|is_alive| *is_alive) {
             return End::Exhausted;
@@ -71,11 +71,11 @@ impl<'g> Paths<'g> {
         End::Stopped
     }
 
-    /// Visits the paths with `length` steps. Stops early like [`Paths::each`].
+    /// Calls `visit` with each path of `length` steps. Stops early like [`Paths::each`].
     fn each_of(&mut self, length: usize, visit: &mut dyn FnMut(Vec<GroundStep>) -> bool) -> End {
         let mut path: Vec<u32> = Vec::new();
         let mut branches = vec![Branch { label: ROOT, next: self.first[ROOT as usize] }];
-        // For each branch: whether a goal was reached below it.
+        // For each branch: whether a goal was reached through it.
         let mut fruitful = vec![false];
         while let Some(branch) = branches.last_mut() {
             let steps_left = length.saturating_sub(path.len());
@@ -115,7 +115,7 @@ impl<'g> Paths<'g> {
         End::Exhausted
     }
 
-    /// Number of steps of a longest path. Returns `None` if there is a cycle.
+    /// Returns the number of steps of a longest path, or `None` if the graph has a cycle.
     fn longest(&self) -> Option<usize> {
         let labels = self.graph.goals.len();
         let mut into = vec![0_usize; labels];
@@ -150,8 +150,9 @@ impl<'g> Paths<'g> {
         (unsorted == 0).then(|| ends.map(|(depth, _)| *depth).max().unwrap_or(0))
     }
 
-    /// For each of the first `length` positions, the steps that cheapest plans make there. The
-    /// entries are `None` from the position on at which a cheapest plan has ended.
+    /// For each of the first `length` positions, returns the distinct steps that cheapest plans have at this
+    /// position. From the first position at which some cheapest plan has already ended, all entries are
+    /// `None`.
     pub(super) fn layers(&self, length: usize) -> Vec<Option<Vec<&'g GroundStep>>> {
         let mut layer: Vec<u32> = vec![ROOT];
         let mut layers = Vec::new();

@@ -1,4 +1,4 @@
-//! Enumerates all cheapest plans of small missions, and compares them and their common choices.
+//! Compares the alternatives and shared choices with an enumeration of all cheapest plans of small missions.
 
 use std::collections::BTreeSet;
 use std::sync::atomic::Ordering;
@@ -17,7 +17,7 @@ use super::{Forced, alternatives};
 use crate::optimize::{Config, Engine, optimize};
 use pddl::{Source, read};
 
-/// All plans from a state that cost exactly `left`.
+/// Enumerates all plans from a state that cost exactly `left`.
 fn all(task: &Task, state: &State, left: Int, path: &mut Vec<GroundStep>, found: &mut Vec<Vec<GroundStep>>) {
     if left == 0 && task.is_goal(state) {
         found.push(path.clone());
@@ -35,7 +35,7 @@ fn all(task: &Task, state: &State, left: Int, path: &mut Vec<GroundStep>, found:
     }
 }
 
-/// Steps of a plan as text.
+/// Returns the steps of a plan as text.
 fn steps(plan: &Plan) -> Vec<String> {
     plan.steps
         .iter()
@@ -66,11 +66,11 @@ fn forced(first: &Plan, plans: &[Plan]) -> Vec<Forced> {
     first.steps.iter().enumerate().map(|(position, step)| at(position, step)).collect()
 }
 
-/// Compares alternatives with enumeration. Returns the number of cheapest plans.
+/// Compares the alternatives of a random mission with the enumeration. Returns the number of cheapest plans.
 fn check(seed: u64) -> usize {
     let mission = Mission::random(seed);
     if mission.weights.0 == 0 {
-        // Recharging is free, so there are infinitely many cheapest plans.
+        // The metric does not weight recharging, so there are infinitely many cheapest plans.
         return 0;
     }
     let (domain, problem) = (Source::new("d", mission.domain()), Source::new("p", mission.problem()));
@@ -90,7 +90,7 @@ fn check(seed: u64) -> usize {
         .map(|steps| decode(Context::new(&task, &Limits::none()), &GroundPlan { steps, cost: ground.cost }))
         .collect();
     let first = solution.plan.as_ref().expect("a plan");
-    // By search, and by formulas.
+    // Both methods are tested: graph search and SAT formulas.
     for config in [config, Config::default().with_engine(Engine::Sat)] {
         let context = format!("seed {seed}, {:?}: {mission:?}", config.engine);
         let result = alternatives(&task, &solution, 1_000, &config).expect("alternatives");
@@ -105,7 +105,7 @@ fn check(seed: u64) -> usize {
             (1.min(result.plans.len()), &result.forced),
             "{context}"
         );
-        // Formulas are not queried for one more plan.
+        // Unlike graph search, the SAT method does not look for one more plan than requested.
         let max_complete = if config.engine == Engine::Sat { 1 } else { 2 };
         assert_eq!(fewer.complete, plans.len() <= max_complete, "{context}");
     }

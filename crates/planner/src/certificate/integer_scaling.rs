@@ -1,4 +1,4 @@
-//! Scales that make the numbers of a ground task integers.
+//! Common denominators, by which the numbers of a ground task are multiplied to obtain integers.
 
 use certificate::format::Integer;
 use num_bigint::BigInt;
@@ -14,24 +14,25 @@ use task::task::quantity::Linear;
 /// Maximum number of bits of a common denominator.
 const MOST_BITS: u64 = 1 << 20;
 
-/// Scaling factor for each kind of numbers.
+/// Factor for each kind of number that makes all numbers of this kind integers.
 pub(super) struct Scales {
     pub(super) numbers: Integer,
     pub(super) costs: Integer,
     pub(super) times: Integer,
-    /// Value of one unit of the cost bounds, in scaled costs.
+    /// Factor between the unit of cost bounds and scaled costs.
     pub(super) bounds: Integer,
 }
 
 impl Scales {
-    /// Scales of a task in integers.
+    /// Returns the scales of a task whose numbers are integers already.
     pub(super) fn one() -> Self {
         let unit = || Integer::from(1);
         Self { numbers: unit(), costs: unit(), times: unit(), bounds: unit() }
     }
 
-    /// Scales of a task in rationals, with cost bounds in multiples of `unit`. Returns `None` if a
-    /// number is multiplied by a fraction, so that its values have no common denominator.
+    /// Computes the scales of a task in rationals; cost bounds are multiples of `unit`. Returns `None` if an
+    /// effect multiplies a number by a fraction (its values then have no common denominator), or a
+    /// denominator has too many bits.
     pub(super) fn of(task: &Task<Rational>, unit: &Rational) -> Option<Self> {
         let mut numbers = CommonDenominator::of_at_most(MOST_BITS);
         let mut times = CommonDenominator::of_at_most(MOST_BITS);
@@ -61,7 +62,7 @@ impl Scales {
     }
 }
 
-/// Product of a number and a scale that is a multiple of its denominator.
+/// Returns `number * scale` as an integer. The scale must be a multiple of the number's denominator.
 pub(super) fn scaled<N: TaskNumber>(number: &N, scale: &Integer) -> Integer {
     let number = number.to_rational();
     if let Some(integer) = number.to_int() {
@@ -72,7 +73,7 @@ pub(super) fn scaled<N: TaskNumber>(number: &N, scale: &Integer) -> Integer {
     product.to_integer().into()
 }
 
-/// Factor that makes the coefficients of a comparison integers.
+/// Returns the least factor that makes the coefficients of a comparison integers.
 pub(super) fn whole<N: TaskNumber>(linear: &Linear<N>) -> Integer {
     let denominators = linear.coefficients.iter().map(|(_, factor)| factor.to_rational());
     let denominators = denominators.filter(|factor| !factor.is_integer());

@@ -1,4 +1,4 @@
-//! Refutes the checker's formula with a SAT solver.
+//! Refutes the checker's formula with a SAT solver and writes the refutation.
 
 use std::io::{BufRead, Write};
 
@@ -9,34 +9,35 @@ use task::limits::Limits;
 
 use crate::certificate::trim;
 
-/// Conflict limit for formulas whose numbers have at most [`REFERENCE_WIDTH`] bits.
+/// Maximum number of conflicts for formulas whose numbers have at most [`REFERENCE_WIDTH`] bits.
 const CONFLICT_LIMIT: u64 = 20_000;
-/// Width up to which the full conflict limit applies. Beyond it the limit shrinks in proportion,
-/// because each conflict costs more.
+/// Number of bits up to which the full conflict limit applies. For wider numbers, the limit is inversely
+/// proportional to the width, because each conflict costs more.
 const REFERENCE_WIDTH: usize = 32;
 
-/// Destinations of the parts of a refutation.
+/// Output streams for the parts of a refutation.
 pub struct Outputs<'o> {
-    /// Formula in DIMACS.
+    /// Formula in DIMACS format.
     pub formula: &'o mut dyn Write,
-    /// Legend: one line per variable with its number and meaning.
+    /// Legend: one line for each variable, with its number and meaning.
     pub legend: &'o mut dyn Write,
-    /// Refutation as written by the solver.
+    /// Untrimmed refutation as the solver writes it.
     pub draft: Box<dyn Write>,
-    /// Opens the written `draft` for reading.
+    /// Opens the untrimmed refutation for reading, after the solver has written it.
     pub written_draft: &'o dyn Fn() -> std::io::Result<Box<dyn BufRead>>,
-    /// Trimmed refutation in DRAT: clauses that follow by unit propagation, without deletions.
+    /// Trimmed refutation in DRAT format: clauses that follow by unit propagation, without deletions.
     pub proof: &'o mut dyn Write,
-    /// Hints: per line of the proof the numbers of the clauses that it follows from. Clauses of the
-    /// formula count from 1, followed by those of the proof.
+    /// Hints: for each line of the proof, the numbers of the clauses from which its clause follows. The
+    /// clauses of the formula are numbered from 1, followed by those of the proof.
     pub hints: &'o mut dyn Write,
 }
 
-/// Writes the formula "some plan is cheaper than the claim and within the step bound" and its
-/// refutation. Returns the number of steps. The claim is as for [`certificate::check`].
+/// Writes the formula "some plan is cheaper than the claim and has at most as many steps as the bound", and
+/// its refutation. Returns the step bound. The claim is as in [`certificate::check`].
 ///
 /// # Errors
-/// Fails if the formula does not cover a construct, there is no step bound, or a limit is reached.
+/// The formula does not support a construct of the task, there is no step bound, the formula is satisfiable,
+/// or a limit is reached.
 #[expect(clippy::arithmetic_side_effects, reason = "two constants, divided by a number that is not 0")]
 pub fn refute(
     documents: (&str, &str),

@@ -1,10 +1,10 @@
-//! Trims a DRAT proof of a solver to a short proof with hints.
+//! Trims the DRAT proof of a SAT solver to a short proof with hints.
 //!
-//! Each clause of the solver follows from the clauses before by unit propagation \[1\]; the clauses
-//! used in the propagation become its hints. Literals that are implied permanently become unit
-//! clauses, which keeps hints short. Only the clauses on which the empty clause depends are kept.
+//! Each clause of the solver's proof follows from earlier clauses by unit propagation \[1\]. The clauses used
+//! in this propagation become the hints of the clause. Literals that are permanently implied become unit
+//! clauses, which keeps hints short. Only clauses on which the empty clause depends are written.
 //!
-//! Crate `certificate`, which shares no code with this file, checks the result again.
+//! The result is checked again by the crate `certificate`, which shares no code with this file.
 //!
 //! \[1\] L. Cruz-Filipe, M. Heule, W. Hunt, M. Kaufmann, P. Schneider-Kamp: Efficient certified RAT
 //! verification, CADE 2017.
@@ -16,15 +16,16 @@ use rustc_hash::FxHashMap;
 
 use task::limits::Limits;
 
-/// Maximum number of literals of all clauses together.
+/// Maximum total number of literals in all clauses.
 const LITERAL_LIMIT: usize = 1 << 26;
-/// Marks a missing clause.
+/// Index that represents a missing clause.
 const NONE: u32 = u32::MAX;
 
-/// Writes the trimmed proof and its hints, line by line.
+/// Reads the solver's proof `draft` for the given clauses, and writes the trimmed proof and its hints, line
+/// by line.
 ///
 /// # Errors
-/// Fails if the draft is not a proof, a limit is reached, or a file cannot be written.
+/// The draft is not a valid proof, a limit is reached, or a file cannot be written.
 #[expect(clippy::arithmetic_side_effects, reason = "places of clauses that are held in memory")]
 pub(super) fn trim<'c>(
     clauses: impl Iterator<Item = &'c [Literal]>,
@@ -63,33 +64,34 @@ pub(super) fn trim<'c>(
 }
 
 struct Trimmer {
-    /// Clauses; the first two literals of each are watched.
+    /// Clauses of the formula, followed by derived clauses. The first two literals of each clause are
+    /// watched.
     clauses: Vec<Vec<Literal>>,
     /// Number of clauses that belong to the formula.
     given: usize,
-    /// Hints of each further clause.
+    /// Hints of each derived clause.
     hints: Vec<Vec<u32>>,
-    /// Whether the solver has deleted a clause.
+    /// For each clause: whether the solver has deleted it.
     is_gone: Vec<bool>,
     watches: Vec<Vec<u32>>,
-    /// Clauses that are not deleted, by sorted literals.
+    /// Indices of the clauses that are not deleted, by their sorted literals.
     positions: FxHashMap<Vec<Literal>, Vec<u32>>,
-    /// Whether a literal is true.
+    /// For each literal: whether it is true.
     is_true: Vec<bool>,
-    /// True literals in the order of assignment.
+    /// True literals in the order of their assignment.
     trail: Vec<Literal>,
-    /// Number of propagated literals of the trail.
+    /// Number of literals at the front of the trail that have been propagated.
     done: usize,
-    /// Per variable: clause that implies its current value.
+    /// For each variable: the clause that implies its current value.
     reasons: Vec<u32>,
-    /// Per variable: unit clause that fixes its value permanently.
+    /// For each variable: the unit clause that fixes its value permanently.
     units: Vec<u32>,
     is_seen: Vec<bool>,
-    /// A falsified clause.
+    /// A clause whose literals are all false, if known.
     conflict: Option<u32>,
-    /// Whether the empty clause has been derived.
+    /// `true` if the empty clause has been derived.
     is_done: bool,
-    /// Number of literals of all clauses.
+    /// Total number of literals in all clauses.
     size: usize,
 }
 
@@ -146,7 +148,8 @@ impl Trimmer {
         }
     }
 
-    /// Watches a new clause, and assigns its literal if it is a unit clause.
+    /// Starts watching a new clause. If it is a unit clause under the current assignment, assigns its
+    /// literal.
     fn watch(&mut self, position: u32) {
         let mut clause = std::mem::take(&mut self.clauses[position as usize]);
         clause.sort_unstable();
@@ -169,8 +172,8 @@ impl Trimmer {
         self.clauses[position as usize] = clause;
     }
 
-    /// Propagates permanently. Implied literals become unit clauses, and a conflict the empty
-    /// clause.
+    /// Propagates all assigned literals permanently. Each implied literal becomes a unit clause, and a
+    /// conflict becomes the empty clause.
     fn settle_all(&mut self) {
         let conflict = self.conflict.or_else(|| self.propagate());
         for at in 0..self.trail.len() {
@@ -191,15 +194,16 @@ impl Trimmer {
         }
     }
 
-    /// Unit clauses that falsify all literals of a clause except one variable, followed by the
-    /// clause itself.
+    /// Returns hints: the unit clauses that falsify all literals of a clause except those of the variable
+    /// `except`, followed by the clause itself.
     fn by_units(&self, position: u32, except: usize) -> Vec<u32> {
         let variables = self.clauses[position as usize].iter().map(|literal| literal.variable());
         let units = variables.filter(|variable| *variable != except).map(|variable| self.units[variable]);
         units.chain([position]).collect()
     }
 
-    /// Adds a clause of the solver with its hints.
+    /// Derives a clause of the solver's proof and adds it with its hints. Returns an error if it does not
+    /// follow.
     fn conclude(&mut self, clause: &[Literal]) -> Result<(), String> {
         if clause.iter().any(|literal| clause.binary_search(&-*literal).is_ok()) {
             return Ok(());
@@ -213,7 +217,8 @@ impl Trimmer {
         Ok(())
     }
 
-    /// Deletes a clause if it exists. Literals that it has fixed stay fixed.
+    /// Marks a clause as deleted if it exists. Literals that the clause has implied permanently stay
+    /// assigned.
     fn forget(&mut self, clause: &[Literal]) {
         let Some(positions) = self.positions.get_mut(clause) else { return };
         if let Some(position) = positions.pop() {
@@ -224,8 +229,8 @@ impl Trimmer {
         }
     }
 
-    /// Hints by which a clause follows, in the order of propagation. Returns `None` if it does not
-    /// follow by unit propagation.
+    /// Returns the clauses from which a clause follows by unit propagation, in the order of propagation.
+    /// Returns `None` if it does not follow.
     fn follows(&mut self, clause: &[Literal]) -> Option<Vec<u32>> {
         if let Some(literal) = clause.iter().find(|literal| self.is_true[literal.index()]) {
             return Some(vec![self.units[literal.variable()]]);
@@ -243,7 +248,8 @@ impl Trimmer {
         hints
     }
 
-    /// Antecedents of a conflict in order; the falsified clause is last.
+    /// Returns the clauses on which a conflict depends, in the order of propagation; the falsified clause is
+    /// last. `settled` is the number of permanently assigned literals.
     fn antecedents(&mut self, conflict: u32, settled: usize) -> Vec<u32> {
         let mut hints = vec![conflict];
         let mut units = Vec::new();
@@ -273,7 +279,7 @@ impl Trimmer {
         hints
     }
 
-    /// Propagates the trail. Returns a falsified clause, if any.
+    /// Propagates the literals of the trail. Returns a clause whose literals are all false, if there is one.
     #[expect(clippy::arithmetic_side_effects, reason = "places of clauses that are held in memory")]
     fn propagate(&mut self) -> Option<u32> {
         while let Some(literal) = self.trail.get(self.done).copied() {
@@ -290,8 +296,8 @@ impl Trimmer {
         None
     }
 
-    /// Visits a clause after one of its watched literals has become false. Returns `true` if that
-    /// literal stays watched.
+    /// Updates a clause after one of its watched literals has become false. Returns `true` if this literal
+    /// stays watched.
     fn visit(&mut self, position: u32, falsified: Literal, conflict: &mut Option<u32>) -> bool {
         if self.is_gone[position as usize] {
             return false;
@@ -317,7 +323,7 @@ impl Trimmer {
         true
     }
 
-    /// Writes the clauses that the empty clause (the last one) depends on.
+    /// Writes all derived clauses on which the empty clause (the last clause) depends, and their hints.
     #[expect(clippy::arithmetic_side_effects, reason = "places of clauses that are held in memory")]
     fn write(&self, proof: &mut dyn Write, hints: &mut dyn Write) -> std::io::Result<()> {
         let mut is_needed = vec![false; self.clauses.len()];
@@ -329,7 +335,7 @@ impl Trimmer {
                 }
             }
         }
-        // Numbers of the clauses that are needed.
+        // Numbers the clauses consecutively, without those that are not needed.
         let mut numbers = 1..;
         let mut places: Vec<i32> = numbers.by_ref().take(self.given).collect();
         let mut line = Vec::new();

@@ -1,4 +1,4 @@
-//! Derives a certificate from a ground task and an exhausted search.
+//! Derives a certificate from a ground task and an exhausted A\* search.
 
 use std::hash::Hash;
 use std::sync::Arc;
@@ -22,21 +22,21 @@ use search::search::{Heuristic, closed_labels};
 use crate::certificate::integer_scaling::{Scales, scaled, whole};
 use crate::exact::{ExactTask, RoundedBounds};
 
-/// Certificate of an optimal plan or of unsolvability: two JSON documents.
+/// Certificate of optimality or of unsolvability, as two JSON documents.
 #[derive(Debug, Clone)]
 pub struct Certificate {
     /// The ground task.
     pub task: String,
-    /// Argument that no plan is cheaper.
+    /// The argument that no plan is cheaper, or that no plan exists.
     pub argument: String,
 }
 
-/// Creates the certificate of a solution. Returns `None` if the solution is not proved for plans of
-/// any length, if the task has several objectives or one that plans improve without bound, or if
-/// the search does not end within the limits.
+/// Creates the certificate of a solution. Returns `None` in any of these cases: the solution is not proved
+/// for plans of any length, the task has several objectives, operators can reduce the cost, or the search
+/// does not end within the limits.
 pub fn certify(task: &Task, solution: &Solution, limits: &Limits) -> Option<Certificate> {
-    // The format has one scale for all numbers, and no terms of the metric that are evaluated at
-    // the end.
+    // The format has a single scale for all numbers, and does not support metrics that are partly evaluated
+    // in the last state.
     if !(task.number_multiples.is_empty() && task.objective.rest.is_empty()) {
         return None;
     }
@@ -46,8 +46,8 @@ pub fn certify(task: &Task, solution: &Solution, limits: &Limits) -> Option<Cert
     certified(context, (solution, cost), &Scales::one(), bounds, |bounds| bounds)
 }
 
-/// As [`certify`], for a task in rationals. Also returns `None` if its numbers have no common
-/// denominator.
+/// Creates the certificate of a solution of a task in rationals, see [`certify`]. Also returns `None` if the
+/// numbers have no common denominator.
 pub fn certify_exact(task: &ExactTask, solution: &Solution, limits: &Limits) -> Option<Certificate> {
     let task = &task.0;
     let context = Context::new(task, limits);
@@ -63,7 +63,7 @@ pub fn certify_exact(task: &ExactTask, solution: &Solution, limits: &Limits) -> 
     certified(context, (solution, cost), &scales, bounds, |rounded| &rounded.bounds)
 }
 
-/// Creates a certificate from bounds and their scales; `plain` returns the bounds in integers.
+/// Creates a certificate from heuristic bounds and scales. `plain` returns the bounds in integers.
 fn certified<N: TaskNumber, E: Heuristic<N>>(
     context: Context<'_, N>,
     (solution, cost): (&Solution, Option<N>),
@@ -118,7 +118,7 @@ fn written(task: &Model, argument: &Argument) -> Option<Certificate> {
     Some(Certificate { task, argument: serde_json::to_string(argument).ok()? })
 }
 
-/// Table of distinct entries.
+/// Table that stores each distinct key once and numbers its entries.
 struct Pool<K, V> {
     positions: FxHashMap<K, u32>,
     all: Vec<V>,
@@ -141,7 +141,7 @@ impl<K: Hash + Eq + Clone, V> Pool<K, V> {
     }
 }
 
-/// Slots, each with its suitable designs.
+/// Slots of an operator, each with its suitable designs.
 type Uses = Vec<(u32, Vec<u32>)>;
 
 struct Writer<'w, N> {
@@ -243,7 +243,7 @@ impl<N: TaskNumber> Writer<'_, N> {
             condition.comparisons.iter().map(|linear| self.linear(linear, &whole(linear))).collect();
         for linear in &condition.above {
             let mut strict = self.linear(linear, &whole(linear));
-            // An integer above 0 is at least 1.
+            // For integers, x > 0 is equivalent to x ≥ 1.
             strict.quantity.constant = &strict.quantity.constant - &Integer::from(1);
             comparisons.push(strict);
         }
@@ -254,7 +254,7 @@ impl<N: TaskNumber> Writer<'_, N> {
         }
     }
 
-    /// Linear expression, multiplied by an additional factor.
+    /// Converts a linear expression, multiplied by the scale of the numbers and by `factor`.
     fn linear(&mut self, linear: &task::quantity::Linear<N>, factor: &Integer) -> Linear {
         let factors = linear.coefficients.iter();
         let scale = &self.scales.numbers * factor;

@@ -1,4 +1,4 @@
-//! Scales the constants of a task to integers, whose sums and comparisons are fast.
+//! Scales the constants of a task in rationals to integers, which are faster to add and compare.
 
 use std::convert::Infallible;
 
@@ -16,7 +16,8 @@ use task::task::{Condition, Task};
 /// Maximum number of bits of a common denominator.
 const MOST_BITS: u64 = 200;
 
-/// A scaled task. Its costs are `cost_scale` times the original costs.
+/// A task whose constants are scaled to integers where possible. Its costs are `cost_scale` times the
+/// original costs.
 pub struct Integral {
     pub(crate) task: Task<Rational>,
     pub(crate) cost_scale: Rational,
@@ -26,7 +27,7 @@ fn compared(condition: &mut Condition<Rational>) -> impl Iterator<Item = &mut Li
     condition.comparisons.iter_mut().chain(&mut condition.above)
 }
 
-/// All linear expressions of a task.
+/// Iterates over all linear expressions in conditions, effects, axioms and the goal of a task.
 fn linears(task: &mut Task<Rational>) -> impl Iterator<Item = &mut Linear<Rational>> {
     let bodies = task.axioms.iter_mut().flat_map(|layer| &mut layer.rules).map(|rule| &mut rule.body);
     let operators = task.operators.iter_mut().flat_map(|operator| {
@@ -36,13 +37,13 @@ fn linears(task: &mut Task<Rational>) -> impl Iterator<Item = &mut Linear<Ration
     bodies.chain([&mut task.goal]).flat_map(compared).chain(operators)
 }
 
-/// Factor that makes numbers integers; 1 if their common denominator is too long.
+/// Returns the common denominator as a scaling factor, or 1 if the denominator has too many bits.
 fn scale(denominator: CommonDenominator) -> Rational {
     let scale = |common| Rational::from_big(BigRational::from_integer(common));
     denominator.get().map_or_else(Rational::one, scale)
 }
 
-/// Multiplies all numbers of a quantity.
+/// Multiplies all numbers of a quantity by `scale`.
 fn multiply(quantity: &mut Quantity<Rational>, scale: &Rational, tables: &mut TableMap<Rational>) {
     let product = |number: &Rational| Ok::<_, Infallible>(number.clone() * scale);
     let Ok(scaled) = tables.map(quantity, &product);
@@ -50,7 +51,7 @@ fn multiply(quantity: &mut Quantity<Rational>, scale: &Rational, tables: &mut Ta
 }
 
 impl Integral {
-    /// Scales everything that the search uses: conditions, effects, costs, and the initial state.
+    /// Scales the conditions, effects, costs and the initial state of a task.
     pub(crate) fn of(context: Context<'_, Rational>) -> Result<Self, Interrupted> {
         let mut task = context.task.clone();
         let mut costs = CommonDenominator::of_at_most(MOST_BITS);

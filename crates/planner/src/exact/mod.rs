@@ -1,9 +1,8 @@
-//! Tasks whose numbers do not fit integers of a fixed size: search in exact rationals.
+//! Planning with exact rationals, for tasks whose numbers do not fit fixed-size integers.
 //!
-//! No scale makes the numbers integers if an action multiplies by one half, and a common
-//! denominator of many measured numbers can exceed any machine integer. The search needs only
-//! addition and comparison. Its heuristic values come from the task without numeric variables, with
-//! costs rounded down to integers, and stay admissible.
+//! If an action multiplies a number by one half, no scale makes all numbers integers. The common denominator
+//! of many measured numbers can exceed any machine integer. The search needs only addition and comparison.
+//! Its heuristics ignore numeric variables and use costs rounded down to integers, so they stay admissible.
 
 mod integer_scaling;
 
@@ -31,38 +30,38 @@ use crate::exact::integer_scaling::Integral;
 use crate::optimize::{Config, can_repeat_reward};
 use pddl::ast::{Domain, Problem};
 
-/// Maximum number of stored states.
+/// Maximum number of states that the search stores.
 const STATE_LIMIT: usize = 2_000_000;
-/// Maximum number of bits of the integer costs that heuristics are computed from.
+/// Maximum number of bits of the rounded integer costs from which heuristics are computed.
 const COST_BITS: u64 = 90;
 
-/// A ground task in rationals of any size.
+/// A ground task with exact rational numbers.
 #[derive(Debug, Clone)]
 pub struct ExactTask(pub Task<Rational>);
 
-/// Grounds a domain and a problem that have passed `pddl::check`, for numbers of any size. Plan
-/// such a task with [`optimize_exact`]. If [`task::ground`] accepts the task, planning is faster
-/// and has more kinds of proofs.
+/// Grounds a domain and a problem that have passed `pddl::check`, with rational numbers of any size. Plan
+/// such a task with [`optimize_exact`]. If [`task::ground`] also accepts the task, its planning is faster and
+/// supports more kinds of proofs.
 ///
 /// # Errors
-/// Fails with every unsupported construct and its place.
+/// Returns all unsupported constructs with their source locations.
 pub fn ground_exact(domain: &Domain, problem: &Problem, config: &GroundConfig) -> Result<ExactTask, Errors> {
     ground_for(domain, problem, config, &Generality::default()).map(ExactTask)
 }
 
 impl ExactTask {
-    /// Returns `true` if the problem has no metric and plans are measured by their time, not by the
-    /// number of their steps.
+    /// Returns `true` if the costs of a problem without metric are durations, and `false` if they count
+    /// actions.
     pub fn is_timed(&self) -> bool {
         self.0.is_measured_by_time(&Rational::one())
     }
 }
 
-/// Finds a cheapest plan by search. Uses only the horizon and the limits of the configuration.
+/// Finds a cheapest plan by heuristic search. Of the configuration, only the horizon and the limits are used.
 ///
-/// If a cheapest plan exceeds the horizon, a best plan within the horizon is searched for, which is
-/// not called optimal. If actions improve the metric, the result is the best by the metric among
-/// plans with the fewest steps.
+/// If a cheapest plan is longer than the horizon, the result is a best plan within the horizon; its status is
+/// not optimal. If actions can improve the metric, the result is a plan with the fewest steps, and the best
+/// metric among these plans.
 pub fn optimize_exact(task: &ExactTask, config: &Config) -> Solution {
     let started = Instant::now();
     let task = &task.0;
@@ -78,7 +77,7 @@ pub fn optimize_exact(task: &ExactTask, config: &Config) -> Solution {
     solution
 }
 
-/// Solves a task without negative costs.
+/// Solves a task whose operators have non-negative costs.
 fn cheapest(task: &Task<Rational>, config: &Config) -> Solution {
     let context = Context::new(task, &config.limits);
     let outcome = explore(context);
@@ -103,7 +102,7 @@ fn cheapest(task: &Task<Rational>, config: &Config) -> Solution {
     }
 }
 
-/// Finds the best plan with at most `horizon` steps, given a lower bound on the cost of every plan.
+/// Finds a best plan with at most `horizon` steps. `lower` is a lower bound on the cost of every plan.
 fn within(context: Context<'_, Rational>, horizon: usize, lower: &Rational) -> Solution {
     let shorter = with_horizon(context.task, horizon);
     let (status, plan, proof) = match explore(Context { task: &shorter, ..context }) {
@@ -118,8 +117,8 @@ fn within(context: Context<'_, Rational>, horizon: usize, lower: &Rational) -> S
     Solution { lower_bound: Some(metric(context.task, lower)), horizon, ..solution }
 }
 
-/// For a metric that actions improve: minimises the number of steps first, then the metric among
-/// those plans.
+/// Solves a task in which actions can improve the metric. Minimises the number of steps, and then the metric
+/// among the plans with this number of steps.
 fn fewest_steps(task: &Task<Rational>, config: &Config) -> Solution {
     let nothing = |solution: Solution| Solution { lower_bound: None, ..solution };
     let unknown = || nothing(answer(Status::Unknown, None, None));
@@ -134,8 +133,8 @@ fn fewest_steps(task: &Task<Rational>, config: &Config) -> Solution {
         let solution = answer(Status::UnsolvableWithinHorizon, None, Some(Proof::Search));
         return Solution { horizon: config.horizon.unwrap_or(steps), ..nothing(solution) };
     }
-    // No plan has fewer steps, so adding a constant to each step only changes the sign of the
-    // costs.
+    // All plans considered have the same number of steps, so adding a constant to each cost only makes the
+    // costs non-negative.
     let least = task.operators.iter().map(|operator| operator.cost.minimum()).min().unwrap_or_default();
     let shifted = with_costs(with_horizon(task, steps), |operator| {
         let mut cost = operator.cost.clone();
@@ -157,12 +156,12 @@ fn fewest_steps(task: &Task<Rational>, config: &Config) -> Solution {
     }
 }
 
-/// Outcome of an exact search.
+/// Outcome of a search in exact rationals.
 enum ExactOutcome {
     Optimal(GroundPlan<Rational>),
-    /// There is no plan.
+    /// It is proved that there is no plan; the solution contains the proof.
     Known(Box<Solution>),
-    /// A limit was reached: the best plan found, and the lower bound.
+    /// A limit was reached. Contains the best plan found and a lower bound on the cost of every plan.
     Unknown(Option<GroundPlan<Rational>>, Rational),
 }
 
@@ -200,7 +199,7 @@ fn answer(status: Status, plan: Option<Plan>, proof: Option<Proof>) -> Solution 
     }
 }
 
-/// Copy of the task with other costs and their sum as the metric.
+/// Returns a copy of the task with other operator costs, whose sum is the metric.
 fn with_costs(
     mut task: Task<Rational>,
     cost: impl Fn(&Operator<Rational>) -> Quantity<Rational>,
@@ -212,8 +211,8 @@ fn with_costs(
     task
 }
 
-/// Copy of the task for plans with at most `horizon` steps: each step consumes one unit of a
-/// counter. As in formulas, waits are steps.
+/// Returns a copy of the task that only has plans with at most `horizon` steps: each step, including waits,
+/// consumes one unit of an additional numeric variable.
 fn with_horizon(task: &Task<Rational>, horizon: usize) -> Task<Rational> {
     let mut task = task.clone();
     let steps_left = NumericId(dense(task.initial.numbers.len()));
@@ -228,7 +227,8 @@ fn with_horizon(task: &Task<Rational>, horizon: usize) -> Task<Rational> {
     task
 }
 
-/// Heuristics of the task without numbers, with costs scaled and rounded down.
+/// Heuristics of a task in rationals, computed from the task without numeric variables and with costs that
+/// are scaled and rounded down to integers.
 pub struct RoundedBounds {
     pub(crate) bounds: Bounds,
     /// Value of one unit of the integer costs.
@@ -291,8 +291,8 @@ impl Heuristic<Rational> for RoundedBounds {
     }
 }
 
-/// Scaling factor for costs: their common denominator if the products are short enough, otherwise a
-/// power of two that gives the greatest cost the maximal length.
+/// Returns a scaling factor for costs. It is the least common denominator if the scaled costs have at most
+/// `COST_BITS` bits. Otherwise, it is a power of two for which the greatest cost has about `COST_BITS` bits.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "numbers have fewer than 2^63 bits, and the greater length is what the smaller one is taken from"
@@ -311,8 +311,8 @@ fn factor(costs: &[BigRational]) -> BigRational {
     if &largest * &common <= BigRational::from_integer(max_cost.clone()) {
         return common;
     }
-    // A number below 2^a divided by one of at least 2^(b - 1) is below 2^(a - b + 1), so the
-    // product has at most this length.
+    // A number below 2^a divided by a number of at least 2^(b - 1) is below 2^(a - b + 1), so the scaled cost
+    // has at most `COST_BITS` bits.
     let (numerator, denominator) = (largest.numer().bits(), largest.denom().bits());
     let unit = BigInt::one();
     if denominator + COST_BITS > numerator {
@@ -326,13 +326,13 @@ fn without_numbers(state: &State<Rational>) -> State {
     State { values: state.values.clone(), numbers: Vec::new() }
 }
 
-/// Copy of a condition without its numeric part.
+/// Returns the facts and clauses of a condition, without comparisons.
 fn bare_condition(condition: &Condition<Rational>) -> Condition {
     let (facts, clauses) = (condition.facts.clone(), condition.clauses.clone());
     Condition { facts, clauses, ..Condition::default() }
 }
 
-/// Part of an operator that heuristics need.
+/// Returns an operator with only the parts that heuristics need, without numeric effects and slots.
 fn bare_operator(operator: &Operator<Rational>, cost: Int) -> Operator {
     Operator {
         schema: operator.schema,

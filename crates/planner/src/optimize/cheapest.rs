@@ -1,4 +1,4 @@
-//! Chooses the algorithm that finds a cheapest plan of a task.
+//! Selects the algorithm that finds a cheapest plan of a task.
 
 use task::plan::solution::{Improvement, Proof, Solution, Status};
 use task::task::Task;
@@ -9,10 +9,10 @@ use crate::optimize::optimizer_run::Run;
 use crate::optimize::solve::solve;
 use crate::optimize::unbounded_metric::shortest_then_best;
 
-/// Finds a cheapest plan. Calls `report` for every improvement.
+/// Finds a cheapest plan of a task. Calls `report` for every better plan or lower bound.
 ///
-/// If the metric contains fluents with state-dependent changes, no plan is called optimal, and
-/// nothing is reported before the end.
+/// If the metric contains fluents with state-dependent changes, no plan is proved optimal, and `report` is
+/// not called.
 ///
 /// ```
 /// use metaplan_planner::{Config, Engine, GroundConfig, Status, ground, optimize};
@@ -40,7 +40,7 @@ pub fn optimize(task: &Task, config: &Config, report: &mut dyn FnMut(Improvement
         return cheapest(task, config, report);
     }
     let mut solution = cheapest(task, config, &mut |_| {});
-    // The search compared plans by a part of the metric only.
+    // The search considered only the part of the metric that operator costs represent.
     (solution.lower_bound, solution.unbounded) = (None, None);
     solution.statistics.history.clear();
     if solution.status == Status::Optimal {

@@ -5,30 +5,30 @@ use encodings::sat::Backend;
 use task::limits::Limits;
 use task::words;
 
-/// Strategy by which the SAT solver finds a cheapest plan.
+/// Strategy by which the SAT solver optimises the cost of a plan.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Strategy {
-    /// The strategy that is faster in general.
+    /// The strategy that is usually faster.
     #[default]
     Auto,
-    /// Linear search: cheaper and cheaper plans until the formula is unsatisfiable.
+    /// Linear search: finds cheaper and cheaper plans until the formula is unsatisfiable.
     Tighten,
-    /// Core-guided search: unsatisfiable cores raise the lower bound until a plan meets it. Without
-    /// a bound on the number of steps of a cheapest plan, this strategy behaves like `Tighten`.
+    /// Core-guided search: unsatisfiable cores raise the lower bound until a plan with this cost exists.
+    /// Without an upper bound on the number of steps of a cheapest plan, this strategy equals `Tighten`.
     Cores,
 }
 
 words! { Strategy, "strategy": Auto = "auto", Tighten = "tighten", Cores = "cores" }
 
-/// Algorithms that find plans and prove optimality.
+/// Selection of the algorithms that find plans and prove optimality.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Engine {
-    /// Heuristic search first, then the SAT solver.
+    /// A portfolio of heuristic search and the SAT solver.
     #[default]
     Auto,
-    /// The SAT solver only, with the bounds that its formulas need.
+    /// The SAT solver only, together with the bounds that its formulas need.
     Sat,
     /// Heuristic search only.
     Search,
@@ -36,24 +36,24 @@ pub enum Engine {
 
 words! { Engine, "engine": Auto = "auto", Sat = "sat", Search = "search" }
 
-/// Options of the optimizer. Starts with the defaults; each `with_` method changes one option.
+/// Options of the optimizer. `default` returns the default options; each `with_` method changes one option.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Config {
-    /// Maximum number of steps of a plan.
+    /// Maximum number of steps of a plan; `None` for no limit.
     pub horizon: Option<usize>,
     /// Algorithms that find plans and prove optimality.
     pub engine: Engine,
-    /// Number of states that A\* stores before the other parts of the planner start. Scales their
+    /// Number of states that A\* stores before the other components of the planner start. Also scales their
     /// budgets in the first round.
     pub head_start: usize,
-    /// Whether the SAT solver must confirm proofs of other engines, without a time limit. Otherwise
-    /// it gets about the time of a small proof.
+    /// Whether the SAT solver must confirm proofs of other engines, without a time limit. If `false`,
+    /// confirmation is attempted with a small budget.
     pub confirm: bool,
-    /// Step semantics of formulas. Always sequential with a horizon, which counts actions. By
-    /// default parallel for a first plan and sequential for the optimality proof.
+    /// Step semantics of the SAT formulas. With a horizon, which counts actions, the semantics is always
+    /// sequential. The default (`None`) is parallel for a first plan and sequential for the optimality proof.
     pub semantics: Option<StepSemantics>,
-    /// Strategy by which the SAT solver finds a cheapest plan.
+    /// Strategy by which the SAT solver optimises the cost of a plan.
     pub strategy: Strategy,
     /// The SAT solver.
     pub backend: Backend,
@@ -89,7 +89,7 @@ impl Config {
         Self { engine, ..self }
     }
 
-    /// Sets the number of states that A\* stores before the other parts start.
+    /// Sets the number of states that A\* stores before the other components of the planner start.
     #[must_use]
     pub fn with_head_start(self, head_start: usize) -> Self {
         Self { head_start, ..self }
@@ -107,7 +107,7 @@ impl Config {
         Self { semantics: semantics.into(), ..self }
     }
 
-    /// Sets the strategy by which the SAT solver finds a cheapest plan.
+    /// Sets the strategy by which the SAT solver optimises the cost of a plan.
     #[must_use]
     pub fn with_strategy(self, strategy: Strategy) -> Self {
         Self { strategy, ..self }

@@ -1,12 +1,14 @@
-//! Core-guided optimisation: unsatisfiable cores raise the lower bound until a plan meets it (OLL \[1, 2\]).
+//! Core-guided optimisation: unsatisfiable cores raise the lower bound until a plan with this cost exists
+//! (OLL \[1, 2\]).
 //!
-//! The cost of a plan above the lower bound is a weighted sum of literals, all of which are assumed
-//! to be false. The solver returns either a plan, which is then a cheapest one, or a core: at least
-//! one of its literals is true in every plan. So the lower bound rises by the least weight in the
-//! core, which is subtracted from each of its weights. The remaining cost, that more than one of
-//! them is true, more than two, and so on, is expressed by the literals of a totalizer with that
-//! weight, added one by one. Heavy literals come first (stratification \[3\]), so that plans are
-//! found early. A literal whose weight alone reaches the incumbent's cost is fixed to false \[3\].
+//! The cost of a plan above the lower bound is a weighted sum of soft literals, all of which are assumed to
+//! be false. The solver returns either a plan, which is then a cheapest plan, or a core: a set of soft
+//! literals at least one of which is true in every plan. The lower bound then rises by the minimum weight in
+//! the core, and this weight is subtracted from all weights in the core. Plans in which several literals of
+//! the core are true cost more; the outputs of a totalizer represent this and are added one by one as soft
+//! literals of the same weight. Literals with high weight are assumed first (stratification \[3\]), so that
+//! plans are found early. A literal whose weight alone reaches the cost of the best known plan is fixed to
+//! false (hardening \[3\]).
 //!
 //! \[1\] B. Andres, B. Kaufmann, O. Matheis, T. Schaub: Unsatisfiability-based optimization in
 //! clasp, ICLP 2012.
@@ -24,18 +26,18 @@ use task::number::{Int, dense};
 
 use crate::optimize::optimizer_run::{Best, IncrementalSolver, Run, StrategyOutcome};
 
-/// Maximum number of calls that try to make a core smaller.
+/// Maximum number of solver calls that try to reduce a core.
 const CORE_TRIM_ROUNDS: usize = 4;
 
-/// Core-guided search: lower bound, soft literals and totalizers.
+/// State of a core-guided search: the lower bound, the soft literals and the totalizers.
 struct Search {
-    /// Lower bound on the cost of every plan of the formula.
+    /// Lower bound on the cost of every plan that the formula admits.
     lower: Int,
-    /// Weight of each soft literal, at least 1; it is added to the cost if the literal is true.
+    /// Weight of each soft literal. It is at least 1, and is added to the cost if the literal is true.
     weights: BTreeMap<Lit, Int>,
     totalizers: Vec<Totalizer>,
-    /// Totalizer outputs among the soft literals: index of the totalizer, and the count that the
-    /// literal exceeds.
+    /// Soft literals that are totalizer outputs: the index of the totalizer, and the number n such that the
+    /// literal is true if more than n inputs are true.
     outputs: FxHashMap<Lit, (usize, usize)>,
 }
 
@@ -53,20 +55,21 @@ impl Search {
         Self { lower, weights, totalizers: Vec::new(), outputs: FxHashMap::default() }
     }
 
-    /// Negations of the soft literals with at least this weight.
+    /// Returns the negations of all soft literals with a weight of at least `least`.
     fn assumptions(&self, least: Int) -> Vec<Lit> {
         self.weights.iter().filter(|(_, weight)| **weight >= least).map(|(literal, _)| !*literal).collect()
     }
 
-    /// Next stratum: the greatest weight of at most half of `than`, otherwise the least weight
-    /// below it.
+    /// Returns the minimum weight of the next stratum: the greatest weight that is at most `than / 2`, or
+    /// otherwise the least weight below `than`. Returns `None` if there is no lower weight.
     fn lighter(&self, than: Int) -> Option<Int> {
         let below = self.weights.values().copied().filter(|weight| *weight < than);
         let lightest = below.clone().min()?;
         Some(below.filter(|weight| *weight <= than / 2).max().unwrap_or(lightest))
     }
 
-    /// Processes a core: a set of literals of which at least one is true.
+    /// Processes a core: raises the lower bound, reduces the weights of the core, and adds totalizer outputs
+    /// as soft literals. At least one literal of the core is true in every plan.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "a core has weights that are at most what the limit leaves, and the least of them is taken off each"
@@ -93,7 +96,8 @@ impl Search {
         }
     }
 
-    /// Adds a soft literal: more than `count` literals of a totalizer cost `weight` more.
+    /// Adds a soft literal of the given weight that is true if more than `count` inputs of a totalizer are
+    /// true.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "weights are at most what the limit on the cost leaves, and each core has its own literals"
@@ -113,7 +117,7 @@ impl Search {
         self.outputs.insert(literal, (totalizer, count));
     }
 
-    /// Fixes literals to false whose weight alone exceeds the limit (hardening).
+    /// Fixes a soft literal to false if its weight alone would make the cost exceed the limit (hardening).
     fn harden(&mut self, limit: Int, formula: &mut Formula) {
         let lower = self.lower;
         let heavy: Vec<Lit> = self
@@ -129,7 +133,8 @@ impl Search {
     }
 }
 
-/// Raises the lower bound of a formula's plans until it exceeds the limit or a plan meets it.
+/// Raises the lower bound on the cost of the formula's plans until it exceeds the limit or a plan with this
+/// cost is found.
 pub(super) fn raise(
     run: &mut Run<'_>,
     mut encoding: Encoding<'_>,
@@ -173,14 +178,14 @@ pub(super) fn raise(
     }
 }
 
-/// Core of the last call, reduced by repeated calls. Returns `None` if a limit is reached.
+/// Returns the core of the last solver call, reduced by further calls. Returns `None` if a limit is reached.
 fn trimmed(run: &mut Run<'_>, live: &mut IncrementalSolver, encoding: &Encoding<'_>) -> Option<Vec<Lit>> {
     let mut core = live.solver.core().to_vec();
     for _ in 0..CORE_TRIM_ROUNDS {
         if core.len() < 2 {
             break;
         }
-        // A call that assumes only the core often returns a smaller one.
+        // A call that assumes only the literals of the core often returns a smaller core.
         match run.call(live, encoding, &core) {
             (Answer::Unsatisfiable, _) if live.solver.core().len() < core.len() => {
                 core = live.solver.core().to_vec();

@@ -1,4 +1,4 @@
-//! A first plan by SAT: formulas with growing horizons.
+//! Finds a first plan by SAT: formulas with increasing horizons (numbers of steps).
 
 use std::time::Instant;
 
@@ -12,29 +12,29 @@ use task::task::Task;
 use crate::optimize::optimizer_run::Run;
 use crate::optimize::sat_budget::{FORMULA_LIMIT, SatBudget};
 
-/// Formulas with growing horizons and without a cost limit, several of them open at a time \[1\].
+/// Formulas with increasing horizons and without a cost limit. Several formulas are solved alternately \[1\].
 ///
 /// \[1\] J. Rintanen, K. Heljanko, I. Niemelä: Planning as satisfiability: parallel plans and
 /// algorithms for plan search, Artificial Intelligence 170, 2006, section 6.
 pub(super) struct HorizonSchedule {
-    /// Undecided horizons.
+    /// Horizons whose formulas are not decided yet.
     open: Vec<usize>,
-    /// Next longer horizon; `None` if all have been tried.
+    /// Next longer horizon; `None` after the last horizon.
     next: Option<usize>,
-    /// Upper bound on the number of steps: of a shortest plan, or the configured horizon.
+    /// Upper bound on the number of steps of a shortest plan, or the configured horizon if it is smaller.
     most: usize,
-    /// Greatest refuted horizon.
+    /// Greatest horizon whose formula was proved unsatisfiable.
     refuted: usize,
 }
 
-/// Outcome of one turn.
+/// Outcome of one turn of the schedule.
 pub(super) enum FirstPlanOutcome {
     Plan(GroundPlan),
-    /// There is no plan, of any length or within the horizon.
+    /// There is no plan of any length, or no plan within the configured horizon.
     Refuted(Box<Solution>),
-    /// The budget is spent.
+    /// The budget is used up; the schedule can be resumed.
     Paused,
-    /// A limit was reached, or formulas become too large.
+    /// A limit was reached, or the formulas become too large.
     Over,
 }
 
@@ -45,7 +45,7 @@ impl HorizonSchedule {
         Self { open: Vec::new(), next: Some(0), most: max_horizon, refuted: 0 }
     }
 
-    /// Resumes all open horizons and one more, each with this budget.
+    /// Adds the next horizon, and solves the formulas of all undecided horizons with the given budget each.
     pub(super) fn advance(
         &mut self,
         run: &mut Run<'_>,
@@ -63,11 +63,11 @@ impl HorizonSchedule {
             match decide(run, bounds, horizon, allowance) {
                 (_, Some(plan)) => return FirstPlanOutcome::Plan(plan),
                 (Answer::Unsatisfiable, None) => self.refuted = self.refuted.max(horizon),
-                // A plan whose cost overflows is unusable, and longer plans cost no less.
+                // A plan whose cost overflows cannot be used, and longer plans cost no less.
                 (Answer::Satisfiable, None) => return FirstPlanOutcome::Over,
                 (Answer::Interrupted, None) => {
-                    // With an unlimited budget, an interruption means that numbers are too large
-                    // for a formula.
+                    // With an unlimited budget, an interruption means that the numbers are too large for a
+                    // formula.
                     if run.config.limits.reached() || allowance.conflicts == u64::MAX {
                         return FirstPlanOutcome::Over;
                     }
@@ -95,7 +95,8 @@ impl HorizonSchedule {
     }
 }
 
-/// Finds a first plan by growing horizons without a budget.
+/// Finds a first plan with increasing horizons and without a budget. Returns the solution without a plan if
+/// there is no plan or a limit is reached.
 pub(super) fn first_plan(run: &mut Run<'_>, bounds: &Bounds) -> Result<GroundPlan, Box<Solution>> {
     let mut first = HorizonSchedule::new(run);
     loop {
@@ -128,7 +129,8 @@ fn decide(
     })
 }
 
-/// Number of states of the task, if it is finite and fits. A shortest plan visits no state twice.
+/// Returns the number of states of the task. Returns `None` if the task has numeric variables or the number
+/// overflows. A shortest plan visits no state twice, so it has fewer steps.
 fn states(task: &Task) -> Option<usize> {
     if !task.initial.numbers.is_empty() {
         return None;

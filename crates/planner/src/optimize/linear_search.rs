@@ -1,12 +1,12 @@
-//! Linear search SAT-UNSAT: one solver finds cheaper and cheaper plans until the formula is unsatisfiable.
+//! Linear SAT-UNSAT search: one solver finds cheaper and cheaper plans until the formula is unsatisfiable.
 
 use encodings::encode::Encoding;
 use encodings::sat::Answer;
 
 use crate::optimize::optimizer_run::{Best, Run, StrategyOutcome};
 
-/// Solves a formula repeatedly with decreasing cost limits until it is unsatisfiable. Lower limits
-/// only add clauses, so learnt clauses stay valid. Stops after `budget` learnt clauses.
+/// Solves a formula repeatedly with decreasing cost limits until it is unsatisfiable. A lower limit only adds
+/// clauses, so learnt clauses stay valid. Stops after `budget` conflicts.
 pub(super) fn linear_search_down(
     run: &mut Run<'_>,
     mut encoding: Encoding<'_>,

@@ -1,11 +1,11 @@
-//! From a ground task to a cheapest plan, and to the proof that no plan is cheaper.
+//! Finds a cheapest plan of a ground task, and a proof that no plan is cheaper.
 //!
-//! Search yields a first plan. Then formulas "a plan of at most B steps that costs at most L" are
-//! solved, where B is the step bound for L: dynamic programming over projections shows that no plan
-//! of this cost has more steps. L starts near the lower bound, where the formula is small. An
-//! unsatisfiable formula raises the lower bound; a satisfiable one is optimised by one of two
-//! strategies. Only then is the answer optimal. If no step bound exists (cycles without cost),
-//! exhaustive search can prove optimality; otherwise the plan is not proved.
+//! Heuristic search finds a first plan. Then formulas of the form "a plan with at most B steps and a cost of
+//! at most L" are solved. B is a step bound for L: dynamic programming over projections proves that every
+//! plan of this cost has at most B steps. L starts near the lower bound, where formulas are small. An
+//! unsatisfiable formula raises the lower bound. A satisfiable formula is optimised by linear or core-guided
+//! search, which proves optimality. If there is no step bound, because of cycles without cost, exhaustive
+//! search can prove optimality; otherwise the plan is not proved optimal.
 
 mod cheapest;
 mod config;

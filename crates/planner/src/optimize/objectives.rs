@@ -1,9 +1,9 @@
-//! Several objectives: lexicographic, or as a Pareto front.
+//! Multiple objectives: lexicographic optimisation, or the Pareto front of two objectives.
 //!
-//! The value of an earlier objective becomes a budget for the later ones: a numeric variable that
-//! each operator reduces by its cost. Each query is then a task with one objective and an ordinary
-//! proof. The Pareto front is enumerated by the ε-constraint method \[1\]: best by A, then best by
-//! B among those, then strictly better by B.
+//! The optimal value of an objective becomes a budget for later objectives: a numeric variable that each
+//! operator reduces by its cost. Each query is thus a task with a single objective and an ordinary proof. The
+//! Pareto front is enumerated by the ε-constraint method \[1\]: the best plan by objective A, the best by B
+//! among these plans, and then the next plan by A that is strictly better by B.
 //!
 //! \[1\] Y. Haimes, L. Lasdon, D. Wismer: On a bicriterion formulation of the problems of integrated system
 //! identification and system optimization, IEEE Trans. SMC 1(3), 1971.
@@ -19,27 +19,28 @@ use task::task::{NumericEffect, Operator, Task};
 use crate::optimize::cheapest::optimize;
 use crate::optimize::config::Config;
 
-/// A point of the Pareto front, or the result of an unfinished query.
+/// A point of the Pareto front, or the result of a query that did not finish.
 #[derive(Debug, Clone)]
 pub struct Point {
-    /// The plan; its cost is by the first objective.
+    /// The solution with its plan. The cost of the plan is its cost under the first objective.
     pub solution: Solution,
-    /// Value of the plan by each objective; empty if there is no plan.
+    /// Value of the plan under each objective; empty if there is no plan.
     pub values: Vec<Exact>,
 }
 
-/// The Pareto front of two objectives.
+/// The Pareto front of two objectives, or a part of it.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Front {
-    /// Points from best by the first objective to best by the second.
+    /// Points in order, from the best by the first objective to the best by the second.
     pub points: Vec<Point>,
-    /// `Optimal` if the front is proved complete, `Unsolvable` if there is no plan at all.
+    /// `Optimal` if the front is proved complete; `Unsolvable` if it is proved that there is no plan.
     pub status: Status,
 }
 
-/// Finds a plan that is optimal by the first objective of the task, among those by the second, and
-/// so on. Also returns its values by all objectives, which are empty if there is no plan.
+/// Finds a lexicographically optimal plan: optimal under the first objective, among these plans optimal under
+/// the second objective, and so on. Also returns its values under all objectives, which are empty if there is
+/// no plan.
 ///
 /// ```
 /// use metaplan_planner::pddl::{ast::Direction, read_objective};
@@ -68,7 +69,8 @@ pub fn lexicographic(task: &Task, config: &Config, report: &mut dyn FnMut(Improv
     in_order(task, &order, &[], config, report)
 }
 
-/// Enumerates the Pareto front of the first two objectives, with one plan for each pair of values.
+/// Enumerates the Pareto front of the first two objectives. For each pair of values, only one plan is
+/// returned.
 ///
 /// ```
 /// use metaplan_planner::pddl::{ast::Direction, read_objective};
@@ -101,7 +103,7 @@ pub fn pareto(task: &Task, config: &Config, report: &mut dyn FnMut(Improvement))
             (Status::Optimal, Some(plan)) => {
                 let by_second = cost_by(task, 1, plan).and_then(|cost| cost.checked_sub(1));
                 points.push(point);
-                // A sum that overflows cannot be a budget, so other points may be missed.
+                // A cost that overflows cannot become a budget, so further points may be missed.
                 let Some(budget) = by_second else { return Front { points, status: Status::Feasible } };
                 budgets = vec![(1, budget)];
             }
@@ -122,7 +124,8 @@ pub fn pareto(task: &Task, config: &Config, report: &mut dyn FnMut(Improvement))
     }
 }
 
-/// Optimises objectives in the given order, within budgets.
+/// Optimises the objectives lexicographically in the order of the indices `order`. Each budget is an
+/// objective with the maximum cost under it.
 fn in_order(
     task: &Task,
     order: &[usize],
@@ -141,14 +144,14 @@ fn in_order(
         swap_objective(&mut narrowed, *objective);
         let solution = optimize(&narrowed, config, report);
         let Some(plan) = &solution.ground else {
-            // The incumbent remains valid, but its optimality by the remaining objectives is
-            // not proved.
+            // The best known plan remains valid, but its optimality under the remaining objectives is not
+            // proved.
             let partial = best.map(|solution| Solution { status: Status::Feasible, proof: None, ..solution });
             return finish(context, partial.unwrap_or(solution));
         };
         let spent = cost_by(task, *objective, plan);
         budgets.extend(spent.map(|spent| (*objective, spent)));
-        // A sum that overflows cannot be a budget for later objectives.
+        // A cost that overflows cannot become a budget for later objectives.
         let proved = solution.status == Status::Optimal && spent.is_some();
         best = Some(match best {
             None => solution,
@@ -167,7 +170,7 @@ fn in_order(
     finish(context, best.unwrap_or_else(|| optimize(task, config, report)))
 }
 
-/// Decodes the plan with the original objectives of the task.
+/// Decodes the plan under the original objectives of the task, and computes its values under all objectives.
 fn finish(context: Context<'_>, mut solution: Solution) -> Point {
     let task = context.task;
     let mut values = Vec::new();
@@ -181,7 +184,7 @@ fn finish(context: Context<'_>, mut solution: Solution) -> Point {
         if let Some(cost) = cost_by(task, 0, plan) {
             let plan = GroundPlan { steps: plan.steps.clone(), cost };
             let decoded = decode(context, &plan);
-            // Some fluents of a metric are only evaluated at the end.
+            // Some fluents of a metric are evaluated only in the last state; `decode` includes them.
             values[0] = decoded.cost.clone();
             (solution.plan, solution.ground) = (Some(decoded), Some(plan));
         }
@@ -189,12 +192,12 @@ fn finish(context: Context<'_>, mut solution: Solution) -> Point {
     Point { solution, values }
 }
 
-/// Cost of an operator by the objective with this index.
+/// Returns the cost of an operator under the objective with this index.
 fn cost(operator: &Operator, objective: usize) -> &Quantity<Int> {
     objective.checked_sub(1).map_or(&operator.cost, |other| &operator.others[other])
 }
 
-/// Costs of the steps of a plan by the objective with this index.
+/// Returns the costs of the steps of a plan under the objective with this index.
 fn costs_by(task: &Task, objective: usize, plan: &GroundPlan) -> impl Iterator<Item = Int> {
     plan.steps.iter().map(move |step| {
         let operator = &task.operators[step.operator.index()];
@@ -202,17 +205,17 @@ fn costs_by(task: &Task, objective: usize, plan: &GroundPlan) -> impl Iterator<I
     })
 }
 
-/// Cost of a plan by an objective. Returns `None` if it overflows.
+/// Returns the cost of a plan under the objective with this index, or `None` if it overflows.
 fn cost_by(task: &Task, objective: usize, plan: &GroundPlan) -> Option<Int> {
     costs_by(task, objective, plan).try_fold(0, Int::checked_add)
 }
 
-/// Exact cost of a plan by an objective.
+/// Returns the exact cost of a plan under the objective with this index.
 fn exact_cost_by(task: &Task, objective: usize, plan: &GroundPlan) -> Rational {
     costs_by(task, objective, plan).map(Rational::from_integer).sum()
 }
 
-/// Limits the cost of plans by an objective.
+/// Adds a numeric variable to the task that limits the cost of plans under an objective to `budget`.
 fn limit(task: &mut Task, objective: usize, budget: Int) {
     let variable = NumericId::of(task.initial.numbers.len());
     task.initial.numbers.push(budget);
@@ -235,7 +238,7 @@ fn limit(task: &mut Task, objective: usize, budget: Int) {
     task.goal.comparisons.push(Linear::variable(variable));
 }
 
-/// Swaps an objective with the first one.
+/// Swaps the objective with this index and the first objective of the task.
 fn swap_objective(task: &mut Task, objective: usize) {
     let Some(index) = objective.checked_sub(1) else { return };
     std::mem::swap(&mut task.objective, &mut task.others[index]);

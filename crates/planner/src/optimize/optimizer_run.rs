@@ -1,4 +1,4 @@
-//! State of one run of the optimizer: SAT queries, incumbent, bounds, and the resulting solution.
+//! State of one optimizer run: SAT queries, the best known plan, bounds, and the resulting solution.
 
 use std::cell::OnceCell;
 use std::time::Instant;
@@ -18,7 +18,7 @@ use tracing::info_span;
 
 use crate::optimize::config::Config;
 
-/// Bounds are reported if they rise by at least one part in this number.
+/// A rise of the lower bound is recorded if it is at least 1/`REPORT_STEP` of the bound.
 const REPORT_STEP: Int = 100;
 
 /// State of one optimizer run.
@@ -28,13 +28,13 @@ pub(super) struct Run<'a> {
     pub(super) report: &'a mut dyn FnMut(Improvement),
     pub(super) statistics: Statistics,
     started: Instant,
-    /// Incumbent cost and lower bound, as reported last.
+    /// Cost of the best plan and lower bound, as recorded last.
     noted: Option<(Option<Int>, Int)>,
-    /// Symmetries, computed on first use.
+    /// Symmetries of the task for formulas, computed at first use.
     symmetry: OnceCell<Symmetry>,
 }
 
-/// Incumbent and lower bound.
+/// The best known plan and the lower bound.
 pub(super) struct Best {
     /// The cheapest known plan.
     pub(super) plan: GroundPlan,
@@ -42,35 +42,39 @@ pub(super) struct Best {
     pub(super) lower: Int,
 }
 
-/// Extent of a formula: cost limit, operators per step, and step bound.
+/// Scope of a formula: the cost limit, the allowed operators at each step, and the step bound.
 pub(super) struct FormulaScope {
-    /// Cost limit of the plans.
+    /// Maximum cost of the plans that the formula describes.
     pub(super) limit: Int,
-    /// Per step: whether each operator may occur.
+    /// For each step and each operator: whether the operator may occur at the step.
     pub(super) allowed: Vec<Vec<bool>>,
-    /// Proved upper bound on the number of steps of such plans, if the formula covers it.
+    /// Proved upper bound on the number of steps of all plans within the cost limit. `None` if there is no
+    /// bound or the formula has fewer steps.
     pub(super) step_bound: Option<usize>,
 }
 
 impl FormulaScope {
-    /// Number of operator variables of the formula.
+    /// Returns the number of operator variables of the formula, i.e. the number of allowed pairs of a step
+    /// and an operator.
     pub(super) fn size(&self) -> usize {
         self.allowed.iter().map(|row| row.iter().filter(|flag| **flag).count()).sum()
     }
 }
 
-/// Outcome of a strategy on one formula.
+/// Outcome of an optimisation strategy for one formula.
 pub(super) enum StrategyOutcome {
-    /// No plan of the formula within its limit is cheaper than the incumbent.
+    /// The formula has no plan that is within its cost limit and cheaper than the best known plan.
     Exhausted,
     /// A limit was reached.
     Interrupted,
 }
 
-/// A solver that has received the clauses of a formula up to some index.
+/// A SAT solver that has already received the first clauses of a formula.
 pub(super) struct IncrementalSolver {
     pub(super) solver: Box<dyn Solver>,
+    /// Number of clauses that the solver has received.
     known: usize,
+    /// Number of conflicts that have been added to the statistics.
     conflicts: u64,
 }
 
@@ -92,13 +96,14 @@ impl<'a> Run<'a> {
         Context::new(self.task, &self.config.limits)
     }
 
-    /// Records that two parts of the planner contradict each other. Panics in debug builds.
+    /// Records a contradiction between the results of two components of the planner. Panics in debug builds.
     pub(super) fn report_internal_contradiction(&mut self, what: &str) {
         debug_assert!(false, "{what}");
         self.statistics.contradiction = Some(what.to_owned());
     }
 
-    /// Records the cost of the incumbent, if any, and the lower bound.
+    /// Records the cost of the best plan, if any, and the lower bound in the history, unless the change is
+    /// too small.
     pub(super) fn note(&mut self, cost: Option<Int>, lower: Int) {
         let is_news = self.noted.is_none_or(|(previous, bound)| {
             let rise = lower.saturating_sub(bound);
@@ -115,6 +120,7 @@ impl<'a> Run<'a> {
         });
     }
 
+    /// Records and reports the best plan and the lower bound.
     pub(super) fn announce(&mut self, best: &Best, horizon: usize) {
         self.note(Some(best.plan.cost), best.lower);
         let improvement = Improvement {
@@ -125,7 +131,8 @@ impl<'a> Run<'a> {
         (self.report)(improvement);
     }
 
-    /// Step semantics for a formula.
+    /// Returns the step semantics for a formula: sequential with a horizon, otherwise the configured
+    /// semantics, otherwise `unless_given`.
     pub(super) fn semantics(&self, unless_given: StepSemantics) -> StepSemantics {
         match self.config.horizon {
             Some(_) => StepSemantics::Sequential,
@@ -133,8 +140,8 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Encodes plans. Returns `None` if a limit is reached or there are more clauses than
-    /// `max_clauses`.
+    /// Encodes the plans that satisfy the constraints as a formula. Returns `None` if a limit is reached or
+    /// the formula needs more than `max_clauses` clauses.
     pub(super) fn encoding(
         &self,
         allowed: &[Vec<bool>],
@@ -150,7 +157,7 @@ impl<'a> Run<'a> {
         Some(encoding)
     }
 
-    /// Extent of a formula for plans with cost at most `limit`.
+    /// Returns the scope of a formula for plans with a cost of at most `limit`.
     pub(super) fn extent(
         &self,
         bounds: &Bounds,
@@ -163,7 +170,7 @@ impl<'a> Run<'a> {
         let allowed = if window.steps.is_some() {
             window.allowed
         } else {
-            // Without a step bound, longer plans may be found but prove nothing.
+            // Without a step bound, a longer formula can find plans but prove nothing.
             let longer = self
                 .config
                 .horizon
@@ -173,7 +180,7 @@ impl<'a> Run<'a> {
         Ok(FormulaScope { limit, allowed, step_bound })
     }
 
-    /// Creates a solver without clauses that stops at a limit or after `budget` learnt clauses.
+    /// Creates a SAT solver without clauses. It stops at a limit or after `budget` conflicts.
     pub(super) fn live(&self, budget: u64) -> IncrementalSolver {
         IncrementalSolver {
             solver: self.config.backend.start(&self.config.limits, budget),
@@ -182,8 +189,8 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Decides a formula under assumptions with a solver that may already have a part of its
-    /// clauses. Returns the decoded plan if it is satisfiable.
+    /// Solves a formula under assumptions with a solver that may already have some of its clauses. If the
+    /// formula is satisfiable, also returns the decoded plan.
     pub(super) fn call(
         &mut self,
         live: &mut IncrementalSolver,
@@ -214,7 +221,8 @@ impl<'a> Run<'a> {
         if let Some(reason) = live.solver.failure() {
             self.statistics.failure = Some(reason.to_owned());
         }
-        // A model of an external program is checked by replaying the plan; its refutation is not.
+        // A model of an external program is verified by executing the plan. Its claim of unsatisfiability is
+        // not verified.
         if let (Answer::Unsatisfiable, Backend::Program { command, arguments }) =
             (answer, &self.config.backend)
         {
@@ -230,18 +238,18 @@ impl<'a> Run<'a> {
         (answer, plan)
     }
 
-    /// Replays a decoded plan. The encoding should only admit plans; this check guards against its
-    /// errors.
+    /// Executes a decoded plan and computes its cost. The formula should admit only plans; this check detects
+    /// errors of the encoding.
     fn check(&mut self, steps: Vec<GroundStep>) -> Option<GroundPlan> {
         if pass(self.task, &self.task.initial, &steps).is_none() {
             self.report_internal_contradiction("a formula admits a sequence of actions that is not a plan");
             return None;
         }
-        // A plan whose cost overflows cannot be compared with others.
+        // A plan whose cost overflows cannot be compared with other plans.
         cost(self.task, &steps).map(|cost| GroundPlan { steps, cost })
     }
 
-    /// Builds the solution. After an internal contradiction nothing counts as proved.
+    /// Builds the solution. After an internal contradiction, nothing counts as proved.
     pub(super) fn finish(
         self,
         status: Status,
@@ -274,6 +282,7 @@ impl<'a> Run<'a> {
         }
     }
 
+    /// Builds a solution without a plan.
     pub(super) fn without_plan(&self, status: Status, horizon: usize, proof: Option<Proof>) -> Solution {
         Solution {
             status,

@@ -1,7 +1,8 @@
-//! Portfolio of exact search, satisficing search and SAT in turns.
+//! Portfolio of exact search, satisficing search and SAT, which take turns.
 //!
-//! In each round all three get about the same work, twice as much as in the round before. Work is counted in
-//! units, not in time, so results are deterministic. Plans and bounds of one engine limit the others.
+//! In each round, all three components get about equal work, and twice the work of the previous round. Work
+//! is counted in units instead of time, so results are deterministic. The plans and bounds of a component
+//! limit the others.
 
 use std::time::Instant;
 
@@ -21,19 +22,19 @@ use crate::optimize::prover::{Prover, ProverOutcome};
 use crate::optimize::sat_budget::SatBudget;
 use crate::optimize::sat_confirmation::{into_solution, proved_by_bound, proved_by_search};
 
-/// Work units of the satisficing search, and maximum number of clauses of a formula, per state that
-/// A\* stores in a round.
+/// Work units of the satisficing search for each state that A\* stores in a round.
 const RELAXATION_WORK_PER_STATE: usize = 200;
+/// Maximum number of clauses of a formula for each state that A\* stores in a round.
 const CLAUSES_PER_STATE: usize = 50;
-/// Stored states that correspond to one conflict of the SAT solver.
+/// Number of stored states that correspond to one conflict of the SAT solver.
 const STATES_PER_CONFLICT: u64 = 4;
-/// Maximum number of times the budget of an unsuccessful component is halved.
+/// Maximum number of times that the budget of an unsuccessful component is halved.
 const MAX_BACKOFF: u32 = 3;
-/// A plan that costs more than this ratio times the lower bound probably has better plans that are
-/// easier to find than a proof.
+/// Numerator and denominator of a ratio. If the cost of a plan exceeds the lower bound by more than this
+/// ratio, a better plan is probably easier to find than a proof.
 const NEAR_OPTIMAL_RATIO: (Int, Int) = (3, 2);
 
-/// The portfolio: the remaining components, the incumbent and the bounds.
+/// The portfolio: its active components, the best known plan and the lower bound.
 struct Portfolio<'r, 'a> {
     run: Run<'a>,
     bounds: &'r Bounds,
@@ -43,28 +44,29 @@ struct Portfolio<'r, 'a> {
     prover: Option<Prover>,
     best: Option<GroundPlan>,
     lower: Int,
-    /// Proof of the lower bound.
+    /// Proof of the lower bound `lower`.
     reason: Proof,
-    /// Number of times the budgets are halved: of formulas, and of the satisficing search.
+    /// Number of times that the budget of formulas is halved.
     share: u32,
+    /// Number of times that the budget of the satisficing search is halved.
     satisficer_share: u32,
 }
 
-/// Result of a turn: an ending, or `None` to continue with the next component.
+/// Result of a turn: how the run ends, or `None` if the next component continues.
 type Turn = Option<Ending>;
 
 enum Ending {
-    /// The exact search has finished with this plan.
+    /// The exact search has finished with this plan, which is optimal.
     Exact(GroundPlan),
     Unsolvable,
-    /// The incumbent meets the lower bound, with its proof.
+    /// The cost of the best plan equals the lower bound; contains the proof of the bound.
     Proved(Proof),
     Refuted(Box<Solution>),
     /// A limit was reached, or no component can continue.
     Over,
 }
 
-/// Finds a cheapest plan with all components in turns.
+/// Finds a cheapest plan with a portfolio of components that take turns.
 pub(super) fn solve(run: Run<'_>, bounds: &Bounds, lower: Int) -> Solution {
     let started = Instant::now();
     let context = run.context();
@@ -95,7 +97,7 @@ pub(super) fn solve(run: Run<'_>, bounds: &Bounds, lower: Int) -> Solution {
 
 impl<'r, 'a: 'r> Portfolio<'r, 'a> {
     fn rounds(&mut self) -> Ending {
-        // Most tasks are solved in this first turn.
+        // Most tasks are solved in this first turn of the exact search.
         let unit = self.run.config.head_start.max(1);
         if let Some(ending) = self.search_exactly(unit) {
             return ending;
@@ -163,8 +165,8 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         let span = info_span!("satisfice", expanded = Empty, generated = Empty).entered();
         let nodes = work.saturating_mul(RELAXATION_WORK_PER_STATE) as u64;
         let limit = self.best.as_ref().map(|plan| plan.cost);
-        // A first plan is worth more than a better one. An unsuccessful satisficing search gets a
-        // smaller budget next time, as long as a proof is in reach.
+        // A first plan is more important than a better plan. If the satisficing search is unsuccessful, its
+        // next budget is smaller, provided that a proof is within reach.
         let has_hope = self.exact.as_ref().is_some_and(InterleavedSearch::may_finish);
         let is_near = |cost: Int| {
             cost.saturating_mul(NEAR_OPTIMAL_RATIO.1) <= self.lower.saturating_mul(NEAR_OPTIMAL_RATIO.0)
@@ -204,7 +206,7 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         };
         let allowance = if alone { SatBudget::UNLIMITED } else { allowance };
         let turn = self.ask_for(allowance);
-        // Unsuccessful turns halve the next budget, successful ones double it.
+        // An unsuccessful turn halves the next budget; a successful turn doubles it.
         let achieved = before != (self.lower, self.best.as_ref().map(|plan| plan.cost));
         self.share =
             if achieved { share.saturating_sub(1) } else { share.saturating_add(1).min(MAX_BACKOFF) };
@@ -245,7 +247,8 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         }
     }
 
-    /// Adopts a plan if it is better than the incumbent.
+    /// Replaces the best known plan if `plan` is cheaper. Ends the run if the cost then equals the lower
+    /// bound.
     fn improve(&mut self, plan: GroundPlan, part: PlannerPart) -> Turn {
         if self.best.as_ref().is_none_or(|best| plan.cost < best.cost) {
             self.run.statistics.found_by = Some(part);
@@ -257,7 +260,7 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         self.meets()
     }
 
-    /// Ends the run if the incumbent meets the lower bound.
+    /// Ends the run if the cost of the best known plan equals the lower bound.
     fn meets(&self) -> Turn {
         let best = self.best.as_ref()?;
         (best.cost <= self.lower).then(|| Ending::Proved(self.reason.clone()))
@@ -299,7 +302,7 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
     }
 }
 
-/// Records the numbers of states of all searches in the span.
+/// Records the numbers of expanded and generated states of all searches in the tracing span.
 fn record(span: &Span, statistics: &Statistics) {
     span.record("expanded", statistics.expanded).record("generated", statistics.generated);
 }

@@ -1,4 +1,4 @@
-//! Optimality proofs by formulas, one per stage.
+//! Proves optimality with formulas, one for each stage of increasing cost limits.
 
 use std::time::Instant;
 
@@ -13,32 +13,32 @@ use crate::optimize::linear_search::linear_search_down;
 use crate::optimize::optimizer_run::{Best, FormulaScope, Run, StrategyOutcome};
 use crate::optimize::sat_budget::{FORMULA_LIMIT, SatBudget};
 
-/// The first formula covers this fraction of the gap between the lower bound and the incumbent;
-/// each further one covers twice as much.
+/// The first formula covers 1/`STAGES` of the gap between the lower bound and the cost of the best plan. Each
+/// further formula covers twice as much as the previous one.
 const STAGES: Int = 8;
 
-/// Optimality prover: formulas for plans cheaper than the incumbent, in stages of growing cost.
+/// Optimality prover: formulas for plans cheaper than the best known plan, in stages of increasing cost.
 #[derive(Default)]
 pub(super) struct Prover {
     stage: Option<Int>,
-    /// Greatest horizon of a formula that was built.
+    /// Greatest number of steps of a formula that was built.
     pub(super) horizon: usize,
-    /// Step bound of the formula that raised the lower bound last.
+    /// Step bound of the formula that last raised the lower bound.
     pub(super) step_bound: usize,
 }
 
-/// Outcome of one turn.
+/// Outcome of one turn of the prover.
 pub(super) enum ProverOutcome {
-    /// The incumbent is optimal.
+    /// The best known plan is optimal.
     Proved(Proof),
-    /// The budget is spent.
+    /// The budget is used up; the prover can be resumed.
     Paused,
-    /// Further formulas would prove nothing, or a limit was reached.
+    /// A limit was reached, formulas become too large, or further formulas would prove nothing.
     Over,
 }
 
 impl Prover {
-    /// Decides formulas, each within a budget. Improves the incumbent and the lower bound.
+    /// Solves formulas, each within a budget. Improves the best known plan and the lower bound.
     pub(super) fn advance(
         &mut self,
         run: &mut Run<'_>,
@@ -57,7 +57,7 @@ impl Prover {
             let Ok(extent) = run.extent(bounds, limit, best) else { return ProverOutcome::Over };
             self.horizon = self.horizon.max(extent.allowed.len());
             if extent.step_bound.is_none() && stage < Int::MAX {
-                // Without a step bound, refuting a stage would prove nothing.
+                // Without a step bound, an unsatisfiable formula of a stage would prove nothing.
                 self.stage = Some(Int::MAX);
                 continue;
             }
@@ -87,7 +87,8 @@ impl Prover {
     }
 }
 
-/// Decides whether there is a plan within the cost limit of an extent, and finds a cheapest one.
+/// Searches for plans within the scope of a formula and optimises their cost, starting from the best known
+/// plan.
 pub(super) fn within(
     run: &mut Run<'_>,
     bounds: &Bounds,

@@ -1,18 +1,20 @@
-//! Conflict budgets of the SAT solver.
+//! Budgets of the SAT solver.
 
-/// Number of clauses beyond which conflicts become noticeably slower.
+/// Number of clauses above which conflicts become noticeably slower.
 const LARGE: usize = 50_000;
 
 /// Budget of the SAT solver for one formula.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SatBudget {
+    /// Maximum number of clauses.
     pub(super) clauses: usize,
-    /// Number of conflicts for a formula that is not large.
+    /// Maximum number of conflicts for a formula that is not large.
     pub(super) conflicts: u64,
 }
 
 impl SatBudget {
-    /// Number of conflicts for a formula with this many clauses: fewer for large formulas.
+    /// Returns the maximum number of conflicts for a formula with `clauses` clauses; the number is lower for
+    /// large formulas.
     pub(super) fn conflicts(self, clauses: usize) -> u64 {
         let factor = (clauses / LARGE).saturating_add(1);
         if self.conflicts == u64::MAX {
@@ -21,7 +23,7 @@ impl SatBudget {
         self.conflicts.checked_div(factor as u64).unwrap_or(self.conflicts)
     }
 
-    /// No limit.
+    /// Budget without limits.
     pub(super) const UNLIMITED: Self = Self { clauses: usize::MAX, conflicts: u64::MAX };
 }
 

@@ -1,4 +1,4 @@
-//! Confirms results of the search with the SAT solver where that is quick.
+//! Confirms results of the search with the SAT solver if this takes little time.
 
 use std::time::Instant;
 
@@ -14,30 +14,32 @@ use crate::optimize::optimizer_run::{Best, Run, StrategyOutcome};
 use crate::optimize::prover::within;
 use crate::optimize::sat_budget::{FORMULA_LIMIT, SatBudget};
 
-/// Budget for confirming a proof of another engine: numbers of clauses and conflicts that each take
-/// about five milliseconds.
+/// Budget for confirming a proof of another component. Both limits correspond to about five milliseconds.
 const CONFIRM_BUDGET: SatBudget = SatBudget { clauses: 50_000, conflicts: 60 };
 /// Maximum number of operator variables of a formula for confirmation.
 const CONFIRM_SIZE: usize = 5_000;
-/// Maximum product of operators and steps for which reachable operators are computed.
+/// Maximum product of the number of operators and the number of steps, above which no confirmation is
+/// attempted.
 const CONFIRM_PRODUCT: usize = 1_500;
-/// Maximum number of operator variables of a formula without bounds for confirmation.
+/// Maximum number of operator variables of a formula for confirmation that does not use bounds.
 const CONFIRM_LIMIT: usize = 400;
-/// Cost limits from here on make formulas large; they arise from scaled products of decimals.
+/// Cost limit from which formulas become large, so that no confirmation is attempted. Such costs arise from
+/// scaled products of decimals.
 const CONFIRM_COST: Int = 1 << 64;
 
-/// Solution for a plan whose cost meets the lower bound.
+/// Returns the solution for a plan whose cost equals the lower bound. The SAT solver confirms optimality if
+/// this takes little time.
 pub(super) fn proved_by_bound(mut run: Run<'_>, best: &Best) -> Solution {
     let proof = confirm(&mut run, &best.plan).unwrap_or(Proof::Bound);
     into_solution(run, best, 0, Some(proof))
 }
 
-/// Solution for a plan that search proved optimal. The SAT solver confirms the proof if that is
-/// quick.
+/// Returns the solution for a plan that heuristic search proved optimal. The SAT solver confirms optimality
+/// if this takes little time.
 pub(super) fn proved_by_search(mut run: Run<'_>, bounds: &Bounds, plan: GroundPlan, lower: Int) -> Solution {
     let mut best = Best { plan, lower };
     run.announce(&best, best.plan.steps.len());
-    // Compares with the initial lower bound, not with the bound that the search itself has raised.
+    // The cost is compared with the initial lower bound, not with the bound that the search has raised.
     let floor = bounds.estimate(&run.task.initial);
     if floor.is_some_and(|floor| best.plan.cost <= floor) {
         return proved_by_bound(run, &best);
@@ -74,8 +76,9 @@ pub(super) fn proved_by_search(mut run: Run<'_>, bounds: &Bounds, plan: GroundPl
     into_solution(run, &best, horizon, proof)
 }
 
-/// Confirms that a plan meeting the lower bound is optimal. On small tasks the SAT solver decides a
-/// formula that is independent of the bounds, with as many steps as the cheapest operator allows.
+/// Confirms with the SAT solver that a plan whose cost equals the lower bound is optimal. The formula is
+/// independent of the bounds: its number of steps follows from the cheapest operator. Returns `None` if
+/// optimality is not confirmed or the task is not small.
 fn confirm(run: &mut Run<'_>, incumbent: &GroundPlan) -> Option<Proof> {
     let cheapest =
         run.task.operators.iter().map(|operator| operator.cost.minimum()).min().filter(|c| *c > 0)?;
@@ -102,7 +105,7 @@ fn confirm(run: &mut Run<'_>, incumbent: &GroundPlan) -> Option<Proof> {
     is_confirmed.then_some(Proof::Sat { step_bound: steps })
 }
 
-/// Solution of a run.
+/// Returns the solution of a run: optimal if there is a proof, and feasible otherwise.
 pub(super) fn into_solution(run: Run<'_>, best: &Best, horizon: usize, proof: Option<Proof>) -> Solution {
     let horizon = horizon.max(best.plan.steps.len());
     let plan = Some(&best.plan);

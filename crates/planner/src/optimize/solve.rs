@@ -1,4 +1,4 @@
-//! Improves a first plan to a cheapest one.
+//! Finds a cheapest plan of a task with non-negative costs, by the configured engine.
 
 use std::time::Instant;
 
@@ -16,7 +16,7 @@ use crate::optimize::prover::{Prover, ProverOutcome};
 use crate::optimize::sat_budget::SatBudget;
 use crate::optimize::sat_confirmation::{into_solution, proved_by_bound, proved_by_search};
 
-/// Solves a task without negative costs.
+/// Solves a task whose operators have non-negative costs.
 pub(super) fn solve(mut run: Run<'_>) -> Solution {
     let started = Instant::now();
     let Ok(bounds) = Bounds::new(run.context()) else {
@@ -34,7 +34,8 @@ pub(super) fn solve(mut run: Run<'_>) -> Solution {
     }
 }
 
-/// Runs search, which ignores horizons, then formulas if its plan is too long.
+/// Runs heuristic search, which ignores the horizon. If its plan is longer than the horizon or no plan is
+/// found, solves formulas.
 fn solve_within(mut run: Run<'_>, bounds: &Bounds, lower: Int, horizon: usize) -> Solution {
     let started = Instant::now();
     let outcome = search(run.context(), bounds);
@@ -52,7 +53,7 @@ fn solve_within(mut run: Run<'_>, bounds: &Bounds, lower: Int, horizon: usize) -
     }
 }
 
-/// Finds a first plan by formulas, then cheaper ones.
+/// Finds a first plan with SAT formulas, and then cheaper plans.
 fn solve_by_formulas(mut run: Run<'_>, bounds: &Bounds, lower: Int) -> Solution {
     match first_plan(&mut run, bounds) {
         Ok(plan) => {
@@ -63,7 +64,7 @@ fn solve_by_formulas(mut run: Run<'_>, bounds: &Bounds, lower: Int) -> Solution 
     }
 }
 
-/// Improves a plan to a cheapest one by formulas.
+/// Improves a plan with SAT formulas until it is a cheapest plan.
 fn improve(mut run: Run<'_>, bounds: &Bounds, mut best: Best) -> Solution {
     run.announce(&best, best.plan.steps.len());
     if best.plan.cost <= best.lower {

@@ -1,4 +1,4 @@
-//! Bounded reading of a metric without a best value: fewest steps first, then the metric.
+//! Treats a metric without a best value: minimises the number of steps, and then the metric.
 
 use search::bounds::Bounds;
 use task::context::Context;
@@ -18,28 +18,28 @@ use crate::optimize::prover::within;
 use crate::optimize::sat_budget::SatBudget;
 use crate::optimize::solve::solve;
 
-/// For a metric that actions improve: minimises the number of steps first, then the metric among
-/// those plans.
+/// Solves a task in which actions can improve the metric. Minimises the number of steps, and then the metric
+/// among the plans with this number of steps.
 pub(super) fn shortest_then_best(original: Run<'_>) -> Solution {
     let lowest = original.task.operators.iter().map(|operator| operator.cost.minimum()).min().unwrap_or(0);
     let by_steps = with_costs(original.task, |_| Quantity::constant(1));
     let context = original.context();
     let mut silent = |_: Improvement| {};
     let shortest = solve(Run::new(&by_steps, original.config, &mut silent));
-    // Waits count as steps, although decoded plans do not show them.
+    // Waits count as steps, although they are not part of decoded plans.
     let steps = match (&shortest.ground, shortest.status) {
         (Some(plan), Status::Optimal) => plan.steps.len(),
-        // A plan found by then would be optimised for its steps, not for the metric, so it is
-        // useless to the user.
+        // A plan that was already found would minimise the number of steps but not the metric, so it is not
+        // returned.
         (Some(_), _) => return unknown(shortest),
         (None, _) => return Solution { lower_bound: None, ..shortest },
     };
-    // All plans of the task within this horizon have exactly this many steps, so adding a constant
-    // to each step only changes the sign of the costs.
+    // All plans within this horizon have exactly this number of steps, so adding a constant to each cost only
+    // makes the costs non-negative.
     let shifted = with_costs(original.task, |operator| {
         let mut cost = operator.cost.clone();
-        // Numbers of a quantity, and so its minimum, stay below `QUANTITY_LIMIT`, so nothing
-        // saturates.
+        // The numbers of a quantity stay below `QUANTITY_LIMIT`, and so does its minimum. The subtraction
+        // therefore never saturates.
         cost.constant = cost.constant.saturating_sub(lowest);
         cost
     });
@@ -84,12 +84,12 @@ pub(super) fn shortest_then_best(original: Run<'_>) -> Solution {
     }
 }
 
-/// Solution without a result by the metric, given the solution by the number of steps.
+/// Returns an unknown solution with the statistics of the solution `by_steps`.
 fn unknown(by_steps: Solution) -> Solution {
     Solution { status: Status::Unknown, plan: None, ground: None, lower_bound: None, proof: None, ..by_steps }
 }
 
-/// Copy of the task with other costs and their sum as the metric.
+/// Returns a copy of the task with other operator costs, whose sum is the metric.
 fn with_costs(task: &Task, cost: impl Fn(&Operator) -> Quantity<Int>) -> Task {
     let mut task = task.clone();
     for operator in &mut task.operators {
@@ -99,9 +99,9 @@ fn with_costs(task: &Task, cost: impl Fn(&Operator) -> Quantity<Int>) -> Task {
     task
 }
 
-/// Returns `true` if some action that improves the metric is applicable in a state of the plan and
-/// leaves that state unchanged, so it can be repeated without bound. Returns `false` if a limit is
-/// reached first.
+/// Returns `true` if an action that improves the metric is applicable in a state of the plan and does not
+/// change the state. Such an action can be repeated without bound. Returns `false` if there is no such action
+/// or a limit is reached.
 pub fn can_repeat_reward<N: TaskNumber>(context: Context<'_, N>, plan: &[GroundStep]) -> bool {
     let Context { task, limits } = context;
     let Some(states) = pass(task, &task.initial, plan) else { return false };

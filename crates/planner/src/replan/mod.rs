@@ -1,19 +1,18 @@
-//! Incremental replanning for one mission: the planner of an adaptation loop.
+//! Incremental replanning for one mission, as needed in an adaptation loop.
 //!
-//! Availability and state are assumptions, not facts \[1\]. The mission is grounded once, with
-//! every design available and without conclusions from numbers. A problem is then a state of that
-//! task (see [`state_mapping`]), and a set of available designs restricts its operators (see
-//! [`restrict_designs`]). Data that depend on that set alone (operators, pattern databases,
-//! undominated designs) are cached for recent sets, since failed components often recover. The
-//! remaining work per problem is the search, whose heuristic is exact in the projections, and the
-//! tie-breaking. The answers equal those of grounding and optimising from scratch, except that SAT
-//! does not prove them a second time.
+//! State and availability are inputs of each query, like assumptions in incremental SAT \[1\]. The mission is
+//! grounded once, with all designs available and without conclusions from initial numbers. A query then gives
+//! a state of this task (see [`state_mapping`]) and a set of available objects, which restricts the operators
+//! (see [`restrict_designs`]). Data that depend only on this set (operators, pattern databases, non-dominated
+//! designs) are cached for recent sets, because failed components often recover. For each query, only the
+//! search and the tie-breaking remain. The answers equal those of grounding and optimising from scratch,
+//! except that the SAT solver does not confirm them.
 //!
-//! The previous plan, if it is still valid, is an upper bound, and the answer if time runs out first.
+//! If the previous plan is still valid, its cost is an upper bound for the search. If the time limit is
+//! reached, it is returned unless a better plan was found.
 //!
-//! No SAT solver is kept with assumptions: on maps of 50 to 200 places the search takes
-//! milliseconds and a SAT proof seconds, and clauses learnt for one cost limit do not help with the
-//! next.
+//! No SAT solver with assumptions is used. On maps of 50 to 200 places, the search takes milliseconds and a
+//! SAT proof seconds, and clauses learnt for one cost limit do not help with the next.
 //!
 //! - \[1\] N. Eén, N. Sörensson: Temporal induction by incremental SAT solving, ENTCS 89(4), 2003.
 
@@ -41,28 +40,29 @@ use usage::Usage;
 
 pub use query::{FirstStep, Progress, Query, ReplanOutcome};
 
-/// Precision of numbers of the initial state, as a power of ten.
+/// Denominator up to which numbers of the initial state are supported: each number must be a multiple of
+/// 1/`PRECISION`.
 const PRECISION: Int = 1_000_000;
-/// Number of sets of available designs whose derived data are cached.
+/// Number of sets of available objects for which derived data are cached.
 const MAX_CACHED_SETS: usize = 8;
 
-/// State limit of each search for blocking objects. Its answer is only a hint, so it must not take
-/// longer than planning.
+/// Maximum number of states for each search for blocking objects. The result is only a hint for users, so it
+/// must not take longer than planning.
 const BLOCKING_STATES: usize = 5_000;
 
-/// Incremental planner for problems of one domain that differ in state and availability.
+/// Incremental planner for problems of one domain that differ only in state and availability.
 #[derive(Clone)]
 pub struct Replanner {
     base: Arc<GroundBase>,
-    /// Cached sets of available designs, least recently used first.
+    /// Cached sets of available objects with their data; the least recently used set comes first.
     sets: Vec<(Vec<Vec<ObjectId>>, Arc<AvailabilityContext>)>,
 }
 
 impl Replanner {
-    /// Grounds a problem with everything available that `available` can mention. Returns `None` if
-    /// the domain is unsuitable: availability is used other than as a condition of actions on their
-    /// parameters, there are timed literals, preferences or trajectory constraints, actions have
-    /// negative costs, or the problem cannot be ground.
+    /// Grounds a problem with all objects available. `available` lists the predicates that state
+    /// availability. Returns `None` if replanning does not support the domain or problem: availability is
+    /// used other than as a condition on action parameters, there are timed initial literals, preferences or
+    /// trajectory constraints, actions have negative costs, or grounding fails.
     pub fn new(
         domain: &Domain,
         problem: &Problem,
@@ -88,12 +88,12 @@ impl Replanner {
         Some(Self { base: Arc::new(GroundBase { task, layout, requirements }), sets: Vec::new() })
     }
 
-    /// Computes a best plan for a problem.
+    /// Computes a best plan for the state and availability of a query.
     pub fn plan(&mut self, query: &Query<'_>) -> ReplanOutcome {
         self.plan_aloud(query, &mut |_| {})
     }
 
-    /// As [`Replanner::plan`], and reports the progress of the search.
+    /// Computes a best plan like [`Replanner::plan`], and reports the progress of the search.
     pub fn plan_aloud(&mut self, query: &Query<'_>, report: &mut dyn FnMut(Progress)) -> ReplanOutcome {
         let base = self.base.clone();
         let Some(situation) = base.layout.situation(&base.task, query.problem) else {
@@ -108,10 +108,10 @@ impl Replanner {
         solve::solve(&base, &set, &situation, query, STATE_LIMIT, report)
     }
 
-    /// Minimal set of unavailable objects that makes an unsolvable problem unsolvable: with any one
-    /// of them available, and all objects outside the set available, there would be a plan. Empty
-    /// if availability is not the reason, and `None` if that could not be determined.
-    /// Deletion-based search for a minimal unsatisfiable core \[1\].
+    /// Returns a minimal set of unavailable objects that makes the problem unsolvable: if any single object
+    /// of the set and all objects outside the set were available, there would be a plan. Returns an empty set
+    /// if the problem has no plan even with all objects available. Returns `None` if a limit prevents the
+    /// answer. Uses deletion-based extraction of a minimal unsatisfiable subset \[1\].
     ///
     /// - \[1\] J. Marques-Silva, I. Lynce: On improving MUS extraction algorithms, SAT 2011.
     pub fn blocking(&mut self, query: &Query<'_>) -> Option<Vec<String>> {
@@ -140,7 +140,7 @@ impl Replanner {
         if !is_solvable(&[])? {
             return Some(Vec::new());
         }
-        // An object can be dropped if the others alone still make the mission unsolvable.
+        // An object can be removed from the set if the remaining objects still make the problem unsolvable.
         for candidate in &missing {
             let reduced: Vec<_> = blocking.iter().copied().filter(|object| object != candidate).collect();
             if !is_solvable(&reduced)? {
@@ -154,8 +154,8 @@ impl Replanner {
         Some(names)
     }
 
-    /// Data for a set of available designs, cached or computed. Interrupted computations are not
-    /// cached.
+    /// Returns the data for a set of available objects, from the cache or newly computed. Data of interrupted
+    /// computations are not cached.
     fn set(
         &mut self,
         available: &[Vec<ObjectId>],
@@ -173,7 +173,7 @@ impl Replanner {
     }
 }
 
-/// Copy of the problem with every object available that can be.
+/// Returns a copy of the problem in which every object is available.
 fn with_all(domain: &Domain, problem: &Problem, available: &[Name]) -> Problem {
     let hierarchy = TypeHierarchy::of(domain);
     let mut full = problem.clone();

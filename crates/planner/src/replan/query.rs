@@ -1,4 +1,4 @@
-//! Queries and answers of a replanner.
+//! Queries and results of a replanner.
 
 use num_rational::BigRational;
 
@@ -7,34 +7,35 @@ use pddl::validate::Advance;
 use task::limits::Limits;
 use task::plan::Step;
 
-/// A step that a plan may begin with, independent of the task's operators: the remaining part of a
-/// running action, with one of the configurations in which it can continue.
+/// A possible first step of a plan that is not an operator of the task: the remaining part of a running
+/// action, with a configuration in which it can continue.
 #[derive(Debug, Clone)]
 pub struct FirstStep {
-    /// Functions with the designs chosen for them.
+    /// Functions of the action, with the designs selected for them.
     pub configuration: Vec<(String, String)>,
-    /// All arguments. Among equally good plans, the one whose arguments are declared first is
-    /// chosen.
+    /// All arguments of the action. Among equally good plans, the plan whose arguments are declared first is
+    /// selected.
     pub arguments: Vec<String>,
     /// Effects of the step.
     pub change: Advance,
-    /// Metric of the mission if it ended with this step; 1 without a metric.
+    /// Metric of the mission if it ended after this step. Without a metric, the number of steps, i.e. 1.
     pub metric: BigRational,
 }
 
-/// A replanning query.
+/// A replanning query: the current situation and preferences for the plan.
 #[derive(Debug)]
 pub struct Query<'a> {
-    /// Problem with the current state and availability; of the same domain, and checked.
+    /// Problem with the current state and availability. It must belong to the domain of the replanner and
+    /// have passed the checks.
     pub problem: &'a Problem,
-    /// First steps. If there are any, plans begin with one of them.
+    /// Alternative first steps. If there are any, every plan must begin with one of them.
     pub first: &'a [FirstStep],
     /// Metric of the mission if it ended now; 0 without a metric.
     pub metric: BigRational,
-    /// Current plan: names and arguments of its actions after the first step. If it is still valid,
+    /// Current plan: names and arguments of its actions after the first step. If the plan is still valid,
     /// more expensive plans are pruned.
     pub old: Option<&'a [(String, Vec<String>)]>,
-    /// Whether, among equally good plans, one with most of these actions is chosen.
+    /// Whether, among equally good plans, a plan with as many of these actions as possible is selected.
     pub stay_close: bool,
     /// Time and memory limits.
     pub limits: &'a Limits,
@@ -45,35 +46,35 @@ pub struct Query<'a> {
 pub enum ReplanOutcome {
     /// A plan that is proved optimal.
     Optimal {
-        /// Index of the first step, if there were any.
+        /// Index of the plan's first step in `Query::first`, if that list is not empty.
         first: Option<usize>,
         /// Steps after the first step.
         steps: Vec<Step>,
         /// Metric of the whole mission.
         metric: BigRational,
     },
-    /// A limit was reached; the best plan found, which may be the old one.
+    /// A limit was reached. Contains the best plan found, which may be the current plan.
     Feasible {
-        /// Index of the first step, if there were any.
+        /// Index of the plan's first step in `Query::first`, if that list is not empty.
         first: Option<usize>,
         /// Steps after the first step.
         steps: Vec<Step>,
         /// Metric of the whole mission.
         metric: BigRational,
     },
-    /// Proof that there is no plan of any length.
+    /// It is proved that there is no plan of any length.
     Unsolvable,
-    /// The problem differs in more than state and availability.
+    /// The problem differs from the grounded problem in more than state and availability.
     Misfit,
-    /// A limit was reached before any plan was found.
+    /// A limit was reached before a plan was found.
     Unknown,
 }
 
-/// Progress of a search.
+/// Progress of the search for a plan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Progress {
-    /// Metric of the mission with the incumbent, if any.
+    /// Metric of the mission with the best known plan, if there is one.
     pub metric: Option<BigRational>,
-    /// Bound on the metric of every plan.
+    /// Lower bound on the metric of every plan.
     pub bound: BigRational,
 }

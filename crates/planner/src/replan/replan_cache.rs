@@ -1,4 +1,4 @@
-//! The ground task with all designs, and cached restrictions to sets of available designs.
+//! The ground task with all objects available, and its restrictions to sets of available objects.
 
 use search::bounds::Bounds;
 use search::search::SearchTask;
@@ -11,16 +11,17 @@ use task::task::{Argument, Task};
 use crate::replan::restrict_designs;
 use crate::replan::state_mapping::Layout;
 
-/// Data shared by all queries.
+/// Data that all queries of a replanner share.
 pub(super) struct GroundBase {
-    /// Ground task with everything available.
+    /// Ground task with all objects available.
     pub(super) task: Task,
     pub(super) layout: Layout,
-    /// Per schema: parameters that must be available, each with the predicate that states it.
+    /// For each schema: the parameters that must be available, each with the index of the predicate that
+    /// states availability.
     pub(super) requirements: Vec<Vec<(usize, usize)>>,
 }
 
-/// Data shared by all states with the same availability.
+/// Data that all states with equal availability share.
 pub(super) struct AvailabilityContext {
     pub(super) task: Task,
     pub(super) bounds: Bounds,
@@ -29,7 +30,7 @@ pub(super) struct AvailabilityContext {
 }
 
 impl GroundBase {
-    /// Ground task restricted to the available objects.
+    /// Returns the ground task restricted to the available objects.
     pub(super) fn masked(&self, available: &[Vec<ObjectId>], limits: &Limits) -> Result<Task, Interrupted> {
         let is_allowed = |schema: u32, position: usize, object: ObjectId| {
             let mut predicates_needed =
@@ -39,7 +40,7 @@ impl GroundBase {
         restrict_designs::restrict(&self.task, &is_allowed, limits)
     }
 
-    /// Computes the data for a set of available objects.
+    /// Computes the restricted task and its search data for a set of available objects.
     pub(super) fn restrict(
         &self,
         available: &[Vec<ObjectId>],
@@ -53,7 +54,8 @@ impl GroundBase {
         Ok(AvailabilityContext { task, bounds, prepared, ties })
     }
 
-    /// Per predicate: objects that some operator needs to be available, sorted.
+    /// Returns, for each availability predicate, the objects that some operator requires to be available, in
+    /// ascending order.
     #[expect(clippy::arithmetic_side_effects, reason = "predicates are held in memory")]
     pub(super) fn possible(&self) -> Vec<Vec<ObjectId>> {
         let count = self.requirements.iter().flatten().map(|(_, predicate)| predicate + 1).max().unwrap_or(0);

@@ -1,8 +1,8 @@
-//! Restricts a task with all designs to the available ones.
+//! Restricts a task that was grounded with all designs to the available designs.
 //!
-//! Operators that require an unavailable design are removed. In tables and exclusions of open slots
-//! only the rows of available designs remain. The result is the task that grounding would make of
-//! the problem with these designs, apart from operators that become unreachable.
+//! Operators that require an unavailable object are removed. Tables and forbidden combinations of open slots
+//! keep only the rows of available designs. The result equals the task that grounding would produce with
+//! these designs, except that it may contain unreachable operators.
 
 use std::sync::Arc;
 
@@ -14,13 +14,13 @@ use task::number::{Int, dense};
 use task::task::quantity::{Linear, Quantity, SlotSet, Table};
 use task::task::{Argument, ForbiddenCombinations, NumericEffect, Operator, SlotUse, Task};
 
-/// Per slot of an operator: indices of the designs that remain.
+/// For each slot of an operator: the indices of the designs that remain.
 type KeptDesigns = Arc<[Vec<u32>]>;
 
-/// Remaining designs of an operator's slots, and the restricted slots.
+/// The remaining designs of an operator's slots, and the restricted slots.
 type RestrictedSlots = (KeptDesigns, Arc<[SlotUse]>);
 
-/// Cache of restricted data that operators share. Keys are addresses within the original task,
+/// Cache of restricted data that several operators share. Keys are addresses of data in the original task,
 /// which outlives the cache.
 #[derive(Default)]
 struct SharedTables {
@@ -29,8 +29,8 @@ struct SharedTables {
     forbidden: FxHashMap<(*const ForbiddenCombinations, *const Vec<u32>), Arc<[ForbiddenCombinations]>>,
 }
 
-/// Copy of the task restricted to the operators whose arguments `is_allowed` accepts. It receives
-/// the schema, an index among the parameters, and the object.
+/// Returns a copy of the task that contains only operators with allowed arguments. The arguments of
+/// `is_allowed` are the schema, the index of the parameter, and the object.
 pub(super) fn restrict(
     task: &Task,
     is_allowed: &dyn Fn(u32, usize, ObjectId) -> bool,
@@ -49,7 +49,7 @@ pub(super) fn restrict(
             operators.extend(shared.operator(task, operator, &allowed));
         }
     }
-    // All parts except the operators are unchanged.
+    // All parts of the task except the operators are unchanged.
     Ok(Task {
         operators,
         object_names: task.object_names.clone(),
@@ -70,7 +70,7 @@ pub(super) fn restrict(
 }
 
 impl SharedTables {
-    /// Restricts an operator. Returns `None` if a slot has no remaining design.
+    /// Returns the restricted operator, or `None` if a slot has no remaining design.
     fn operator(
         &mut self,
         task: &Task,
@@ -140,7 +140,7 @@ impl SharedTables {
     }
 }
 
-/// Remaining designs of an operator's slots.
+/// Returns the remaining designs of an operator's slots, and the restricted slots.
 fn left(task: &Task, operator: &Operator, allowed: &dyn Fn(usize, ObjectId) -> bool) -> RestrictedSlots {
     let arguments = |slot: usize| {
         let is_in_slot = move |argument: &Argument| *argument == Argument::Slot(dense(slot));
@@ -171,7 +171,7 @@ fn left(task: &Task, operator: &Operator, allowed: &dyn Fn(usize, ObjectId) -> b
     (remaining, uses)
 }
 
-/// Remaining rows of a table.
+/// Returns the entries of a table for the remaining designs, in row-major order.
 #[expect(clippy::arithmetic_side_effects, reason = "a position in the table, which is in memory")]
 fn rows(table: &Table<Int>, kept: &KeptDesigns, sizes: &[usize]) -> Arc<[Int]> {
     let mut positions = vec![0_usize];
@@ -185,7 +185,7 @@ fn rows(table: &Table<Int>, kept: &KeptDesigns, sizes: &[usize]) -> Arc<[Int]> {
     positions.into_iter().map(|position| table.values[position]).collect()
 }
 
-/// Combinations of a rule that are still possible.
+/// Returns the forbidden combinations whose designs all remain, with the new indices of the designs.
 fn exclusions(rule: &ForbiddenCombinations, kept: &KeptDesigns) -> ForbiddenCombinations {
     let moved = |(slot, index): (&u32, &u32)| {
         kept[*slot as usize].iter().position(|candidate| candidate == index).map(dense)

@@ -1,9 +1,9 @@
-//! Optimal replanning from a situation: one search per possible first step, then tie-breaking.
+//! Optimal replanning from a state: one search for each possible first step, then tie-breaking.
 //!
-//! The most promising first step is searched first; a step whose lower bound exceeds the best
-//! metric is skipped. Ties are broken as without first steps: fewest steps, fewest
-//! reconfigurations, model order. A plan to stay close to is kept if it is optimal; otherwise,
-//! among plans with the fewest steps, one that shares most of its steps is chosen.
+//! First steps are searched in the order of their lower bounds. A first step whose lower bound exceeds the
+//! best metric is skipped. Ties are broken as in planning: fewest steps, then fewest reconfigurations, then
+//! model order. If the current plan should be preserved, a plan that shares most of its steps is selected
+//! among the optimal plans with the fewest steps.
 
 use num_rational::BigRational;
 use rustc_hash::FxHashSet;
@@ -20,19 +20,20 @@ use crate::replan::query::{FirstStep, Progress, Query, ReplanOutcome};
 use crate::replan::replan_cache::{AvailabilityContext, GroundBase};
 use crate::replan::state_mapping::ReplanState;
 
-/// Possible start of a plan.
+/// A possible beginning of a plan: the initial situation, or the situation after a first step.
 struct Start {
     first: Option<usize>,
     state: State,
-    /// Functions and designs of the first step.
+    /// Functions used by the first step, with their designs.
     designs: Vec<(ObjectId, ObjectId)>,
-    /// Arguments of the first step, which are ordered by declaration.
+    /// Arguments of the first step. Ids are in order of declaration.
     arguments: Vec<ObjectId>,
-    /// Metric before the plan begins; lower is better.
+    /// Metric of the mission if it ended here, negated if it is maximised.
     own: BigRational,
 }
 
-/// Finds a best plan. Each search stores at most `max_states` states.
+/// Finds a best plan for a query. Each search stores at most `max_states` states. `report` receives the
+/// progress.
 pub(super) fn solve(
     base: &GroundBase,
     set: &AvailabilityContext,
@@ -116,7 +117,8 @@ pub(super) fn solve(
     ReplanOutcome::Optimal { first, steps: decode(context, &plan).steps, metric }
 }
 
-/// The old plan, if it is still valid. Used if there is no time to search.
+/// Returns the current plan of the query if it is still valid, and otherwise no plan. Used if there is no
+/// time for a search.
 pub(super) fn reuse_previous_plan(
     base: &GroundBase,
     task: &Task,
@@ -133,7 +135,8 @@ pub(super) fn reuse_previous_plan(
     least.map_or(ReplanOutcome::Unknown, |least| least.feasible(Context::new(task, query.limits)))
 }
 
-/// The old plan, if it is valid from a state.
+/// Returns the current plan if it is valid in the given state. `old` holds its steps; a step is `None` if it
+/// no longer exists.
 fn old_plan(task: &Task, state: &State, query: &Query<'_>, old: &[Option<GroundStep>]) -> Option<GroundPlan> {
     query.old?;
     let steps: Vec<GroundStep> = old.iter().cloned().collect::<Option<_>>()?;
@@ -141,11 +144,11 @@ fn old_plan(task: &Task, state: &State, query: &Query<'_>, old: &[Option<GroundS
     Some(GroundPlan { steps, cost })
 }
 
-/// A plan that need not be optimal.
+/// A plan for the query; it need not be optimal.
 #[derive(Clone)]
 struct Candidate {
     first: Option<usize>,
-    /// Metric of the mission (lower is better), and number of steps.
+    /// Metric of the mission (lower is better), and number of steps of the plan.
     value: (BigRational, usize),
     plan: GroundPlan,
 }
@@ -162,7 +165,8 @@ impl Candidate {
     }
 }
 
-/// Possible starts of plans. Returns `None` if the task is unsuitable for the query.
+/// Returns the possible beginnings of plans. Returns `None` if the task does not support a first step of the
+/// query.
 fn starts(base: &GroundBase, situation: &ReplanState, query: &Query<'_>) -> Option<Vec<Start>> {
     let sign = |metric: &BigRational| if base.task.objective.maximize { -metric } else { metric.clone() };
     if query.first.is_empty() {
@@ -185,7 +189,7 @@ fn starts(base: &GroundBase, situation: &ReplanState, query: &Query<'_>) -> Opti
     query.first.iter().enumerate().map(start).collect()
 }
 
-/// Selects one of the optimal plans, and returns the first step that it begins with.
+/// Selects one of several optimal plans. Also returns the index of its first step.
 fn choose(
     set: &AvailabilityContext,
     query: &Query<'_>,
@@ -197,7 +201,7 @@ fn choose(
     let mut chosen = None;
     let mut max_changes = Some((usize::MAX, usize::MAX));
     for (start, plan) in winners {
-        // A later candidate is chosen only if it has fewer changes.
+        // A later plan is selected only if it has fewer changes.
         let Some(limit) = max_changes else { break };
         let beginning = plan_tiebreak::PlanPrefix { state: &start.state, designs: &start.designs, close_to };
         let (plan, changes) =
@@ -213,7 +217,8 @@ fn choose(
     chosen.unwrap_or((None, GroundPlan { steps: Vec::new(), cost: 0 }))
 }
 
-/// Greatest value below the given number of changes.
+/// Returns the greatest pair of changes that is lexicographically less than the given pair, or `None` for (0,
+/// 0).
 #[expect(clippy::arithmetic_side_effects, reason = "those that are 0 are told apart")]
 fn fewer((departures, reconfigurations): plan_tiebreak::Changes) -> Option<plan_tiebreak::Changes> {
     match (departures, reconfigurations) {
@@ -223,7 +228,7 @@ fn fewer((departures, reconfigurations): plan_tiebreak::Changes) -> Option<plan_
     }
 }
 
-/// Step of the task for an action given by names, if it still exists.
+/// Returns the step of the task for an action that is given by names, or `None` if there is no such step.
 fn find(task: &Task, (action, arguments): &(String, Vec<String>)) -> Option<GroundStep> {
     let same = |object: ObjectId, name: &String| task.object_names[object.index()].eq_ignore_ascii_case(name);
     for (operator, id) in task.operators.iter().zip((0..).map(task::task::OperatorId)) {

@@ -1,10 +1,10 @@
-//! Maps a problem to a state of a task that was grounded for another problem, if both have the same
-//! operators.
+//! Maps problems of a domain to states of a task that was grounded for another problem of the domain.
 //!
-//! Two problems of one domain have the same operators if they differ in three respects only: availability,
-//! numbers that actions change, and facts that actions change and for which the task has variables. The facts
-//! must be relaxed-reachable in the task and must not violate its mutex groups. Everything reachable from the
-//! new state is then reachable from the old one. Facts and values that nothing reads may differ freely.
+//! The mapping requires that both problems have the same operators. They may differ in availability, in
+//! numbers that actions change, and in facts that actions change and for which the task has variables. These
+//! facts must be reachable in the relaxation of the task and must respect its mutex groups. Then every fact
+//! that is reachable in the new problem is also reachable in the grounded problem. Facts and values that
+//! nothing reads may differ arbitrarily.
 
 use num_rational::BigRational;
 use num_traits::ToPrimitive;
@@ -17,38 +17,38 @@ use crate::replan::usage::{Usage, key};
 use pddl::ast::{Atom, InitialElement, Name, Problem};
 use pddl::validate::Advance;
 
-/// Mapping of the facts and values of problems to the task.
+/// Mapping of the facts and values of problems to the variables of the task.
 #[derive(Debug)]
 pub(super) struct Layout {
     usage: Usage,
-    /// Predicates that state availability, all with one parameter.
+    /// Predicates that state availability. Each has one parameter.
     assumed: Vec<Name>,
     objects: FxHashMap<String, ObjectId>,
-    /// The problem without its initial state, as text.
+    /// Text of the problem without its initial state. It must be equal for all problems.
     frame: String,
-    /// Facts with a variable, and whether relaxed reachability has reached them.
+    /// Variable and value of each fact, and whether the fact is reachable in the relaxation.
     facts: FxHashMap<String, (Fact, bool)>,
+    /// Index of each numeric variable.
     numbers: FxHashMap<String, usize>,
     scale: BigRational,
-    /// Static facts that must hold, with dense indices.
+    /// Static facts that must be true in every problem, numbered from 0.
     fixed: FxHashMap<String, usize>,
-    /// Static values that must be unchanged, with dense indices.
+    /// Static values that must be equal in every problem, numbered from 0.
     values: FxHashMap<String, (usize, BigRational)>,
-    /// A state in which no fact holds.
+    /// Values of the variables if no fact is true.
     nothing: Vec<u32>,
 }
 
-/// A state of the task, and the available objects.
+/// A state of the task, and the objects that are available.
 #[derive(Debug, Clone)]
 pub(super) struct ReplanState {
     pub(super) state: State,
-    /// Per predicate: available objects, sorted.
+    /// For each availability predicate: the available objects in ascending order.
     pub(super) available: Vec<Vec<ObjectId>>,
 }
 
 impl Layout {
-    /// Computes the mapping from a problem to the task that was grounded from it with everything
-    /// available.
+    /// Computes the mapping for the problem from which the task was grounded.
     #[expect(clippy::arithmetic_side_effects, reason = "every variable has a value")]
     pub(super) fn new(usage: Usage, assumed: &[Name], problem: &Problem, task: &Task) -> Self {
         let names = task.object_names.iter().map(|name| name.to_ascii_lowercase());
@@ -87,20 +87,20 @@ impl Layout {
         layout
     }
 
-    /// Returns `true` if a fact without a variable must be unchanged.
+    /// Returns `true` if a fact that has no variable must be the same in every problem.
     fn matters(&self, atom: &Atom, key: &str) -> bool {
         let predicate = &atom.predicate.name;
         !self.assumed.contains(predicate)
             && (!self.usage.is_changed(predicate) || self.usage.is_read(predicate, key))
     }
 
-    /// Returns `true` if a value without a variable must be unchanged.
+    /// Returns `true` if a value that has no variable must be the same in every problem.
     fn value_matters(&self, function: &Atom) -> bool {
         let name = &function.predicate.name;
         !self.usage.is_changed(name) || self.usage.is_function_read(name)
     }
 
-    /// State that a problem describes. Returns `None` if the task is unsuitable for it.
+    /// Returns the state that the problem describes, or `None` if the task does not support the problem.
     pub(super) fn situation(&self, task: &Task, problem: &Problem) -> Option<ReplanState> {
         if frame(problem) != self.frame {
             return None;
@@ -162,7 +162,7 @@ impl Layout {
         Some(())
     }
 
-    /// Sets a fact. Returns `None` if it contradicts another fact of its variable or is
+    /// Makes a fact true. Returns `None` if its variable already has another fact, or the fact is
     /// unreachable.
     fn set(&self, values: &mut [u32], fact: Fact, is_reached: bool) -> Option<()> {
         let value = &mut values[fact.variable.index()];
@@ -176,7 +176,7 @@ impl Layout {
         scaled.is_integer().then(|| scaled.to_integer().to_i128()).flatten()
     }
 
-    /// State after a step. Returns `None` if the step changes parts that must be unchanged.
+    /// Returns the state after a step, or `None` if the step changes facts or values that must not change.
     pub(super) fn advance(&self, task: &Task, state: &State, step: &Advance) -> Option<State> {
         let mut next = state.clone();
         for atom in &step.deleted {
@@ -214,28 +214,28 @@ impl Layout {
         Some(next)
     }
 
-    /// Object with this name, ignoring case.
+    /// Returns the object with this name; letter case is ignored.
     pub(super) fn object(&self, name: &str) -> Option<ObjectId> {
         self.objects.get(&name.to_ascii_lowercase()).copied()
     }
 }
 
-/// Returns `true` if the state satisfies the mutex groups that the operators rely on.
+/// Returns `true` if the state respects the mutex groups on which the operators rely.
 fn respects_exclusion(task: &Task, state: &State) -> bool {
     task.exclusive.iter().all(|group| group.iter().filter(|fact| fact.holds(&state.values)).count() <= 1)
 }
 
-/// Contents of an initial state while it is read.
+/// Partial state while the initial state of a problem is read.
 struct Reading {
     values: Vec<u32>,
     numbers: Vec<Option<Int>>,
     available: Vec<Vec<ObjectId>>,
-    /// Per static fact: whether it holds.
+    /// For each static fact that must be true: whether it was read.
     fixed: Vec<bool>,
     fixed_values: Vec<bool>,
 }
 
-/// All parts of a problem except its initial state, as text.
+/// Returns all parts of a problem except its initial state, as text.
 fn frame(problem: &Problem) -> String {
     use std::fmt::Write as _;
     let mut text = String::new();
@@ -247,13 +247,14 @@ fn frame(problem: &Problem) -> String {
         }
         text.push(' ');
     }
-    // Source positions are included. A text with other positions counts as different, which costs
-    // time but is harmless.
+    // The text includes source positions. A problem with other positions is therefore not supported, which
+    // costs time but is correct.
     let _ = write!(text, "{:?} {:?}", problem.goal, problem.metric);
     text
 }
 
-/// Facts of basic variables, and whether they hold initially or are effects of some operator.
+/// Returns the facts of the basic variables by their names, and whether each is true initially or an effect
+/// of an operator.
 fn facts(task: &Task) -> FxHashMap<String, (Fact, bool)> {
     let mut reached: FxHashSet<Fact> = FxHashSet::default();
     for operator in &task.operators {

@@ -1,22 +1,24 @@
-//! Usage of the symbols of a domain: read by conditions, changed by effects, or required to be available.
+//! Usage of the symbols of a domain: which symbols conditions read, which symbols effects change, and which
+//! parameters must be available.
 //!
-//! The analysis is syntactic: a symbol that is read somewhere counts as read everywhere.
+//! The analysis is syntactic: if a symbol is read anywhere, all its atoms count as read.
 
 use rustc_hash::FxHashSet;
 
 use pddl::ast::{Atom, Condition, Domain, Effect, Expression, Name, Problem, Term};
 use pddl::visit::Node;
 
-/// Uses of symbols.
+/// Predicates and functions of a domain and problem, by their usage.
 #[derive(Debug, Default)]
 pub(super) struct Usage {
-    /// Predicates that conditions of actions and effects, axioms, or quantifiers of the goal read.
+    /// Predicates that are read by conditions of actions and effects, by axioms, or below quantifiers of the
+    /// goal.
     read: FxHashSet<Name>,
-    /// Atoms of the goal, as keys.
+    /// Keys of the atoms of the goal, see [`key`].
     goal: FxHashSet<String>,
     /// Predicates and functions that effects or axioms change.
     changed: FxHashSet<Name>,
-    /// Functions that conditions, durations and effects read.
+    /// Functions that conditions, durations or effects read.
     functions: FxHashSet<Name>,
 }
 
@@ -34,23 +36,23 @@ impl Usage {
         usage
     }
 
-    /// Returns `true` if effects or axioms change a predicate or function.
+    /// Returns `true` if an effect or axiom changes the predicate or function.
     pub(super) fn is_changed(&self, name: &Name) -> bool {
         self.changed.contains(name)
     }
 
-    /// Returns `true` if a condition reads an atom.
+    /// Returns `true` if a condition reads the atom.
     pub(super) fn is_read(&self, predicate: &Name, key: &str) -> bool {
         self.read.contains(predicate) || self.goal.contains(key)
     }
 
-    /// Returns `true` if any part other than the metric reads a function.
+    /// Returns `true` if a condition, duration or effect reads the function. The metric is not considered.
     pub(super) fn is_function_read(&self, function: &Name) -> bool {
         self.functions.contains(function)
     }
 
-    /// Collects the symbols of a condition. If `is_ground`, only the very atoms that occur without
-    /// variables count as read.
+    /// Collects the symbols that a condition reads. If `is_ground`, an atom outside quantifiers is collected
+    /// as an atom; otherwise its whole predicate counts as read.
     fn condition(&mut self, condition: &Condition, is_ground: bool) {
         match condition {
             Condition::Exists(_, part) | Condition::ForAll(_, part) => self.condition(part, false),
@@ -78,7 +80,7 @@ impl Usage {
     }
 }
 
-/// Canonical text of an atom in lower case: `(robot_at wp1)`.
+/// Returns the canonical text of an atom in lower case, such as `(robot_at wp1)`.
 pub(super) fn key(atom: &Atom) -> String {
     let mut text = String::with_capacity(32);
     text.push('(');
@@ -92,16 +94,16 @@ pub(super) fn key(atom: &Atom) -> String {
     text
 }
 
-/// Name of a variable or constant.
+/// Returns the name of a variable or constant.
 pub(super) fn identifier(term: &Term) -> &Name {
     match term {
         Term::Variable(identifier) | Term::Constant(identifier) => &identifier.name,
     }
 }
 
-/// Per action: indices of the parameters that must be available, each with the index of the
-/// predicate that states it. Returns `None` if a predicate is used in another way, because then
-/// more availability need not mean more operators.
+/// Returns, for each action, the indices of the parameters that must be available, each with the index of the
+/// predicate that states availability. Returns `None` if one of the predicates is used in another way,
+/// because more availability might then exclude operators.
 #[expect(clippy::arithmetic_side_effects, reason = "occurrences in a text in memory")]
 pub(super) fn requirements(domain: &Domain, predicates: &[Name]) -> Option<Vec<Vec<(usize, usize)>>> {
     let mut requirements = Vec::new();
@@ -123,7 +125,7 @@ pub(super) fn requirements(domain: &Domain, predicates: &[Name]) -> Option<Vec<V
     (total == mentions).then_some(requirements)
 }
 
-/// Atoms of a conjunction.
+/// Returns the atoms of a conjunction.
 fn conjuncts(condition: &Condition) -> Vec<&Atom> {
     match condition {
         Condition::And(parts) => parts.iter().flat_map(conjuncts).collect(),
@@ -132,7 +134,7 @@ fn conjuncts(condition: &Condition) -> Vec<&Atom> {
     }
 }
 
-/// Number of occurrences of a predicate in conditions and effects of a domain.
+/// Returns the number of occurrences of a predicate in conditions and effects of a domain.
 fn occurrences(domain: &Domain, predicate: &Name) -> usize {
     let mut count = Count { predicate, mentions: 0 };
     for action in &domain.actions {
@@ -145,7 +147,7 @@ fn occurrences(domain: &Domain, predicate: &Name) -> usize {
     count.mentions
 }
 
-/// Number of occurrences of a predicate in a condition.
+/// Returns the number of occurrences of a predicate in a condition.
 pub(super) fn in_condition(condition: &Condition, predicate: &Name) -> usize {
     let mut count = Count { predicate, mentions: 0 };
     condition.walk(&mut |node| count.node(node));

@@ -1,4 +1,4 @@
-//! Decodes bytes into a lifted task, so that every source of bytes (property test, fuzzer) generates tasks.
+//! Decodes bytes to a lifted task, so that property tests and fuzzers can generate tasks.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,26 +10,26 @@ use crate::ground_semantics::model::{
     Range, STATICS, Sign, TOTAL_COST, Task, Term, UPPER, Way,
 };
 
-/// Constructs that generated tasks may contain.
+/// Language constructs that generated tasks may contain.
 #[expect(clippy::struct_excessive_bools, reason = "switches that have nothing to do with each other")]
 #[derive(Debug, Clone, Copy)]
 pub struct Features {
     pub conditional: bool,
     pub derived: bool,
     pub timed: bool,
-    /// Durations with other bounds than one equation at the start.
+    /// Durations with bounds other than a single equation at the start.
     pub inequalities: bool,
-    /// Functions that change and have no initial value; effects that contradict each other.
+    /// Functions that change and have no initial value, and effects that contradict each other.
     pub undefined: bool,
-    /// Derived predicates that recur through all objects of a type.
+    /// Derived predicates that depend on themselves through a universal quantifier.
     pub universal: bool,
-    /// Durations below zero, with which no action can be executed.
+    /// Negative durations, with which no action can be executed.
     pub negative: bool,
-    /// Products of fluents, comparisons in axioms, durations and divisors that change.
+    /// Products of fluents, comparisons in axioms, and durations and divisors that change.
     pub nonlinear: bool,
 }
 
-/// Everything that the language has.
+/// All constructs of the language.
 pub const ALL: Features = Features {
     conditional: true,
     derived: true,
@@ -53,23 +53,24 @@ pub const PLANNED: Features = Features {
     nonlinear: false,
 };
 
-/// Draws from bytes; when they have run out, always the first choice, so that every text is finite.
+/// Decoder that draws choices from bytes. If no bytes remain, it draws the first choice, so that every text
+/// is finite.
 pub struct Draw<'b> {
     bytes: &'b [u8],
     features: Features,
-    /// Whether static expressions may be undefined.
+    /// Whether static expressions may be undefined in the generated task.
     partial: bool,
 }
 
-/// Derived predicates that a condition may use.
+/// Derived predicates that a condition may read.
 #[derive(Debug, Clone, Copy)]
 struct Allowed {
-    /// Anywhere.
+    /// Predicates that may be read anywhere.
     free: &'static [usize],
-    /// Only where it is not negated.
+    /// Predicates that may be read only where they are not negated.
     positive: &'static [usize],
     negated: bool,
-    /// Whether numbers may be compared.
+    /// Whether the condition may contain numeric comparisons.
     numeric: bool,
 }
 
@@ -138,7 +139,7 @@ impl<'b> Draw<'b> {
         Formula::Fact(predicate, self.terms(PREDICATES[predicate].1, depth))
     }
 
-    /// An expression; `is_constant`: over what never changes.
+    /// Generates an expression. If `is_constant`, it contains only functions that never change.
     fn expression(&mut self, depth: usize, nesting: usize, is_constant: bool, duration: bool) -> Expression {
         let leaf = nesting == 0 || self.chance(50);
         if leaf {
@@ -161,7 +162,7 @@ impl<'b> Draw<'b> {
             }
             _ => {
                 let is_constant = is_constant || !self.features.nonlinear;
-                // Zero and what has no value are divisors where expressions may be undefined.
+                // If expressions may be undefined, divisors may be 0 or undefined.
                 let divisor = if self.partial || self.features.undefined {
                     self.expression(depth, 0, is_constant, false)
                 } else {
@@ -221,7 +222,7 @@ impl<'b> Draw<'b> {
         Allowed { positive, ..allowed }
     }
 
-    /// A condition of an action or of the goal: mostly a conjunction of little.
+    /// Generates a condition of an action or of the goal, usually a small conjunction.
     fn condition(&mut self, depth: usize, most: usize, duration: bool) -> Formula {
         self.condition_over(depth, most, duration, true)
     }
@@ -280,7 +281,7 @@ impl<'b> Draw<'b> {
     fn effects(&mut self, depth: usize, duration: bool) -> Vec<Effect> {
         let mut effects = self.some(0, 3, |this| this.effect(depth, 2, duration));
         if !self.features.undefined {
-            // At most one effect on numbers, so that none contradicts another, and not below a quantifier.
+            // At most one numeric effect, and not below a quantifier, so that no effect contradicts another.
             let mut seen = false;
             effects.retain(|effect| !changes_number(effect) || !std::mem::replace(&mut seen, true));
             effects.retain(|effect| {
@@ -381,7 +382,7 @@ impl<'b> Draw<'b> {
         Some((self.chance(30), Expression::Sum(parts)))
     }
 
-    /// A task.
+    /// Generates a task.
     pub fn task(&mut self) -> Task {
         self.partial = self.chance(50);
         let axioms = if self.features.derived { self.axioms() } else { Vec::new() };
@@ -393,7 +394,7 @@ impl<'b> Draw<'b> {
                 (Number::new(this.below(12) as i128, 2), this.atom(&basic), this.chance(50))
             });
             timed.sort_by_key(|(time, ..)| *time);
-            // The language does not define which of two opposite literals at one time wins.
+            // The language does not define which of two opposite literals at the same time takes effect.
             timed.dedup_by_key(|(time, ..)| *time);
         }
         Task {
@@ -407,7 +408,7 @@ impl<'b> Draw<'b> {
         }
     }
 
-    /// Some steps of a plan for a task, right or wrong.
+    /// Generates some steps of a valid or invalid plan for a task.
     pub fn plan(&mut self, task: &Task) -> Vec<Step> {
         self.some(0, 5, |this| {
             let index = this.below(task.actions.len());

@@ -1,5 +1,5 @@
-//! The ground task against the interpreter: from state to state, the same actions can be executed,
-//! the same atoms hold, the goal is reached in the same states, and the metric is the same.
+//! Compares the ground task with the interpreter. In corresponding states, the same actions must be
+//! applicable, the same atoms true, the goal satisfied or not, and the metric equal.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,16 +9,17 @@ use pddl::ast::{Domain, Problem};
 use crate::ground_semantics::interpret::{State, choices};
 use crate::ground_semantics::model::{Action, Expression, Number, OBJECTS, Sign, Task, fact_text};
 
-/// Number of pairs of states that are compared.
+/// Maximum number of pairs of states that are compared.
 const LIMIT: usize = 60;
 
-/// States with numbers beyond are not followed: exact integers end somewhere.
+/// States with numbers above this limit are not expanded, because exact integers are limited.
 const LARGE: i128 = 100_000;
 
-/// Codes of admitted rejections: a construct, a product of fluents, numbers that are too large.
+/// Error codes with which grounding may reject a task: unsupported construct, product of fluents, too large
+/// numbers.
 const REFUSALS: [&str; 3] = ["E301", "E303", "E304"];
 
-/// Whether the metric rewards time.
+/// Returns `true` if the metric rewards time.
 fn rewards_time(task: &Task) -> bool {
     let Some((maximize, Expression::Sum(parts))) = &task.metric else { return false };
     let weights = parts.iter().filter_map(|part| match part {
@@ -33,8 +34,8 @@ fn rewards_time(task: &Task) -> bool {
     if *maximize { sum > zero } else { sum < zero }
 }
 
-/// Duration of an action: the value of its only equation, or else the only bound that is optimal
-/// for the metric.
+/// Returns the duration that the planner should choose: the value of the only equation, or otherwise of the
+/// only bound that is optimal for the metric.
 fn duration(task: &Task, action: &Action, scope: &[usize], state: &State) -> Option<Number> {
     let bounds = action.duration.as_ref()?;
     let among = |signs: &[Sign]| {
@@ -50,13 +51,13 @@ fn duration(task: &Task, action: &Action, scope: &[usize], state: &State) -> Opt
     state.value(task, chosen?, scope)
 }
 
-/// The state after an instance of an action, which takes the time that the planner would choose.
+/// Returns the state after an action instance with the duration that the planner should choose.
 fn after(task: &Task, state: &State, index: usize, objects: Vec<usize>) -> Option<State> {
     let duration = duration(task, &task.actions[index], &objects, state);
     state.after(task, &(index, objects, duration))
 }
 
-/// Searches for a state of the lifted task in which the goal holds.
+/// Checks by search that no state of the lifted task satisfies the goal.
 fn goal_is_out_of_reach(task: &Task) {
     let mut open = vec![State::initial(task)];
     let mut next = 0;
@@ -80,12 +81,12 @@ fn is_small(state: &State) -> bool {
 struct Pair {
     lifted: State,
     ground: TaskState,
-    /// Number of actions from the initial state. `None` if some of them are not in the ground task,
-    /// so that their costs are unknown.
+    /// Number of actions from the initial state. `None` if one of them is not in the ground task, so that its
+    /// cost is unknown.
     steps: Option<usize>,
 }
 
-/// Compares states up to the limit. Returns `None` if the task is rejected.
+/// Compares corresponding states up to the limit. Returns `None` if grounding rejects the task.
 pub fn check(task: &Task, (domain, problem): &(Domain, Problem)) -> Option<usize> {
     let context = || format!("{}\n{}", task.domain(), task.problem());
     let ground = match ground(domain, problem, &GroundConfig::default()) {
@@ -136,8 +137,8 @@ pub fn check(task: &Task, (domain, problem): &(Domain, Problem)) -> Option<usize
                 let after = after(task, &lifted, index, objects);
                 let pair = match (after, transitions.remove(&key)) {
                     (Some(after), Some(ground)) => (after, ground, steps.map(|steps| steps + 1)),
-                    // Left out where it changes nothing that matters; of one with conditional
-                    // effects, such a case.
+                    // Grounding may omit an action that changes nothing relevant, and such a case of an
+                    // action with conditional effects.
                     (Some(after), None) if !actions.contains(&key) || action.is_conditional() => {
                         (after, state.clone(), None)
                     }

@@ -1,23 +1,23 @@
-//! Interference of happenings: one writes an atom or number that the other reads, or both write it
-//! and do not commute.
+//! Interference of happenings: one happening writes an atom or number that the other reads, or both write it
+//! in ways that do not commute.
 
 use std::collections::BTreeSet;
 
 use crate::ground_semantics::interpret::{Change, Changes, objects, with};
 use crate::ground_semantics::model::{Atom, DERIVED, Effect, Expression, Formula, PREDICATES, Task, UPPER};
 
-/// Read and write sets of a happening.
+/// The atoms and numbers that a happening reads and writes.
 #[derive(Debug, Default)]
 pub struct Touch {
     facts: BTreeSet<Atom>,
-    /// Predicates of which everything is read.
+    /// Predicates all of whose atoms count as read.
     predicates: BTreeSet<usize>,
     values: BTreeSet<Atom>,
-    /// Functions of which everything is read.
+    /// Functions all of whose values count as read.
     functions: BTreeSet<usize>,
     pub added: BTreeSet<Atom>,
     pub deleted: BTreeSet<Atom>,
-    /// Changed numbers with the kind of change: assign, add, or scale.
+    /// Changed numbers, each with the kind of change: assignment, addition or scaling.
     changed: BTreeSet<(Atom, u8)>,
 }
 
@@ -95,14 +95,14 @@ impl Touch {
         }
     }
 
-    /// Everything that a derived predicate depends on, for all objects.
+    /// Adds everything that a derived predicate depends on, for all objects.
     fn below(&mut self, task: &Task, predicate: usize) {
         if !self.predicates.insert(predicate) {
             return;
         }
         for (_, body) in task.axioms.iter().filter(|(head, _)| *head == predicate) {
             let mut inner = Self { predicates: self.predicates.clone(), ..Self::default() };
-            // Variables may denote any object, so only the predicates and functions matter.
+            // Variables may denote any object, so only the predicates and functions are recorded.
             inner.reads_of_formula(task, body, &vec![0; PREDICATES[predicate].1]);
             self.functions.extend(inner.values.iter().map(|(function, _)| *function));
             self.functions.extend(inner.functions);
@@ -126,8 +126,8 @@ impl Touch {
         }));
     }
 
-    /// Returns `true` if this happening writes an atom or number that `other` reads, or both write
-    /// it and do not commute.
+    /// Returns `true` if this happening writes an atom or number that `other` reads, or both write it in ways
+    /// that do not commute.
     pub fn disturbs(&self, other: &Self) -> bool {
         let is_read = |atom: &Atom| other.facts.contains(atom) || other.predicates.contains(&atom.0);
         let is_read_number = |atom: &Atom| other.values.contains(atom) || other.functions.contains(&atom.0);

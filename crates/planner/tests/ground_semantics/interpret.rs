@@ -1,4 +1,4 @@
-//! Reference interpreter of lifted tasks: direct evaluation without compilation, indices or caches.
+//! Reference interpreter of lifted tasks: evaluates them directly, without compilation, indices or caches.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,20 +9,20 @@ use crate::ground_semantics::model::{
     Action, Atom, DERIVED, Effect, Expression, Formula, Number, PREDICATES, Task, Term, UPPER, Way,
 };
 
-/// A state: true atoms, values of functions, and elapsed time.
+/// A state of a lifted task: true atoms, values of functions, and elapsed time.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct State {
     pub facts: BTreeSet<Atom>,
     pub values: BTreeMap<Atom, Number>,
     pub time: Number,
-    /// Number of timed literals that have taken place.
+    /// Number of timed literals that have already taken effect.
     timed: usize,
 }
 
-/// One step of a plan: an action, its objects, and its duration where the plan has to say it.
+/// A step of a plan: the index of the action, its objects, and its duration if the plan must state it.
 pub type Step = (usize, Vec<usize>, Option<Number>);
 
-/// True, false, or undefined because a function has no value.
+/// Truth value; `None` if it is undefined because a function has no value.
 type Truth = Option<bool>;
 
 fn conjunction(parts: impl Iterator<Item = Truth>) -> Truth {
@@ -41,7 +41,7 @@ fn disjunction(parts: impl Iterator<Item = Truth>) -> Truth {
     negation(conjunction(parts.map(negation)))
 }
 
-/// A state with its derived atoms, and the variables in scope of a condition.
+/// A state with its derived atoms, and the variables in scope.
 struct View<'a> {
     state: &'a State,
     derived: BTreeSet<Atom>,
@@ -60,7 +60,7 @@ pub fn with(scope: &[usize], object: usize) -> Vec<usize> {
     scope.iter().copied().chain([object]).collect()
 }
 
-/// All ways to choose objects, one from each list.
+/// Returns all combinations of one object from each list.
 pub fn choices(lists: &[&[usize]]) -> Vec<Vec<usize>> {
     lists.iter().fold(vec![Vec::new()], |all, list| {
         all.iter().flat_map(|known| list.iter().map(|object| with(known, *object))).collect()
@@ -142,7 +142,7 @@ impl<'a> View<'a> {
         })
     }
 
-    /// Collects the changes of an effect. Returns `None` if they are undefined or contradict another change.
+    /// Collects the changes of an effect. Returns `None` if a change is undefined or contradicts another.
     fn collect(&self, effect: &Effect, scope: &[usize], changes: &mut Changes) -> Option<()> {
         match effect {
             Effect::And(parts) => parts.iter().try_for_each(|part| self.collect(part, scope, changes))?,
@@ -207,7 +207,8 @@ impl Changes {
     }
 }
 
-/// The start or the end of an action: its condition, its effects, and the bounds of its duration.
+/// The start or the end of an action: its condition, its effects, and the bounds of its duration that are
+/// evaluated then.
 type Half<'a> = (&'a Formula, &'a [Effect], Vec<&'a Expression>);
 
 impl State {
@@ -243,7 +244,7 @@ impl State {
         Some(after)
     }
 
-    /// Lets the timed literals that are due take place.
+    /// Applies the timed literals that are due.
     fn pass(&mut self, task: &Task, is_due: impl Fn(Number) -> bool) {
         while let Some((time, atom, holds)) = task.timed.get(self.timed).filter(|(time, ..)| is_due(*time)) {
             let _ = time;
@@ -256,7 +257,8 @@ impl State {
         }
     }
 
-    /// The duration of an action here: the stated one where the bounds admit it, or the only possible one.
+    /// Returns the duration of an action in this state: the stated duration if the bounds admit it, or the
+    /// only possible one.
     fn duration(
         &self,
         task: &Task,
@@ -279,13 +281,13 @@ impl State {
         exact.or(stated).filter(|duration| *duration >= Ratio::from_integer(0))
     }
 
-    /// Value of an expression over functions in this state.
+    /// Returns the value of an expression in this state.
     pub fn value(&self, task: &Task, expression: &Expression, scope: &[usize]) -> Option<Number> {
         View::new(task, self, None).value(expression, scope)
     }
 
-    /// The state after a happening: all its effects read this state, and neither its halves nor an
-    /// event of its time interfere with it.
+    /// Returns the state after a happening. All its effects read this state. Returns `None` if its parts
+    /// interfere with each other or with a simultaneous event.
     fn happen(
         &self,
         task: &Task,
@@ -329,7 +331,8 @@ impl State {
         Some(after)
     }
 
-    /// The state after a step, begun as soon as the one before has ended; nothing if it cannot be executed.
+    /// Returns the state after a step that starts as soon as the previous step has ended, or `None` if the
+    /// step cannot be executed.
     pub fn after(&self, task: &Task, (action, scope, stated): &Step) -> Option<Self> {
         let action = &task.actions[*action];
         let start = self.time;
@@ -379,7 +382,7 @@ impl State {
         Some(state)
     }
 
-    /// True atoms, including derived ones.
+    /// Returns all true atoms, including derived atoms.
     pub fn all_facts(&self, task: &Task) -> BTreeSet<Atom> {
         let derived = View::new(task, self, None).derived;
         self.facts.iter().cloned().chain(derived).collect()
@@ -389,7 +392,7 @@ impl State {
         View::new(task, self, None).holds(&task.goal, &[])
     }
 
-    /// Value of the metric in this state. Returns `None` without a metric.
+    /// Returns the value of the metric in this state, or `None` without a metric.
     pub fn metric(&self, task: &Task) -> Option<Number> {
         let (_, value) = task.metric.as_ref()?;
         View::new(task, self, None).value(value, &[])

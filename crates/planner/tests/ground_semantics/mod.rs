@@ -1,5 +1,5 @@
-//! Random lifted tasks with all that the language has, against an interpreter that shares nothing
-//! with the library: printing and reading, the validator, and the ground task.
+//! Compares the library with an independent interpreter on random lifted tasks with all language constructs:
+//! printing and reading, the validator, and the ground task.
 
 mod generate;
 mod ground;
@@ -64,7 +64,7 @@ proptest! {
     }
 }
 
-/// Whether the task could be ground.
+/// Returns `true` if the task could be grounded.
 fn check_ground(bytes: &[u8]) -> bool {
     let task = Draw::new(bytes, PLANNED).task();
     ground::check(&task, &text::trees(&task)).is_some()
@@ -89,7 +89,7 @@ proptest! {
     }
 }
 
-/// Bytes that are always the same (`SplitMix64`).
+/// Returns pseudo-random bytes that depend only on the seed (`SplitMix64`).
 fn fixed_bytes(seed: u64) -> Vec<u8> {
     let mut state = seed;
     let mut next = || {

@@ -1,8 +1,8 @@
-//! A small lifted task as plain data, and its PDDL text.
+//! A small lifted task as plain data, and its conversion to PDDL.
 //!
-//! Three objects, a few predicates and functions of fixed names; whatever varies is in the actions,
-//! axioms, goal and initial state. A variable is the number of quantifiers and parameters around
-//! the one that binds it.
+//! There are three objects and a few predicates and functions with fixed names. Only the actions, axioms,
+//! goal and initial state vary. A variable is a number: the count of quantified variables and parameters in
+//! scope where it is bound.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,40 +10,40 @@ use num_rational::Ratio;
 
 /// An exact number.
 pub type Number = Ratio<i128>;
-/// A predicate or function applied to objects.
+/// A predicate or function (as an index) applied to objects.
 pub type Atom = (usize, Vec<usize>);
 
 /// The objects: a thing, a thing that is a part, and a tool.
 pub const OBJECTS: [(&str, &str); 3] = [("o0", "thing"), ("o1", "part"), ("0.5_tool", "tool")];
 
-/// A predicate: its name and its number of arguments.
+/// Name and number of arguments of each predicate.
 pub const PREDICATES: [(&str, usize); 8] =
     [("p", 0), ("q", 1), ("Q-r", 2), ("s", 1), ("t", 2), ("d", 1), ("w", 2), ("e", 1)];
-/// The predicates that actions change.
+/// Indices of the predicates that actions change.
 pub const FLUENTS: [usize; 3] = [0, 1, 2];
-/// The predicates that only the initial state has.
+/// Indices of the static predicates, which only the initial state sets.
 pub const STATICS: [usize; 2] = [3, 4];
-/// The predicates that follow, positively, from fluents and from each other.
+/// Indices of the derived predicates that depend only positively on fluents and on each other.
 pub const DERIVED: [usize; 2] = [5, 6];
-/// A derived predicate that may depend on all others, also negatively.
+/// Index of the derived predicate that may depend on all others, also negatively.
 pub const UPPER: usize = 7;
 
-/// A function: its name and its number of arguments.
+/// Name and number of arguments of each function.
 pub const FUNCTIONS: [(&str, usize); 5] = [("f", 0), ("g", 1), ("total-cost", 0), ("c", 1), ("k", 0)];
-/// The functions that actions change, apart from `total-cost`.
+/// Indices of the functions that actions change, except `total-cost`.
 pub const CHANGING: [usize; 2] = [0, 1];
-/// `total-cost`.
+/// Index of the function `total-cost`.
 pub const TOTAL_COST: usize = 2;
-/// The functions that only the initial state sets.
+/// Indices of the static functions, which only the initial state sets.
 pub const CONSTANT: [usize; 2] = [3, 4];
 
-/// Range of a variable.
+/// Type of a variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Range {
     Object,
     Thing,
     Part,
-    /// `(either part tool)`
+    /// The union type `(either part tool)`.
     Either,
 }
 
@@ -149,11 +149,11 @@ pub enum Effect {
     ForAll(Range, Box<Effect>),
 }
 
-/// An action; one without a duration uses only what is at its start.
+/// An action. An instantaneous action uses only its condition and effects at the start.
 #[derive(Debug, Clone)]
 pub struct Action {
     pub parameters: Vec<Range>,
-    /// Bounds of `?duration`; those with the flag are evaluated at the end.
+    /// Bounds of `?duration`; a bound with the flag `true` is evaluated at the end.
     pub duration: Option<Vec<(bool, Sign, Expression)>>,
     pub at_start: Formula,
     pub over_all: Formula,
@@ -168,10 +168,10 @@ pub struct Task {
     pub actions: Vec<Action>,
     pub facts: BTreeSet<Atom>,
     pub values: BTreeMap<Atom, Number>,
-    /// Time, atom, whether it begins to hold.
+    /// Timed literals: time, atom, and whether the atom becomes true.
     pub timed: Vec<(Number, Atom, bool)>,
     pub goal: Formula,
-    /// Whether to maximize, and what.
+    /// Metric: `true` for maximisation, and the expression.
     pub metric: Option<(bool, Expression)>,
 }
 
@@ -191,7 +191,7 @@ fn applied(name: &str, terms: &[Term]) -> String {
     format!("({})", words.join(" "))
 }
 
-/// A number as PDDL has it: a decimal, or a quotient.
+/// Formats a number in PDDL: as a decimal or a quotient.
 pub fn number(value: Number) -> String {
     match (*value.numer(), *value.denom()) {
         (numerator, 1) => numerator.to_string(),
@@ -221,7 +221,7 @@ fn bound(range: Range, depth: usize) -> String {
 }
 
 impl Formula {
-    /// The text where `depth` variables are bound around it.
+    /// Formats the expression in PDDL. `depth` is the number of variables bound around it.
     pub fn text(&self, depth: usize) -> String {
         match self {
             Self::Fact(predicate, terms) => applied(PREDICATES[*predicate].0, terms),
@@ -277,7 +277,7 @@ impl Effect {
 }
 
 impl Action {
-    /// Whether what it does depends on the state.
+    /// Returns `true` if the effects of the action depend on the state.
     pub fn is_conditional(&self) -> bool {
         self.start_effects.iter().chain(&self.end_effects).any(Effect::is_conditional)
     }
@@ -318,17 +318,17 @@ fn ground_text(name: &str, arguments: &[usize]) -> String {
     applied(name, &arguments.iter().map(|object| Term::Object(*object)).collect::<Vec<_>>())
 }
 
-/// `(p o0)` as a message or a ground task writes it.
+/// Formats an atom as messages and ground tasks do, e.g. `(p o0)`.
 pub fn fact_text((predicate, arguments): &Atom) -> String {
     ground_text(PREDICATES[*predicate].0, arguments)
 }
 
-/// `(f o0)`.
+/// Formats a function with objects, e.g. `(f o0)`.
 pub fn function_text((function, arguments): &Atom) -> String {
     ground_text(FUNCTIONS[*function].0, arguments)
 }
 
-/// Declaration of `arity` variables of any type.
+/// Returns the declaration of `arity` variables of type `object`.
 fn objects_of(arity: usize) -> String {
     join(&(0..arity).collect::<Vec<_>>(), |at| format!("?v{at} - object"))
 }

@@ -1,24 +1,24 @@
-//! Generates a valid plan of a task, by deriving the goal from its final state, and plans that
-//! differ from it in one place. The validator must reject the plans that the interpreter rejects.
+//! Generates a valid plan whose final state defines the goal, and plans that differ from it in one place. The
+//! validator must reject the plans that the interpreter rejects.
 
 use crate::ground_semantics::generate::Draw;
 use crate::ground_semantics::interpret::{State, Step, choices};
 use crate::ground_semantics::model::{Action, Atom, Expression, Formula, Number, Sign, Task, Term};
 use crate::ground_semantics::text;
 
-/// Number of changed plans per valid plan.
+/// Number of changed plans for each valid plan.
 const CHANGES: usize = 8;
 
 fn needs_duration(action: &Action) -> bool {
     action.duration.as_ref().is_some_and(|bounds| !matches!(bounds[..], [(false, Sign::Equal, _)]))
 }
 
-/// Some durations, among them such as no action has.
+/// Returns some durations, including durations that no action can have.
 fn durations() -> impl Iterator<Item = Number> + Clone {
     (-1..=6).map(|halves| Number::new(halves, 2))
 }
 
-/// All steps that have the right form.
+/// Returns all steps with the correct number and types of arguments.
 fn steps(task: &Task) -> Vec<Step> {
     let mut found = Vec::new();
     for (index, action) in task.actions.iter().enumerate() {
@@ -34,14 +34,14 @@ fn steps(task: &Task) -> Vec<Step> {
     found
 }
 
-/// Some steps that can be executed one after another, and where they lead.
+/// Draws a sequence of executable steps, and returns it with its final state.
 fn walk(draw: &mut Draw<'_>, task: &Task) -> (Vec<Step>, State) {
     let (mut plan, mut state) = (Vec::new(), State::initial(task));
     let steps = steps(task);
     for _ in 0..=draw.below(4) {
         let executable = steps.iter().filter_map(|step| Some((step, state.after(task, step)?)));
         let mut executable: Vec<_> = executable.collect();
-        // Most instances have no effect; a plan of such instances stays valid after any change.
+        // Most instances have no effect. A plan of such instances would stay valid after any change.
         if executable.iter().any(|(_, after)| after.facts != state.facts) {
             executable.retain(|(_, after)| after.facts != state.facts);
         }
@@ -59,7 +59,7 @@ fn terms(objects: &[usize]) -> Vec<Term> {
     objects.iter().map(|object| Term::Object(*object)).collect()
 }
 
-/// All that is different in two states.
+/// Returns a formula that describes all differences between two states.
 fn difference(before: &State, after: &State) -> Formula {
     let fact = |(predicate, objects): &Atom| Formula::Fact(*predicate, terms(objects));
     let gained = after.facts.difference(&before.facts).map(fact);
@@ -72,7 +72,7 @@ fn difference(before: &State, after: &State) -> Formula {
     Formula::And(gained.chain(lost).chain(values).collect())
 }
 
-/// The plan with one thing changed.
+/// Returns the plan with a single change.
 fn changed(draw: &mut Draw<'_>, task: &Task, plan: &[Step]) -> Vec<Step> {
     let mut plan = plan.to_vec();
     let place = draw.below(plan.len());
@@ -100,7 +100,8 @@ fn changed(draw: &mut Draw<'_>, task: &Task, plan: &[Step]) -> Vec<Step> {
     plan
 }
 
-/// Checks a valid plan and its changes; how many of the changed ones are valid, and how many are not.
+/// Checks a valid plan and its changed copies. Returns how many changed copies are valid, and how many are
+/// invalid.
 pub fn check(draw: &mut Draw<'_>) -> (usize, usize) {
     let mut task = draw.task();
     let (plan, last) = walk(draw, &task);

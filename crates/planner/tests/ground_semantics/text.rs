@@ -1,5 +1,5 @@
-//! Generated files are read without errors, and printing and reading them gives the same tree; a
-//! plan is judged by the validator as the interpreter judges it.
+//! Generated files must be read without errors, and printing and reading must yield equal trees. The
+//! validator must judge plans as the interpreter does.
 
 use pddl::ast::{Domain, Problem};
 use pddl::validate::{Options, PlanText, validate};
@@ -8,7 +8,7 @@ use pddl::{Source, has_errors, parse_domain, parse_problem, print_domain, print_
 use crate::ground_semantics::interpret::{State, Step};
 use crate::ground_semantics::model::{Number, OBJECTS, Task, function_text};
 
-/// The trees of a task's texts.
+/// Parses the domain and the problem text of a task.
 pub fn trees(task: &Task) -> (Domain, Problem) {
     let (domain, problem) = (Source::new("domain", task.domain()), Source::new("problem", task.problem()));
     match read(&domain, &problem) {
@@ -17,7 +17,7 @@ pub fn trees(task: &Task) -> (Domain, Problem) {
     }
 }
 
-/// A tree as text without the places of its parts.
+/// Returns a syntax tree as text without source positions.
 fn without_places(tree: &impl std::fmt::Debug) -> String {
     let text = format!("{tree:?}");
     let mut parts = text.split("Span { start: ");
@@ -25,7 +25,7 @@ fn without_places(tree: &impl std::fmt::Debug) -> String {
     parts.fold(first, |kept, part| kept + part.split_once(" }").map_or(part, |(_, rest)| rest))
 }
 
-/// Prints both trees, reads them again, and compares.
+/// Prints both syntax trees, reads the texts, and compares the trees.
 pub fn check_printing(domain: &Domain, problem: &Problem) {
     let source = Source::new("printed domain", print_domain(domain));
     let (again, found) = parse_domain(&source);
@@ -38,7 +38,7 @@ pub fn check_printing(domain: &Domain, problem: &Problem) {
 }
 
 fn decimal(value: Number) -> String {
-    // The tolerance of the validator is no concern here: all stated numbers are halves.
+    // The tolerance of the validator does not matter here, because all stated numbers are multiples of 1/2.
     format!("{}.{}", value.trunc(), if value.is_integer() { 0 } else { 5 })
 }
 
@@ -50,7 +50,8 @@ fn step_text((action, objects, duration): &Step) -> String {
     format!("(a{action} {}){duration}\n", objects.join(" "))
 }
 
-/// Number of the first inapplicable step (0 for the goal), or the final state of a valid plan.
+/// Returns the final state of a valid plan, or otherwise the number of the first inapplicable step (0 for an
+/// unsatisfied goal).
 fn interpret(task: &Task, plan: &[Step]) -> Result<State, usize> {
     let mut state = State::initial(task);
     for (number, step) in plan.iter().enumerate() {
@@ -59,12 +60,11 @@ fn interpret(task: &Task, plan: &[Step]) -> Result<State, usize> {
     if state.is_goal(task) { Ok(state) } else { Err(0) }
 }
 
-/// Upper limit on numerators and denominators. Products of larger numbers might overflow in the
-/// interpreter.
+/// Limit on numerators and denominators. Products of larger numbers could overflow in the interpreter.
 const LARGE: i128 = 200;
 
-/// Prefix of the plan before the first step that makes a number larger than [`LARGE`]. The goal is
-/// therefore never evaluated with a larger number.
+/// Returns the prefix of the plan before the first step that makes a number larger than [`LARGE`]. The goal
+/// is thus never evaluated with a larger number.
 fn with_small_numbers<'s>(task: &Task, plan: &'s [Step]) -> &'s [Step] {
     let mut state = State::initial(task);
     for (number, step) in plan.iter().enumerate() {
@@ -82,8 +82,8 @@ fn with_small_numbers<'s>(task: &Task, plan: &'s [Step]) -> &'s [Step] {
     plan
 }
 
-/// Executes a plan with the validator and with the interpreter, and compares the results. Returns
-/// `true` if the plan is valid.
+/// Executes a plan with the validator and with the interpreter, and compares the results. Returns `true` if
+/// the plan is valid.
 pub fn check_plan(task: &Task, (domain, problem): &(Domain, Problem), plan: &[Step]) -> bool {
     let plan = with_small_numbers(task, plan);
     let text: String = plan.iter().map(step_text).collect();

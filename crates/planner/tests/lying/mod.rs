@@ -1,10 +1,10 @@
-//! Certificates as a faulty grounder would write them: operators, effects, conditions and numbers
-//! of the ground task are changed, the witness with them. Whatever the comparison with the files
-//! still accepts proves nothing that is false of them.
+//! Certificates as a faulty grounder would write them: operators, effects, conditions and numbers of the
+//! ground task are changed, and possibly the witness too. A changed certificate that the comparison with the
+//! files accepts must not prove a false claim.
 //!
-//! The judge is a search of its own over the written task, from what `metaplan-task/1` says of it:
-//! a task that has no plan, or a more expensive one, although the files have one for the known
-//! least cost, must not be accepted.
+//! The truth is determined by an independent search over the written task, based on the specification of
+//! `metaplan-task/1`. A changed task must not be accepted if it has no plan, or only more expensive plans,
+//! although the files have a plan with the known optimal cost.
 
 mod search;
 mod tasks;
@@ -19,7 +19,8 @@ use serde_json::{Value, json};
 use search::{Best, optimum};
 use tasks::{Example, TASKS};
 
-/// Approximate number of mutants tried per task, in addition to all that omit an operator or change a cost.
+/// Approximate number of changed tasks that are tested for each task, in addition to all that omit an
+/// operator or change a cost.
 const MUTANTS: usize = 300;
 
 fn files(example: &Example) -> (Domain, Problem) {
@@ -34,7 +35,7 @@ fn fraction(text: &str) -> BigRational {
     text.parse().unwrap_or_else(|_| panic!("{text} is not a fraction"))
 }
 
-/// The certificate of an example, with its witness.
+/// Returns the certificate of an example, and its witness.
 fn certified(example: &Example) -> (Certificate, String) {
     let (domain, problem) = files(example);
     let task = ground(&domain, &problem, &GroundConfig::default())
@@ -73,7 +74,8 @@ fn true_certificates_are_accepted() {
     }
 }
 
-/// All changes that can be made in a document: place and new value.
+/// Collects all possible changes of a document: the JSON pointer and the new value (`None` to remove the
+/// element).
 fn changes(value: &Value, path: &str, found: &mut Vec<(String, Option<Value>)>) {
     match value {
         Value::Array(elements) => {
@@ -106,7 +108,7 @@ fn changes(value: &Value, path: &str, found: &mut Vec<(String, Option<Value>)>) 
     }
 }
 
-/// A document with one change.
+/// Returns a document with one change applied.
 fn changed(document: &Value, (path, new): &(String, Option<Value>)) -> Value {
     let mut document = document.clone();
     if let Some(new) = new {
@@ -119,14 +121,14 @@ fn changed(document: &Value, (path, new): &(String, Option<Value>)) -> Value {
     document
 }
 
-/// Whether a task that is accepted would prove something that is false of the files.
+/// Returns `true` if an accepted task would prove a false claim about the files.
 fn lies(example: &Example, task: &str) -> bool {
     let Some(truth) = example.optimum.map(fraction) else { return false };
     match optimum(task) {
         Some(Best::Cost(cost)) if example.problem.contains("maximize") => cost < truth,
         Some(Best::Cost(cost)) => cost > truth,
         Some(Best::NoPlan) => true,
-        // The mutant is no valid task, or too large to decide.
+        // The changed task is invalid, or too large to decide.
         None => false,
     }
 }
@@ -167,8 +169,7 @@ fn no_change_of_the_task_makes_a_false_claim_verified() {
     assert!(count.lies >= 200 && count.harmless >= 100, "{count:?}");
 }
 
-/// Borders and starts that are a moment, half a unit or a unit of time early or late, and events
-/// that are forgotten in part.
+/// Shifts bounds and starts by a moment, half a unit or a unit of time, and omits parts of events.
 #[test]
 fn no_shift_of_a_time_makes_a_false_claim_verified() {
     let mut count = Count::default();
@@ -183,7 +184,7 @@ fn no_shift_of_a_time_makes_a_false_claim_verified() {
         let scale = task["number_scale"].as_i64().expect("a scale");
         let mut all = Vec::new();
         changes(&task["operators"], "/operators", &mut all);
-        // Every third one, to be done in seconds.
+        // Only every third change is tested, so that the test takes seconds.
         for (path, new) in all.iter().step_by(3) {
             let is_time = path.ends_with("/quantity/constant") || path.ends_with("/wait");
             if is_time && new.is_some() {
@@ -205,7 +206,7 @@ fn no_shift_of_a_time_makes_a_false_claim_verified() {
     assert!(count.lies >= 15 && count.harmless >= 50, "{count:?}");
 }
 
-/// The grounder leaves out an operator, and has the witness say that it is right.
+/// The grounder omits an operator, and changes the witness to hide this.
 #[test]
 fn no_change_of_the_witness_hides_that_an_operator_is_missing() {
     let mut count = Count::default();
@@ -227,7 +228,7 @@ fn no_change_of_the_witness_hides_that_an_operator_is_missing() {
     assert!(count.lies >= 200, "{count:?}");
 }
 
-/// Each difference is reported by its own cause, not only by a text.
+/// Each kind of difference is reported by a separate variant, not only by a text.
 #[test]
 fn each_difference_has_its_own_cause() {
     let example = TASKS.iter().find(|example| example.name == "ways").expect("the example");
@@ -255,8 +256,8 @@ fn each_difference_has_its_own_cause() {
     assert!(matches!(found, Faithful::No(Difference::Form { .. })), "{found:?}");
 }
 
-/// Instances that grounders have lost in practice: one of whose cases contradicts itself, and one
-/// whose condition is a product of decimals.
+/// Instances that grounders have lost in practice: one of their cases contradicts itself, or their condition
+/// contains a product of decimals.
 const FIELD: [(&str, &str, &str); 4] = [
     (
         "a",
@@ -326,7 +327,7 @@ fn omitted_instances_are_detected() {
     }
 }
 
-/// An assignment and an addition to one number at one time contradict each other: there is no such step.
+/// A simultaneous assignment and addition to one number contradict each other, so there is no such step.
 #[test]
 fn contradictions_are_no_steps() {
     let example = Example {
@@ -343,7 +344,7 @@ fn contradictions_are_no_steps() {
     assert!(matches!(found, Faithful::Yes { .. }), "{found:?}");
 }
 
-/// Unsupported constructs are named in the result.
+/// The result names the unsupported construct.
 #[test]
 fn unsupported_constructs_are_named() {
     let domain = "(define (domain d) (:predicates (p) (q) (r)) (:functions (p) (total-cost))
@@ -365,7 +366,7 @@ fn unsupported_constructs_are_named() {
     assert_eq!(found, Err(Faithful::Undecided(Cause::Unsupported { construct })));
 }
 
-/// Whatever numbers a certificate has, the checker neither panics nor takes one for another.
+/// The checker must neither panic nor confuse numbers, whatever numbers a certificate contains.
 #[test]
 fn hostile_numbers_prove_nothing() {
     let hostile = [i128::MAX, i128::MIN, 1 << 107, -(1 << 107), 1 << 63];

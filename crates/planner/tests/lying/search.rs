@@ -1,14 +1,14 @@
-//! Least cost of a written task by uniform-cost search over its states.
+//! Computes the optimal cost of a written task by uniform-cost search over its states.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use num_rational::BigRational;
 use serde_json::Value;
 
-/// With more states, there is no answer.
+/// Maximum number of states; with more states, the task is not decided.
 const STATE_LIMIT: usize = 2_000;
 
-/// Values of variables and numbers.
+/// A state: values of the finite-domain variables and of the numeric variables.
 type State = (Vec<i64>, Vec<i64>);
 
 fn list(value: &Value) -> &[Value] {
@@ -25,15 +25,16 @@ fn index(value: &Value) -> Option<usize> {
 
 struct Task<'t>(&'t Value);
 
-/// Cost of the best plan of a task.
+/// Result of the search: the cost of a cheapest plan, or that there is no plan.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Best {
-    /// In units of the metric.
+    /// Cost of a cheapest plan, in units of the metric.
     Cost(BigRational),
     NoPlan,
 }
 
-/// Best plan of a written task. Returns `None` if the text is no valid task, or the task is too large.
+/// Computes the optimal cost of a written task. Returns `None` if the text is not a valid task or the task is
+/// too large.
 pub fn optimum(text: &str) -> Option<Best> {
     let document: Value = serde_json::from_str(text).ok()?;
     let task = Task(&document);
@@ -68,7 +69,8 @@ impl Task<'_> {
                     }
                     let step = self.quantity(&operator["cost"], &choice)?;
                     let next = self.after(operator, &state, &choice)?;
-                    // A step that improves the metric makes plans cheaper, and hides nothing.
+                    // A step that improves the metric only makes plans cheaper, so counting it as 0 conceals
+                    // no false claim.
                     let total = cost + step.max(0);
                     if best.get(&next).is_none_or(|known| total < *known) {
                         best.insert(next.clone(), total);
@@ -80,7 +82,8 @@ impl Task<'_> {
         Some(Best::NoPlan)
     }
 
-    /// Slots of an operator, each with a position in its list of designs, and how long that is.
+    /// Returns all combinations of designs for the slots of an operator. Each slot has the index of its
+    /// design and the number of its designs.
     fn choices(&self, operator: &Value) -> Option<Vec<BTreeMap<usize, (i64, i64)>>> {
         let mut all = vec![BTreeMap::new()];
         for (slot, uses) in list(self.0["uses"].get(index(&operator["uses"])?)?).iter().enumerate() {
@@ -179,7 +182,7 @@ impl Task<'_> {
         self.derived(next)
     }
 
-    /// Evaluates derived variables layer by layer; they are false unless a rule derives them.
+    /// Evaluates the derived variables layer by layer. A derived variable is false unless a rule derives it.
     fn derived(&self, mut state: State) -> Option<State> {
         let basic = index(&self.0["basic"])?;
         for (variable, values) in list(&self.0["variables"]).iter().enumerate().skip(basic) {

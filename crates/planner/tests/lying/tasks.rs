@@ -1,15 +1,15 @@
-//! Small tasks with their least costs, worked out by hand.
+//! Small tasks whose optimal costs were determined by hand.
 
 pub struct Example {
     pub name: &'static str,
     pub domain: &'static str,
     pub problem: &'static str,
-    /// Least cost; `None` if there is no plan.
+    /// Optimal cost; `None` if there is no plan.
     pub optimum: Option<&'static str>,
 }
 
 pub const TASKS: &[Example] = &[
-    // a to c directly costs 5, by b 2 + 2.
+    // The direct route from a to c costs 5; the route through b costs 2 + 2.
     Example {
         name: "ways",
         domain: "(define (domain d) (:predicates (at ?p) (way ?a ?b)) (:functions (far ?a ?b) (total-cost))
@@ -21,7 +21,7 @@ pub const TASKS: &[Example] = &[
           (:goal (at c)) (:metric minimize (total-cost)))",
         optimum: Some("4"),
     },
-    // The way that costs 4 takes 6 of the battery, so that it has to be filled for 3 before.
+    // The route with cost 4 consumes 6 of the battery, so the battery must first be filled at a cost of 3.
     Example {
         name: "battery",
         domain: "(define (domain d) (:predicates (at ?p) (way ?a ?b)) (:functions (battery) (use ?a ?b) (total-cost))
@@ -36,7 +36,8 @@ pub const TASKS: &[Example] = &[
           (:goal (at c)) (:metric minimize (total-cost)))",
         optimum: Some("7"),
     },
-    // `lift` takes 4, and needs the hand in between; `carry` takes 2 and never gives it back.
+    // `lift` takes 4 units of time and returns the hand at its end; `carry` takes 2.5 and never returns the
+    // hand.
     Example {
         name: "durative",
         domain: "(define (domain d) (:predicates (free) (up) (done) (sure))
@@ -49,7 +50,7 @@ pub const TASKS: &[Example] = &[
         problem: "(define (problem p) (:domain d) (:init (free) (sure)) (:goal (and (done) (up))))",
         optimum: Some("13/2"),
     },
-    // A lamp is switched by one action, and a second effect depends on what was before.
+    // An action switches a lamp, and a second conditional effect depends on the previous state of the lamp.
     Example {
         name: "switch",
         domain: "(define (domain d) (:types lamp) (:predicates (on ?l - lamp) (seen ?l - lamp) (dark))
@@ -62,7 +63,7 @@ pub const TASKS: &[Example] = &[
           (:goal (and (seen x) (seen y) (not (on x)))))",
         optimum: Some("4"),
     },
-    // Numbers under conditions: the second stroke counts double once the first has been made.
+    // Conditional numeric effects: a strike adds more if the first strike has warmed the material.
     Example {
         name: "strokes",
         domain: "(define (domain d) (:predicates (warm) (p)) (:functions (work) (total-cost))
@@ -74,7 +75,7 @@ pub const TASKS: &[Example] = &[
           (:metric minimize (total-cost)))",
         optimum: Some("9"),
     },
-    // The door opens with one of two keys, or if the house is empty.
+    // The door can be opened with one of two keys, or if the house is empty.
     Example {
         name: "door",
         domain: "(define (domain d) (:types key room) (:predicates (have ?k - key) (fits ?k - key) (home ?r - room) (in))
@@ -88,7 +89,7 @@ pub const TASKS: &[Example] = &[
           (:init (fits k2) (fits k3) (home r1) (home r2) (home r3)) (:goal (in)))",
         optimum: Some("2"),
     },
-    // A switch joins two lines; what is reached follows from what is joined.
+    // A switch joins two lines. A derived predicate follows from the joined lines.
     Example {
         name: "lines",
         domain: "(define (domain d) (:constants b c d) (:predicates (line ?a ?b) (joined ?a ?b) (live ?a) (source ?a) (safe))
@@ -102,7 +103,7 @@ pub const TASKS: &[Example] = &[
           (:init (line a b) (line b c) (line a e) (line e c) (source a) (joined a b)) (:goal (and (safe) (source d))))",
         optimum: Some("3"),
     },
-    // Lines that go round: what is live depends on itself.
+    // Lines that form a cycle: the derived predicate `live` depends on itself.
     Example {
         name: "ring",
         domain: "(define (domain d) (:predicates (joined ?a ?b) (live ?a) (source ?a) (lit ?a))
@@ -117,7 +118,7 @@ pub const TASKS: &[Example] = &[
           (:goal (and (lit c) (not (live a)) (live b))))",
         optimum: Some("4"),
     },
-    // At the start one of two things happens, and the end depends on which.
+    // The start has one of two effects, and the end depends on which of them occurred.
     Example {
         name: "start",
         domain: "(define (domain d) (:predicates (wet) (dry) (tried) (won))
@@ -130,7 +131,7 @@ pub const TASKS: &[Example] = &[
         problem: "(define (problem p) (:domain d) (:init (wet) (dry)) (:goal (and (won) (tried))))",
         optimum: Some("5"),
     },
-    // Numbers are too small for one of the actions, whatever is done.
+    // The numbers never suffice for one of the actions.
     Example {
         name: "bounds",
         domain: "(define (domain d) (:predicates (p) (q)) (:functions (level) (total-cost))
@@ -144,7 +145,7 @@ pub const TASKS: &[Example] = &[
           (:metric minimize (total-cost)))",
         optimum: Some("15"),
     },
-    // Nothing makes (at c) true, and numbers are out of reach.
+    // No action makes (at c) true, or the required numbers are unreachable.
     Example {
         name: "island",
         domain: "(define (domain d) (:predicates (at ?p) (way ?a ?b))
@@ -171,7 +172,7 @@ pub const TASKS: &[Example] = &[
           (:goal (and (at a) (at b))))",
         optimum: None,
     },
-    // The shop closes at 6: preparing and buying end just then. Ordering takes longer.
+    // The shop closes at 6; preparing and buying can end exactly then. Ordering takes longer.
     Example {
         name: "shop",
         domain: "(define (domain d) (:predicates (open) (money) (have) (home))
@@ -185,7 +186,7 @@ pub const TASKS: &[Example] = &[
         problem: "(define (problem p) (:domain d) (:init (at 3 (open)) (at 6 (not (open)))) (:goal (home)))",
         optimum: Some("7"),
     },
-    // It has to start between 2 and 5, when nothing happens.
+    // The action must start between 2 and 5, while no event occurs.
     Example {
         name: "between",
         domain: "(define (domain d) (:predicates (p) (q) (done))
@@ -195,7 +196,7 @@ pub const TASKS: &[Example] = &[
         problem: "(define (problem p) (:domain d) (:init (p) (at 5 (not (p))) (at 12 (q))) (:goal (done)))",
         optimum: Some("10"),
     },
-    // It has to start less than a thousandth after 3, and what comes next before 6.
+    // The action must start less than 1/1000 after 3, and the next action must end before 6.
     Example {
         name: "moment",
         domain: "(define (domain d) (:predicates (p) (q) (r) (done))
@@ -208,7 +209,7 @@ pub const TASKS: &[Example] = &[
         problem: "(define (problem p) (:domain d) (:init (q) (at 3 (p)) (at 5 (not (q))) (at 6 (not (p)))) (:goal (done)))",
         optimum: Some("2999/1000"),
     },
-    // What an event sets right on the way counts at the end, and so does what one spoils.
+    // Events during an action matter at its end, whether they make a condition true or false.
     Example {
         name: "on the way",
         domain: "(define (domain d) (:predicates (lit) (seen) (wet) (done)) (:functions (total-cost))
@@ -224,7 +225,8 @@ pub const TASKS: &[Example] = &[
           (:goal (done)) (:metric minimize (total-cost)))",
         optimum: Some("4"),
     },
-    // An event at time 0, one that interferes with a start, and one that ends all hope.
+    // Events at time 0, an event that interferes with a start, and an event after which the goal is
+    // unreachable.
     Example {
         name: "late",
         domain: "(define (domain d) (:predicates (up) (key) (in) (out))
@@ -242,7 +244,7 @@ pub const TASKS: &[Example] = &[
         problem: "(define (problem p) (:domain d) (:init (key) (at 0 (up)) (at 2.001 (not (key)))) (:goal (out)))",
         optimum: Some("2"),
     },
-    // The remaining amount is maximised: the detour consumes less.
+    // The remaining amount is maximised, and the detour consumes less.
     Example {
         name: "left",
         domain: "(define (domain d) (:predicates (at ?p) (way ?a ?b)) (:functions (fuel) (use ?a ?b))
@@ -254,8 +256,8 @@ pub const TASKS: &[Example] = &[
           (:goal (at d)) (:metric maximize (* 2 (fuel))))",
         optimum: Some("25"),
     },
-    // Work takes as little as it may; the shorter of two kinds may not take less than the longer of
-    // its bounds.
+    // The work takes its shortest duration. For the shorter kind of work, the greater of its lower bounds
+    // counts.
     Example {
         name: "as little",
         domain: "(define (domain d) (:predicates (p ?x) (q)) (:functions (least ?x))

@@ -1,4 +1,4 @@
-//! Random tasks with functions that have objects as values.
+//! Generates random tasks with functions whose values are objects (object fluents).
 
 use testing::random::Random;
 
@@ -24,7 +24,7 @@ impl Generator {
         let inner = |own: &mut Self, bound| Box::new(own.formula(bound, depth - 1));
         match if depth == 0 { self.below(5) } else { self.below(11) } {
             0 | 1 => match (self.term(bound, 2), self.term(bound, 1)) {
-                // That could not be, and is an error.
+                // Such an equation can never hold and is an error, so it is replaced.
                 (Term::Function(1, inner), Term::Object(2)) => Formula::Marked(Term::Function(1, inner)),
                 (Term::Object(2), Term::Function(1, inner)) => Formula::Heavy(Term::Function(1, inner)),
                 (left, right) => Formula::Equal(left, right),
@@ -89,7 +89,7 @@ impl Generator {
         task
     }
 
-    /// A formula that holds after some random steps but not initially, if one is found soon.
+    /// Returns a formula that holds after some random steps but not initially, if one is found soon.
     fn goal(&mut self, task: &Task) -> Formula {
         let (steps, mut end) = (task.steps(), task.init);
         for _ in 0..20 {

@@ -1,6 +1,6 @@
-//! Functions with objects as values: random tasks against a search through all states, executed
-//! with functions as they are defined. Planner and validator have to agree with that, though they
-//! only see what the functions are compiled to.
+//! Functions whose values are objects (object fluents): random tasks are compared with a search through all
+//! states that uses the definition of such functions. Planner and validator process the compiled task and
+//! must agree with this search.
 
 #![expect(clippy::print_stdout, reason = "a skipped test says so")]
 
@@ -16,7 +16,7 @@ use model::{Formula, Step, Term};
 use pddl::validate::{Options, PlanText, validate};
 use pddl::{Source, print_domain, print_problem, read};
 
-/// The domain and the problem as they are compiled, which are read back as they are printed.
+/// Returns the compiled domain and problem. Printing and reading them must yield equal trees.
 fn compiled(domain: &str, problem: &str) -> (pddl::ast::Domain, pddl::ast::Problem) {
     let read_both = |domain: &str, problem: &str| {
         let (tree, task, found) = read(&Source::new("domain", domain), &Source::new("problem", problem))
@@ -32,7 +32,8 @@ fn compiled(domain: &str, problem: &str) -> (pddl::ast::Domain, pddl::ast::Probl
     (tree, task)
 }
 
-/// Solves a task. Returns `None` if an effect at start or on a number depends on too many values.
+/// Solves a task. Returns `None` if it is rejected because an effect at the start or a numeric effect has too
+/// many cases.
 fn solve(domain: &str, problem: &str) -> Option<Solution> {
     let (tree, task) = compiled(domain, problem);
     tally::solve(&tree, &task, "with more than 64 cases")
@@ -104,7 +105,7 @@ fn the_public_file_is_planned() {
         println!("skipped: {directory} is not there");
         return;
     };
-    // Nothing assigns the place of a package.
+    // No action assigns a place to a package.
     let solved = |problem: &str| solve(&domain, problem).expect("it is ground");
     assert_eq!(solved(&problem).status, Status::Unsolvable);
     let goal = "(= (package_at pkg1) loc3)";

@@ -1,18 +1,18 @@
-//! Tasks with functions that have objects as values, executed by their definition.
+//! Tasks with functions whose values are objects, executed by their definition.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
-/// Maximum cost of enumerated plans.
+/// Maximum cost of the plans that are enumerated.
 pub(crate) const REACH: u32 = 7;
 
-/// Objects are 0, 1 and 2; the values of g are 0 and 1.
+/// Number of objects 0, 1 and 2. Function g has only the values 0 and 1.
 pub(crate) const OBJECTS: usize = 3;
 pub(crate) const WEIGHTS: [u32; OBJECTS] = [1, 2, 0];
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct State {
-    /// The values of f and g.
+    /// Values of the functions f and g for each object.
     pub(crate) values: [[Option<usize>; OBJECTS]; 2],
     pub(crate) marked: [bool; OBJECTS],
 }
@@ -20,7 +20,7 @@ pub(crate) struct State {
 #[derive(Debug, Clone)]
 pub(crate) enum Term {
     Object(usize),
-    /// By its place in the binding.
+    /// Index of a variable in the binding.
     Variable(usize),
     Function(usize, Box<Term>),
 }
@@ -34,7 +34,7 @@ pub(crate) enum Formula {
     Not(Box<Formula>),
     And(Box<Formula>, Box<Formula>),
     Or(Box<Formula>, Box<Formula>),
-    /// Of the variable behind those of the binding.
+    /// The quantified variable follows the variables of the binding.
     Exists(Box<Formula>),
     ForAll(Box<Formula>),
 }
@@ -57,7 +57,7 @@ pub(crate) struct Effect {
 pub(crate) struct Action {
     pub(crate) parameters: usize,
     pub(crate) condition: Formula,
-    /// Effects at start; `None` for an instantaneous action.
+    /// Effects at the start; `None` for an instantaneous action.
     pub(crate) start: Option<Vec<Effect>>,
     pub(crate) end: Vec<Effect>,
 }
@@ -69,7 +69,7 @@ pub(crate) struct Task {
     pub(crate) goal: Formula,
 }
 
-/// An action and its arguments.
+/// Index of an action, and its arguments.
 pub(crate) type Step = (usize, Vec<usize>);
 
 impl Term {
@@ -91,7 +91,8 @@ impl Term {
 }
 
 impl Formula {
-    /// Truth of a formula. Atoms about undefined terms are false, except the test for undefinedness.
+    /// Returns the truth value of a formula. Atoms with undefined terms are false, except the test whether a
+    /// term is undefined.
     pub(crate) fn holds(&self, state: &State, binding: &[usize]) -> bool {
         let with = |object| [binding, &[object]].concat();
         match self {
@@ -110,7 +111,7 @@ impl Formula {
         }
     }
 
-    /// PDDL text, given the number of bound variables.
+    /// Returns the PDDL text. `bound` is the number of bound variables.
     pub(crate) fn text(&self, bound: usize) -> String {
         match self {
             Self::Equal(left, right) => format!("(= {} {})", left.text(), right.text()),
@@ -146,8 +147,8 @@ impl Effect {
     }
 }
 
-/// State after some effects, and their cost. Returns `None` if they read an undefined term or
-/// assign two values to one term.
+/// Returns the state after some effects, and their cost. Returns `None` if an effect reads an undefined term
+/// or two effects assign different values to one term.
 pub(crate) fn after(state: &State, effects: &[Effect], arguments: &[usize]) -> Option<(State, u32)> {
     let mut assigned: BTreeMap<(usize, usize), Option<usize>> = BTreeMap::new();
     let (mut added, mut deleted, mut cost) = (BTreeSet::new(), BTreeSet::new(), 0);
@@ -205,7 +206,7 @@ impl Task {
         Some((end, first + second + 1))
     }
 
-    /// Cost of a plan. Returns `None` if it is invalid.
+    /// Returns the cost of a plan, or `None` if the plan is invalid.
     pub(crate) fn cost(&self, plan: &[Step]) -> Option<u32> {
         let start = (self.init, 0);
         let (end, cost) = plan.iter().try_fold(start, |(state, cost), step| {
@@ -229,7 +230,7 @@ impl Task {
         self.actions.iter().enumerate().flat_map(of).collect()
     }
 
-    /// The least cost of a plan, if it is at most [`REACH`].
+    /// Returns the minimum cost of a plan, or `None` if it exceeds [`REACH`].
     pub(crate) fn best(&self) -> Option<u32> {
         let steps = self.steps();
         let mut open = BTreeSet::from([(0, self.init)]);

@@ -1,5 +1,5 @@
-//! Numbers without an initial value: random tasks against all plans up to a length, executed with
-//! values that may be undefined. Planner and validator have to agree with that.
+//! Numbers without an initial value: random tasks are compared with all plans up to a maximum length,
+//! executed with possibly undefined values. Planner and validator must agree with this.
 
 mod model;
 

@@ -1,11 +1,11 @@
-//! Small tasks with numbers that may be undefined, executed by their definition; at random, and as PDDL.
+//! Small random tasks with possibly undefined numbers, their execution by definition, and their PDDL text.
 
 use testing::random::Random;
 
-/// Maximum length of enumerated plans.
+/// Maximum length of the plans that are enumerated.
 pub(crate) const DEPTH: usize = 5;
 
-/// Whether r and s hold, and the values of a and b.
+/// A state: truth values of the facts r and s, and the values of the numbers a and b.
 #[derive(Debug, Clone, Copy)]
 struct State {
     facts: [bool; 2],
@@ -21,7 +21,7 @@ enum Number {
 #[derive(Debug, Clone)]
 enum Formula {
     Fact(usize),
-    /// The first is less than the second.
+    /// The first number is less than the second.
     Less(Number, Number),
     Not(Box<Formula>),
     And(Box<Formula>, Box<Formula>),
@@ -32,7 +32,7 @@ enum Formula {
 enum Change {
     Set(usize, bool),
     Assign(usize, Number),
-    /// By 1, but not above 3.
+    /// Increase by 1, up to at most 3.
     Increase(usize),
 }
 
@@ -74,7 +74,7 @@ impl Number {
 }
 
 impl Formula {
-    /// In Kleene's logic: none where it is neither true nor false.
+    /// Returns the truth value in Kleene's three-valued logic; `None` is undefined.
     fn truth(&self, state: &State) -> Option<bool> {
         match self {
             Self::Fact(fact) => Some(state.facts[*fact]),
@@ -124,7 +124,7 @@ impl Effect {
     }
 }
 
-/// State after some effects. Returns `None` if they read an undefined value.
+/// Returns the state after some effects, or `None` if an effect reads an undefined value.
 fn after(state: State, effects: &[Effect]) -> Option<State> {
     let mut next = state;
     let mut added = Vec::new();
@@ -164,7 +164,7 @@ impl Task {
         self.execute(plan).is_some_and(|state| self.goal.truth(&state) == Some(true))
     }
 
-    /// The length of the shortest plan, if one is short enough.
+    /// Returns the length of a shortest plan, or `None` if there is no plan up to the maximum length.
     pub(crate) fn shortest(&self) -> Option<usize> {
         let mut layer: Vec<Vec<usize>> = vec![Vec::new()];
         for length in 0..=DEPTH {
@@ -244,7 +244,7 @@ impl Generator {
         }
     }
 
-    /// At most one effect on each number.
+    /// Generates effects with at most one effect on each number.
     fn effects(&mut self) -> Vec<Effect> {
         let mut changes = Vec::new();
         if self.below(2) == 0 {

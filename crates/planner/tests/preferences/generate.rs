@@ -1,4 +1,4 @@
-//! Random tasks.
+//! Generates random tasks with preferences and trajectory constraints.
 
 use testing::random::Random;
 

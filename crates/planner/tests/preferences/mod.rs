@@ -1,6 +1,6 @@
-//! Preferences and constraints on trajectories: random tasks against all plans up to a length,
-//! executed and judged by the definition of PDDL 3 on the whole sequence of states. Planner and
-//! validator have to agree with that.
+//! Preferences and trajectory constraints: random tasks are compared with all plans up to a maximum length.
+//! The plans are evaluated on the whole sequence of states by the definition of PDDL 3. Planner and validator
+//! must agree with this.
 
 mod generate;
 mod model;
@@ -13,7 +13,7 @@ use pddl::validate::{Options, PlanText, validate};
 use pddl::{Source, read};
 use testing::random::Random;
 
-/// Solves a task. Returns `None` if an instance has too many cases.
+/// Solves a task. Returns `None` if it is rejected because an instance has too many cases.
 fn solve(domain: &str, problem: &str, engine: Engine) -> Option<Solution> {
     let (domain, problem, _) = read(&Source::new("domain", domain), &Source::new("problem", problem))
         .unwrap_or_else(|errors| panic!("{errors:?}\n{domain}\n{problem}"));
@@ -39,7 +39,7 @@ fn compare(seed: u64) -> bool {
     };
     let about = || format!("seed {seed}\n{domain}\n{problem}\n{solution:?}");
     let Some(plan) = &solution.plan else {
-        // The solver alone may not end.
+        // The SAT solver alone may not terminate.
         assert!(matches!(solution.status, Status::Unsolvable | Status::Unknown), "{}", about());
         assert!(best.is_none() || solution.status == Status::Unknown, "{}", about());
         return false;
@@ -107,8 +107,8 @@ fn the_validator_judges_random_plans_by_the_definition() {
     assert!(valid > 50 && invalid > 50, "{valid} valid and {invalid} invalid plans");
 }
 
-/// A comparison with an undefined number is neither true nor false, so that a plan without it would
-/// be no plan at all.
+/// A comparison with an undefined number is neither true nor false. If a preference contained one, a plan
+/// that violates the preference would be invalid.
 #[test]
 fn numbers_without_an_initial_value_are_refused() {
     let domain = "(define (domain d) (:predicates (done)) (:functions (f) (g) (total-cost))
@@ -136,7 +136,7 @@ fn numbers_without_an_initial_value_are_refused() {
     for constraints in ["", &sometime[..], &in_the_end[..]] {
         let task = ground_with("(= (f) 0) (= (g) 0)", constraints).expect("a task");
         let solution = optimize(&task, &Config::default(), &mut |_| {});
-        // To do nothing about it costs 4 more for each; to set g is enough for the sum.
+        // Each violation costs 4. For the sum, it suffices to set g.
         let expected = if constraints.is_empty() {
             "5"
         } else if constraints == sometime {

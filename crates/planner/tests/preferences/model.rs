@@ -1,19 +1,19 @@
-//! Small tasks with preferences and constraints on trajectories, executed and judged by the
-//! definition; and as PDDL.
+//! Small tasks with preferences and trajectory constraints, their evaluation by definition, and their PDDL
+//! text.
 
 use std::fmt::Write as _;
 
-/// Plans up to this length are enumerated.
+/// Maximum length of the plans that are enumerated.
 const DEPTH: usize = 4;
 
-/// Truth of p(o0), p(o1), r and s, and the number n.
+/// A state: truth values of p(o0), p(o1), r and s, and the value of the number n.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct State {
     pub facts: [bool; 4],
     pub n: i64,
 }
 
-/// An object or a variable: the parameter ?x, or ?z of a quantifier.
+/// A term: an object, the parameter ?x, or the quantified variable ?z.
 #[derive(Debug, Clone, Copy)]
 pub enum Term {
     Object(usize),
@@ -48,7 +48,7 @@ pub enum Formula {
 #[derive(Debug, Clone)]
 pub enum Effect {
     Set(Option<Formula>, Atom, bool),
-    /// Of all objects.
+    /// Sets the atom for all objects that satisfy the condition.
     SetAll(Option<Formula>, bool),
     Up,
     Assign(i64),
@@ -59,7 +59,7 @@ pub struct Action {
     pub has_parameter: bool,
     pub is_durative: bool,
     pub condition: Formula,
-    /// Should hold at the start, or at the end.
+    /// Preference of the action: whether it refers to the end, and its condition.
     pub preference: Option<(bool, Formula)>,
     pub start: Vec<Effect>,
     pub end: Vec<Effect>,
@@ -72,7 +72,7 @@ pub struct Constraint {
     pub first: Formula,
     pub second: Formula,
     pub for_all: bool,
-    /// Index of the preference; `None` for a hard condition.
+    /// Index of the preference; `None` for a hard constraint.
     pub preference: Option<usize>,
 }
 
@@ -82,7 +82,7 @@ pub struct Task {
     pub init: State,
     pub goal: Formula,
     pub constraints: Vec<Constraint>,
-    /// Of the preferences 0 to 3; the last is that of actions.
+    /// Weights of the preferences 0 to 3. The last weight is that of the action preferences.
     pub weights: [i64; 4],
     pub maximize: bool,
 }
@@ -170,7 +170,7 @@ impl Effect {
     }
 }
 
-/// The state after some effects; of an atom that is added and deleted, the addition counts.
+/// Returns the state after some effects. An atom that is added and deleted is true.
 pub fn after(state: &State, effects: &[Effect], bound: Bound) -> State {
     let mut next = state.clone();
     let mut set = Vec::new();
@@ -200,7 +200,7 @@ pub fn after(state: &State, effects: &[Effect], bound: Bound) -> State {
     next
 }
 
-/// Whether states follow a constraint, by the definition of PDDL 3.
+/// Returns `true` if the states satisfy a constraint by the definition of PDDL 3.
 pub fn follows(constraint: &Constraint, states: &[State], bound: Bound) -> bool {
     let first: Vec<bool> = states.iter().map(|state| constraint.first.holds(state, bound)).collect();
     let second: Vec<bool> = states.iter().map(|state| constraint.second.holds(state, bound)).collect();
@@ -209,7 +209,8 @@ pub fn follows(constraint: &Constraint, states: &[State], bound: Bound) -> bool 
         "at end" => first[states.len() - 1],
         "always" => all.clone().all(|i| first[i]),
         "sometime" => all.clone().any(|i| first[i]),
-        // If it holds in one state, then from there to some later one, and in none after that.
+        // If the condition holds in a state, it holds from there up to some later state, and in no state
+        // after that.
         "at-most-once" => all.clone().all(|i| {
             !first[i]
                 || (i..states.len())
@@ -222,8 +223,8 @@ pub fn follows(constraint: &Constraint, states: &[State], bound: Bound) -> bool 
 }
 
 impl Task {
-    /// States of a plan, its cost, and its number of violations of the action preference. Returns
-    /// `None` if an action is not applicable.
+    /// Returns the states of a plan, its cost, and the number of violated action preferences. Returns `None`
+    /// if an action is not applicable.
     pub fn execute(&self, plan: &[(usize, usize)]) -> Option<(Vec<State>, i64, i64)> {
         let mut states = vec![self.init.clone()];
         let (mut cost, mut violated) = (0, 0);
@@ -246,7 +247,7 @@ impl Task {
         Some((states, cost, violated))
     }
 
-    /// Metric of a plan. Returns `None` if it is invalid.
+    /// Returns the metric of a plan, or `None` if the plan is invalid.
     pub fn judge(&self, plan: &[(usize, usize)]) -> Option<i64> {
         let (states, mut cost, violated) = self.execute(plan)?;
         if !self.goal.holds(states.last()?, Bound::default()) {
@@ -265,7 +266,7 @@ impl Task {
         Some(if self.maximize { 20 - cost } else { cost })
     }
 
-    /// The best metric of all plans up to a length.
+    /// Returns the best metric of all plans up to the maximum length.
     pub fn best(&self) -> Option<i64> {
         let instances: Vec<_> = (0..self.actions.len())
             .flat_map(|action| {

@@ -1,10 +1,10 @@
-//! Saturated cost partitioning \[1\] over projections.
+//! Saturated cost partitioning \[1\] over projections of a task.
 //!
-//! Projections take their share of the operators' costs one after another: as much as their
-//! heuristic values need. The remaining costs go to the next projection. The result depends on the
-//! order, so several orders are tried. The sum of the values is consistent, since each of them is
-//! for its own costs. It counts costs that a single projection cannot see, such as goals of another
-//! robot or design changes outside its pattern.
+//! The projections of an order take shares of the operator costs in turn. Each projection takes only the
+//! costs that its goal distances need, and the next projection gets the remaining costs. The sum of all goal
+//! distances is consistent, because each projection uses its own share. The result depends on the order, so
+//! several orders are tried. The sum includes costs that no single projection contains, for example of goals
+//! of another robot or of design changes.
 //!
 //! \[1\] J. Seipp, T. Keller, M. Helmert: Saturated cost partitioning for optimal classical
 //! planning, JAIR 67, 2020.
@@ -20,22 +20,24 @@ use crate::bounds::pattern_database::Projection;
 
 /// Maximum number of cost partitionings that are kept.
 const MAX_PARTITIONINGS: usize = 4;
-/// Maximum number of orders that are tried, and of transitions visited over all orders.
+/// Maximum number of orders of projections that are tried.
 const MAX_ORDERS: usize = 60;
+/// Maximum number of transitions visited over all orders.
 const MAX_TRANSITIONS: usize = 6_000_000;
 
-/// One cost partitioning: indices of projections, and goal distances under each one's share of the
-/// costs.
+/// A cost partitioning: for each projection in it, its index and the goal distances of its abstract states
+/// under its share of the costs.
 pub(super) struct CostPartitioning {
     parts: Vec<(usize, Vec<Option<Int>>)>,
 }
 
 impl CostPartitioning {
-    /// Heuristic value of a state, given its abstract state in each projection.
+    /// Returns the heuristic value of a state. `states` is the abstract state of the state in each
+    /// projection.
     pub(super) fn estimate(&self, states: &[u32]) -> Int {
         let shares = self.parts.iter().map(|(position, to_go)| to_go[states[*position] as usize]);
-        // The projections detect dead ends themselves. A capped sum remains a consistent lower
-        // bound.
+        // Dead ends are detected by the projections, so a missing distance counts as 0. The capped sum
+        // remains a consistent lower bound.
         let sum = shares.fold(0, |sum: Int, share| sum.saturating_add(share.unwrap_or(0)));
         sum.min(GROWTH_LIMIT)
     }
@@ -61,8 +63,8 @@ impl CostPartitioning {
     }
 }
 
-/// Saturated cost partitionings, sorted by decreasing value of the initial state. Empty if the best
-/// projection alone is as good.
+/// Returns saturated cost partitionings, sorted by decreasing heuristic value of the initial state. Returns
+/// an empty list if none is better than the best single projection.
 pub(super) fn saturated_cost_partitionings(
     context: Context<'_>,
     projections: &[Projection],
@@ -75,8 +77,7 @@ pub(super) fn saturated_cost_partitionings(
     let mut positions: Vec<usize> = (0..projections.len()).filter(|position| alone(*position) > 0).collect();
     positions.sort_by_key(|position| projections[*position].pattern.len());
     for position in positions {
-        // If a projection to fewer variables has the same values, the costs are not shared with the
-        // finer one.
+        // A projection to fewer variables with equal values makes the finer projection useless.
         let is_coarser = |coarser: &usize| projections[position].is_dominated_by(&projections[*coarser]);
         if !useful.iter().any(is_coarser) {
             useful.push(position);
@@ -96,7 +97,7 @@ pub(super) fn saturated_cost_partitionings(
         budget = budget.saturating_sub(1);
         let partition = CostPartitioning::new(projections, &costs, &order, limits)?;
         tried.push((partition.estimate(&initial), order, partition));
-        // The sort is stable: of equal orders the earlier one stays first.
+        // The sort is stable: among orders with equal value, the earlier order stays first.
         tried.sort_by_key(|(estimate, ..)| Reverse(*estimate));
         Ok(())
     };
@@ -106,7 +107,7 @@ pub(super) fn saturated_cost_partitionings(
         let successors = greedy.iter().filter(|position| *position != first);
         attempt(std::iter::once(first).chain(successors).copied().collect(), &mut tried)?;
     }
-    // Then local search from the best order: exchange two neighbours.
+    // Local search from the best order: exchange two neighbouring projections.
     for (before, place) in (1..useful.len()).enumerate() {
         let mut order = tried[0].1.clone();
         order.swap(before, place);
@@ -120,11 +121,12 @@ pub(super) fn saturated_cost_partitionings(
     Ok(tried.into_iter().map(|(.., partition)| partition).collect())
 }
 
-/// Orders projections by value of the initial state per unit of cost that they use, highest first.
+/// Orders projections by the ratio of the initial state's goal distance to the costs that they use, highest
+/// ratio first.
 fn by_yield(projections: &[Projection], useful: &[usize], alone: impl Fn(usize) -> Int) -> Vec<usize> {
     let used_cost = |position: usize| {
         let projection = &projections[position];
-        // Saturation of the sum is harmless: it only affects the order.
+        // The sum may saturate, because it affects only the order.
         projection.saturated(projection.costs()).fold(0, Int::saturating_add).max(1)
     };
     let mut order: Vec<(usize, Int, Int)> =

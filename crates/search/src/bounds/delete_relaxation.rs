@@ -1,9 +1,9 @@
-//! Delete relaxation \[1\] of a task: rules that derive facts from facts, each at the cost of an operator.
+//! Delete relaxation \[1\] of a task: rules that derive facts from facts, at the cost of an operator.
 //!
-//! An operator becomes one rule for its unconditional effects and one rule per conditional effect.
-//! All of them have the operator's least cost, which is paid once. Axioms and the literals of
-//! clauses are rules without cost. Numbers are ignored, and derived variables may be false at any
-//! time, so the relaxation admits every plan of the task.
+//! An operator becomes one rule for its unconditional effects and one rule for each conditional effect. All
+//! these rules have the operator's minimum cost, which is paid only once. Axioms and literals of clauses
+//! become rules without cost. Numeric conditions are ignored, and derived variables may be false at any time.
+//! The relaxation therefore admits every plan of the task.
 //!
 //! \[1\] B. Bonet, H. Geffner: Planning as heuristic search, Artificial Intelligence 129, 2001.
 
@@ -14,12 +14,12 @@ use task::task::{Condition, Fact, Literal, Task};
 
 /// Maximum operator cost, so that sums do not overflow.
 const COST_LIMIT: Int = 1 << 40;
-/// Fact that always holds.
+/// Number of the artificial fact that is always true.
 pub(super) const ALWAYS: u32 = 0;
-/// Artificial fact that represents the goal.
+/// Number of the artificial fact that represents the goal.
 pub(super) const GOAL: u32 = 1;
 
-/// Lists stored one after the other in one vector.
+/// Lists of numbers, stored one after another in a single vector.
 #[derive(Default)]
 pub(super) struct Lists {
     ends: Vec<u32>,
@@ -32,7 +32,8 @@ impl Lists {
         self.ends.push(dense(self.all.len()));
     }
 
-    /// Inverse index: for each value below `count`, the positions of the lists that contain it.
+    /// Returns the inverse relation: for each value below `count`, the positions of the lists that contain
+    /// it.
     fn inverse(&self, count: usize) -> Self {
         let mut positions: Vec<Vec<u32>> = vec![Vec::new(); count];
         for list in 0..dense(self.ends.len()) {
@@ -57,20 +58,23 @@ impl Lists {
     }
 }
 
-/// A task without delete effects, as rules between facts.
+/// Delete relaxation of a task: rules between facts, without delete effects.
 pub(super) struct DeleteRelaxation {
-    /// Cost of each payer: the operators, then a payer without cost.
+    /// Cost of each payer. Payers are the operators, followed by one payer without cost.
     pub(super) costs: Vec<u64>,
-    /// Per rule: the operator that pays for it, its condition (never empty), and its effects.
+    /// For each rule: the operator that pays for it.
     pub(super) payers: Vec<u32>,
+    /// For each rule: the facts of its condition, which is never empty.
     pub(super) required: Lists,
+    /// For each rule: the facts that it adds.
     pub(super) given: Lists,
-    /// Rules of each payer.
+    /// For each payer: its rules.
     pub(super) rules_of: Lists,
-    /// By fact: rules that require it, and rules that add it.
+    /// For each fact: the rules that require it.
     pub(super) required_by: Lists,
+    /// For each fact: the rules that add it.
     pub(super) given_by: Lists,
-    /// Number of each variable's first fact.
+    /// Number of the first fact of each variable.
     first: Vec<u32>,
     basic: usize,
 }
@@ -87,7 +91,7 @@ struct Builder<'a> {
 }
 
 impl DeleteRelaxation {
-    /// Returns `None` if an operator costs more than `COST_LIMIT`.
+    /// Creates the delete relaxation of a task. Returns `None` if an operator costs more than `COST_LIMIT`.
     pub(super) fn new(task: &Task) -> Option<Self> {
         let costs = task.operators.iter().map(|operator| operator.cost.minimum().max(0));
         let costs = costs.map(|cost| u64::try_from(cost).ok().filter(|_| cost <= COST_LIMIT));
@@ -108,7 +112,7 @@ impl DeleteRelaxation {
             builder.rule(builder.free, &rule.body, &[], vec![head]);
         }
         let Builder { first, facts, payers, required, given, .. } = builder;
-        // Rules of one operator are updated together when its cost changes.
+        // All rules of an operator are updated together when its cost changes.
         let mut rules_by_payer: Vec<Vec<u32>> = vec![Vec::new(); costs.len()];
         for (payer, rule) in payers.iter().zip(0..) {
             rules_by_payer[*payer as usize].push(rule);
@@ -135,7 +139,7 @@ impl DeleteRelaxation {
         self.required_by.len()
     }
 
-    /// Facts of a state.
+    /// Returns the numbers of the facts that hold in a state.
     #[expect(clippy::arithmetic_side_effects, reason = "facts are numbered")]
     pub(super) fn state<'s>(&'s self, values: &'s [u32]) -> impl Iterator<Item = u32> + 's {
         let values = values[..self.basic].iter().zip(&self.first);
@@ -158,7 +162,7 @@ impl<'a> Builder<'a> {
         Self { task, first, facts, payers, required, given, clauses: FxHashMap::default(), free }
     }
 
-    /// Number of a fact. A derived variable may be false at any time, so its falsity is `ALWAYS`.
+    /// Returns the number of a fact. A derived variable may be false at any time, so its falsity is `ALWAYS`.
     #[expect(clippy::arithmetic_side_effects, reason = "facts are numbered")]
     fn fact(&self, fact: Fact) -> u32 {
         let variable = fact.variable.index();
@@ -169,7 +173,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Facts each of which makes a literal true.
+    /// Returns the facts that each make the literal true.
     fn literal(&self, literal: Literal) -> Vec<u32> {
         if literal.positive {
             return vec![self.fact(literal.fact)];
@@ -179,7 +183,7 @@ impl<'a> Builder<'a> {
         values.map(|value| self.fact(Fact { value, ..literal.fact })).collect()
     }
 
-    /// Fact that represents a disjunction of facts.
+    /// Returns a fact that represents the disjunction of facts, and adds rules for it if it is new.
     #[expect(clippy::arithmetic_side_effects, reason = "facts are held in memory")]
     fn any(&mut self, mut facts: Vec<u32>) -> u32 {
         facts.sort_unstable();

@@ -1,10 +1,10 @@
 //! LM-cut \[1\]: an admissible heuristic that sums the costs of disjunctive action landmarks.
 //!
-//! h^max selects the supporting fact of each rule of the delete relaxation. The rules that lead
-//! from the facts before the cut into the zone from which the goal costs nothing form a landmark:
-//! every plan uses one of their operators. The least of their costs is counted and subtracted from
-//! all of them, until the goal costs nothing. The rules of an operator with conditional effects
-//! share one cost, so nothing is counted twice.
+//! The h^max values determine the supporter of each rule of the delete relaxation, i.e. its most expensive
+//! condition. The goal zone contains the facts from which the goal can be reached at no cost. Rules that lead
+//! into the goal zone form a landmark: every plan uses one of their operators. The minimum of their costs is
+//! added to the heuristic value and subtracted from each cost. This is repeated until the goal costs nothing.
+//! The rules of an operator with conditional effects share a single cost, so no cost is counted twice.
 //!
 //! \[1\] M. Helmert, C. Domshlak: Landmarks, critical paths and abstractions: what's the difference
 //! anyway?, ICAPS 2009.
@@ -19,15 +19,15 @@ use crate::bounds::delete_relaxation::{ALWAYS, DeleteRelaxation, GOAL};
 
 /// Work units per visited fact or rule.
 const WORK_PER_VISIT: u64 = 8;
-/// Value of an unreached fact.
+/// h^max value of an unreachable fact.
 const UNREACHABLE: u64 = u64::MAX;
-/// Marks a missing fact.
+/// Number that represents a missing fact.
 const NONE: u32 = u32::MAX;
 
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum CutSide {
     Open,
-    /// The goal is reachable from here at no cost.
+    /// In the goal zone: the goal is reachable from the fact at no cost.
     Goal,
     /// Reachable from the state without entering the goal zone.
     Before,
@@ -37,19 +37,23 @@ enum CutSide {
 pub struct LandmarkCut {
     relaxed: DeleteRelaxation,
     costs: Vec<u64>,
-    /// Per fact: its h^max value and its side of the cut.
+    /// For each fact: its h^max value.
     values: Vec<u64>,
+    /// For each fact: its side of the cut.
     zones: Vec<CutSide>,
-    /// Per rule: number of its conditions, number of unreached ones, its supporter (the condition
-    /// with the greatest h^max value), and the value of the supporter.
+    /// For each rule: the number of its conditions.
     lengths: Vec<u32>,
+    /// For each rule: the number of its unreached conditions.
     left: Vec<u32>,
+    /// For each rule: its supporter, i.e. the condition with the greatest h^max value.
     supporters: Vec<u32>,
+    /// For each rule: the h^max value of its supporter.
     supports: Vec<u64>,
     queue: BinaryHeap<Reverse<(u64, u32)>>,
     stack: Vec<u32>,
-    /// Payers in the cut, and a flag for each payer.
+    /// Payers of the rules in the cut.
     cut: Vec<u32>,
+    /// For each payer: `true` if it is in `cut`.
     in_cut: Vec<bool>,
     work: u64,
 }
@@ -59,7 +63,7 @@ pub struct LandmarkCut {
     reason = "costs are below 2^40, and cuts are fewer than steps of a computer"
 )]
 impl LandmarkCut {
-    /// Returns `None` if an operator costs too much.
+    /// Creates the heuristic. Returns `None` if an operator costs too much.
     pub(crate) fn new(task: &Task) -> Option<Self> {
         let relaxed = DeleteRelaxation::new(task)?;
         let (facts, rules) = (relaxed.facts(), relaxed.payers.len());
@@ -82,13 +86,13 @@ impl LandmarkCut {
         })
     }
 
-    /// Work units done up to now.
+    /// Returns the work done since creation, in work units.
     pub(crate) fn work(&self) -> u64 {
         self.work.saturating_mul(WORK_PER_VISIT)
     }
 
-    /// LM-cut value of a state given by its values: an admissible estimate of its goal distance.
-    /// Returns `None` if the goal is unreachable.
+    /// Returns the LM-cut value of a state, which is an admissible estimate of its goal distance. Returns
+    /// `None` if the goal is unreachable.
     pub(crate) fn lm_cut_value(&mut self, values: &[u32]) -> Option<u64> {
         self.costs.clone_from(&self.relaxed.costs);
         self.reach(values);
@@ -105,7 +109,7 @@ impl LandmarkCut {
         Some(sum)
     }
 
-    /// Computes the h^max values from a state.
+    /// Computes the h^max values of all facts from a state.
     fn reach(&mut self, values: &[u32]) {
         self.values.fill(UNREACHABLE);
         self.supporters.fill(NONE);
@@ -125,8 +129,8 @@ impl LandmarkCut {
                 let unreached = &mut self.left[*rule as usize];
                 *unreached -= 1;
                 if *unreached == 0 {
-                    // Facts are popped by increasing value, so the last condition is the most
-                    // expensive one.
+                    // Facts are popped by increasing value, so the condition that is reached last is the most
+                    // expensive.
                     self.supporters[*rule as usize] = fact;
                     self.supports[*rule as usize] = value;
                     let total = value + self.costs[self.relaxed.payers[*rule as usize] as usize];
@@ -156,8 +160,8 @@ impl LandmarkCut {
         }
     }
 
-    /// Finds the payers of the rules that lead into the goal zone, and subtracts the least of their
-    /// costs from each.
+    /// Finds the payers of the rules that lead into the goal zone, and subtracts the minimum of their costs
+    /// from each of them. Returns this minimum.
     fn cross(&mut self, values: &[u32]) -> u64 {
         for payer in self.cut.drain(..) {
             self.in_cut[payer as usize] = false;
@@ -235,7 +239,7 @@ impl LandmarkCut {
     }
 }
 
-/// Lowers the values of facts to at most `total`, and queues the facts that changed.
+/// Lowers the value of each fact to `total` if it is greater, and queues the facts whose values changed.
 fn offer(facts: &[u32], total: u64, values: &mut [u64], queue: &mut BinaryHeap<Reverse<(u64, u32)>>) {
     for fact in facts {
         let value = &mut values[*fact as usize];

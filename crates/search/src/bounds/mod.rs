@@ -1,10 +1,10 @@
-//! Admissible heuristics, and upper bounds on the number of steps of a cheaper plan.
+//! Admissible heuristics, and upper bounds on the number of steps of cheaper plans.
 //!
-//! A projection to a few finite-domain variables is solved exactly. Dijkstra's algorithm from the
-//! abstract goal states gives a consistent, admissible heuristic: a pattern database \[1\]. Dynamic
-//! programming over steps and abstract states gives the operators that can occur at each step of a
-//! plan cheaper than the best known one, and the number of steps beyond which there is no such
-//! plan. Cost partitioning adds up several projections.
+//! A projection to a few finite-domain variables is solved exactly. Dijkstra's algorithm from the abstract
+//! goal states yields an admissible and consistent heuristic: a pattern database \[1\]. Dynamic programming
+//! over steps and abstract states yields two more results: the operators that can occur at each step of a
+//! plan cheaper than the best known plan, and the number of steps above which no such plan exists. Cost
+//! partitioning adds the values of several projections.
 //!
 //! \[1\] S. Edelkamp: Planning with pattern databases, ECP 2001.
 
@@ -29,36 +29,37 @@ use task::number::Int;
 use task::task::quantity::NumericId;
 use task::task::{State, VariableId};
 
-/// Longest plan that step bounds are computed for.
+/// Maximum number of steps up to which step bounds are computed.
 const STEP_LIMIT: usize = 4_000;
-/// Largest number of states of a projection.
+/// Maximum number of abstract states of a projection.
 const STATE_LIMIT: usize = 20_000;
-/// Number of projections to pairs of variables that are tried.
+/// Maximum number of projections to pairs of variables.
 const PAIR_LIMIT: usize = 40;
-/// Number of projections that are used on their own. More of them cost more time than they save
-/// expansions.
+/// Maximum number of projections that are evaluated individually. More projections cost more time than the
+/// avoided expansions save.
 const MAX_PROJECTIONS: usize = 12;
 
-/// Projections of a task, sorted by decreasing heuristic value of the initial state, and bounds
-/// derived from them.
+/// Projections of a task, sorted by decreasing heuristic value of the initial state, and lower bounds
+/// computed from them.
 pub struct Bounds {
     pub projections: Vec<Projection>,
     resources: Vec<Resource>,
-    /// Cost partitionings, and the projections that only these use.
+    /// Cost partitionings; empty if they do not improve the heuristic.
     partitions: Vec<CostPartitioning>,
+    /// Projections that only the cost partitionings use.
     further: Vec<Projection>,
 }
 
-/// Facts about the plans whose cost and length stay within given limits.
+/// Information about plans whose cost and number of steps are limited.
 pub struct ReachableWindow {
-    /// Upper bound on the number of steps of such a plan. `None` if no projection yields one.
+    /// Upper bound on the number of steps of these plans. `None` if no projection yields a bound.
     pub steps: Option<usize>,
-    /// For each step: whether each operator can occur at it.
+    /// For each step and each operator: whether the operator can occur at the step.
     pub allowed: Vec<Vec<bool>>,
 }
 
 impl Bounds {
-    /// Computes projections and saturated cost partitionings.
+    /// Computes projections and saturated cost partitionings of a task.
     ///
     /// # Errors
     /// Fails when a limit is reached.
@@ -113,7 +114,7 @@ impl Bounds {
         Ok(Self { projections, resources, partitions: Vec::new(), further })
     }
 
-    /// Heuristic that is 0 everywhere: the projection to no variable.
+    /// Returns the heuristic that is 0 everywhere except at dead ends of the projection to no variable.
     ///
     /// # Errors
     /// Fails when a limit is reached.
@@ -122,7 +123,8 @@ impl Bounds {
         Ok(Self { projections, resources: Vec::new(), partitions: Vec::new(), further: Vec::new() })
     }
 
-    /// Lower bound on the cost from a state to the goal. Returns `None` if the goal is unreachable.
+    /// Returns a lower bound on the cost from a state to the goal, or `None` if the goal is proved
+    /// unreachable from the state.
     pub fn estimate(&self, state: &State) -> Option<Int> {
         let mut best = 0;
         if self.partitions.is_empty() {
@@ -142,8 +144,9 @@ impl Bounds {
         self.resources.iter().all(enough).then_some(best)
     }
 
-    /// Lower bounds on the resources that must remain: the number, the projection, and a value for
-    /// each of its abstract states.
+    /// Returns lower bounds on resources that states must have. Each item is a numeric variable, a
+    /// projection, and the required amount for each abstract state of the projection; `None` means that no
+    /// amount suffices.
     pub fn needs(&self) -> impl Iterator<Item = (NumericId, &Projection, &[Option<Int>])> {
         let projection = |position: &usize| &self.projections[*position];
         self.resources.iter().flat_map(move |resource| {
@@ -152,8 +155,8 @@ impl Bounds {
         })
     }
 
-    /// Facts about plans with cost at most `limit` and at most `horizon` steps, where these are
-    /// given.
+    /// Returns information about the plans with cost at most `limit` and at most `horizon` steps. A missing
+    /// limit does not restrict the plans.
     ///
     /// # Errors
     /// Fails when a limit is reached.

@@ -1,4 +1,4 @@
-//! Pattern database: the projection of a task to a few finite-domain variables, with goal distances.
+//! Pattern database: the projection of a task to a few finite-domain variables, and its goal distances.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -8,30 +8,31 @@ use task::limits::{Interrupted, Limits};
 use task::number::{GROWTH_LIMIT, Int, dense};
 use task::task::{ConditionalEffect, Literal, OperatorId, State, VariableId};
 
-/// Transition of an operator between abstract states.
+/// A transition between two abstract states.
 #[derive(Debug, Clone, Copy)]
 pub struct Transition {
     pub source: u32,
     pub target: u32,
 }
 
-/// A projection: its abstract state space and the goal distance of each abstract state.
+/// A projection of a task to a few variables (the pattern), with the goal distance of each abstract state.
 pub struct Projection {
     pub pattern: Vec<VariableId>,
     sizes: Vec<usize>,
     initial: u32,
     goals: Vec<u32>,
-    /// Per operator: cost with the cheapest designs, and its transitions. Empty if the operator
-    /// neither reads nor changes the pattern.
+    /// For each operator: its cost with the cheapest designs, and its transitions. There are no transitions
+    /// if the operator neither reads nor changes the pattern.
     operators: Vec<(Int, Vec<Transition>)>,
-    /// Least cost of an operator that neither reads nor changes the pattern.
+    /// Minimum cost of an operator that neither reads nor changes the pattern; `None` if there is no such
+    /// operator.
     idle_cost: Option<Int>,
-    /// Goal distance of each abstract state.
+    /// Goal distance of each abstract state; `None` if the goal is unreachable.
     to_go: Vec<Option<Int>>,
 }
 
-/// Sum of two amounts between 0 and `GROWTH_LIMIT`, capped at `GROWTH_LIMIT`. Capped sums remain
-/// consistent lower bounds.
+/// Returns the sum of two numbers between 0 and `GROWTH_LIMIT`, capped at `GROWTH_LIMIT`. Capped distances
+/// remain consistent lower bounds.
 fn sum(a: Int, b: Int) -> Int {
     a.saturating_add(b).min(GROWTH_LIMIT)
 }
@@ -55,8 +56,8 @@ impl Projection {
         projection.goals = projection.matching(&goal);
         for operator in limits.watch(&task.operators) {
             let operator = operator?;
-            // Dijkstra's algorithm requires non-negative costs. Counting rewards as 0 preserves
-            // reachability.
+            // Dijkstra's algorithm requires non-negative costs. Counting a negative cost as 0 keeps the
+            // transitions.
             let cost = operator.cost.minimum().max(0);
             let before = projection.required(&operator.condition.facts);
             let after = projection.required(&operator.effects);
@@ -88,7 +89,7 @@ impl Projection {
         self.sizes.iter().product()
     }
 
-    /// Abstract state of a state.
+    /// Returns the abstract state of a state.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "an abstract state is below the number of them, which are in memory"
@@ -98,7 +99,7 @@ impl Projection {
         dense(self.sizes.iter().zip(values).fold(0, |index, (size, value)| index * size + value))
     }
 
-    /// Values of the pattern variables in an abstract state.
+    /// Returns the values of the pattern variables in an abstract state.
     #[expect(clippy::arithmetic_side_effects, reason = "every variable has a value, so that no size is 0")]
     pub fn values(&self, state: u32) -> Vec<u32> {
         let mut index = state as usize;
@@ -137,8 +138,8 @@ impl Projection {
         states
     }
 
-    /// Abstract states that an operator can lead to. A conditional effect whose condition mentions
-    /// variables outside the pattern may fire or not.
+    /// Returns the abstract states to which an operator can lead. If the condition of a conditional effect
+    /// mentions variables outside the pattern, both outcomes are possible.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "abstract states are below the number of them, which are in memory"
@@ -178,7 +179,7 @@ impl Projection {
         reached.into_iter().map(index).collect()
     }
 
-    /// Goal distance of each abstract state under the given operator costs.
+    /// Returns the goal distance of each abstract state under the given operator costs.
     pub(crate) fn goal_distances(
         &self,
         costs: &[Int],
@@ -187,7 +188,8 @@ impl Projection {
         self.distances(|operator| costs[operator], self.goals.iter().map(|goal| (*goal, 0)), limits)
     }
 
-    /// Saturated costs: the least operator costs that preserve the given goal distances.
+    /// Returns the saturated costs: for each operator, the minimum cost that preserves the given goal
+    /// distances.
     #[expect(clippy::arithmetic_side_effects, reason = "costs to go are between 0 and GROWTH_LIMIT")]
     pub(crate) fn saturated(&self, to_go: &[Option<Int>]) -> impl Iterator<Item = Int> {
         self.operators.iter().map(|(_, transitions)| {
@@ -198,7 +200,8 @@ impl Projection {
         })
     }
 
-    /// Returns `true` if `other` projects to a part of the pattern and yields the same values.
+    /// Returns `true` if the pattern of `other` is a subset of this pattern and both projections yield equal
+    /// goal distances for all states.
     pub(crate) fn is_dominated_by(&self, other: &Self) -> bool {
         let places: Option<Vec<usize>> = other
             .pattern
@@ -216,21 +219,21 @@ impl Projection {
         })
     }
 
-    /// Size of the abstract state space: abstract states and transitions. Measures the work of a
-    /// goal distance computation.
+    /// Returns the number of abstract states plus the number of transitions, as a measure of the work to
+    /// compute goal distances.
     #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(crate) fn transition_count(&self) -> usize {
         self.size() + self.operators.iter().map(|(_, transitions)| transitions.len()).sum::<usize>()
     }
 
-    /// Least number of steps from each abstract state to the goal.
+    /// Returns the minimum number of steps from each abstract state to the goal.
     pub(crate) fn steps_to_go(&self, limits: &Limits) -> Result<Vec<Option<Int>>, Interrupted> {
         self.distances(|_| 1, self.goals.iter().map(|goal| (*goal, 0)), limits)
     }
 
-    /// Lower bound on the consumption of a resource, from each abstract state, until it is
-    /// replenished or a goal state is reached. `used` is the consumption of each operator, `None`
-    /// if it may replenish. `left` is the amount that must remain in a goal state.
+    /// Returns, for each abstract state, a lower bound on the consumption of a resource until the resource is
+    /// replenished or a goal state is reached. `used` is the consumption of each operator, or `None` if the
+    /// operator may replenish. `left` is the amount that must remain in a goal state.
     pub(crate) fn needs(
         &self,
         used: &[Option<Int>],
@@ -243,13 +246,14 @@ impl Projection {
         self.distances(|operator| used[operator].unwrap_or(0).max(0), goals.chain(free), limits)
     }
 
-    /// Returns `true` if an operator changes or reads the pattern.
+    /// Returns `true` if the operator reads or changes a variable of the pattern and is applicable in some
+    /// abstract state.
     pub(crate) fn affects_pattern(&self, operator: usize) -> bool {
         !self.operators[operator].1.is_empty()
     }
 
-    /// Least cost from each abstract state to a target, plus the initial value of that target.
-    /// Backward Dijkstra search.
+    /// Returns the minimum, over all targets, of the path cost from each abstract state to the target plus
+    /// the target's initial value. Uses a backward Dijkstra search.
     fn distances(
         &self,
         cost: impl Fn(usize) -> Int,
@@ -281,26 +285,28 @@ impl Projection {
         Ok(to_go)
     }
 
-    /// Goal distance of a state's abstract state. Returns `None` if the goal is unreachable.
+    /// Returns the goal distance of a state's abstract state, or `None` if the goal is unreachable.
     pub fn estimate(&self, state: &State) -> Option<Int> {
         self.to_go[self.state(state) as usize]
     }
 
-    /// Goal distances of all abstract states.
+    /// Returns the goal distances of all abstract states.
     pub fn costs(&self) -> &[Option<Int>] {
         &self.to_go
     }
 
+    /// Returns the goal distance of an abstract state, or `None` if the goal is unreachable.
     pub fn goal_distance(&self, state: u32) -> Option<Int> {
         self.to_go[state as usize]
     }
 
-    /// Transitions of an operator; empty if it neither reads nor changes the pattern.
+    /// Returns the transitions of an operator; empty if the operator neither reads nor changes the pattern.
     pub fn transitions(&self, operator: OperatorId) -> &[Transition] {
         &self.operators[operator.index()].1
     }
 
-    /// Least cost of reaching each abstract state in exactly one more step.
+    /// Returns the minimum cost of reaching each abstract state with one more step. `costs` are the minimum
+    /// costs before this step.
     fn advance(&self, costs: &[Option<Int>]) -> Vec<Option<Int>> {
         let improve =
             |slot: &mut Option<Int>, cost: Int| *slot = Some(slot.map_or(cost, |least| least.min(cost)));
@@ -328,8 +334,8 @@ impl Projection {
         costs
     }
 
-    /// Upper bound on the number of steps of a plan with cost at most `limit`. Returns `None` if
-    /// there is no bound up to `max_steps`.
+    /// Returns an upper bound on the number of steps of a plan with cost at most `limit`. Returns `None` if
+    /// there is no bound of at most `max_steps`.
     pub(crate) fn step_bound(
         &self,
         limit: Int,
@@ -351,7 +357,7 @@ impl Projection {
             }
             bound = step;
             let next = self.advance(&costs);
-            // At a fixpoint the bound would never be exceeded.
+            // At a fixpoint, the number of steps is not bounded.
             if next == costs {
                 return Ok(None);
             }
@@ -360,8 +366,8 @@ impl Projection {
         Ok(None)
     }
 
-    /// Clears `allowed[step][operator]` if no plan with cost at most `limit` has the operator at
-    /// that step.
+    /// Sets `allowed[step][operator]` to `false` if no plan with cost at most `limit` can apply the operator
+    /// at that step.
     pub(crate) fn restrict(
         &self,
         limit: Option<Int>,

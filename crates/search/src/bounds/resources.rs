@@ -1,9 +1,9 @@
-//! Lower bounds on the consumption of a resource before it is replenished.
+//! Lower bounds on the consumption of a resource until it is replenished or the goal is reached.
 //!
-//! A numeric variable is a resource if every operator that may lower it requires that it does not
-//! fall below 0. The least consumption, in a projection, on the way to the goal or to a
-//! replenishing operator is what a state must have left: the resource-to-go of constrained shortest
-//! paths \[1\].
+//! A numeric variable is a resource if every operator that can only lower the variable requires that the new
+//! value is at least 0. The minimum consumption in a projection, on the way to the goal or to a replenishing
+//! operator, is a lower bound on the amount that a state must have. This is the resource-to-go of constrained
+//! shortest paths \[1\].
 //!
 //! \[1\] I. Dumitrescu, N. Boland: Improved preprocessing, labeling and scaling algorithms for the
 //! weight-constrained shortest path problem, Networks 42(3), 2003.
@@ -16,16 +16,17 @@ use task::task::{Operator, State};
 
 use crate::bounds::pattern_database::Projection;
 
-/// A resource and the lower bound on its remaining amount, by projection and abstract state.
+/// A resource, with lower bounds on its amount for the abstract states of some projections.
 pub(super) struct Resource {
     pub(super) variable: NumericId,
-    /// By index of the projection.
+    /// Index of a projection, with the required amount for each of its abstract states; `None` means that no
+    /// amount suffices.
     pub(super) needs: Vec<(usize, Vec<Option<Int>>)>,
 }
 
 impl Resource {
-    /// Returns `true` unless a projection proves that the state has too little to reach the goal or
-    /// a replenishment. A value below 0 is harmless if nothing is needed.
+    /// Returns `false` if a projection proves that the state has too little of the resource to reach the goal
+    /// or a replenishment. A value below 0 is harmless if nothing is required.
     pub(super) fn has_enough_resources(&self, state: &State, projections: &[Projection]) -> bool {
         let amount = state.numbers[self.variable.index()];
         self.needs.iter().all(|(projection, needs)| {
@@ -35,7 +36,7 @@ impl Resource {
     }
 }
 
-/// Resources of a task.
+/// Returns the resources of a task, with their lower bounds in each projection.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "numbers of a task are above the least number of their type"
@@ -55,7 +56,7 @@ pub(super) fn resources(
         let required = required.map(|comparison| -comparison.quantity.constant).fold(0, Int::max);
         let mut needs = Vec::new();
         for (projection, position) in projections.iter().zip(0..) {
-            // An operator that replenishes from any abstract state makes every lower bound 0.
+            // If an operator replenishes in every abstract state, all lower bounds would be 0.
             let anywhere =
                 |operator: usize| used[operator].is_none() && !projection.affects_pattern(operator);
             if !(0..used.len()).any(anywhere) {
@@ -67,8 +68,9 @@ pub(super) fn resources(
     Ok(result)
 }
 
-/// Least consumption of an operator: `Some(None)` if it may replenish. Returns `None` if it may
-/// lower the variable below 0, so the variable is no resource.
+/// Returns the minimum consumption of an operator, or `Some(None)` if the operator may replenish the
+/// resource. Returns `None` if the operator may lower the variable below 0, so that the variable is not a
+/// resource.
 #[allow(clippy::option_option)]
 #[expect(
     clippy::arithmetic_side_effects,

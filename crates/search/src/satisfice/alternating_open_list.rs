@@ -1,14 +1,14 @@
-//! Alternating open list: several lists in turns, each sorted by its heuristic value.
+//! Alternating open list: several open lists that take turns, each sorted by its own heuristic value.
 //!
-//! The search is lazy: the operators applicable in a state inherit its value \[1\]. A list
-//! therefore holds states, each with its operators. Lists of preferred operators are boosted after
-//! progress.
+//! The search is lazy: the operators that are applicable in a state get the heuristic value of this state
+//! \[1\]. An entry of a list is therefore a state with its untried operators. Lists of preferred operators
+//! get extra turns (a boost) after progress.
 //!
 //! \[1\] M. Helmert: The Fast Downward planning system, JAIR 26, 2006, section 5.
 
 use std::collections::{BTreeMap, VecDeque};
 
-/// Untried operators of a state: a range of the stored steps.
+/// An entry of an open list: a state, and the range of its untried steps in `AlternatingOpenList::steps`.
 #[derive(Debug, Clone, Copy)]
 struct Entry {
     state: u32,
@@ -16,33 +16,33 @@ struct Entry {
     end: u32,
 }
 
-/// Turns that progress gives to each list of preferred operators.
+/// Number of extra turns that each list of preferred operators gets after progress.
 const PREFERRED_BOOST: i64 = 1_000;
 
 #[derive(Debug)]
 struct List<K> {
     buckets: BTreeMap<K, VecDeque<Entry>>,
-    /// Number of turns taken. The non-empty list with the fewest comes next.
+    /// Number of turns taken. The non-empty list with the fewest turns is used next.
     turns: i64,
     preferred: bool,
 }
 
-/// Open lists for all operators and for preferred ones, each sorted by its own values.
+/// Open lists for all operators and for preferred operators. Each list is sorted by its own heuristic values.
 #[derive(Debug)]
 pub struct AlternatingOpenList<K> {
     lists: Vec<List<K>>,
-    /// Steps of all entries: operators with their designs.
+    /// Steps of all entries. A step is the id of an operator with designs.
     steps: Vec<u32>,
 }
 
 impl<K: Ord> AlternatingOpenList<K> {
-    /// Creates one list per item; the item says whether the list holds preferred operators only.
+    /// Creates one list for each item. The item is `true` if the list contains preferred operators only.
     pub fn new(lists: impl IntoIterator<Item = bool>) -> Self {
         let list = |preferred| List { preferred, buckets: BTreeMap::new(), turns: 0 };
         Self { lists: lists.into_iter().map(list).collect(), steps: Vec::new() }
     }
 
-    /// Adds a state with its value in each list, all of its steps, and its preferred steps.
+    /// Adds a state with its heuristic value for each list, its applicable steps, and its preferred steps.
     pub fn push(
         &mut self,
         state: u32,
@@ -63,7 +63,8 @@ impl<K: Ord> AlternatingOpenList<K> {
         }
     }
 
-    /// Returns a state and its next untried step.
+    /// Removes and returns the next entry: a state and one of its untried steps. Returns `None` if all lists
+    /// are empty.
     pub fn pop(&mut self) -> Option<(u32, u32)> {
         let waiting = self.lists.iter_mut().filter(|list| !list.buckets.is_empty());
         let list = waiting.min_by_key(|list| list.turns)?;
@@ -82,12 +83,13 @@ impl<K: Ord> AlternatingOpenList<K> {
         Some(step)
     }
 
-    /// Approximate memory use in words.
+    /// Returns the approximate memory use in 64-bit words.
     pub fn size(&self) -> usize {
         self.steps.len() / 2
     }
 
-    /// Gives the lists of preferred operators extra turns after some heuristic has improved.
+    /// Gives each list of preferred operators `PREFERRED_BOOST` extra turns. Called when a heuristic has
+    /// found a new best value.
     pub fn boost(&mut self) {
         for list in self.lists.iter_mut().filter(|list| list.preferred) {
             list.turns = list.turns.saturating_sub(PREFERRED_BOOST);

@@ -1,17 +1,16 @@
-//! Bucket queue: numbers sorted by small integer costs.
+//! Bucket queue: a priority queue for items with small integer costs.
 
-/// Number of buckets. Items with higher costs are kept in a heap.
+/// Number of buckets. Items with a cost of at least this number are stored in a heap.
 const BUCKET_COUNT: usize = 1 << 16;
 
-/// Monotone bucket queue: an item that is added while the queue is emptied costs at least as much
-/// as the last one taken.
+/// Monotone bucket queue: every added item must cost at least as much as the item that was removed last.
 #[derive(Debug, Default)]
 pub struct Queue {
     buckets: Vec<Vec<u32>>,
     at: usize,
-    /// Number of items of the cheapest bucket that [`Queue::pop_first`] has taken.
+    /// Number of items of the cheapest bucket that [`Queue::pop_first`] has already returned.
     taken: usize,
-    /// Number of items in buckets.
+    /// Number of items in the buckets, without the heap.
     count: usize,
     dear: std::collections::BinaryHeap<std::cmp::Reverse<(u32, u32)>>,
 }
@@ -38,7 +37,7 @@ impl Queue {
         self.count = self.count.saturating_add(1);
     }
 
-    /// Removes one of the cheapest items, last in, first out.
+    /// Removes an item with the lowest cost; the last one added comes first. Returns its cost and the item.
     pub(crate) fn pop(&mut self) -> Option<(u32, u32)> {
         if self.count == 0 {
             return self.dear.pop().map(|std::cmp::Reverse(least)| least);
@@ -52,8 +51,8 @@ impl Queue {
         }
     }
 
-    /// Removes one of the cheapest items, first in, first out. A queue must be emptied by this
-    /// method or by `pop`, never by both.
+    /// Removes an item with the lowest cost; the first one added comes first. A queue must be emptied either
+    /// by this method or by `pop`, never by both.
     pub fn pop_first(&mut self) -> Option<(u32, u32)> {
         if self.count == 0 {
             return self.dear.pop().map(|std::cmp::Reverse(least)| least);

@@ -1,10 +1,12 @@
-//! Delete relaxation of a ground task as nodes with conditions and effects.
+//! Delete relaxation of a ground task as an AND/OR graph: nodes with conditions and effects over
+//! propositions.
 //!
-//! Propositions are facts, disjunctions and numeric comparisons. A node is an operator, a
-//! conditional effect, a rule of a derived variable, or one way to make a disjunction true. A
-//! derived variable that is required to be false counts as false. The best designs are selected for
-//! each purpose separately. The number of repetitions until a comparison holds is estimated as by
-//! Scala et al. \[1\]; an operator that does not add a constant counts as achieving it at once.
+//! Propositions are facts, disjunctions and numeric comparisons. A node is an operator, a conditional effect,
+//! a rule of a derived variable, or one disjunct of a disjunction. Conditions that require a derived variable
+//! to be false are assumed to hold. For each numeric comparison separately, the most favourable designs are
+//! assumed. The number of repetitions of an operator until a comparison holds is estimated as by Scala et al.
+//! \[1\]. An operator whose numeric effect is not the addition of a constant is assumed to achieve a
+//! comparison with one application.
 //!
 //! \[1\] E. Scala, P. Haslum, S. Thiébaux: Heuristics for numeric planning via subgoaling, IJCAI 2016.
 
@@ -17,54 +19,55 @@ use task::task::number::{TaskNumber, sum_of_products};
 use task::task::quantity::{Linear, NumericId, Quantity};
 use task::task::{Condition, Fact, Literal, Operator, OperatorId, State, Task, VariableId};
 
-/// Number of a fact, disjunction or numeric comparison.
+/// Index of a proposition: a fact, a disjunction or a numeric comparison.
 pub(super) type Proposition = u32;
 
-/// Marks a node that does not belong to an operator.
+/// Operator index of a node that does not belong to an operator.
 pub(super) const NO_OPERATOR: u32 = u32::MAX;
 
-/// A linear expression with the thresholds that conditions compare it with.
+/// A linear expression, and all thresholds with which conditions compare it.
 pub(super) struct NumericCondition<N> {
     pub(super) sum: Vec<(NumericId, N)>,
-    /// Threshold, whether the comparison is strict (greater than, not at least), and its
+    /// For each comparison: the threshold, a flag that is `true` for > and `false` for ≥, and its
     /// proposition.
     pub(super) thresholds: Vec<(N, bool, Proposition)>,
 }
 
 impl<N: TaskNumber> NumericCondition<N> {
-    /// Value of the expression. Returns `None` if it overflows.
+    /// Returns the value of the expression, or `None` if it overflows.
     pub(super) fn value(&self, numbers: &[N]) -> Option<N> {
         let terms = self.sum.iter().map(|(variable, factor)| (factor, &numbers[variable.index()]));
         sum_of_products(N::zero(), terms)
     }
 }
 
-/// Contribution of an operator to a numeric condition.
+/// Contribution of an operator to a linear expression in conditions.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Achiever {
+    /// Index of the linear expression in `Relaxation::directions`.
     pub(super) direction: u32,
-    /// Increase per application; infinite if one application is assumed to suffice.
+    /// Increase of the expression per application; infinite if a single application is assumed to suffice.
     pub(super) gain: f64,
 }
 
 /// The delete relaxation of a task.
 pub(super) struct Relaxation<N> {
-    /// Proposition of each variable's first value.
+    /// Index of the first fact of each variable, followed by the total number of facts.
     first: Vec<Proposition>,
     pub(super) propositions: usize,
-    /// Propositions that are assumed to hold always.
+    /// Propositions that are assumed to be always true.
     pub(super) always: Vec<Proposition>,
     pub(super) directions: Vec<NumericCondition<N>>,
-    /// Operator of each node.
+    /// For each node: its operator, or `NO_OPERATOR`.
     pub(super) operators: Vec<u32>,
     pub(super) conditions: Lists,
     pub(super) effects: Lists,
     pub(super) supports: Vec<Vec<Achiever>>,
-    /// Per proposition: the nodes that have it as a condition.
+    /// For each proposition: the nodes that have it as a condition.
     pub(super) waiting: Lists,
-    /// Whether a node represents an operator itself, not one of its conditional effects.
+    /// For each node: `true` if it represents the unconditional part of an operator.
     pub(super) is_base: Vec<bool>,
-    /// Artificial proposition that holds if the goal does.
+    /// Artificial proposition that is true if all conditions of the goal are true.
     pub(super) goal: Proposition,
     /// Conditions of the goal.
     pub(super) goals: Vec<Proposition>,
@@ -79,7 +82,7 @@ impl<N: TaskNumber> Relaxation<N> {
         self.first[fact.variable.index()].saturating_add(fact.value)
     }
 
-    /// Fact of a proposition. Returns `None` if it is a disjunction or a comparison.
+    /// Returns the fact of a proposition, or `None` if the proposition is a disjunction or a comparison.
     pub(super) fn fact_of(&self, proposition: Proposition) -> Option<Fact> {
         if proposition >= *self.first.last()? {
             return None;
@@ -89,14 +92,14 @@ impl<N: TaskNumber> Relaxation<N> {
         Some(Fact { variable: VariableId::of(variable), value })
     }
 
-    /// Propositions of the facts of a state.
+    /// Returns the propositions of the facts that hold in a state.
     pub(super) fn facts<'s>(&'s self, values: &'s [u32]) -> impl Iterator<Item = Proposition> + 's {
         self.first.iter().zip(values).map(|(first, value)| first.saturating_add(*value))
     }
 }
 
 impl<N: TaskNumber> Relaxation<N> {
-    /// Returns `true` if a proposition that is a fact or a comparison holds in a state.
+    /// Returns `true` if a fact or a numeric comparison holds in a state. Returns `false` for disjunctions.
     pub(super) fn holds(&self, proposition: Proposition, state: &State<N>) -> bool {
         if let Some(fact) = self.fact_of(proposition) {
             return fact.holds(&state.values);
@@ -248,7 +251,8 @@ impl<'a, N: TaskNumber> Builder<'a, N> {
         propositions
     }
 
-    /// Proposition of a comparison with the best designs. Returns `None` if it always holds.
+    /// Returns the proposition of a comparison under the most favourable designs, or `None` if it always
+    /// holds.
     fn comparison(&mut self, linear: &Linear<N>, strict: bool) -> Option<Proposition> {
         let threshold = negated(maximum(&linear.quantity));
         if linear.coefficients.is_empty() {
@@ -293,7 +297,7 @@ impl<'a, N: TaskNumber> Builder<'a, N> {
         Some(proposition)
     }
 
-    /// Proposition of a literal. Returns `None` if it is assumed to hold always.
+    /// Returns the proposition of a literal, or `None` if the literal is assumed to be always true.
     fn literal(&mut self, literal: Literal) -> Option<Proposition> {
         let Literal { fact, positive } = literal;
         let proposition = self.fact(fact);
@@ -302,8 +306,7 @@ impl<'a, N: TaskNumber> Builder<'a, N> {
         }
         let values = dense(self.task.variables[fact.variable.index()].values.len());
         if fact.variable.index() >= self.task.basic {
-            // A derived variable is true only if its rules derive it; its falsity is always
-            // assumed.
+            // A derived variable is true only if a rule derives it. Its falsity is always assumed.
             return (fact.value != 0).then(|| self.fact(Fact { value: 0, ..fact }));
         }
         if values == 2 {
@@ -322,7 +325,8 @@ impl<'a, N: TaskNumber> Builder<'a, N> {
         Some(proposition)
     }
 
-    /// Contributions of each operator's base node to the numeric conditions.
+    /// Returns, for each node, the numeric expressions that the operator of the node increases. Only
+    /// unconditional parts of operators have entries.
     fn supports(&self, limits: &Limits) -> Result<Vec<Vec<Achiever>>, Interrupted> {
         let mut conditions_by_variable: FxHashMap<NumericId, Vec<usize>> = FxHashMap::default();
         for (index, direction) in self.directions.iter().enumerate() {
@@ -355,9 +359,9 @@ impl<'a, N: TaskNumber> Builder<'a, N> {
     }
 }
 
-/// Greatest increase of an expression by an operator. Returns `None` if it is not positive, and
-/// infinity if it is not constant or overflows. The sign is decided exactly, because a condition
-/// that no operator increases is unreachable.
+/// Returns the maximum increase of an expression by one application of the operator. Returns `None` if the
+/// increase is not positive, and infinity if it is not constant or overflows. The sign is decided with exact
+/// arithmetic, because a comparison that no operator increases counts as unreachable.
 fn gain<N: TaskNumber>(operator: &Operator<N>, sum: &[(NumericId, N)]) -> Option<f64> {
     let mut gain = N::zero();
     for (variable, factor) in sum {
@@ -380,7 +384,7 @@ fn gain<N: TaskNumber>(operator: &Operator<N>, sum: &[(NumericId, N)]) -> Option
         };
         gain = next;
     }
-    // A positive increase may round to 0 as a double.
+    // A positive increase may round to 0 in floating-point arithmetic.
     (gain > N::zero()).then(|| gain.approximate().max(f64::MIN_POSITIVE))
 }
 
@@ -389,7 +393,7 @@ fn negated<N: TaskNumber>(number: N) -> N {
     -number
 }
 
-/// Upper bound on a quantity over all designs, the counterpart of `Quantity::minimum`.
+/// Returns an upper bound on a quantity over all designs, analogous to the lower bound `Quantity::minimum`.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "where they are machine integers, the numbers of a quantity fit together (TaskNumber::fits), whatever their signs"

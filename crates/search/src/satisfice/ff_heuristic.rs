@@ -1,8 +1,8 @@
-//! FF heuristic with additive costs: the cost of a relaxed plan, and its applicable operators as
-//! preferred operators.
+//! FF heuristic with additive costs: the cost of a relaxed plan. Operators of the relaxed plan that are
+//! applicable in the state are preferred.
 //!
-//! Costs of propositions are those of h^add \[1\], computed in the order of Dijkstra's algorithm.
-//! The relaxed plan consists of the cheapest supporters, followed back from the goal \[2\].
+//! Costs of propositions are their h^add values \[1\], computed by Dijkstra's algorithm. The relaxed plan
+//! consists of the cheapest supporters, collected backwards from the goal \[2\].
 //!
 //! - \[1\] B. Bonet, H. Geffner: Planning as heuristic search, Artificial Intelligence 129, 2001.
 //! - \[2\] E. Keyder, H. Geffner: Heuristics for planning with action costs revisited, ECAI 2008.
@@ -15,12 +15,12 @@ use crate::satisfice::bucket_queue::Queue;
 use crate::satisfice::delete_relaxation::{NO_OPERATOR, Proposition, Relaxation};
 
 const UNREACHED: u32 = u32::MAX;
-/// Cap on sums of costs.
+/// Upper limit at which sums of costs are capped.
 const MAX_COST: u32 = 1 << 30;
-/// Cap on the number of applications of an operator that a numeric condition is assumed to need.
+/// Upper limit on the assumed number of repetitions of an operator until a numeric comparison holds.
 const MAX_REPETITIONS: f64 = 10_000.0;
 
-/// Cheapest achiever of a proposition, and its number of applications.
+/// Cheapest achiever of a proposition, and the number of its applications until the proposition holds.
 #[derive(Debug, Clone, Copy)]
 struct Supporter {
     node: u32,
@@ -29,17 +29,18 @@ struct Supporter {
 
 /// The FF heuristic, with scratch buffers for evaluating states.
 pub(super) struct FfHeuristic {
-    /// Cost (h^add) of each proposition.
+    /// h^add value of each proposition.
     costs: Vec<u32>,
     supporters: Vec<Supporter>,
-    /// Per node: number of its unreached conditions, and sum of the costs of the reached ones.
+    /// For each node: the number of its unreached conditions.
     left: Vec<u32>,
+    /// For each node: the sum of the costs of its reached conditions.
     sums: Vec<u32>,
     initially_left: Vec<u32>,
     queue: Queue,
-    /// Per numeric expression: its value in the state.
+    /// For each numeric expression: its approximate value in the state.
     values: Vec<f64>,
-    /// Operators whose conditions cost nothing.
+    /// Operators whose conditions all hold in the state, according to the relaxation.
     pub(super) applicable: Vec<u32>,
     /// Operators of the relaxed plan that are applicable in the state.
     pub(super) preferred: Vec<u32>,
@@ -70,9 +71,9 @@ impl FfHeuristic {
         }
     }
 
-    /// Cost of a relaxed plan under the operator costs `prices`, each at least 1. Returns `None` if
-    /// there is no relaxed plan. Afterwards `applicable` contains the operators that may be
-    /// applicable, and `preferred` those of them that are in the relaxed plan.
+    /// Returns the cost of a relaxed plan under the operator costs `prices`, each at least 1. Returns `None`
+    /// if there is no relaxed plan. Afterwards `applicable` contains the operators that may be applicable in
+    /// the state, and `preferred` contains those of them that belong to the relaxed plan.
     pub(super) fn estimate<N: TaskNumber>(
         &mut self,
         relaxation: &Relaxation<N>,
@@ -97,7 +98,7 @@ impl FfHeuristic {
         for (direction, index) in relaxation.directions.iter().zip(0..) {
             let value: Option<N> = direction.value(&state.numbers);
             for (threshold, strict, proposition) in &direction.thresholds {
-                // A value that overflows counts as satisfying the condition.
+                // If the value overflows, the comparison is assumed to hold.
                 let holds = value
                     .as_ref()
                     .is_none_or(|value| if *strict { value > threshold } else { value >= threshold });
@@ -117,8 +118,8 @@ impl FfHeuristic {
             if self.costs[proposition as usize] != cost {
                 continue;
             }
-            // Propositions of cost 0 are always processed completely, because they determine the
-            // applicable operators.
+            // Propositions of cost 0 are always processed completely, because they determine which operators
+            // are applicable.
             if cost > 0 && self.costs[relaxation.goal as usize] <= cost {
                 break;
             }
@@ -143,7 +144,7 @@ impl FfHeuristic {
         }
     }
 
-    /// Processes a node whose conditions are all reached.
+    /// Processes a node when its last condition is reached: updates the costs of its effects.
     fn reached<N: TaskNumber>(&mut self, relaxation: &Relaxation<N>, prices: &[u32], node: u32) {
         let sum = self.sums[node as usize];
         let operator = relaxation.operators[node as usize];
@@ -182,7 +183,8 @@ impl FfHeuristic {
             }
             let operator = relaxation.operators[node as usize];
             if operator != NO_OPERATOR {
-                // An operator counts once, or as many times as each numeric condition needs it.
+                // An operator is counted once, or `times` times for each numeric comparison that needs
+                // several applications.
                 if !self.in_plan[operator as usize] || times > 1 {
                     let price = prices[operator as usize];
                     total = total.saturating_add(price.saturating_mul(times)).min(MAX_COST);
@@ -212,7 +214,7 @@ impl FfHeuristic {
     }
 }
 
-/// Number of applications that add up to at least the missing amount.
+/// Returns the number of applications whose gains add up to at least the missing amount.
 fn times(missing: f64, gain: f64) -> u32 {
     if gain.is_infinite() {
         return 1;

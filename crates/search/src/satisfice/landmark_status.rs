@@ -1,8 +1,9 @@
-//! Landmark status: the landmarks that were reached on the path to a state, and the number still required.
+//! Landmark status: the landmarks reached on the path to a state, and the number of landmarks that are still
+//! required.
 //!
-//! A landmark is reached when it holds and its predecessors were reached. A reached landmark is
-//! required again if it is a goal that does not hold, or needed right before another landmark that
-//! was not reached \[1\].
+//! A landmark is reached when it is true and all its predecessors have been reached. A reached landmark is
+//! required again in two cases \[1\]: it is a goal that is not true, or it is not true and must hold directly
+//! before another landmark that is not reached.
 //!
 //! \[1\] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010, section 5.
 
@@ -15,15 +16,15 @@ use crate::satisfice::landmarks::Landmarks;
 /// Landmarks of a task, with scratch buffers for evaluating states.
 pub(super) struct LandmarkStatus {
     landmarks: Landmarks,
-    /// Per landmark: its propositions that are facts, and its other propositions.
+    /// For each landmark: the facts among its propositions, and the other propositions.
     facts: Vec<(Vec<Fact>, Vec<Proposition>)>,
-    /// Per proposition: whether it would achieve a landmark that is due next.
+    /// For each proposition: `true` if it achieves an unreached landmark whose predecessors are reached.
     wanted: Vec<bool>,
     marks: Vec<Proposition>,
     holds: Vec<bool>,
 }
 
-/// Number of words of a bitset with one bit per landmark.
+/// Returns the number of 64-bit words of a bitset with `count` bits.
 fn words(count: usize) -> usize {
     count.div_ceil(64)
 }
@@ -62,14 +63,14 @@ impl LandmarkStatus {
         words(self.landmarks.all.len())
     }
 
-    /// Landmarks that are reached in the initial state.
+    /// Returns the bitset of the landmarks that are reached in the initial state.
     pub(super) fn initially<N: TaskNumber>(
         &mut self,
         relaxation: &Relaxation<N>,
         state: &State<N>,
     ) -> Vec<u64> {
         let mut reached = vec![0; self.stride()];
-        // A landmark is reached only after its predecessors, so reaching one may enable others.
+        // A landmark is reached only after its predecessors, so reaching a landmark may enable others.
         for _ in 0..self.landmarks.all.len() {
             let before = reached.clone();
             reached = self.progress(relaxation, &before, state);
@@ -80,7 +81,8 @@ impl LandmarkStatus {
         reached
     }
 
-    /// Landmarks that are reached in `state` if `before` were reached in its predecessor.
+    /// Returns the bitset of the landmarks that are reached in `state`, if the landmarks `before` were
+    /// reached in its predecessor.
     pub(super) fn progress<N: TaskNumber>(
         &mut self,
         relaxation: &Relaxation<N>,
@@ -100,7 +102,7 @@ impl LandmarkStatus {
         reached
     }
 
-    /// Number of landmarks that are still required, given the state of the last call of `progress`.
+    /// Returns the number of landmarks that are still required in the state of the last call of `progress`.
     pub(super) fn remaining(&self, reached: &[u64]) -> u32 {
         let mut count: u32 = 0;
         for (landmark, index) in self.landmarks.all.iter().zip(0_u32..) {
@@ -115,7 +117,7 @@ impl LandmarkStatus {
         count
     }
 
-    /// Marks the propositions of the unreached landmarks whose predecessors were reached.
+    /// Marks the propositions of all unreached landmarks whose predecessors are reached.
     pub(super) fn request_landmark(&mut self, reached: &[u64]) {
         for mark in self.marks.drain(..) {
             self.wanted[mark as usize] = false;

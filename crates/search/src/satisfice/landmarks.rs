@@ -1,10 +1,10 @@
-//! Landmarks and their orders, found backwards from the goal \[1\].
+//! Landmarks of a task and their orders, found by backchaining from the goal \[1\].
 //!
-//! Each condition that all possible first achievers of a landmark share is a landmark, ordered
-//! greedily-necessary before it. If each achiever requires a fact of one predicate, the disjunction
-//! of these facts is a landmark. Facts that are unreachable without a landmark come after it.
-//! Reasonable orders delay a landmark that would be deleted on the way to another one; they only
-//! guide the search.
+//! A fact that is a condition of all possible first achievers of a landmark is a landmark itself, with a
+//! greedy-necessary order before the other. If each achiever requires a fact of one predicate, the
+//! disjunction of these facts is a landmark. A landmark that is unreachable in the relaxation without another
+//! landmark comes after the other. A reasonable order delays a landmark that would have to be destroyed to
+//! achieve another landmark; such orders only guide the search.
 //!
 //! \[1\] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010, section 4.
 
@@ -16,25 +16,26 @@ use task::task::{Fact, Task};
 
 use crate::satisfice::delete_relaxation::{NO_OPERATOR, Proposition, Relaxation};
 
-/// Maximum number of facts of a disjunctive landmark.
+/// Maximum number of facts in a disjunctive landmark.
 const MAX_DISJUNCTION: usize = 4;
 /// Maximum number of landmarks.
 const MAX_LANDMARKS: usize = 500;
-/// Work limit: propositions and nodes of the relaxation times landmarks.
+/// Limit on the number of landmarks times the number of propositions and nodes of the relaxation.
 const MAX_WORK: usize = 400_000_000;
 
-/// A landmark: every plan makes one of its propositions true.
+/// A landmark: in every plan, at least one of its propositions is true at some time.
 #[derive(Debug, Clone)]
 pub(super) struct Landmark {
     pub(super) any_of: Vec<Proposition>,
-    /// Landmarks ordered before it, by sound or reasonable orders.
+    /// Landmarks ordered before this landmark, by sound or reasonable orders.
     pub(super) after: Vec<u32>,
-    /// Landmarks for which it must hold immediately before (greedy-necessary orders).
+    /// Landmarks that require this landmark directly before they are first achieved (greedy-necessary
+    /// orders).
     pub(super) needed_by: Vec<u32>,
     pub(super) is_goal: bool,
 }
 
-/// Landmarks of a task.
+/// All landmarks of a task that were found.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Landmarks {
     pub(super) all: Vec<Landmark>,
@@ -47,15 +48,15 @@ struct LandmarkFactory<'a, N> {
     initial: Vec<bool>,
     all: Vec<Landmark>,
     known: FxHashMap<Vec<Proposition>, u32>,
-    /// Orders between landmarks: (earlier, later).
+    /// Orders between landmarks, as pairs (earlier, later).
     orders: FxHashSet<(u32, u32)>,
-    /// Greedy-necessary orders: (earlier, later).
+    /// Greedy-necessary orders between landmarks, as pairs (earlier, later).
     needed: FxHashSet<(u32, u32)>,
     exclusive: FxHashMap<Proposition, Vec<usize>>,
 }
 
 impl Landmarks {
-    /// Finds the landmarks of a task from its initial state.
+    /// Finds the landmarks of a task for its initial state, and their orders.
     pub(super) fn new<N: TaskNumber>(
         task: &Task<N>,
         relaxation: &Relaxation<N>,
@@ -128,7 +129,7 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
         index
     }
 
-    /// Finds the landmarks that must hold before a landmark, and their orders.
+    /// Finds landmarks that must hold before a landmark, and adds their orders.
     fn before(&mut self, landmark: u32) {
         let propositions = self.all[landmark as usize].any_of.clone();
         // A landmark that holds initially needs no achiever.
@@ -170,8 +171,8 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
         }
     }
 
-    /// Finds disjunctive landmarks: facts of one predicate such that each achiever requires one of
-    /// them.
+    /// Adds disjunctive landmarks: sets of facts of one predicate such that each achiever requires a fact of
+    /// the set.
     fn disjunctive(&mut self, achievers: &[u32], shared: &[Proposition], landmark: u32) {
         if achievers.len() < 2 {
             return;
@@ -210,8 +211,8 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
         }
     }
 
-    /// Relaxed reachability without the propositions `excluded`: reached propositions, and nodes
-    /// whose conditions are reached.
+    /// Computes relaxed reachability if the propositions `excluded` are never true. Returns for each
+    /// proposition whether it is reached, and for each node whether all its conditions are reached.
     fn reach_without(&self, excluded: &[Proposition]) -> (Vec<bool>, Vec<bool>) {
         let relaxation = self.relaxation;
         let mut reached = vec![false; relaxation.propositions];
@@ -225,7 +226,7 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
                 open.push(proposition);
             }
         }
-        // Numeric conditions count as reached. This can only lose landmarks, never add wrong ones.
+        // Numeric comparisons are assumed to be reached. This can miss landmarks, but never adds wrong ones.
         for (_, _, proposition) in relaxation.directions.iter().flat_map(|direction| &direction.thresholds) {
             if !excluded.contains(proposition) {
                 reached[*proposition as usize] = true;
@@ -257,7 +258,7 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
         (reached, enabled)
     }
 
-    /// Adds reasonable orders, which keep landmarks from being destroyed and achieved again.
+    /// Adds reasonable orders, which prevent that a landmark is achieved, destroyed and achieved again.
     fn reasonable(&mut self, limits: &Limits) -> Result<(), Interrupted> {
         let indices = 0..dense(self.all.len());
         let sides: Vec<Vec<Proposition>> = indices.clone().map(|landmark| self.side(landmark)).collect();
@@ -280,7 +281,7 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
             let (sooner, later) = pair?;
             if sooner == later
                 || has(&reach[later as usize], sooner)
-                // An order that would close a cycle is dropped.
+                // An order that would close a cycle is not added.
                 || self.orders.contains(&(sooner, later))
             {
                 continue;
@@ -294,8 +295,8 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
         Ok(())
     }
 
-    /// Propositions that hold when a landmark is achieved: the landmark itself, common effects of
-    /// all its achievers, and propositions needed immediately before. Empty for a disjunction.
+    /// Returns propositions that are true when a landmark is achieved: the landmark, the common effects of
+    /// all its achievers, and landmarks required directly before. Returns an empty list for a disjunction.
     fn side(&self, landmark: u32) -> Vec<Proposition> {
         let [proposition] = self.all[landmark as usize].any_of[..] else { return Vec::new() };
         let mut achievers = self.adders[proposition as usize].iter();
@@ -315,7 +316,7 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
         side
     }
 
-    /// Effects of a node, including the unconditional effects of its operator.
+    /// Returns the effects of a node, including the unconditional effects of its operator.
     fn all_effects(&self, node: u32) -> Vec<Proposition> {
         let mut effects = self.relaxation.effects.of(node).to_vec();
         let operator = self.relaxation.operators[node as usize];
@@ -352,7 +353,8 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
     }
 }
 
-/// Transitive closure: per landmark a bitset of the landmarks ordered after it.
+/// Returns the transitive closure of the orders: for each landmark, a bitset of the landmarks ordered after
+/// it.
 fn closure(count: usize, orders: &FxHashSet<(u32, u32)>) -> Vec<Vec<u64>> {
     let mut reach = vec![vec![0_u64; count.div_ceil(64)]; count];
     for (sooner, later) in orders {
@@ -369,7 +371,7 @@ fn has(words: &[u64], landmark: u32) -> bool {
     words[(landmark >> 6) as usize] >> (landmark & 63) & 1 == 1
 }
 
-/// Adds the successors `further` to everything that precedes a landmark.
+/// Adds the landmarks in `further` to the successors of every landmark that is ordered before `landmark`.
 fn join(reach: &mut [Vec<u64>], landmark: u32, further: &[u64]) {
     for successors in reach.iter_mut().filter(|successors| has(successors, landmark)) {
         for (word, more) in successors.iter_mut().zip(further) {
@@ -378,7 +380,7 @@ fn join(reach: &mut [Vec<u64>], landmark: u32, further: &[u64]) {
     }
 }
 
-/// Adds an order and updates the transitive closure.
+/// Adds an order to the transitive closure.
 fn connect(reach: &mut [Vec<u64>], sooner: u32, later: u32) {
     let mut further = reach[later as usize].clone();
     further[(later >> 6) as usize] |= 1 << (later & 63);
@@ -388,7 +390,7 @@ fn connect(reach: &mut [Vec<u64>], sooner: u32, later: u32) {
     join(reach, sooner, &further);
 }
 
-/// Predicate name of a fact: the first word of its value's name.
+/// Returns the predicate name of a fact, i.e. the first word in the name of its value.
 fn predicate<N>(task: &Task<N>, fact: Fact) -> &str {
     let name = &task.variables[fact.variable.index()].values[fact.value as usize];
     name.split([' ', '(', ')']).find(|word| !word.is_empty()).unwrap_or(name)

@@ -1,12 +1,12 @@
-//! Satisficing search: lazy greedy best-first search, then weighted A\*, guided by the FF heuristic
-//! and landmarks, as in LAMA \[1\].
+//! Satisficing search: lazy greedy best-first search, followed by weighted A\*, both guided by the FF
+//! heuristic and landmarks as in LAMA \[1\].
 //!
-//! `delete_relaxation` is the task without deletes, `ff_heuristic` computes relaxed plans, `landmarks` finds
-//! landmarks, and `landmark_status` tracks which of them a path has reached. `search` is the search with an
-//! `alternating_open_list` over the states of a `store`.
+//! `delete_relaxation` builds the delete relaxation, `ff_heuristic` computes relaxed plans, `landmarks` finds
+//! landmarks, and `landmark_status` tracks which landmarks a path has reached. `search` implements the search
+//! with an `alternating_open_list` over the states in a `store`.
 //!
-//! Heuristic values never serve as proofs: callers execute each plan, and only an exhausted search
-//! reports that there is no plan.
+//! Heuristic values never serve as proofs. Callers execute each plan to verify it, and unsolvability is
+//! reported only if a search has exhausted the state space.
 //!
 //! \[1\] S. Richter, M. Westphal: The LAMA planner: guiding cost-based anytime planning with
 //! landmarks, JAIR 39, 2010.
@@ -32,8 +32,8 @@ use crate::search::{MutexPairs, SearchStatistics};
 use search::{HeuristicWeight, Outcome, Search};
 use search_context::{SearchContext, USELESS_OPERATOR_COST};
 
-/// Configurations of the successive searches: whether operator costs are used, and the weight of
-/// the heuristic.
+/// Configurations of the searches that run one after another: whether operator costs are used, and the weight
+/// of the heuristic.
 const SEARCH_SEQUENCE: [(bool, HeuristicWeight); 6] = [
     (false, HeuristicWeight::Greedy),
     (true, HeuristicWeight::Greedy),
@@ -43,29 +43,28 @@ const SEARCH_SEQUENCE: [(bool, HeuristicWeight); 6] = [
     (true, HeuristicWeight::Times(1)),
 ];
 
-/// One part in `MEMORY_SHARE` of the available memory is the limit of one search; beyond it the
-/// next search begins.
+/// A search may use 1/`MEMORY_SHARE` of the available memory. If it needs more, the next search begins.
 const MEMORY_SHARE: usize = 16;
 
-/// Outcome of one turn of the satisficing search.
+/// Result of one turn of the satisficing search.
 pub enum StepResult<N> {
-    /// A cheaper plan.
+    /// A plan that costs less than the given limit.
     Plan(GroundPlan<N>),
-    /// There is no plan at all.
+    /// The task has no plan.
     Unsolvable,
-    /// The budget of work is spent; the search can be resumed.
+    /// The work budget is used up, or the next search begins. The search can be resumed.
     Paused,
     /// All searches of the sequence have ended.
     Ended,
 }
 
-/// A resumable sequence of searches for a plan, then for cheaper ones.
+/// A resumable sequence of searches for cheaper and cheaper plans.
 pub struct Satisficer<'a, N> {
     known: SearchContext<'a, N>,
     limits: &'a Limits,
     phase: usize,
     search: Option<Search<N>>,
-    /// Whether h² mutexes were computed, or their computation was tried.
+    /// `true` if the computation of h² mutexes was attempted.
     knows_pairs: bool,
     pub figures: SearchStatistics,
 }
@@ -87,13 +86,13 @@ impl<'a, N: TaskNumber> Satisficer<'a, N> {
         }))
     }
 
-    /// Number of searches that have ended.
+    /// Returns the number of searches that have ended.
     pub fn restarts(&self) -> usize {
         self.phase
     }
 
-    /// Searches for a plan that costs less than `limit` (any plan if `None`) within `work` units. A
-    /// unit is a visit of one node or proposition of the relaxed task.
+    /// Searches for a plan with a cost below `limit` (for any plan if `None`), with at most `work` work
+    /// units. A work unit is a visit of one node or proposition of the delete relaxation.
     ///
     /// # Errors
     /// Fails when a limit is reached.
@@ -104,7 +103,7 @@ impl<'a, N: TaskNumber> Satisficer<'a, N> {
         if !self.knows_pairs && self.figures.evaluated >= self.limits.thresholds().pairs {
             self.knows_pairs = true;
             self.known.pairs = MutexPairs::new(self.known.task, self.limits)?;
-            // Preferred operators and costs change with the mutexes, so the current search
+            // The h² mutexes change the preferred operators and the operator costs, so the current search
             // restarts.
             self.search = None;
         }
@@ -150,7 +149,7 @@ impl<'a, N: TaskNumber> Satisficer<'a, N> {
 
     fn next(&mut self) {
         self.phase = self.phase.saturating_add(1);
-        // With uniform costs this search would repeat the previous one.
+        // With uniform operator costs, this search would repeat the first search.
         let is_uniform = || {
             let costs = self.known.operator_costs();
             costs.iter().all(|cost| Some(cost) == costs.first())

@@ -1,9 +1,9 @@
-//! Lazy greedy best-first search with preferred operators, then weighted A\* with decreasing weights.
+//! Lazy greedy best-first search with preferred operators, and weighted A\* with a fixed weight.
 //!
-//! A state is evaluated when it is expanded, and its successors are queued with its values \[1\]:
-//! the cost of the relaxed plan and the number of required landmarks, in turns. The first search
-//! counts steps, the next ones costs, with smaller and smaller weights \[2\]. A search that ends
-//! without a plan is exhaustive, except for states without a relaxed plan.
+//! A state is evaluated when it is expanded, and its successors are queued with its heuristic values \[1\].
+//! The two heuristics are the cost of the relaxed plan and the number of required landmarks; their open lists
+//! alternate. The first search of a sequence uses unit costs, and later searches use operator costs with
+//! decreasing weights \[2\]. If the open lists are empty, all states that have a relaxed plan were visited.
 //!
 //! - \[1\] M. Helmert: The Fast Downward planning system, JAIR 26, 2006, section 5.
 //! - \[2\] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010, section 6.
@@ -18,51 +18,51 @@ use crate::satisfice::search_context::{SearchContext, USELESS_OPERATOR_COST};
 use crate::satisfice::store::Store;
 use crate::search::SearchStatistics;
 
-/// Work units charged for generating a successor and looking it up.
+/// Work units charged for generating a successor and looking it up in the store.
 const GENERATION_COST: u64 = 200;
 
 /// Weight of the heuristic in the sort key of the open lists.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum HeuristicWeight {
-    /// Heuristic value only (greedy best-first search).
+    /// The heuristic value only (greedy best-first search).
     Greedy,
-    /// Path cost plus this multiple of the heuristic value (weighted A\*).
+    /// The path cost plus this multiple of the heuristic value (weighted A\*).
     Times(u64),
 }
 
 struct Node<N> {
     parent: u32,
-    /// Number of the step from the parent.
+    /// Index of the step (operator with designs) that leads from the parent to this node.
     step: u32,
     cost: N,
-    /// Path cost in scaled operator costs.
+    /// Path cost as the sum of the scaled operator costs.
     price: u64,
 }
 
-/// Outcome of one run.
+/// Result of running a search with a work budget.
 pub(super) enum Outcome<N> {
     /// A plan that costs less than the limit.
     Plan(GroundPlan<N>),
-    /// The open lists are empty: no such plan exists, unless the search is incomplete.
+    /// The open lists are empty. No plan within the limit exists, unless the search is incomplete.
     Exhausted,
-    /// The work is spent; the search can be resumed.
+    /// The work budget is used up. The search can be resumed.
     Paused,
 }
 
-/// A resumable search.
+/// A resumable greedy or weighted A\* search.
 pub(super) struct Search<N> {
     weight: HeuristicWeight,
     prices: Vec<u32>,
-    /// Mean operator cost; converts a number of landmarks into a cost.
+    /// Mean operator cost, used to convert a number of landmarks to a cost.
     mean: u32,
     store: Store<N>,
     nodes: Vec<Node<N>>,
-    /// Reached landmarks: a bitset of `LandmarkStatus::stride` words per state.
+    /// Reached landmarks of each state, as a bitset of `LandmarkStatus::stride` words.
     reached: Vec<u64>,
     open: AlternatingOpenList<u64>,
-    /// Best value of each heuristic up to now.
+    /// Lowest value of each heuristic among the evaluated states.
     best: [u32; 2],
-    /// Whether states were pruned because their numbers overflow or their cost reaches the limit.
+    /// `true` if states were pruned because a number overflowed or their cost reached the limit.
     pub(super) incomplete: bool,
 }
 
@@ -92,12 +92,12 @@ impl<N: TaskNumber> Search<N> {
         search
     }
 
-    /// Approximate memory use in words.
+    /// Returns the approximate memory use in 64-bit words.
     pub(super) fn size(&self) -> usize {
         self.store.size().saturating_add(self.reached.len()).saturating_add(self.open.size())
     }
 
-    /// Searches for a plan that costs less than `limit` within `work` units.
+    /// Searches for a plan that costs less than `limit`, with at most `work` work units.
     pub(super) fn run(
         &mut self,
         context: &mut SearchContext<'_, N>,
@@ -140,7 +140,7 @@ impl<N: TaskNumber> Search<N> {
                 continue;
             }
             let (id, is_new) = self.store.insert(&state);
-            // Greedy search ignores path costs, so reopening a state cannot improve it.
+            // Greedy search ignores path costs, so it does not reopen states.
             if !is_new && (self.weight == HeuristicWeight::Greedy || total >= self.nodes[id as usize].cost) {
                 continue;
             }
@@ -155,7 +155,7 @@ impl<N: TaskNumber> Search<N> {
             } else {
                 self.nodes[id as usize] = node;
                 let start = (id as usize).saturating_mul(stride);
-                // A landmark counts as reached only if every path to the state has reached it.
+                // A landmark counts as reached only if it was reached on every known path to the state.
                 for (new, old) in reached.iter_mut().zip(&mut self.reached[start..]) {
                     *new &= *old;
                     *old = *new;
@@ -172,7 +172,8 @@ impl<N: TaskNumber> Search<N> {
         Ok(Outcome::Paused)
     }
 
-    /// Evaluates a state and puts its successors on the open lists.
+    /// Evaluates a state and adds its applicable steps to the open lists. A state without a relaxed plan is a
+    /// dead end.
     fn look(&mut self, context: &mut SearchContext<'_, N>, id: u32, state: &State<N>, reached: &[u64]) {
         let Some(ff_value) = context.explorer.estimate(&context.relaxation, &self.prices, state) else {
             return;
@@ -185,7 +186,7 @@ impl<N: TaskNumber> Search<N> {
                 progress = true;
             }
         }
-        // Progress gives preferred operators priority (boosting).
+        // After progress, preferred operators get priority (boosting).
         if progress {
             self.open.boost();
         }
@@ -212,7 +213,7 @@ impl<N: TaskNumber> Search<N> {
             at = node.parent;
         }
         steps.reverse();
-        // A node on the path may have been reached more cheaply since the goal was found.
+        // A cheaper path to a node of the plan may have been found since the goal was reached.
         let cost = cost(context.task, &steps).unwrap_or_else(|| self.nodes[goal as usize].cost.clone());
         GroundPlan { steps, cost }
     }

@@ -1,4 +1,4 @@
-//! Data that the satisficing searches of a task share.
+//! Data that all satisficing searches of a task share.
 
 use num_traits::ToPrimitive as _;
 use task::context::Context;
@@ -14,31 +14,31 @@ use crate::satisfice::landmarks::Landmarks;
 use crate::search::design_combinations::pareto_optimal_combinations;
 use crate::search::{MutexPairs, is_monotone};
 
-/// Cost of an operator that no plan needs.
+/// Cost of an operator that is never useful according to the h² mutexes.
 pub(super) const USELESS_OPERATOR_COST: u32 = 1 << 20;
 
-/// An operator with a combination of its designs and its cost.
+/// An operator with chosen designs, and its cost.
 struct Step<N> {
     operator: OperatorId,
     choice: Vec<u32>,
     cost: N,
 }
 
-/// Data that the searches share: relaxation, heuristics, mutexes and steps.
+/// Data that all satisficing searches of a task share: relaxation, heuristics, mutexes and steps.
 pub(super) struct SearchContext<'a, N> {
     pub(super) task: &'a Task<N>,
     pub(super) relaxation: Relaxation<N>,
     pub(super) explorer: FfHeuristic,
     pub(super) status: LandmarkStatus,
-    /// The h² mutexes, once computed.
+    /// The h² mutexes; `None` until they are computed.
     pub(super) pairs: Option<MutexPairs>,
     steps: Vec<Step<N>>,
-    /// Number of each operator's first step; at the end the total number of steps.
+    /// Index of the first step of each operator, followed by the total number of steps.
     first: Vec<u32>,
 }
 
 impl<'a, N: TaskNumber> SearchContext<'a, N> {
-    /// Returns `None` if an operator has too many combinations of designs.
+    /// Computes the shared data. Returns `None` if an operator has too many combinations of designs.
     pub(super) fn new(context: Context<'a, N>) -> Result<Option<Self>, Interrupted> {
         let Context { task, limits } = context;
         let monotone = is_monotone(task);
@@ -58,25 +58,26 @@ impl<'a, N: TaskNumber> SearchContext<'a, N> {
         Ok(Some(Self { task, relaxation, explorer, status, pairs: None, steps, first }))
     }
 
-    /// Work units charged for the evaluation of a state.
+    /// Returns the number of work units charged for the evaluation of a state.
     pub(super) fn size(&self) -> u64 {
         self.relaxation.propositions.saturating_add(self.relaxation.operators.len()) as u64
     }
 
+    /// Returns the operator, the designs and the cost of a step.
     pub(super) fn step(&self, step: u32) -> (OperatorId, &[u32], &N) {
         let Step { operator, choice, cost } = &self.steps[step as usize];
         (*operator, choice, cost)
     }
 
-    /// Applicable steps of the state evaluated last, and the preferred ones among them.
+    /// Returns the applicable steps of the state that was evaluated last, and the preferred steps among them.
     pub(super) fn steps(&mut self, state: &State<N>) -> (Vec<u32>, Vec<u32>) {
         self.explorer.applicable.sort_unstable();
         self.explorer.preferred.sort_unstable();
         let (mut steps, mut preferred) = (Vec::new(), Vec::new());
         for operator in &self.explorer.applicable {
             let schema = &self.task.operators[*operator as usize];
-            // The relaxation ignores clauses and treats falsity of derived variables as true, so
-            // conditions are checked here.
+            // The relaxation is more permissive than the task, for example for derived variables that must be
+            // false. Conditions are therefore checked here.
             if !schema.condition.holds_propositionally(&state.values) {
                 continue;
             }
@@ -105,8 +106,8 @@ impl<'a, N: TaskNumber> SearchContext<'a, N> {
         effects.iter().any(|fact| self.status.is_wanted(self.relaxation.fact(*fact)))
     }
 
-    /// Operator costs scaled to integers: positive costs have a mean of about 10, and 1 is added to
-    /// each.
+    /// Returns operator costs scaled to integers: positive costs are scaled to a mean of about 10, and 1 is
+    /// added to every cost.
     pub(super) fn operator_costs(&self) -> Vec<u32> {
         let costs: Vec<f64> =
             self.task.operators.iter().map(|operator| operator.cost.minimum().approximate()).collect();

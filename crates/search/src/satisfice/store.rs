@@ -1,4 +1,4 @@
-//! Packed states of a satisficing search, each stored once.
+//! Bit-packed states of a satisficing search. Each state is stored once.
 
 use std::hash::{BuildHasher as _, Hash as _, Hasher as _};
 
@@ -7,7 +7,7 @@ use rustc_hash::FxBuildHasher;
 
 use task::task::{State, Task};
 
-/// Bit field of a variable in a packed state.
+/// Bits of a packed state that hold the value of a variable.
 #[derive(Debug, Clone, Copy)]
 struct Field {
     word: usize,
@@ -15,7 +15,8 @@ struct Field {
     mask: u64,
 }
 
-/// Registry of all generated states: bit-packed values, and numbers.
+/// Registry of all generated states: bit-packed values of finite-domain variables, and values of numeric
+/// variables.
 pub(super) struct Store<N> {
     fields: Vec<Field>,
     stride: usize,
@@ -50,7 +51,7 @@ impl<N: Clone + Eq + std::hash::Hash> Store<N> {
         }
     }
 
-    /// Index of a state, and whether it is new.
+    /// Adds a state if it is not stored yet. Returns its index, and `true` if the state is new.
     pub(super) fn insert(&mut self, state: &State<N>) -> (u32, bool) {
         let mut key = vec![0_u64; self.stride];
         for (field, value) in self.fields.iter().zip(&state.values) {
@@ -94,7 +95,7 @@ impl<N: Clone + Eq + std::hash::Hash> Store<N> {
         State { values: self.fields.iter().map(value).collect(), numbers }
     }
 
-    /// Approximate memory use in words.
+    /// Returns the approximate memory use in 64-bit words.
     pub(super) fn size(&self) -> usize {
         self.packed.len().saturating_add(self.stored_numbers.len().saturating_mul(2))
     }

@@ -1,12 +1,14 @@
-//! A\* with Pareto dominance over numeric variables; returns a cheapest plan with the fewest steps.
+//! A\* with Pareto dominance over numeric variables. Returns a cheapest plan, and among these a plan with the
+//! fewest steps.
 //!
-//! States with equal finite-domain variables are compared by cost and by numeric variables. Where a higher
-//! value is never worse (a battery), a state is dominated by another one that costs no more and has at least
-//! as much of everything. This is label setting for resource-constrained shortest paths \[1\]. The answer is
-//! exact if the search ends before its limits.
+//! States with equal finite-domain variables are compared by cost and by numeric variables. If a higher value
+//! of a numeric variable is never worse (for example battery charge), a state dominates another state that
+//! costs at least as much and has at most the same values. This is label setting for resource-constrained
+//! shortest paths \[1\]. The result is exact if the search ends before its limits.
 //!
-//! The open list is sorted by cost plus heuristic value. Ties are broken by the fewest estimated steps to the
-//! goal, then by depth. A plan is optimal once no open node can be cheaper, or as cheap with fewer steps.
+//! The open list is sorted by path cost plus heuristic value. Ties are broken by the lower bound on the
+//! number of steps, then by depth. A plan is optimal once no open node can lead to a cheaper plan, or to a
+//! plan of equal cost with fewer steps.
 //!
 //! \[1\] M. Desrochers, F. Soumis: A generalized permanent labelling algorithm for the shortest path problem
 //! with time windows, INFOR 26(3), 1988.
@@ -28,60 +30,61 @@ use crate::search::statistics::SearchStatistics;
 use crate::search::stubborn_sets::StubbornSetPruning;
 use crate::search::symmetry::Orbits;
 
-/// Work units of an expansion: open list and applicable operators.
+/// Work units charged for an expansion: popping the node and finding the applicable operators.
 const EXPANSION_COST: u64 = 2_000;
-/// Work units charged for one generated successor: applying the operator and looking the state up.
+/// Work units charged for generating a successor: applying the operator and looking the state up.
 const GENERATION_COST: u64 = 600;
-/// Work units charged per operator that the stubborn-set closure visits.
+/// Work units charged for each operator that the stubborn-set computation visits.
 const STUBBORN_SET_COST: u64 = 10;
 
-/// Outcome of a search.
+/// Outcome of an optimal search.
 #[derive(Debug)]
 pub enum SearchOutcome<N = Int> {
     /// An optimal plan.
     Optimal(GroundPlan<N>),
-    /// Proof that no plan exists: all reachable states were expanded or dominated.
+    /// Proof that no plan exists: every reachable state was expanded or is dominated.
     None,
-    /// No proof: the best plan found. Returned if a limit was reached, or (with `None`) if the
-    /// search proved that no plan is cheaper than the external incumbent.
+    /// No proof. Contains the best plan found if a limit was reached. Contains `None` if no plan was found,
+    /// or if the search proved that no plan is cheaper than an external incumbent.
     Unknown(Option<GroundPlan<N>>),
 }
 
-/// A search problem: task, heuristic and preprocessed successor data.
+/// A search problem: the task, the heuristic and precomputed operator data.
 pub struct SearchProblem<'a, N, E> {
     pub context: Context<'a, N>,
     pub bounds: &'a E,
     pub prepared: &'a SearchTask<N>,
-    /// Symmetries of interchangeable objects. If set, symmetric states are merged.
+    /// Symmetries of interchangeable objects. If set, symmetric states count as equal.
     pub orbits: Option<Arc<Orbits>>,
 }
 
-/// Order of the open list.
+/// Sort order of the open list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OpenListOrder {
-    /// By f value, then by lower bound on the plan length: fewest steps among the cheapest plans.
+    /// By f value, then by a lower bound on the length of the plan. Finds a cheapest plan with the fewest
+    /// steps.
     Fewest,
-    /// By f value, then by lower bound on the steps to the goal: a cheapest plan of any length.
+    /// By f value, then by a lower bound on the steps to the goal. Finds a cheapest plan of any length.
     Nearest,
-    /// By heuristic value only, without the path cost (greedy best-first search).
+    /// By heuristic value only, ignoring the path cost (greedy best-first search).
     Greedy,
 }
 
-/// Reaction to a forecast that memory will run out before the search can finish.
+/// Reaction to a forecast that the search will run out of memory before it can finish.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum OutOfMemoryPolicy {
     /// Stop the search.
     None,
-    /// Ignore the forecast. The last one was favourable.
+    /// Ignore forecasts; the last forecast was favourable.
     Some,
-    /// Ignore the forecast. The last one was unfavourable.
+    /// Ignore forecasts; the last forecast was unfavourable.
     Needed,
 }
 
-/// Sort key of an open node: primary value, lower bound on steps, and depth (deepest first).
+/// Sort key of an open node: primary value, lower bound on steps, and a tie-breaker that prefers deep nodes.
 type NodeKey<N> = (N, u32, u32);
 
-/// Tie-breaker that decreases with the depth of a node.
+/// Returns a tie-breaker that decreases with the depth `steps` of a node, so that deep nodes come first.
 fn later(steps: u32) -> u32 {
     u32::MAX.saturating_sub(steps)
 }
@@ -94,40 +97,43 @@ pub struct AStar<'a, N, E> {
     prepared: &'a SearchTask<N>,
     pub(super) store: StateRegistry<N>,
     open: OpenList<NodeKey<N>>,
-    /// Whether states were dropped because their numbers overflow. The search then proves nothing.
+    /// `true` if states were dropped because their numbers overflow. The search then proves nothing.
     states_dropped: bool,
     order: OpenListOrder,
-    /// More accurate heuristic that is evaluated only when a node is expanded (lazy A\*).
+    /// More accurate heuristic that is evaluated only when a node is about to be expanded (lazy A\*).
     pub(super) lazy_heuristic: Option<Box<dyn LazyHeuristic<N>>>,
     /// Stubborn-set pruning, if enabled.
     pub(super) pruning: Option<StubbornSetPruning>,
-    /// Work units done, without those of the lazy heuristic.
+    /// Work units already done, without those of the lazy heuristic.
     own_work: u64,
     /// Number of searches that share the memory limit.
     sharing: usize,
-    /// Current lower bound on the cost of every plan.
+    /// Lower bound on the cost of every plan.
     bound: Option<N>,
     is_interrupted: bool,
     pub(super) patience: OutOfMemoryPolicy,
     /// Goal node of the best plan of this search.
     best: Option<u32>,
-    /// Cost of the incumbent, if any. More expensive nodes are pruned.
+    /// Cost of the best known plan (the incumbent), if any. More expensive nodes are pruned.
     limit: Option<N>,
-    /// Whether the incumbent was found by another component of the portfolio.
+    /// `true` if the incumbent was found by another component of the planner.
     incumbent_is_external: bool,
-    /// Length of the incumbent, if ties are broken by length: nodes of equal cost must be shorter.
+    /// Number of steps of the incumbent if this search found it. Nodes of equal cost must lead to shorter
+    /// plans.
     fewest: Option<u32>,
-    /// Number of stored states at which the search first compares its progress with its memory.
+    /// Number of stored states at which the search first forecasts whether its memory suffices.
     first_look: usize,
-    /// Lower bound at each doubling of the number of stored states.
+    /// Lower bound on the plan cost at each doubling of the number of stored states.
     progress: Vec<N>,
     pub(crate) statistics: SearchStatistics,
-    /// Scratch buffers: the expanded state and its current successor.
+    /// Scratch buffer: the state that is being expanded.
     state: State<N>,
+    /// Scratch buffer: the successor that is being generated.
     next: State<N>,
 }
 
-/// Progress callback: receives the cost of the incumbent, if any, and the lower bound.
+/// Progress callback. Receives the cost of the incumbent, if any, and the lower bound on the cost of every
+/// plan.
 pub type ProgressCallback<'a, N> = &'a mut dyn FnMut(Option<&N>, &N);
 
 impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
@@ -168,7 +174,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         search
     }
 
-    /// Runs until more than `max_states` states are stored. `None` if unfinished; it can be resumed.
+    /// Searches until more than `max_states` states are stored. Returns `None` if the search is not finished
+    /// and can be resumed.
     pub(super) fn run_until_states(
         &mut self,
         max_states: usize,
@@ -177,7 +184,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         self.resume(max_states, u64::MAX, hear)
     }
 
-    /// Runs until the total work exceeds `work` units. `None` if unfinished; it can be resumed.
+    /// Searches until the total work exceeds `work` units. Returns `None` if the search is not finished and
+    /// can be resumed.
     pub(super) fn run_for_work(
         &mut self,
         work: u64,
@@ -204,7 +212,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
             if self.store.is_dominated(id) {
                 continue;
             }
-            // Keys ascend, so the first node that cannot improve the incumbent ends the search.
+            // Keys are popped in ascending order, so the first node that cannot improve the incumbent ends
+            // the search.
             let (total, least, _) = &key;
             if self.can_stop_at(total, *least) {
                 return Some(self.outcome_when_exhausted());
@@ -221,7 +230,7 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
             if self.proves_upper_bound() {
                 return Some(SearchOutcome::Unknown(None));
             }
-            // `len >> k` makes one sample per doubling of the number of states.
+            // The shift by the number of samples yields one sample for each doubling of the number of states.
             if self.store.len() >> self.progress.len() >= self.first_look {
                 self.progress.extend(self.bound.clone());
                 let is_hopeful = self.expects_to_finish();
@@ -242,8 +251,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         None
     }
 
-    /// Evaluates the lazy heuristic on a node that is about to be expanded. Returns `None` if the
-    /// node was reinserted with a higher key or pruned.
+    /// Evaluates the lazy heuristic for a node that is about to be expanded. Returns the key of the node, or
+    /// `None` if the node was pruned or reinserted with a higher key.
     fn reevaluate(&mut self, id: u32, key: NodeKey<N>) -> Option<NodeKey<N>> {
         let Some(sharper) = &mut self.lazy_heuristic else { return Some(key) };
         if !self.store.mark_reevaluated(id) {
@@ -264,12 +273,13 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         None
     }
 
-    /// Work units done (deterministic, not wall time).
+    /// Returns the work units already done. They are deterministic and do not measure time.
     pub(super) fn work(&self) -> u64 {
         self.own_work.saturating_add(self.lazy_heuristic.as_ref().map_or(0, |sharper| sharper.work()))
     }
 
-    /// Returns `true` if no node with this key or a later one can improve the incumbent.
+    /// Returns `true` if neither a node with this cost and number of steps nor any later node can improve the
+    /// incumbent.
     fn can_stop_at(&self, cost: &N, steps: u32) -> bool {
         if self.order == OpenListOrder::Greedy {
             return self.best.is_some();
@@ -278,19 +288,20 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         (limit, if self.order == OpenListOrder::Nearest { 0 } else { fewest }) <= (cost, steps)
     }
 
-    /// Cost of the incumbent, if any.
+    /// Returns the cost of the incumbent, if any.
     pub(super) fn upper_bound(&self) -> Option<&N> {
         self.limit.as_ref()
     }
 
-    /// Sets the upper bound, but keeps searching for plans of the same cost.
+    /// Lowers the upper bound on the plan cost. The search still looks for plans with exactly this cost.
     pub(super) fn set_upper_bound_inclusive(&mut self, cost: &N) {
         if self.limit.as_ref().is_none_or(|limit| cost < limit) {
             self.limit = Some(cost.clone());
         }
     }
 
-    /// Sets the cost of an external incumbent. The search ends once the lower bound reaches it.
+    /// Sets the cost of an incumbent that another component found. The search ends once the lower bound
+    /// reaches this cost.
     pub(crate) fn set_upper_bound(&mut self, cost: N) {
         if self.limit.as_ref().is_none_or(|limit| cost < *limit) {
             self.limit = Some(cost);
@@ -305,7 +316,7 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         self.incumbent_is_external && self.limit == self.bound
     }
 
-    /// Returns `true` if the time limit or a cancellation ended the search.
+    /// Returns `true` if a limit or a cancellation ended the search.
     pub(super) fn is_interrupted(&self) -> bool {
         self.is_interrupted
     }
@@ -315,13 +326,13 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         self.sharing = count.max(1);
     }
 
-    /// Lower bound on the cost of every plan.
+    /// Returns the lower bound on the cost of every plan; `None` before the first expansion.
     pub(super) fn bound(&self) -> Option<&N> {
         self.bound.as_ref()
     }
 
-    /// Extrapolated lower bound after `times` more doublings of the number of states, assuming that
-    /// it rises as in the last doubling.
+    /// Returns the expected lower bound after `times` further doublings of the number of states. Assumes that
+    /// each doubling raises the bound as much as the last doubling did.
     #[expect(clippy::arithmetic_side_effects, reason = "sums of costs that fit")]
     pub(super) fn forecast_lower_bound(&self, times: u32) -> Option<N> {
         let [.., before, now] = &self.progress[..] else { return None };
@@ -338,9 +349,9 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         self.store.bytes().saturating_add(self.open.bytes()) <= self.room()
     }
 
-    /// Returns `true` if the lower bound is expected to reach the cost of the incumbent before
-    /// memory is full. Assumes that each doubling of the number of states raises the bound as much
-    /// as the last one did.
+    /// Returns `true` if the lower bound is expected to reach the cost of the incumbent before the memory
+    /// limit is reached. Assumes that each doubling of the number of states raises the bound as much as the
+    /// last doubling did.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "sums of costs that fit, and less than what is limited by memory"
@@ -358,7 +369,7 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         reachable_rise.is_none_or(|reachable_rise| reachable_rise >= remaining)
     }
 
-    /// Outcome if no open node can improve the incumbent.
+    /// Returns the outcome when no open node can improve the incumbent.
     fn outcome_when_exhausted(&self) -> SearchOutcome<N> {
         match self.best_plan() {
             plan if self.states_dropped || self.order == OpenListOrder::Greedy => {
@@ -373,14 +384,14 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         self.best.map(|goal| self.plan(goal))
     }
 
-    /// Operators whose propositional condition holds in the current state, ascending and reduced by
-    /// stubborn sets.
+    /// Returns the operators whose propositional conditions hold in `self.state`, in ascending order.
+    /// Stubborn sets may remove operators.
     fn applicable(&mut self) -> Vec<OperatorId> {
         let mut applicable = self.prepared.index.applicable(self.task, &self.state);
         if let Some(choosing) = &mut self.pruning {
             let size = choosing.prune_operators(self.task, &self.state.values, &mut applicable);
             self.own_work = self.own_work.saturating_add(size.saturating_mul(STUBBORN_SET_COST));
-            // The closure costs time, so pruning ends if it removes too few operators.
+            // Computing stubborn sets costs time, so pruning is disabled if it removes too few operators.
             if choosing.prunes_too_little() {
                 self.pruning = None;
             }
@@ -388,8 +399,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         applicable
     }
 
-    /// Generates all successors of a node whose state is unpacked. After an interruption the node
-    /// counts as not expanded, so the search must end.
+    /// Generates all successors of a node, whose state is in `self.state`. If interrupted, the node counts as
+    /// not expanded, and the search must end.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "steps are fewer than nodes, combinations are numbered"
@@ -423,8 +434,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         Ok(())
     }
 
-    /// Stores the successor in `self.next` unless it is dominated, pruned or a dead end. Its
-    /// derived variables have no values yet. `through` is the f value of the parent.
+    /// Stores the successor in `self.next`, unless it is dominated, too expensive or a dead end. Its derived
+    /// variables are not evaluated yet. `through` is the f value of the parent.
     fn push(&mut self, cost: N, through: &N, origin: ParentLink) {
         self.statistics.generated = self.statistics.generated.saturating_add(1);
         if self.exceeds_upper_bound(&cost) {
@@ -437,8 +448,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
             self.states_dropped = true;
             return;
         };
-        // Taking the maximum with the parent's f value keeps f monotone along a path (pathmax),
-        // even if the heuristic is inconsistent.
+        // The f value is at least that of the parent, so f never decreases along a path (pathmax), even if
+        // the heuristic is inconsistent.
         let total = if self.order == OpenListOrder::Greedy { total } else { total.max(through.clone()) };
         let least = origin.steps.saturating_add(self.prepared.steps_at_least(&estimate));
         if self.exceeds_upper_bound(&total) || self.is_dominated_by_incumbent(&total, least) {
@@ -463,14 +474,15 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         self.limit.as_ref().is_some_and(|limit| cost > limit)
     }
 
-    /// Returns `true` if the incumbent is at least as good as any plan with this cost and this
-    /// number of steps.
+    /// Returns `true` if the incumbent is at least as good as every plan with this cost and this number of
+    /// steps.
     fn is_dominated_by_incumbent(&self, cost: &N, steps: u32) -> bool {
         let (Some(limit), Some(fewest)) = (&self.limit, self.fewest) else { return false };
         (limit, fewest) <= (cost, steps)
     }
 
-    /// Returns `true` if the successor in `self.next` satisfies the goal.
+    /// Evaluates the derived variables of `self.next` if necessary. Returns `true` if this state satisfies
+    /// the goal.
     fn is_goal(&mut self) -> bool {
         let values = &self.next.values[..self.task.basic];
         let is_basic = |fact: &&Fact| fact.variable.index() < values.len();

@@ -1,4 +1,4 @@
-//! The combinations of designs of an operator that no other combination dominates.
+//! Pareto-optimal combinations of the designs of an operator.
 
 use std::collections::hash_map::Entry;
 
@@ -15,25 +15,25 @@ const COMBINATION_LIMIT: usize = 2_000_000;
 /// Maximum number of Pareto-optimal combinations of one operator.
 const CHOICE_LIMIT: usize = 100_000;
 
-/// Designs for some slots of an operator, with their contributions to its cost and to the numbers
-/// in its conditions and effects.
+/// A combination of designs for some slots. `cost` is its contribution to the operator's cost, and `profile`
+/// its contributions to the numeric conditions and effects.
 struct Partial<N> {
     choice: Vec<u32>,
     cost: N,
     profile: Vec<N>,
 }
 
-/// Combinations of designs, each with its cost.
+/// Combinations of designs, each with the cost of the operator.
 pub type CostedCombinations<N> = Vec<(Vec<u32>, N)>;
 
-/// Combinations of an operator's designs that no other combination dominates, with their costs. A
-/// combination dominates another one if it is at most as expensive and leaves at least as much of
-/// the numeric variables. Of equal combinations only the first is kept, unless `all` is set.
-/// Returns `None` if there are too many combinations.
+/// Returns the combinations of an operator's designs that no other combination dominates, with their costs. A
+/// combination dominates another if it costs no more and contributes at least as much to every numeric
+/// condition and effect; if `monotone` is `false`, the contributions must be equal. Of equal combinations,
+/// only one is kept unless `all` is `true`. Returns `None` if there are too many combinations.
 ///
-/// Slots that no table and no exclusion joins contribute independently. A combination that is
-/// dominated within one group of slots is dominated in every extension, so k independent functions
-/// with m designs do not cost m^k comparisons.
+/// Slots that no table and no forbidden combination connects contribute independently. A combination that is
+/// dominated within a group of connected slots is dominated in every extension. For k independent functions
+/// with m designs each, this avoids m^k comparisons.
 ///
 /// # Errors
 /// Fails when a limit is reached.
@@ -46,7 +46,7 @@ pub fn pareto_optimal_combinations<N: TaskNumber>(
     let sizes = operator.sizes();
     let effects = operator.numeric_effects.iter().map(|effect| &effect.value.quantity);
     let conditions = operator.condition.linears().map(|linear| &linear.quantity);
-    // A resource is usually compared and reduced by the same quantity.
+    // The condition and the effect on a resource often contain equal quantities.
     let mut quantities: Vec<&Quantity<N>> = Vec::new();
     for quantity in effects.chain(conditions) {
         if !quantities.contains(&quantity) {
@@ -71,7 +71,7 @@ pub fn pareto_optimal_combinations<N: TaskNumber>(
     Ok(Some(front.into_iter().map(|Partial { choice, cost, .. }| (choice, cost)).collect()))
 }
 
-/// Non-dominated combinations of designs for some slots. Returns `None` if there are too many.
+/// Returns the non-dominated combinations of designs for some slots, or `None` if there are too many.
 fn own_front<N: TaskNumber>(
     operator: &Operator<N>,
     quantities: &[&Quantity<N>],
@@ -99,7 +99,7 @@ fn own_front<N: TaskNumber>(
         let cost = sum(&operator.cost);
         let profile = quantities.iter().map(|quantity| sum(quantity)).collect();
         combinations.push(Partial { choice, cost, profile });
-        // Pruning in between bounds the memory.
+        // Removing dominated combinations from time to time bounds the memory.
         if combinations.len() > 2 * CHOICE_LIMIT {
             combinations = best(combinations, monotone, all, limits)?;
             if combinations.len() > CHOICE_LIMIT {
@@ -125,7 +125,7 @@ impl<N: TaskNumber> Partial<N> {
     }
 }
 
-/// Non-dominated combinations, in lexicographic order of their designs.
+/// Returns the non-dominated combinations, in lexicographic order of their designs.
 fn best<N: TaskNumber>(
     mut candidates: Vec<Partial<N>>,
     monotone: bool,
@@ -133,19 +133,19 @@ fn best<N: TaskNumber>(
     limits: &Limits,
 ) -> Result<Vec<Partial<N>>, Interrupted> {
     limits.check()?;
-    // After sorting, a dominating combination comes before those that it dominates.
+    // After sorting, every combination comes after the combinations that dominate it.
     candidates.sort_by(|a, b| {
         a.cost.cmp(&b.cost).then_with(|| b.profile.cmp(&a.profile)).then_with(|| a.choice.cmp(&b.choice))
     });
     let mut front: Vec<Partial<N>> = Vec::new();
-    // If profiles must be equal, the first combination with a profile is the cheapest one.
+    // If profiles must be equal, the first combination with a given profile is the cheapest.
     let mut cheapest: FxHashMap<Vec<N>, N> = FxHashMap::default();
     let mut pulse = limits.pulse();
     for new in candidates {
         let is_equal = |cost: &N, profile: &[N]| all && *cost == new.cost && profile == new.profile;
         let is_dominated = if monotone {
-            // With one criterion the last entry of the front has the highest number of all cheaper
-            // ones.
+            // With a single criterion, the last entry of the front has the highest value of all earlier
+            // combinations.
             let first_candidate = if new.profile.len() > 1 { 0 } else { front.len().saturating_sub(1) };
             let mut is_dominated = false;
             for old in &front[first_candidate..] {
@@ -175,7 +175,8 @@ fn best<N: TaskNumber>(
     Ok(front)
 }
 
-/// Slots of an operator, grouped such that no table and no exclusion joins two groups.
+/// Returns the slots of an operator in groups, such that no table and no forbidden combination connects two
+/// groups.
 fn independent<N>(operator: &Operator<N>, quantities: &[&Quantity<N>]) -> Vec<Vec<u32>> {
     let tables = quantities.iter().copied().chain([&operator.cost]).flat_map(|quantity| &quantity.tables);
     let joined = tables.map(|table| &table.slots).chain(operator.forbidden.iter().map(|rule| &rule.slots));
@@ -193,7 +194,8 @@ fn independent<N>(operator: &Operator<N>, quantities: &[&Quantity<N>]) -> Vec<Ve
     groups
 }
 
-/// All combinations of designs for some slots, in lexicographic order. The other slots stay at 0.
+/// Iterator over all combinations of designs for some slots, in lexicographic order. The other slots have
+/// design 0.
 struct Combinations<'a> {
     slots: &'a [u32],
     sizes: &'a [usize],
@@ -237,7 +239,7 @@ mod tests {
 
     const SIZES: [usize; 4] = [2, 3, 2, 2];
 
-    /// Quantity with a table over each list of slots, filled with small numbers.
+    /// Creates a quantity with a table over each list of slots, filled with the given numbers.
     fn quantity(tables: &[Vec<u32>], numbers: &mut impl Iterator<Item = Int>) -> Quantity<Int> {
         let mut quantity = Quantity::constant(numbers.next().unwrap_or(0));
         for slots in tables {
@@ -257,7 +259,7 @@ mod tests {
             slot: SlotId(slot),
             designs: (0..*size as u32).collect(),
         };
-        // Slots 0 and 1 exclude some pairs of designs.
+        // Some pairs of designs for slots 0 and 1 are forbidden.
         let combinations = excluded.iter().map(|(a, b)| [*a, *b].into()).collect();
         Operator {
             schema: 0,
@@ -277,7 +279,7 @@ mod tests {
         }
     }
 
-    /// Definition of the result: compares every combination with every other one.
+    /// Reference implementation: compares every combination with every other combination.
     fn expected(operator: &Operator, monotone: bool, all: bool) -> Vec<(Vec<u32>, Int)> {
         let sizes = operator.sizes();
         let value = |choice: &Vec<u32>| {
@@ -310,7 +312,8 @@ mod tests {
             let operator = operator(&costs, &uses, &excluded, &numbers);
             let limits = Limits::none();
             prop_assert_eq!(pareto_optimal_combinations(&operator, monotone, true, &limits), Ok(Some(expected(&operator, monotone, true))));
-            // Of equal combinations only one is kept, so values are compared.
+            // If equal combinations occur, it is not specified which is kept, so costs and quantities are
+            // compared.
             let values = |choices: Vec<(Vec<u32>, Int)>| {
                 let sizes = operator.sizes();
                 let remaining = |choice: &[u32]| operator.numeric_effects[0].value.quantity.at(choice, &sizes);

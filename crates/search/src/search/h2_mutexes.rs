@@ -1,10 +1,9 @@
 //! h² mutexes: pairs of facts that no state on a path from the initial state to the goal contains.
 //!
-//! Forward h² \[1\] finds pairs that no reachable state contains. Backward h² \[2\] finds pairs
-//! that no state contains from which the goal is reachable, so it detects dead ends. An operator is
-//! useless if such a pair holds before or after it. Numeric conditions, clauses and derived facts
-//! are ignored, and conditional effects may fire or not. The analysis is therefore conservative: it
-//! may miss mutexes.
+//! Forward h² \[1\] finds pairs of facts that no reachable state contains. Backward h² \[2\] finds pairs that
+//! no state contains from which the goal is reachable; such pairs detect dead ends. An operator is useless if
+//! its condition or its result contains a mutex pair. The analysis is conservative, i.e. it may miss mutexes:
+//! numeric conditions, clauses and derived facts are ignored, and conditional effects may occur or not.
 //!
 //! \[1\] P. Haslum, H. Geffner: Admissible heuristics for optimal planning, AIPS 2000.
 //! \[2\] V. Alcázar, Á. Torralba: A reminder about the importance of computing and exploiting invariants in
@@ -17,32 +16,31 @@ use task::task::{Fact, Operator, OperatorId, Task, VariableId};
 
 /// Upper limit on the number of facts; the pair table then takes 8 MB.
 const MAX_FACTS: usize = 8_000;
-/// Work limit of the fixpoint, in bitset words visited (about 0.5 s).
+/// Limit on the work of the fixpoint computation, as the number of visited bitset words (about 0.5 s).
 const MAX_WORK: usize = 400_000_000;
-/// Maximum number of rounds of forward and backward analysis. Each direction prunes with the result
-/// of the other one.
+/// Maximum number of rounds of forward and backward h² analysis, which prune with each other's results.
 const MAX_ROUNDS: usize = 4;
 
-/// Bitset of facts, or one such bitset per fact.
+/// A bitset of facts, or one such bitset for each fact.
 type Words = Vec<u64>;
 
-/// An operator in terms of numbered facts.
+/// An operator in terms of numbered facts of basic variables.
 struct Rule {
-    /// Facts that hold before it.
+    /// Facts that its condition requires.
     before: Vec<u32>,
-    /// Facts that certainly hold after it, as far as they are known.
+    /// Facts that are known to hold after the operator.
     after: Vec<u32>,
-    /// Facts that it may add.
+    /// Facts that the operator may make true.
     adds: Vec<u32>,
-    /// Facts of the variables that it certainly sets.
+    /// All facts of the variables that the operator certainly sets.
     set: Words,
-    /// Facts of the variables that it may change without requiring a value.
+    /// All facts of the variables that the operator may change and does not require.
     open: Vec<u32>,
-    /// Facts of all variables that it may change or requires.
+    /// All facts of the variables that the operator requires or may change.
     touched: Words,
 }
 
-/// Per fact: bitset of the facts that hold together with it in some state.
+/// For each fact: a bitset of the facts that are compatible with it, i.e. can hold in a common state.
 struct Table {
     words: usize,
     bits: Words,
@@ -63,7 +61,7 @@ impl Table {
         has(self.row(one), other)
     }
 
-    /// Adds a pair. Returns `true` if it is new.
+    /// Marks two facts as compatible. Returns `true` if they were not marked before.
     fn insert(&mut self, one: u32, other: u32) -> bool {
         let is_new = !self.has(one, other);
         for (row, fact) in [(one, other), (other, one)] {
@@ -73,7 +71,7 @@ impl Table {
         is_new
     }
 
-    /// Adds the pairs of a fact with all facts of a set. Returns `true` if any of them is new.
+    /// Marks a fact as compatible with all facts of a set. Returns `true` if a pair was not marked before.
     fn join(&mut self, fact: u32, others: &[u64]) -> bool {
         let mut is_new = false;
         for (index, word) in others.iter().enumerate() {
@@ -89,8 +87,8 @@ impl Table {
         is_new
     }
 
-    /// Facts that are compatible with each of `facts`. Returns `None` if `facts` are not pairwise
-    /// compatible.
+    /// Returns the facts in `all` that are compatible with each fact in `facts`. Returns `None` if `facts`
+    /// are not pairwise compatible.
     fn beside(&self, facts: &[u32], all: &[u64]) -> Option<Words> {
         let mut common = all.to_vec();
         for fact in facts {
@@ -124,18 +122,19 @@ fn without(words: &[u64], others: &[u64]) -> Words {
     words.iter().zip(others).map(|(word, other)| word & !other).collect()
 }
 
-/// The h² mutex pairs of a task, forwards and backwards.
+/// The h² mutexes of a task, from forward and backward analysis.
 pub struct MutexPairs {
-    /// Number of each basic variable's first fact.
+    /// Number of the first fact of each basic variable.
     first: Vec<u32>,
-    /// Pairs that a state on a path from the initial state to the goal may contain.
+    /// Compatible pairs: pairs that a state on a path from the initial state to the goal may contain.
     alive: Table,
-    /// Per operator: whether no plan needs it.
+    /// For each operator: `true` if no plan can use it.
     useless: Vec<bool>,
 }
 
 impl MutexPairs {
-    /// Returns `None` if there are too many facts or the work limit is reached.
+    /// Computes the mutexes of a task. Returns `None` if there are too many facts, or the work limit is
+    /// reached in the first round.
     pub(crate) fn new<N: TaskNumber>(task: &Task<N>, limits: &Limits) -> Result<Option<Self>, Interrupted> {
         let mut first = Vec::with_capacity(task.basic);
         let mut variables = Vec::new();
@@ -162,7 +161,7 @@ impl MutexPairs {
             let mut is_over = true;
             let all_facts = vec![u64::MAX; builder.words()];
             for (rule, useless) in rules.iter().zip(&mut useless) {
-                // An operator is useless if its precondition or its result contains a mutex pair.
+                // An operator is useless if its condition or its result contains a mutex pair.
                 let is_alive = |facts| backwards.beside(facts, &all_facts).is_some();
                 if !(*useless || is_alive(&rule.before) && is_alive(&rule.after)) {
                     *useless = true;
@@ -177,13 +176,13 @@ impl MutexPairs {
         Ok(alive.map(|alive| Self { first: builder.first, alive, useless }))
     }
 
-    /// Returns `true` if no plan needs an operator.
+    /// Returns `true` if no plan can use the operator.
     pub(crate) fn is_operator_useless(&self, operator: OperatorId) -> bool {
         self.useless[operator.index()]
     }
 
-    /// Returns `true` if a mutex pair proves that the goal is unreachable from `values`. Checks
-    /// only the variables that differ from `before`, a state without mutex pairs.
+    /// Returns `true` if a mutex pair proves that the goal is unreachable from the state `values`. Checks
+    /// only pairs with a variable that differs from `before`, a state without mutex pairs.
     pub(crate) fn is_dead_end(&self, before: &[u32], values: &[u32]) -> bool {
         let number = |variable: usize| self.first[variable].saturating_add(values[variable]);
         (0..self.first.len()).filter(|variable| before[*variable] != values[*variable]).any(|changed| {
@@ -199,7 +198,7 @@ struct H2Builder<'a, N> {
     /// Variable of each fact.
     variables: Vec<VariableId>,
     facts: u32,
-    /// Remaining work, in bitset words.
+    /// Remaining work limit, in bitset words.
     left: usize,
 }
 
@@ -216,7 +215,7 @@ impl<N: TaskNumber> H2Builder<'_, N> {
         self.first[fact.variable.index()].saturating_add(fact.value)
     }
 
-    /// Numbers of a variable's facts.
+    /// Returns the numbers of a variable's facts.
     fn values(&self, variable: VariableId) -> std::ops::Range<u32> {
         let first = self.first[variable.index()];
         first..first.saturating_add(dense(self.task.variables[variable.index()].values.len()))
@@ -254,7 +253,8 @@ impl<N: TaskNumber> H2Builder<'_, N> {
         }
     }
 
-    /// Pairs that a reachable state may contain. Returns `None` if the work limit is reached.
+    /// Computes the pairs of facts that a reachable state may contain. Returns `None` if the work limit is
+    /// reached.
     fn forwards(
         &mut self,
         rules: &[Rule],
@@ -293,8 +293,8 @@ impl<N: TaskNumber> H2Builder<'_, N> {
                 let mut beside = without(&beside, &rule.set);
                 rule.adds.iter().for_each(|fact| insert(&mut beside, *fact));
                 for fact in &rule.adds {
-                    // A variable has only one value, so an added fact excludes the variable's other
-                    // facts.
+                    // A variable has only one value, so an added fact is incompatible with the variable's
+                    // other facts.
                     let variable_facts = self.values(self.variables[*fact as usize]);
                     let mut compatible = beside.clone();
                     variable_facts
@@ -312,8 +312,8 @@ impl<N: TaskNumber> H2Builder<'_, N> {
         }
     }
 
-    /// Pairs, among those that a reachable state may contain, that a state may contain from which
-    /// the goal is reachable. Returns `None` if the work limit is reached.
+    /// Computes the pairs of facts that a state from which the goal is reachable may contain. Only pairs in
+    /// `forwards` are considered. Returns `None` if the work limit is reached.
     fn backwards(
         &mut self,
         rules: &[Rule],
@@ -323,8 +323,8 @@ impl<N: TaskNumber> H2Builder<'_, N> {
     ) -> Result<Option<Table>, Interrupted> {
         let mut table = Table::new(self.facts as usize);
         let mut reached = vec![0; self.words()];
-        // Facts that are compatible with all goal facts. This excludes the other values of the goal
-        // variables.
+        // Facts that are compatible with all goal facts. Other values of the goal variables are thus
+        // excluded.
         let goal = self.task.goal.facts.iter().filter(|fact| self.is_basic(fact.variable));
         let goal: Vec<u32> = goal.map(|fact| self.number(*fact)).collect();
         let reachable_facts = self.facts_of(forwards);
@@ -365,7 +365,7 @@ impl<N: TaskNumber> H2Builder<'_, N> {
         }
     }
 
-    /// Facts that hold in some state of a table.
+    /// Returns the facts that hold in some state, according to the table.
     fn facts_of(&self, table: &Table) -> Words {
         let mut facts = vec![0; self.words()];
         (0..self.facts).filter(|fact| table.has(*fact, *fact)).for_each(|fact| insert(&mut facts, fact));
@@ -382,14 +382,14 @@ mod tests {
     use testing::random::Random;
     use testing::{depot, ground_text};
 
-    /// Checks that no state on a path to the goal counts as a dead end and no operator on it as
-    /// useless. Returns the numbers of dead ends and of useless operators.
+    /// Checks that no state on a path to the goal counts as a dead end, and no operator on such a path as
+    /// useless. Returns the numbers of dead ends and of useless operators that were found.
     fn check(text: &(String, String)) -> Option<[usize; 2]> {
         let task = ground_text(text.clone());
         let (states, steps) = reachable(&task).filter(|_| task.unreachable.is_none())?;
         let best = to_go(&task, &states, &steps);
         let pairs = MutexPairs::new(&task, &Limits::none()).expect("no limit")?;
-        // With no equal value in the other state, the pairs of all variables are checked.
+        // No value equals the value in the other state, so all pairs of variables are checked.
         let differing_values: Vec<u32> = vec![u32::MAX; task.variables.len()];
         let mut counts = [0, 0];
         for ((state, successors), goal_distance) in states.iter().zip(&steps).zip(&best) {
@@ -434,8 +434,7 @@ mod tests {
         check_all(60..2_000);
     }
 
-    /// A robot below three tiles in a row. It paints the neighbouring tile and cannot enter painted
-    /// tiles.
+    /// A robot is below three tiles in a column. It paints neighbouring tiles and cannot enter painted tiles.
     #[test]
     fn painting_oneself_in_is_a_dead_end() {
         let domain = "(define (domain tiles) (:predicates (at ?t) (clear ?t) (painted ?t) (above ?a ?b))

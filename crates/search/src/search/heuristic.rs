@@ -1,4 +1,4 @@
-//! The interface between A\* and admissible heuristics.
+//! Interface between A\* and admissible heuristics.
 
 use task::context::Context;
 use task::number::Int;
@@ -7,17 +7,17 @@ use task::task::{State, Task};
 use crate::bounds::{Bounds, LandmarkCut};
 use crate::search::symmetry::Orbits;
 
-/// An admissible heuristic: a lower bound on the cost from a state to the goal.
+/// An admissible heuristic, i.e. a lower bound on the cost from a state to the goal.
 pub trait Heuristic<N> {
-    /// Heuristic value of a state. Returns `None` if the goal is unreachable.
+    /// Returns the heuristic value of a state, or `None` if the goal is proved unreachable.
     fn estimate(&self, state: &State<N>) -> Option<N>;
 
-    /// A more accurate but slower heuristic, if available.
+    /// Returns a more accurate but slower heuristic, if one is available.
     fn sharper(&self, _: &Task<N>) -> Option<Box<dyn LazyHeuristic<N>>> {
         None
     }
 
-    /// Symmetries of interchangeable objects, if available.
+    /// Returns symmetries of interchangeable objects, if they are available.
     fn orbits(&self, _: Context<'_, N>) -> Option<Orbits> {
         None
     }
@@ -25,10 +25,10 @@ pub trait Heuristic<N> {
 
 /// A slow admissible heuristic that is evaluated only when a node is expanded.
 pub trait LazyHeuristic<N> {
-    /// Heuristic value of a state. Returns `None` if the goal is unreachable.
+    /// Returns the heuristic value of a state, or `None` if the goal is proved unreachable.
     fn estimate(&mut self, state: &State<N>) -> Option<N>;
 
-    /// Work units done up to now.
+    /// Returns the work units already done.
     fn work(&self) -> u64;
 }
 

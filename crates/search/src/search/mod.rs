@@ -1,5 +1,5 @@
-//! Optimal search in the state space: A\*, its open list, state registry, heuristics interface and
-//! pruning methods.
+//! Optimal search in the state space: A\*, its open list, state registry, heuristic interface and pruning
+//! methods.
 
 mod astar;
 pub mod design_combinations;

@@ -1,10 +1,12 @@
-//! Monotonicity of numeric variables: more is never worse, less is never worse, or neither.
+//! Monotonicity of numeric variables: whether a higher value is never worse, a lower value is never worse, or
+//! neither.
 //!
 //! A variable is needed upwards if a higher value can make a condition true, and downwards if a lower value
-//! can. The need passes to the variables from which it is computed: in the same direction for positive
-//! factors, in the opposite direction for negative ones. The least fixpoint decides which labels dominate
-//! which in a search with resources \[1\]. A variable needed in one direction is compared, one needed in both
-//! must be equal, and one that is not needed is ignored.
+//! can. The need is propagated to the variables from which the variable is computed: in the same direction
+//! for positive coefficients, in the opposite direction for negative ones. The least fixpoint determines how
+//! labels are compared in a search with resources \[1\]. A variable that is needed in one direction is
+//! compared by ≥ or ≤. A variable that is needed in both directions must be equal, and a variable that is not
+//! needed is ignored.
 //!
 //! \[1\] M. Desrochers, F. Soumis: A generalized permanent labelling algorithm for the shortest path problem
 //! with time windows, INFOR 26(3), 1988.
@@ -13,8 +15,8 @@ use task::task::number::TaskNumber;
 use task::task::quantity::Linear;
 use task::task::{Condition, Fact, Task};
 
-/// Directions in which a quantity (or a fact) is needed: `up` for more (or true), `down` for less
-/// (or false).
+/// Directions in which a number or a fact is needed: `up` if a higher value (or true) helps, `down` if a
+/// lower value (or false) helps.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Polarity {
     pub up: bool,
@@ -34,7 +36,7 @@ impl Polarity {
     }
 }
 
-/// Fixpoint computation of the polarity of each numeric variable and each derived variable.
+/// Fixpoint computation of the polarities of all numeric variables and derived variables.
 struct PolarityAnalysis<'a, N> {
     task: &'a Task<N>,
     numbers: Vec<Polarity>,
@@ -42,7 +44,7 @@ struct PolarityAnalysis<'a, N> {
     changed: bool,
 }
 
-/// Polarity of each numeric variable of a task.
+/// Returns the polarity of each numeric variable of a task.
 pub fn directions<N: TaskNumber>(task: &Task<N>) -> Vec<Polarity> {
     let numbers = vec![Polarity::default(); task.initial.numbers.len()];
     let facts = vec![Polarity::default(); task.variables.len()];
@@ -62,7 +64,7 @@ impl<N: TaskNumber> PolarityAnalysis<'_, N> {
         self.condition(&task.goal, UP);
         for operator in &task.operators {
             self.condition(&operator.condition, UP);
-            // An effect may fire or not, so its condition is needed in both directions.
+            // A conditional effect may help or hurt, so its condition is needed in both directions.
             for literal in operator.conditional.iter().flat_map(|effect| &effect.condition) {
                 self.fact(literal.fact, BOTH);
             }
@@ -90,7 +92,7 @@ impl<N: TaskNumber> PolarityAnalysis<'_, N> {
         }
     }
 
-    /// Adds a polarity to the variable of a fact. A derived variable is true if its value is 0.
+    /// Adds a polarity to the variable of a fact. Value 0 of a derived variable means true.
     fn fact(&mut self, fact: Fact, polarity: Polarity) {
         let polarity = if fact.value == 0 { polarity } else { polarity.flipped() };
         let current = &mut self.facts[fact.variable.index()];
@@ -111,7 +113,7 @@ impl<N: TaskNumber> PolarityAnalysis<'_, N> {
     }
 }
 
-/// Returns `true` if a higher value of any numeric variable never hurts.
+/// Returns `true` if a higher value is never worse, for every numeric variable of the task.
 pub fn is_monotone<N: TaskNumber>(task: &Task<N>) -> bool {
     directions(task).iter().all(|polarity| !polarity.down)
 }

@@ -1,8 +1,9 @@
-//! Open list of a best-first search: one bucket per priority, last in, first out.
+//! Open list of a best-first search: one bucket for each key. Nodes of a bucket are popped in last-in,
+//! first-out order.
 
 use std::collections::BTreeMap;
 
-/// Open list. The smallest key is popped first.
+/// Open list. A node with the smallest key is popped first.
 pub(super) struct OpenList<K> {
     buckets: BTreeMap<K, Vec<u32>>,
     length: usize,
@@ -31,7 +32,7 @@ impl<K: Ord + Clone> OpenList<K> {
         }
     }
 
-    /// Approximate memory use in bytes.
+    /// Returns the approximate memory use in bytes.
     pub(super) fn bytes(&self) -> usize {
         let nodes = self.length.saturating_mul(size_of::<u32>());
         nodes.saturating_add(self.buckets.len().saturating_mul(size_of::<(K, Vec<u32>)>()))

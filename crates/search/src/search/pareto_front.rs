@@ -1,30 +1,31 @@
-//! Pareto front of many labels, stored as a tree of boxes.
+//! Pareto front of many labels, stored as a tree of boxes in the space of criteria.
 //!
-//! Each box stores the best and the worst value of each criterion among its labels. Whole boxes are
-//! skipped in dominance queries, as in the ND-tree \[1\]. Boxes are split where their labels
-//! differ, as in a k-d tree.
+//! Each box stores the best and the worst value of each criterion among its labels, so dominance queries can
+//! skip whole boxes, as in the ND-tree \[1\]. A box is split by the criterion that divides its labels most
+//! evenly, as in a k-d tree.
 //!
 //! \[1\] A. Jaszkiewicz, T. Lust: ND-Tree-Based Update: A Fast Algorithm for the Dynamic
 //! Nondominance Problem, IEEE Transactions on Evolutionary Computation 22(5), 2018.
 
 use task::number::dense;
 
-/// Comparison of labels by several criteria. Each label has one number index per criterion.
+/// Comparison of labels by several criteria. A label has one number for each criterion, which is given by an
+/// index.
 pub(super) trait Criteria {
-    /// Returns `true` if number `one` is at least as good as number `other` by a criterion.
+    /// Returns `true` if the number with index `one` is at least as good as the number with index `other`.
     fn is_as_good(&self, criterion: usize, one: u32, other: u32) -> bool;
 
-    /// Returns `true` if label `one` is at least as good as label `other` by all criteria.
+    /// Returns `true` if label `one` is at least as good as label `other` by every criterion.
     fn dominates(&self, one: u32, other: u32) -> bool;
 
-    /// Writes the number indices of a label to `to`, one per criterion.
+    /// Replaces the contents of `to` by the number indices of a label, one for each criterion.
     fn numbers(&self, label: u32, to: &mut Vec<u32>);
 }
 
 enum Content {
     Labels(Vec<u32>),
-    /// Inner node. Labels whose number by `criterion` is at least as good as `number` are in
-    /// `first`, the others in `second`.
+    /// Inner node. Box `first` contains the labels whose number is at least as good as `number` by
+    /// `criterion`; box `second` contains the other labels.
     Boxes {
         criterion: usize,
         number: u32,
@@ -39,11 +40,11 @@ struct Region {
     content: Content,
 }
 
-/// A Pareto front with many labels.
+/// A Pareto front: labels none of which dominates another, stored as a tree of boxes.
 #[derive(Default)]
 pub(super) struct Front {
     regions: Vec<Region>,
-    /// Maximum number of labels in a leaf.
+    /// Maximum number of labels in a leaf that can be split.
     most: usize,
 }
 
@@ -54,15 +55,15 @@ impl Front {
         front
     }
 
-    /// Approximate memory use in bytes.
+    /// Returns the approximate memory use in bytes.
     pub(super) fn bytes(&self) -> usize {
         let numbers = self.regions.first().map_or(0, |region| region.best.len());
         let region = numbers.saturating_add(self.most).saturating_mul(8);
         self.regions.len().saturating_mul(region.saturating_add(size_of::<Region>()))
     }
 
-    /// Returns `true` if some label satisfies `dominates`. Boxes whose best values do not reach
-    /// `numbers` are skipped.
+    /// Returns `true` if `dominates` returns `true` for some label. Boxes whose best values are worse than
+    /// `numbers` by some criterion are skipped.
     pub(super) fn any(
         &self,
         numbers: &[u32],
@@ -73,8 +74,8 @@ impl Front {
         while let Some(region) = stack.pop() {
             let region = &self.regions[region as usize];
             let mut pairs = region.best.iter().zip(numbers).enumerate();
-            // The best values bound all labels of the box, so a box that fails one criterion holds
-            // no dominating label.
+            // The best values bound all labels of the box. If they fail in one criterion, no label of the box
+            // dominates.
             if !pairs.all(|(criterion, (best, number))| criteria.is_as_good(criterion, *best, *number)) {
                 continue;
             }
@@ -90,8 +91,8 @@ impl Front {
         false
     }
 
-    /// Adds a label that is not dominated. Calls `leaves` for each label that it dominates and
-    /// removes that label.
+    /// Adds a label that is not dominated. Removes all labels that it dominates, and calls `leaves` with each
+    /// of them.
     pub(super) fn insert(&mut self, label: u32, criteria: &impl Criteria, mut leaves: impl FnMut(u32)) {
         let mut numbers = Vec::new();
         criteria.numbers(label, &mut numbers);
@@ -99,7 +100,8 @@ impl Front {
         while let Some(region) = stack.pop() {
             let region = &mut self.regions[region as usize];
             let mut pairs = numbers.iter().zip(&region.worst).enumerate();
-            // A label that is worse than the worst value by some criterion dominates nothing in the box.
+            // If the new label is worse than the worst value of the box by some criterion, it dominates no
+            // label of the box.
             if !pairs.all(|(criterion, (number, worst))| criteria.is_as_good(criterion, *number, *worst)) {
                 continue;
             }
@@ -132,8 +134,7 @@ impl Front {
         self.split(at, criteria);
     }
 
-    /// Splits a leaf recursively until each part holds at most `most` labels or its labels do not
-    /// differ.
+    /// Splits a leaf recursively, until each leaf has at most `most` labels or its labels have equal numbers.
     fn split(&mut self, from: u32, criteria: &impl Criteria) {
         let mut stack = vec![from];
         while let Some(at) = stack.pop() {
@@ -162,7 +163,7 @@ impl Front {
     }
 }
 
-/// Leaf with these labels and their bounding values.
+/// Creates a leaf with these labels and their best and worst values.
 fn region(labels: Vec<u32>, criteria: &impl Criteria) -> Region {
     let mut region = Region { best: Vec::new(), worst: Vec::new(), content: Content::Labels(Vec::new()) };
     let mut numbers = Vec::new();
@@ -189,8 +190,8 @@ fn widen(region: &mut Region, numbers: &[u32], criteria: &impl Criteria) {
     }
 }
 
-/// Criterion and number that split the labels most evenly. Returns `None` if the labels do not
-/// differ.
+/// Returns the criterion and the number that split the labels most evenly, or `None` if all labels have equal
+/// numbers.
 fn middle(labels: &[u32], criteria: &impl Criteria) -> Option<(usize, u32)> {
     let mut label_numbers = Vec::new();
     let mut columns: Vec<Vec<u32>> = Vec::new();
@@ -215,7 +216,8 @@ fn middle(labels: &[u32], criteria: &impl Criteria) -> Option<(usize, u32)> {
     best.map(|(_, criterion, number)| (criterion, number))
 }
 
-/// Median of a column, or the next better number if the median equals the worst one.
+/// Returns the median of a column. If the median equals the worst number, returns the worst of the better
+/// numbers, or `None` if all numbers are equal.
 fn median(criterion: usize, mut column: Vec<u32>, criteria: &impl Criteria) -> Option<u32> {
     column.sort_by(|one, other| {
         match (criteria.is_as_good(criterion, *one, *other), criteria.is_as_good(criterion, *other, *one)) {
@@ -237,7 +239,8 @@ mod tests {
 
     use super::*;
 
-    /// Points with three coordinates: lower is better in the first two, higher in the last.
+    /// Points with three coordinates. Lower values are better in the first two coordinates, higher values in
+    /// the last.
     struct Points(Vec<Vec<u32>>);
 
     impl Criteria for Points {

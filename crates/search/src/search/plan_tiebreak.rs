@@ -1,13 +1,14 @@
-//! Selection among plans of equal cost.
+//! Tie-breaking among plans of equal cost: selects a canonical plan.
 //!
-//! The chosen plan has the fewest steps, then the fewest reconfigurations (steps at which a function changes
-//! its design), then comes first in model order. Model order compares step by step the position of the action
-//! in the domain, of its arguments in the problem, and of its designs. Names play no part. A design is not
-//! chosen if a strictly better one exists (cheaper, or with less consumption).
+//! The canonical plan has the fewest steps, and among these plans the fewest reconfigurations (steps at which
+//! a function changes its design). Remaining ties are broken by model order: step by step, it compares the
+//! position of the action in the domain, the positions of its arguments in the problem, and its designs.
+//! Names are not compared. A design is not selected if a strictly better design exists (cheaper, or with less
+//! consumption).
 //!
-//! The known plan bounds both searches: one for the fewest reconfigurations, and a depth-first
-//! search in model order that stops at the first plan. If these bounds do not keep the searches
-//! small, the choice is still deterministic, but not in this order.
+//! The cost and length of the known plan bound two searches: the first minimises reconfigurations, and the
+//! second is a depth-first search in model order that stops at the first plan. If these searches exceed their
+//! limits, the known plan is returned; the result is still deterministic, but not canonical.
 
 use std::cell::{Cell, RefCell};
 use std::cmp::Reverse;
@@ -28,16 +29,16 @@ use crate::search::design_combinations::pareto_optimal_combinations;
 use crate::search::monotonicity::is_monotone;
 use crate::search::successor_generator::SuccessorGenerator;
 
-/// Maximum number of labels that are generated.
+/// Maximum number of labels that are stored.
 const LABEL_LIMIT: usize = 100_000;
 /// Maximum number of comparisons between labels.
 const PAIR_LIMIT: usize = 50_000_000;
 
-/// A partial plan: the state that it reaches and its quality.
+/// A label of the search: a partial plan, represented by the state that it reaches and by its quality.
 #[derive(Debug, Clone)]
 struct Label {
     state: State,
-    /// Last design of each function.
+    /// Last design of each function, if the function was used.
     designs: Vec<Option<ObjectId>>,
     cost: Int,
     steps: usize,
@@ -45,54 +46,54 @@ struct Label {
 }
 
 impl Label {
-    /// Key of the front that the label is compared in. Numbers that must be equal are part of the
-    /// key.
+    /// Returns the key of the Pareto front to which the label belongs. Numbers that must be equal for
+    /// dominance are part of the key.
     fn place(&self, task: &Task, monotone: bool) -> Place {
         let numbers = if monotone { Vec::new() } else { self.state.numbers.clone() };
         (self.state.values[..task.basic].into(), self.designs.clone(), numbers)
     }
 }
 
-/// Secondary objectives in lexicographic order, each summed over the steps: steps that are not part
-/// of the plan to stay close to, and functions that change their design.
+/// Secondary objectives in lexicographic order, summed over the steps: the number of steps that are not in
+/// the reference plan, and the number of functions that change their design.
 pub type Changes = (usize, usize);
 
-/// A combination of designs of an operator.
+/// A combination of designs for the slots of an operator.
 struct Choice {
     designs: Vec<u32>,
     cost: Int,
-    /// Positions of functions, with their designs.
+    /// Functions used by the operator (as positions in `TieBreakContext::functions`), with their designs.
     configuration: Vec<(usize, ObjectId)>,
-    /// Whether the step is part of the plan to stay close to, or there is no such plan.
+    /// `true` if the step is part of the reference plan, or there is no reference plan.
     is_kept: bool,
 }
 
-/// Combinations of designs of an operator, sorted. `None` if there are too many.
+/// Combinations of designs of an operator, in ascending order; `None` if there are too many.
 type Choices = Option<Vec<Choice>>;
 
-/// Key of a front: values, designs and, if they are not monotone, numbers.
+/// Key of a Pareto front: values of the basic variables, last designs of the functions and, if the task is
+/// not monotone, numbers.
 type Place = (Box<[u32]>, Vec<Option<ObjectId>>, Vec<Int>);
 
-/// Labels, and their indices by front.
+/// All labels of a search, and their indices by Pareto front.
 #[derive(Default)]
 struct Labels {
     all: Vec<Label>,
     fronts: FxHashMap<Place, Vec<usize>>,
 }
 
-/// The situation in which the plan begins.
+/// Situation in which the plan begins: the state, and preferences for the remaining plan.
 pub struct PlanPrefix<'a> {
     pub state: &'a State,
     /// Last design of each function before the plan.
     pub designs: &'a [(ObjectId, ObjectId)],
-    /// Steps of a plan to stay close to. Among equally good plans, one with more of these steps is
-    /// chosen.
+    /// Steps of a reference plan. Among equally good plans, a plan with more of these steps is selected.
     pub close_to: &'a FxHashSet<GroundStep>,
 }
 
-/// Tie-breaking data of a task, independent of the initial state.
+/// Tie-breaking data of a task that does not depend on the initial state.
 pub struct TieBreakContext {
-    /// Lower bounds on the steps to the goal, by projection and abstract state.
+    /// Lower bounds on the number of steps to the goal, by projection and abstract state.
     steps_to_go: Vec<Vec<Option<Int>>>,
     index: SuccessorGenerator,
     monotone: bool,
@@ -101,7 +102,7 @@ pub struct TieBreakContext {
 }
 
 impl TieBreakContext {
-    /// Prepares the comparison of plans of equal cost.
+    /// Precomputes the data for comparing plans of equal cost.
     ///
     /// # Errors
     /// Fails when a limit is reached.
@@ -111,7 +112,7 @@ impl TieBreakContext {
         let mut functions: Vec<ObjectId> = configurations.map(|(function, _)| *function).collect();
         functions.sort_unstable();
         functions.dedup();
-        // With unit costs the goal distance already is the number of steps.
+        // With unit costs, the goal distance equals the number of steps.
         let is_unit = |cost: (Int, Int)| cost == (1, 1);
         let unit =
             task.operators.iter().all(|operator| is_unit((operator.cost.minimum(), operator.cost.maximum())));
@@ -127,7 +128,8 @@ impl TieBreakContext {
         })
     }
 
-    /// Pareto-optimal combinations of designs, and those of the steps to stay close to.
+    /// Returns the Pareto-optimal combinations of designs of an operator, and the combinations of its steps
+    /// in the reference plan.
     fn choices_of(
         &self,
         context: Context<'_>,
@@ -164,8 +166,8 @@ struct Ties<'a> {
     bounds: &'a Bounds,
     prepared: &'a TieBreakContext,
     limits: &'a Limits,
-    /// Choices that depend on the plan to stay close to, if there is one; otherwise those of
-    /// `prepared` are shared.
+    /// Combinations of designs by operator if there is a reference plan. Otherwise the shared combinations in
+    /// `prepared` are used.
     choices: Option<Vec<OnceLock<Choices>>>,
     close_to: &'a FxHashSet<GroundStep>,
     cost: Int,
@@ -175,8 +177,8 @@ struct Ties<'a> {
     pulse: RefCell<LimitPoll<'a>>,
 }
 
-/// Selects the first plan in the canonical order among the plans with the cost and length of
-/// `plan`.
+/// Returns the canonical plan among all plans with the cost and the number of steps of `plan`. Returns `plan`
+/// if a limit is reached.
 pub fn select_canonical_plan(context: Context<'_>, bounds: &Bounds, plan: GroundPlan) -> GroundPlan {
     let close_to = FxHashSet::default();
     let beginning = PlanPrefix { state: &context.task.initial, designs: &[], close_to: &close_to };
@@ -185,8 +187,9 @@ pub fn select_canonical_plan(context: Context<'_>, bounds: &Bounds, plan: Ground
     choose_from((context, bounds, &prepared), plan, max_changes, &beginning).0
 }
 
-/// Selects the canonical plan from another state or after settled steps. Also returns its changes
-/// if they are at most `max_changes` and the search stayed within its limits.
+/// Selects the canonical plan for a given beginning, for example after steps that are already executed. Also
+/// returns its changes, unless they exceed `max_changes` or the search reached a limit; in these cases, the
+/// plan is `plan`.
 pub fn choose_from(
     (context, bounds, prepared): (Context<'_>, &Bounds, &TieBreakContext),
     plan: GroundPlan,
@@ -221,25 +224,25 @@ pub fn choose_from(
     }
 }
 
-/// A node of the depth-first search with its untried successors.
+/// A node of the depth-first search, with its untried successors.
 struct Branch<'a> {
     label: usize,
     operators: std::vec::IntoIter<OperatorId>,
-    /// Current operator and its untried choices.
+    /// Current operator, and its untried combinations of designs.
     current: Option<(OperatorId, std::slice::Iter<'a, Choice>)>,
 }
 
 impl Ties<'_> {
-    /// First plan in the canonical order and its changes. Returns `None` if it needs more than
-    /// `max_changes` changes or a limit is reached.
+    /// Returns the canonical plan and its changes, or `None` if it needs more than `max_changes` changes or a
+    /// limit is reached.
     fn first(&self, start: Label, max_changes: Changes) -> Option<(Vec<GroundStep>, Changes)> {
         let (changes, first_labels) = self.fewest_changes(start.clone(), max_changes)?;
         let steps = self.first_in_order(start, changes, &first_labels)?;
         (steps.len() == self.steps).then_some((steps, changes))
     }
 
-    /// Choices of an operator. Returns `None` if there are too many, or if a limit was reached
-    /// (which is not cached).
+    /// Returns the combinations of designs of an operator. Returns `None` if there are too many, or a limit
+    /// was reached; only the former is cached.
     fn choices(&self, operator: OperatorId) -> Option<&[Choice]> {
         let choices = &self.choices.as_ref().unwrap_or(&self.prepared.choices)[operator.index()];
         if choices.get().is_none() {
@@ -247,14 +250,14 @@ impl Ties<'_> {
                 .prepared
                 .choices_of(Context::new(self.task, self.limits), operator, self.close_to)
                 .ok()?;
-            // If another thread was first, its choices are the same.
+            // If another thread has set the value first, it is equal.
             let _ = choices.set(operator_choices);
         }
         choices.get()?.as_deref()
     }
 
-    /// Label after a step. Returns `None` if the step is inapplicable or cannot lead to a plan
-    /// within the cost and length of the given plan.
+    /// Returns the label after a step. Returns `None` if the step is inapplicable or cannot lead to a plan
+    /// within the cost and number of steps of the known plan.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "costs are not negative and those of labels at most that of a known plan, so that sums with an operator and an estimate fit"
@@ -289,8 +292,8 @@ impl Ties<'_> {
         Some(next)
     }
 
-    /// Least changes of a plan from a label, at most `max_changes`, and the labels that were
-    /// generated.
+    /// Returns the minimum changes of a plan that starts at the label `from`, and all labels that were
+    /// generated. Returns `None` if the minimum exceeds `max_changes` or a limit is reached.
     fn fewest_changes(&self, from: Label, max_changes: Changes) -> Option<(Changes, Labels)> {
         let mut open = BinaryHeap::from([Reverse((from.changes, Reverse(from.steps), 0))]);
         let mut labels = Labels { all: vec![from], ..Labels::default() };
@@ -302,8 +305,8 @@ impl Ties<'_> {
                 for choice in self.choices(operator)? {
                     self.beat()?;
                     let Some(next) = self.successor(&labels.all[id], operator, choice) else { continue };
-                    // Labels are popped by changes, then by greatest depth, so the first goal label
-                    // has the least changes.
+                    // Labels are popped by ascending changes and then by descending depth, so the first goal
+                    // label has the minimum changes.
                     if next.changes <= max_changes && !self.is_beaten(&labels, &next, false) {
                         open.push(Reverse((next.changes, Reverse(next.steps), labels.all.len())));
                         self.keep(&mut labels, next)?;
@@ -314,12 +317,14 @@ impl Ties<'_> {
         None
     }
 
-    /// First plan in model order with `changes`, which is the minimum, by depth-first search.
+    /// Returns the first plan in model order with at most `changes`, which is the minimum. Uses depth-first
+    /// search.
     ///
-    /// A label is pruned if a visited label is at least as good. Either the visited label led to no
-    /// plan, so this one leads to none; or it is an ancestor, and then a plan from here would give
-    /// a shorter plan from there. A label is also pruned if a label of the first search is strictly
-    /// better in cost, steps or changes, which are already minimal.
+    /// A label is pruned if a visited label is at least as good. If the visited label has led to no plan, the
+    /// new label leads to none either. If the visited label is an ancestor of the new label, a plan from the
+    /// new label would imply a shorter plan from the ancestor, which cannot exist. A label is also pruned if
+    /// a label of the first search is strictly better in cost, steps or changes, because the minimum values
+    /// of all three are known.
     fn first_in_order(
         &self,
         start: Label,
@@ -368,8 +373,8 @@ impl Ties<'_> {
         None
     }
 
-    /// Returns `true` if some label is at least as good as `next`; if `strictly`, also better in
-    /// cost, steps or changes.
+    /// Returns `true` if a stored label is at least as good as `next`. If `strictly`, the label must also be
+    /// better in cost, steps or changes.
     fn is_beaten(&self, labels: &Labels, next: &Label, strictly: bool) -> bool {
         let is_better =
             |label: &Label| (label.cost, label.steps, label.changes) != (next.cost, next.steps, next.changes);
@@ -380,12 +385,12 @@ impl Ties<'_> {
         })
     }
 
-    /// Polls the limits. Returns `None` if one is reached.
+    /// Polls the limits. Returns `None` if a limit is reached.
     fn beat(&self) -> Option<()> {
         self.pulse.borrow_mut().beat().ok()
     }
 
-    /// Stores a label. Returns `None` if there are too many labels or comparisons.
+    /// Stores a label. Returns `None` if the limit on labels or comparisons is reached.
     #[expect(clippy::arithmetic_side_effects, reason = "labels are counted up to their limit")]
     fn keep(&self, labels: &mut Labels, label: Label) -> Option<()> {
         labels

@@ -1,9 +1,9 @@
-//! The order of searches: a first plan, an optimal plan, and the closed states that prove it.
+//! Scheduling of searches: a first plan, an optimal plan, and the closed states that prove its optimality.
 //!
-//! A\* with pattern databases runs first. If it does not finish soon, greedy best-first search
-//! finds some plan. Then two searches run interleaved with equal work: one with pattern databases
-//! only, one with LM-cut as well. The first to finish has the answer, so the total work is at most
-//! twice that of the better search. Work is counted in units, not in time, so the result is
+//! A\* with pattern databases runs first. If it does not finish soon, a greedy best-first search finds some
+//! plan. Then two A\* searches alternate with equal shares of the work: one uses only pattern databases, the
+//! other also LM-cut. The result of the search that finishes first is returned, so the total work is at most
+//! twice the work of the faster search. Work is counted in units instead of time, so the result is
 //! deterministic.
 
 use std::sync::Arc;
@@ -24,18 +24,18 @@ use crate::search::search_task::SearchTask;
 use crate::search::statistics::SearchStatistics;
 use crate::search::stubborn_sets::{Stubborn, StubbornSetPruning};
 
-/// Maximum number of stored states for searches that must answer quickly, or whose closed list is
-/// written to a certificate.
+/// Maximum number of stored states of a search that must answer quickly or whose closed states are written to
+/// a certificate.
 pub const STATE_LIMIT: usize = 400_000;
-/// Minimum state budget of greedy best-first search.
+/// Minimum number of stored states that the greedy best-first search may use.
 const LEAST: usize = 100;
-/// Work units that count as one stored state in the budgets of interleaved searches.
+/// Number of work units that correspond to one stored state in the budgets of alternating searches.
 const WORK_PER_STATE: u64 = 2_500;
-/// Work units after which the lagging search is abandoned.
+/// Number of work units after which the lagging search is abandoned.
 const ABANDON_WORK: u64 = 100_000_000_000;
 
-/// Searches for an optimal plan of a task whose operators have non-negative costs. Stops early if
-/// memory is forecast to run out before the proof.
+/// Searches for an optimal plan. All operators must have non-negative costs. Stops early if a forecast shows
+/// that memory will not suffice for a proof.
 pub fn search(context: Context<'_>, bounds: &Bounds) -> SearchOutcome {
     let Ok(Some(prepared)) = SearchTask::new(context) else { return SearchOutcome::Unknown(None) };
     let space = || SearchProblem { context, bounds, prepared: &prepared, orbits: None };
@@ -46,8 +46,7 @@ pub fn search(context: Context<'_>, bounds: &Bounds) -> SearchOutcome {
     loop {
         match searches.run(max_states, &mut |_, _| {}) {
             Some(SearchOutcome::Unknown(plan)) => {
-                // A plan found by the greedy search is optimal if the proved lower bound has
-                // reached its cost.
+                // A plan of the greedy search is optimal if its cost equals the proved lower bound.
                 let is_met = |plan: &GroundPlan| searches.bound.as_ref() == Some(&plan.cost);
                 return match cheaper(plan, greedy_plan) {
                     Some(plan) if is_met(&plan) => SearchOutcome::Optimal(plan),
@@ -57,7 +56,7 @@ pub fn search(context: Context<'_>, bounds: &Bounds) -> SearchOutcome {
             Some(outcome) => return outcome,
             None => {}
         }
-        // A long A\* run without a plan has no upper bound for pruning, so a greedy plan supplies
+        // A long A\* run without a plan has no upper bound for pruning. The cost of a greedy plan provides
         // one.
         if max_states == soon && searches.best_plan().is_none() {
             greedy_plan = greedy_best_first(&space(), &context.task.initial, usize::MAX);
@@ -69,7 +68,7 @@ pub fn search(context: Context<'_>, bounds: &Bounds) -> SearchOutcome {
     }
 }
 
-/// Runs A\* from the initial state with at most `max_states` stored states.
+/// Runs A\* from the initial state until it has stored `max_states` states.
 pub fn search_states<N: TaskNumber>(
     context: Context<'_, N>,
     bounds: &impl Heuristic<N>,
@@ -84,8 +83,8 @@ pub fn search_states<N: TaskNumber>(
     }
 }
 
-/// Runs A\* from `initial` with at most `max_states` stored states, for a plan that costs at most
-/// `limit`. `Int::MAX` means that there is no limit.
+/// Runs A\* from the state `initial` until it has stored `max_states` states. Looks for a plan with a cost of
+/// at most `limit`; `Int::MAX` means no limit.
 pub fn search_from(
     space: &SearchProblem<'_, Int, Bounds>,
     initial: &State,
@@ -125,7 +124,7 @@ fn search_within<N: TaskNumber, E: Heuristic<N>>(
     }
 }
 
-/// Runs greedy best-first search for any plan.
+/// Runs a greedy best-first search from `initial` and returns the plan that it finds, if any.
 fn greedy_best_first<N: TaskNumber, E: Heuristic<N>>(
     space: &SearchProblem<'_, N, E>,
     initial: &State<N>,
@@ -137,16 +136,16 @@ fn greedy_best_first<N: TaskNumber, E: Heuristic<N>>(
     greedy.best_plan()
 }
 
-/// Two A\* searches of the same task, interleaved by work. Starts with pattern databases alone;
-/// later adds a search that also evaluates LM-cut lazily.
+/// Two A\* searches of a task that alternate with equal shares of the work. The first uses pattern databases
+/// only; the second, which is added later, also evaluates LM-cut lazily.
 pub struct InterleavedSearch<'a, N, E> {
     space: SearchProblem<'a, N, E>,
     initial: State<N>,
     searches: Vec<AStar<'a, N, E>>,
     has_begun: bool,
-    /// Whether searches continue although memory is forecast to run out.
+    /// `true` if searches continue although memory is forecast to run out.
     is_patient: bool,
-    /// Lower bound on the cost of every plan, over both searches.
+    /// Greatest lower bound on the cost of every plan that a search has proved.
     bound: Option<N>,
     /// Best plan of the abandoned searches.
     best: Option<GroundPlan<N>>,
@@ -169,40 +168,41 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> InterleavedSearch<'a, N, E> {
         }
     }
 
-    /// Makes searches continue, with half of the work, when memory is forecast to run out before
-    /// they finish.
+    /// Makes searches continue with half of their work if memory is forecast to run out before they finish.
+    /// Without this setting, such searches end.
     #[must_use]
     pub fn continue_without_forecast(self) -> Self {
         Self { is_patient: true, ..self }
     }
 
-    /// Returns `true` if the forecast lets at least one search finish within the memory limit.
+    /// Returns `true` if at least one search is forecast to finish within the memory limit.
     pub fn may_finish(&self) -> bool {
         self.searches.iter().any(|search| search.patience != OutOfMemoryPolicy::Needed)
     }
 
-    /// Sets the cost of an external incumbent. More expensive nodes are pruned, and the search ends
-    /// once the lower bound reaches this cost.
+    /// Sets the cost of a plan that another component found. More expensive nodes are pruned, and a search
+    /// ends once its lower bound reaches this cost.
     pub fn set_upper_bound(&mut self, cost: &N) {
         self.searches.iter_mut().for_each(|search| search.set_upper_bound(cost.clone()));
     }
 
-    /// Statistics summed over all searches, including abandoned ones.
+    /// Returns the statistics summed over all searches, including abandoned searches.
     pub fn figures(&self) -> SearchStatistics {
         self.searches.iter().fold(self.figures, |sum, search| sum.plus(search.statistics))
     }
 
+    /// Returns the best plan of all searches, including abandoned searches.
     pub fn best_plan(&self) -> Option<GroundPlan<N>> {
         let plans = self.searches.iter().filter_map(AStar::best_plan);
         plans.fold(self.best.clone(), |best, plan| cheaper(best, Some(plan)))
     }
 
-    /// Resumes all searches until each has done the work of `max_states` states. The first call
-    /// runs a single search until it stores `max_states` states. The LM-cut search gets a quarter
-    /// of the work while `max_states` is small.
+    /// Resumes all searches until each has done the work of `max_states` states. The first call runs a single
+    /// search until it has stored `max_states` states. While `max_states` is small, the LM-cut search gets a
+    /// quarter of the work.
     ///
-    /// Returns `None` if the turn ended without a result. `SearchOutcome::Unknown(None)` also means
-    /// that no plan is cheaper than the external incumbent.
+    /// Returns `None` if the searches are not finished. `SearchOutcome::Unknown(None)` also means that no
+    /// plan is cheaper than the cost set by `set_upper_bound`.
     pub fn run(&mut self, max_states: usize, hear: ProgressCallback<'_, N>) -> Option<SearchOutcome<N>> {
         if !self.has_begun {
             let outcome = self.searches[0].run_until_states(max_states, hear);
@@ -226,7 +226,7 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> InterleavedSearch<'a, N, E> {
             };
             let search = &mut self.searches[position];
             search.set_memory_share(count);
-            // Most proofs that succeed at all succeed early and without landmarks.
+            // Most successful proofs are found early, and without LM-cut.
             let is_soon = search.lazy_heuristic.is_some() && max_states <= STATE_LIMIT;
             let is_doubtful = behind == Some(position) || search.patience == OutOfMemoryPolicy::Needed;
             let parts = match (is_soon, is_doubtful) {
@@ -262,11 +262,11 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> InterleavedSearch<'a, N, E> {
             self.figures = self.figures.plus(search.statistics);
             self.best = cheaper(self.best.take(), search.best_plan());
         }
-        // Without a search to resume, the answer is the best plan without a proof.
+        // No search can be resumed, so the result is the best plan without a proof.
         self.searches.is_empty().then(|| SearchOutcome::Unknown(self.best.clone()))
     }
 
-    /// Adds the LM-cut search and enables symmetry reduction and stubborn sets. With symmetries the
+    /// Adds the LM-cut search and enables symmetry reduction and stubborn sets. If there are symmetries, the
     /// first search restarts, because its stored states are not canonical.
     fn begin(&mut self) {
         self.has_begun = true;
@@ -295,8 +295,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> InterleavedSearch<'a, N, E> {
     }
 }
 
-/// Position of the search whose lower bound, extrapolated over two doublings of its states, stays
-/// below the current bound of the other search.
+/// Returns the index of a search that lags behind: its lower bound, extrapolated over two doublings of its
+/// states, stays below the current lower bound of the other search.
 fn lagging_search<N: TaskNumber, E: Heuristic<N>>(searches: &[AStar<'_, N, E>]) -> Option<usize> {
     let [first, second] = searches else { return None };
     let is_behind = |search: &AStar<'_, N, E>, other: &AStar<'_, N, E>| {
@@ -309,12 +309,12 @@ fn cheaper<N: Ord>(first: Option<GroundPlan<N>>, second: Option<GroundPlan<N>>) 
     first.into_iter().chain(second).min_by(|a, b| (&a.cost, a.steps.len()).cmp(&(&b.cost, b.steps.len())))
 }
 
-/// A closed state: values of the basic variables, numeric values, and path cost.
+/// A closed state: values of the basic variables, values of the numeric variables, and path cost.
 pub type ClosedEntry<N> = (Vec<u32>, Vec<N>, N);
 
-/// States whose f value is below `cost` (all of them if `cost` is `None`), after an exhaustive
-/// search. Returns `None` if a plan cheaper than `cost` (or any plan, if `cost` is `None`) exists,
-/// or a limit is reached.
+/// Runs an exhaustive A\* search and returns the closed states whose f value is below `cost` (all closed
+/// states if `cost` is `None`). Returns `None` if a plan cheaper than `cost` exists (any plan if `cost` is
+/// `None`), or a limit is reached.
 pub fn closed_labels<N: TaskNumber>(
     context: Context<'_, N>,
     bounds: &impl Heuristic<N>,
@@ -352,8 +352,8 @@ mod tests {
     use testing::random::Random;
     use testing::{depot, fleet, ground_text, optimum, successors};
 
-    /// Cost and length of the plan that A\* returns, with or without LM-cut, symmetry reduction and
-    /// stubborn sets.
+    /// Returns the cost and the length of the plan that A\* finds, with or without LM-cut, symmetry reduction
+    /// and stubborn sets.
     fn solve(
         task: &Task,
         order: OpenListOrder,
@@ -376,8 +376,8 @@ mod tests {
         }
     }
 
-    /// Checks that every variant returns the optimum of Dijkstra's algorithm, and that LM-cut never
-    /// overestimates.
+    /// Checks that every variant of the search finds the optimum of Dijkstra's algorithm, and that LM-cut
+    /// never overestimates. Returns `true` if the optimum is positive.
     fn check(text: &(String, String)) -> bool {
         let task = ground_text(text.clone());
         if task.unreachable.is_some() {

@@ -1,4 +1,5 @@
-//! Preprocessed task of a search, independent of the initial state: applicable operators and their costs.
+//! Precomputed operator data of a search, independent of the initial state: applicable operators, their
+//! designs and costs.
 
 use task::context::Context;
 use task::limits::Interrupted;
@@ -11,21 +12,21 @@ use crate::search::design_combinations::{CostedCombinations, pareto_optimal_comb
 use crate::search::monotonicity::is_monotone;
 use crate::search::successor_generator::SuccessorGenerator;
 
-/// Successor data of a task, independent of the initial state.
+/// Precomputed operator data of a task, independent of the initial state.
 pub struct SearchTask<N = Int> {
-    /// Per operator: Pareto-optimal combinations of designs with their costs.
+    /// For each operator: its Pareto-optimal combinations of designs, with their costs.
     pub(super) choices: Vec<CostedCombinations<N>>,
-    /// Per operator: number of its first combination. The last element is the total number of
-    /// combinations.
+    /// For each operator: the index of its first combination among all combinations. The last element is the
+    /// total number of combinations.
     pub(super) numbers: Vec<u32>,
     pub(super) index: SuccessorGenerator,
-    /// Cost of the most expensive combination of any operator.
+    /// Highest cost of a combination of any operator.
     dearest: N,
 }
 
 impl<N: TaskNumber> SearchTask<N> {
-    /// Returns `None` if some operator has too many combinations of designs, or their total number
-    /// overflows `u32`.
+    /// Precomputes the data. Returns `None` if an operator has too many combinations of designs, or their
+    /// total number exceeds `u32`.
     ///
     /// # Errors
     /// Fails when a limit is reached.
@@ -51,7 +52,7 @@ impl<N: TaskNumber> SearchTask<N> {
         Ok(Some(Self { choices, numbers, index: SuccessorGenerator::new(task), dearest: max_cost }))
     }
 
-    /// Operator and combination with this number.
+    /// Returns the operator and the designs of the combination with this index.
     pub(super) fn step(&self, number: u32) -> GroundStep {
         let operator = self.numbers.partition_point(|first| *first <= number).saturating_sub(1);
         let choice = number.saturating_sub(self.numbers[operator]);
@@ -59,7 +60,7 @@ impl<N: TaskNumber> SearchTask<N> {
         GroundStep { operator: OperatorId(dense(operator)), choice }
     }
 
-    /// Lower bound on the number of steps of a plan suffix with this cost.
+    /// Returns a lower bound on the number of steps that together have this cost.
     pub(super) fn steps_at_least(&self, cost: &N) -> u32 {
         if self.dearest > N::zero() { cost.times_at_least(&self.dearest) } else { 0 }
     }

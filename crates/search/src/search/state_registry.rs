@@ -1,10 +1,9 @@
-//! State registry and closed list with packed states.
+//! State registry and closed list of A\*, with packed states.
 //!
-//! Finite-domain values take as many bits as they need. Equal numbers are stored once, and states
-//! hold their positions. A *place* combines the finite-domain values with the numbers that are not
-//! monotone. Places are found by a hash table over one arena. The states of a place differ in cost
-//! and in comparable numbers; those that no other state of the place dominates form its Pareto
-//! front.
+//! Finite-domain values are packed into as few bits as they need. Equal numbers are stored once, and states
+//! refer to them by index. A *place* is the combination of the finite-domain values and the numbers that must
+//! be equal for dominance. A hash table finds the place of a state. The states of a place differ only in cost
+//! and in comparable numbers. Those that no other state of the place dominates form its Pareto front.
 
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
@@ -19,12 +18,12 @@ use crate::search::monotonicity::{Polarity, directions};
 use crate::search::pareto_front::{Criteria, Front};
 use crate::search::symmetry::Orbits;
 
-/// Marks a missing link: no next node of a front, no parent, no step.
+/// Represents a missing index: no next node of a front, no parent, or no step.
 pub(super) const NONE: u32 = u32::MAX;
 
 const WORD: u32 = u32::BITS;
 
-/// Position of a finite-domain variable in a packed key.
+/// Bits of a packed key that hold the value of a finite-domain variable.
 struct BitField {
     variable: usize,
     word: usize,
@@ -32,37 +31,37 @@ struct BitField {
     mask: u32,
 }
 
-/// A numeric variable that is compared within a place, not part of its key.
+/// A numeric variable that is compared by ≥ or ≤ within a place and is not part of its key.
 struct ComparedVariable {
     variable: usize,
     asked: Polarity,
 }
 
-/// Flag of an entry of `fronts` that refers to a tree.
+/// Flag of an entry of `fronts` that is the index of a tree instead of a node.
 const TREE_FLAG: u32 = 1 << 31;
 
-/// Interned numbers.
+/// Interned numbers: equal numbers have equal indices.
 struct Numbers<N> {
     all: Vec<N>,
     table: HashTable<u32>,
 }
 
-/// Parent link of a node.
+/// Link from a node to its parent in the search space.
 #[derive(Clone, Copy)]
 pub(super) struct ParentLink {
     pub(super) parent: u32,
-    /// Number of the operator and its design combination, see `SearchTask::step`.
+    /// Index of the operator with its combination of designs, see `SearchTask::step`.
     pub(super) step: u32,
-    /// Number of steps from the initial state.
+    /// Number of steps from the initial state to the node.
     pub(super) steps: u32,
 }
 
 struct Node {
     place: u32,
     origin: ParentLink,
-    /// Index of an interned number.
+    /// Path cost, as the index of an interned number.
     cost: u32,
-    /// Next node of the front, or `NONE`.
+    /// Next node of the linked front, or `NONE`.
     next: u32,
     state: NodeStatus,
 }
@@ -70,46 +69,48 @@ struct Node {
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum NodeStatus {
     Open,
-    /// The lazy heuristic was evaluated.
+    /// Open, not dominated, and the lazy heuristic has been evaluated.
     Closer,
     Dominated,
 }
 
-/// The state registry of A\*.
+/// The state registry of A\*, which also stores the search nodes.
 pub(super) struct StateRegistry<N> {
     fields: Vec<BitField>,
     exact: Vec<usize>,
     compared: Vec<ComparedVariable>,
-    /// Number of words of a key.
+    /// Number of 32-bit words of a key.
     width: usize,
-    /// Keys of all places, `width` words each.
+    /// Keys of all places, with `width` words for each place.
     keys: Vec<u32>,
-    /// Per place: first node of its front, or number of its tree with `TREE_FLAG`.
+    /// For each place: the first node of its linked front, or the index of its tree combined with
+    /// `TREE_FLAG`.
     fronts: Vec<u32>,
     trees: Vec<Front>,
-    /// Maximum length of a linked front. Longer fronts become trees.
+    /// Maximum length of a linked front. A longer front is stored as a tree.
     longest: usize,
     /// Memory use of the trees in bytes.
     tree_bytes: usize,
     table: HashTable<u32>,
     nodes: Vec<Node>,
-    /// Per node: indices of the numbers that are not part of the key.
+    /// For each node: the indices of the numbers that are not part of the key.
     others: Vec<u32>,
     numbers: Numbers<N>,
-    /// Scratch buffers for the state that is looked up: its key and its compared numbers.
+    /// Scratch buffer: the key of the state that is looked up.
     key: Vec<u32>,
+    /// Scratch buffer: indices of the compared numbers of the state that is looked up.
     own: Vec<u32>,
-    /// Symmetries, if states are merged by them. Keys are then canonical, and `plain` holds the
-    /// words of the original values of each node. `own_plain` holds those of the state that is
-    /// looked up.
+    /// Symmetries, if symmetric states count as equal. The keys are then canonical.
     orbits: Option<Arc<Orbits>>,
+    /// With symmetries: the packed original values of each node.
     plain: Vec<u32>,
+    /// With symmetries: the packed original values of the state that is looked up.
     own_plain: Vec<u32>,
     values: Vec<u32>,
     image: Vec<u32>,
 }
 
-/// Result of a lookup: an entry for a state that is not dominated.
+/// Result of a lookup if no stored state dominates the state: the data needed to insert it.
 pub(super) struct VacantEntry {
     hash: u64,
     place: Option<u32>,
@@ -136,7 +137,7 @@ impl<N: TaskNumber> Numbers<N> {
     }
 }
 
-/// Assigns bit fields to variables with the given domain sizes: first-fit decreasing, by number of
+/// Assigns bit fields to variables with the given domain sizes, by first-fit decreasing on their number of
 /// bits. Returns the fields and the number of words.
 #[expect(clippy::arithmetic_side_effects, reason = "bits of a word, and words that are held in memory")]
 fn fields(sizes: &[usize]) -> (Vec<BitField>, usize) {
@@ -145,7 +146,7 @@ fn fields(sizes: &[usize]) -> (Vec<BitField>, usize) {
         sizes.iter().map(bits).zip(0..).filter(|(bits, _)| *bits > 0).collect();
     order.sort_by_key(|(bits, _)| std::cmp::Reverse(*bits));
     let mut used: Vec<u32> = Vec::new();
-    // Words before this index are full.
+    // All words before this index are full.
     let mut first = 0;
     let mut fields = Vec::with_capacity(order.len());
     for (bits, variable) in order {
@@ -215,7 +216,7 @@ impl<N: TaskNumber> StateRegistry<N> {
         self.nodes.len()
     }
 
-    /// Approximate memory use in bytes.
+    /// Returns the approximate memory use in bytes.
     pub(super) fn bytes(&self) -> usize {
         let words =
             [&self.keys, &self.fronts, &self.others].map(|list| list.len().saturating_mul(size_of::<u32>()));
@@ -229,11 +230,12 @@ impl<N: TaskNumber> StateRegistry<N> {
             .fold(nodes.saturating_add(numbers), usize::saturating_add)
     }
 
-    /// Looks a state up. Returns `None` if a stored state dominates it.
+    /// Looks up a state. Returns `None` if a stored state dominates it. Cost and steps belong to the path
+    /// that leads to the state.
     pub(super) fn look_up(&mut self, state: &State<N>, cost: &N, steps: u32) -> Option<VacantEntry> {
         let words = self.words();
-        // The original values are stored as well: a plan must be extracted from real states, not
-        // from their canonical images.
+        // The original values are stored in addition to the key. A plan must be extracted from original
+        // states, not from their canonical images.
         if let Some(orbits) = &self.orbits {
             pack(&self.fields, &state.values, words, &mut self.own_plain);
             self.values.clone_from(&state.values);
@@ -257,7 +259,7 @@ impl<N: TaskNumber> StateRegistry<N> {
         let cost = self.numbers.position(cost);
         let front = place.map_or(NONE, |place| self.fronts[place as usize]);
         let dominates = |id: u32| {
-            // Cost and steps are compared lexicographically: they form one criterion.
+            // Cost and number of steps form one criterion, which is compared lexicographically.
             let node = &self.nodes[id as usize];
             self.is_as_cheap((node.cost, node.origin.steps), (cost, steps))
                 && self.is_no_worse(self.others_of(id), &self.own)
@@ -272,18 +274,18 @@ impl<N: TaskNumber> StateRegistry<N> {
         (!is_dominated).then_some(VacantEntry { hash, place, cost })
     }
 
-    /// Number of words of a key that hold finite-domain values.
+    /// Returns the number of words of a key that hold finite-domain values.
     fn words(&self) -> usize {
         self.width.saturating_sub(self.exact.len())
     }
 
-    /// Nodes of a linked front.
+    /// Returns the nodes of a linked front, beginning with `first`.
     fn chain(&self, first: u32) -> impl Iterator<Item = u32> {
         let some = |node: u32| (node != NONE).then_some(node);
         std::iter::successors(some(first), move |node| some(self.nodes[*node as usize].next))
     }
 
-    /// Stores the state of the last lookup and returns its node.
+    /// Stores the state of the last lookup and returns its node index.
     pub(super) fn insert(&mut self, vacancy: &VacantEntry, origin: ParentLink) -> u32 {
         let place = vacancy.place.unwrap_or_else(|| self.add_place(vacancy.hash));
         let id = dense(self.nodes.len());
@@ -298,7 +300,7 @@ impl<N: TaskNumber> StateRegistry<N> {
             self.insert_into_tree(front ^ TREE_FLAG, id);
             return id;
         }
-        // Nodes that the new one dominates leave the front.
+        // Nodes that the new node dominates are removed from the front.
         let (out, mut stay): (Vec<u32>, Vec<u32>) =
             self.chain(front).partition(|node_id| self.dominates(id, *node_id));
         for node_id in out {
@@ -358,7 +360,7 @@ impl<N: TaskNumber> StateRegistry<N> {
         one == other || (!up || number(one) >= number(other)) && (!down || number(one) <= number(other))
     }
 
-    /// Returns `true` if all compared variables are at least as good.
+    /// Returns `true` if each compared variable is at least as good in `one` as in `other`.
     fn is_no_worse(&self, one: &[u32], other: &[u32]) -> bool {
         let mut pairs = self.compared.iter().zip(one.iter().zip(other));
         pairs.all(|(compared, (one, other))| self.compares(compared.asked, *one, *other))
@@ -368,7 +370,8 @@ impl<N: TaskNumber> StateRegistry<N> {
         self.nodes[node as usize].state == NodeStatus::Dominated
     }
 
-    /// Marks the lazy heuristic as evaluated. Returns `false` if it was marked before.
+    /// Marks that the lazy heuristic was evaluated for a node. Returns `false` if the node was marked before
+    /// or is dominated.
     pub(super) fn mark_reevaluated(&mut self, node: u32) -> bool {
         let state = &mut self.nodes[node as usize].state;
         let is_first = *state == NodeStatus::Open;
@@ -386,11 +389,10 @@ impl<N: TaskNumber> StateRegistry<N> {
         &self.numbers.all[self.nodes[node as usize].cost as usize]
     }
 
-    /// Unpacks a state. Does not set its derived variables.
+    /// Unpacks the state of a node into `state`. Derived variables are not set.
     pub(super) fn unpack(&self, node: u32, state: &mut State<N>) {
         let key = self.key_of(self.nodes[node as usize].place);
-        // Canonical keys identify states but must not be expanded, since their steps would not
-        // chain into a plan.
+        // Canonical keys identify states but must not be expanded, because their steps would not form a plan.
         let words = if self.orbits.is_some() { key_of(&self.plain, self.words(), node) } else { key };
         for field in &self.fields {
             state.values[field.variable] = (words[field.word] >> field.shift) & field.mask;

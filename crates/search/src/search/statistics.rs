@@ -1,15 +1,15 @@
-//! Statistics of a search.
+//! Statistics of a heuristic search.
 
 use task::plan::solution::Statistics;
 
-/// Numbers of states.
+/// Counters of a heuristic search.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct SearchStatistics {
-    /// Expanded states.
+    /// Number of expanded states.
     pub expanded: u64,
-    /// Generated successors.
+    /// Number of generated successors.
     pub generated: u64,
-    /// Evaluated states.
+    /// Number of evaluated states.
     pub evaluated: u64,
 }
 
@@ -23,7 +23,7 @@ impl SearchStatistics {
         }
     }
 
-    /// Adds the difference to the earlier statistics `before`.
+    /// Adds the increase since the earlier counters `before` to the statistics of the planner.
     pub fn add_to(self, before: Self, statistics: &mut Statistics) {
         let add =
             |sum: &mut u64, now: u64, before: u64| *sum = sum.saturating_add(now.saturating_sub(before));

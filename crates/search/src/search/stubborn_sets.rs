@@ -1,28 +1,28 @@
-//! Stubborn-set pruning: applying a subset of the applicable operators is enough.
+//! Stubborn-set pruning: in each state, only a subset of the applicable operators is applied.
 //!
-//! Operators that do not interfere can be reordered, so only one of their orders has to be searched. A set of
+//! Operators that do not interfere can be reordered, so only one of their orders must be searched. A set of
 //! operators is stubborn in a state \[1\] if it contains
 //!
-//! - every operator that makes some unsatisfied part of the goal true;
-//! - for each of its inapplicable operators, every operator that makes some unsatisfied part of its
+//! - every operator that makes a selected unsatisfied part of the goal true;
+//! - for each inapplicable operator in the set, every operator that makes a selected unsatisfied part of its
 //!   precondition true;
-//! - for each of its applicable operators, every operator that it *disturbs*: one that requires or
-//!   sets another value of a variable that it sets, or has a conditional effect on such a value. If
-//!   it has conditional effects itself, it also contains every operator that sets one of their
-//!   conditions.
+//! - for each applicable operator o in the set, every operator that o *disturbs*: an operator that requires
+//!   or sets another value of a variable that o sets, or has a conditional effect that depends on such a
+//!   variable. If o has conditional effects, the set also contains every operator that sets a variable in
+//!   their conditions.
 //!
-//! Proof sketch. Take any plan from the state, and its first operator in the set. One exists by the
-//! first condition. It is applicable, because by the second condition an earlier operator would
-//! otherwise be in the set. By the third condition it can be moved to the front: the plan has the
-//! same operators in another order. An earlier operator may make it inapplicable for a while; weak
-//! stubborn sets allow this \[2\]. So a cheapest plan with the fewest steps is preserved from each
-//! state. Pruning of dominated states and of symmetric states remains sound \[3\]: the
-//! representative has a plan with the same operators or their images.
+//! Proof sketch. Consider a plan from the state, and the first operator of the plan that is in the set. Such
+//! an operator exists by the first condition. It is applicable, because otherwise, by the second condition,
+//! an earlier operator of the plan would be in the set. By the third condition it can be moved to the front,
+//! which yields a plan with the same operators in another order. An earlier operator may temporarily make it
+//! inapplicable; weak stubborn sets allow this \[2\]. From each state, a cheapest plan with the fewest steps
+//! is thus preserved. Pruning of dominated and symmetric states remains sound \[3\]: the stored state has a
+//! plan with the same operators or their images.
 //!
-//! If an operator requires one value of a variable and sets another one, other operators change the variable
-//! only from that value or from any value.
+//! If an operator requires a value of a variable and sets another value, it disturbs only those operators
+//! that change the variable from the required value or from any value.
 //!
-//! Pruning is switched off when it removes too few operators to pay for its time.
+//! Pruning is disabled if it removes too few operators to justify its time.
 //!
 //! - \[1\] M. Wehrle, M. Helmert: Efficient stubborn sets: generalized algorithms and selection
 //!   strategies, ICAPS 2014.
@@ -36,48 +36,54 @@ use task::lists::Lists;
 use task::number::dense;
 use task::task::{Condition, Fact, Literal, Operator, OperatorId, Task};
 
-/// Pruning pays if it removes at least one of this many applicable operators.
+/// Pruning stays enabled if at least one of this number of applicable operators is pruned on average.
 const MIN_PRUNED_FRACTION: u64 = 5;
 
-/// Index of a task: which operators require, set and read each fact or variable.
+/// Indices of a task: the operators that require, set or read each fact or variable.
 pub struct Stubborn {
-    /// Number of each variable's first fact.
+    /// Number of the first fact of each variable.
     first: Vec<u32>,
-    /// By fact: operators that require it, and operators that may set it.
+    /// For each fact: operators that require it.
     requiring: Lists,
+    /// For each fact: operators that may set it.
     setting: Lists,
-    /// By variable: operators that require no value of it but may set it (`blind`), and operators
-    /// that read it in a clause or a conditional effect (`asking`).
+    /// For each variable: operators that may set it and require no value of it.
     blind: Lists,
+    /// For each variable: operators that read it in a clause or in the condition of a conditional effect.
     asking: Lists,
-    /// By operator, and at the end for the goal: numbers of the required facts.
+    /// For each operator, and last for the goal: numbers of the required facts.
     required: Lists,
 }
 
-/// Stubborn-set pruning: scratch buffers and statistics.
+/// State of stubborn-set pruning: scratch buffers, and statistics for disabling it.
 pub(super) struct StubbornSetPruning {
     stubborn: Arc<Stubborn>,
-    /// By operator: whether it is in the set.
+    /// For each operator: whether it is in the set.
     is_in: Vec<bool>,
+    /// For each operator: whether it is applicable in the state.
     can_be_applied: Vec<bool>,
-    /// Operators of the set that are not processed yet, and all operators of the set.
+    /// Operators of the set that are not processed yet.
     open: Vec<u32>,
+    /// All operators of the set.
     all: Vec<u32>,
-    /// By fact: whether all operators that set it are in the set.
+    /// For each fact: whether all operators that set it are in the set.
     is_set: Vec<bool>,
+    /// Facts for which `is_set` is `true`.
     set: Vec<u32>,
-    /// Number of applicable operators outside the set.
+    /// Number of applicable operators that are not in the set.
     out: usize,
-    /// Number of expansions after which pruning is switched off if it prunes too little.
+    /// Number of expansions after which pruning is disabled if it has pruned too little.
     trial: u64,
-    /// Statistics: expanded states, applicable operators in them, and pruned operators.
+    /// Number of expanded states.
     looked: u64,
+    /// Number of applicable operators in all expanded states.
     applicable: u64,
+    /// Number of pruned operators.
     left_out: u64,
 }
 
 impl Stubborn {
-    /// Returns `None` if the task has numeric or derived variables.
+    /// Builds the indices. Returns `None` if the task has numeric or derived variables.
     pub(crate) fn new<N>(task: &Task<N>) -> Option<Self> {
         if !task.axioms.is_empty() || !task.initial.numbers.is_empty() || task.basic < task.variables.len() {
             return None;
@@ -118,7 +124,7 @@ impl Stubborn {
         })
     }
 
-    /// Numbers of a variable's facts.
+    /// Returns the numbers of a variable's facts.
     fn facts(&self, variable: u32) -> std::ops::Range<u32> {
         let next = self.first.get((variable as usize).saturating_add(1)).copied();
         self.first[variable as usize]..next.unwrap_or_else(|| dense(self.setting.count()))
@@ -151,13 +157,13 @@ impl StubbornSetPruning {
         }
     }
 
-    /// Returns `true` if the trial is over and too few operators were pruned.
+    /// Returns `true` if the trial period ends now and too few operators were pruned.
     pub(super) fn prunes_too_little(&self) -> bool {
         self.looked == self.trial && self.left_out.saturating_mul(MIN_PRUNED_FRACTION) < self.applicable
     }
 
-    /// Removes the applicable operators outside a stubborn set. Removes none if the goal holds.
-    /// Returns the size of the set.
+    /// Computes a stubborn set and removes all other operators from `applicable`. Removes none if the state
+    /// satisfies the goal. Returns the size of the set.
     pub(super) fn prune_operators<N>(
         &mut self,
         task: &Task<N>,
@@ -189,15 +195,15 @@ impl StubbornSetPruning {
         size
     }
 
-    /// Computes a stubborn set, and stops early if it contains all applicable operators. The set is
-    /// empty if the goal holds.
+    /// Computes a stubborn set in `all`. Stops early once the set contains all applicable operators. The set
+    /// is empty if the state satisfies the goal.
     fn look<N>(&mut self, task: &Task<N>, values: &[u32]) {
         let stubborn = &*Arc::clone(&self.stubborn);
         let goal = dense(task.operators.len());
         if !self.enable(stubborn, goal, &task.goal, values) {
             return;
         }
-        // Once the set contains all applicable operators, nothing can be pruned.
+        // Once the set contains all applicable operators, no operator can be pruned.
         while self.out > 0
             && let Some(operator_id) = self.open.pop()
         {
@@ -208,8 +214,8 @@ impl StubbornSetPruning {
         }
     }
 
-    /// Adds the operators that achieve some unsatisfied part of a condition. Returns `false` if the
-    /// condition holds.
+    /// Adds all operators that achieve one unsatisfied part of a condition. Returns `false` if the condition
+    /// holds.
     fn enable<N>(
         &mut self,
         stubborn: &Stubborn,
@@ -222,7 +228,8 @@ impl StubbornSetPruning {
             if fact.holds(values) {
                 continue;
             }
-            // An unsatisfied part whose achievers are in the set already costs nothing.
+            // If the achievers of an unsatisfied part are already in the set, this part requires no further
+            // operators.
             if self.is_set[*number as usize] {
                 return true;
             }
@@ -249,14 +256,15 @@ impl StubbornSetPruning {
         true
     }
 
-    /// Adds the operators that an operator disturbs or that change its conditional effects.
+    /// Adds the operators that `operator` disturbs, and those that set variables in conditions of its
+    /// conditional effects.
     fn disturb<N>(&mut self, stubborn: &Stubborn, operator: &Operator<N>) {
         for effect in &operator.effects {
             let required = operator.condition.facts.iter().find(|fact| fact.variable == effect.variable);
             let variable = effect.variable.0;
             let number = |fact: &Fact| stubborn.first[variable as usize].saturating_add(fact.value);
             match required {
-                // The operator keeps this value, so it disturbs nothing.
+                // The value does not change, so the effect disturbs no operator.
                 Some(required) if required.value == effect.value => continue,
                 Some(required) => {
                     self.add_all(stubborn.requiring.of(number(required)));
@@ -287,7 +295,7 @@ impl StubbornSetPruning {
         }
     }
 
-    /// Adds all operators that set a fact.
+    /// Adds all operators that may set the fact with this number.
     fn add_setting(&mut self, stubborn: &Stubborn, number: u32) {
         if !std::mem::replace(&mut self.is_set[number as usize], true) {
             self.set.push(number);
@@ -322,13 +330,13 @@ pub(super) mod tests {
     use testing::random::Random;
     use testing::{depot, ground_text};
 
-    /// Maximum number of states of a test task.
+    /// Maximum number of reachable states of a test task.
     const STATES: usize = 3_000;
 
-    /// Successors of a state: operator, index of the next state, and cost.
+    /// Successors of a state, each with the operator, the index of the successor state, and the cost.
     pub(in crate::search) type Steps = Vec<(OperatorId, usize, Int)>;
 
-    /// All reachable states and their successors. Returns `None` if there are more than `STATES`.
+    /// Returns all reachable states and their successors, or `None` if there are more than `STATES` states.
     pub(in crate::search) fn reachable(task: &Task) -> Option<(Vec<State>, Vec<Steps>)> {
         let mut indices = FxHashMap::from_iter([(task.initial.clone(), 0)]);
         let (mut states, mut steps): (Vec<State>, Vec<Steps>) = (vec![task.initial.clone()], Vec::new());
@@ -354,7 +362,7 @@ pub(super) mod tests {
         Some((states, steps))
     }
 
-    /// Cost and length of a cheapest plan with the fewest steps from each state, by backward
+    /// Returns, for each state, the cost and length of a cheapest plan with the fewest steps. Uses a backward
     /// Dijkstra search.
     pub(in crate::search) fn to_go(
         task: &Task,
@@ -385,8 +393,9 @@ pub(super) mod tests {
         best
     }
 
-    /// Checks that the pruned operators keep a cheapest plan with the fewest steps from each state.
-    /// Returns the number of pruned operators, if the task has stubborn sets.
+    /// Checks that, in each state, the operators that are not pruned include the first operator of a cheapest
+    /// plan with the fewest steps. Returns the number of pruned operators, or `None` if stubborn sets do not
+    /// apply to the task.
     fn check(text: &(String, String)) -> Option<usize> {
         let task = ground_text(text.clone());
         let stubborn = Arc::new(Stubborn::new(&task).filter(|_| task.unreachable.is_none())?);
@@ -412,7 +421,7 @@ pub(super) mod tests {
         Some(left_out)
     }
 
-    /// Random task whose operators require, set and read mostly neighbouring propositions.
+    /// Generates a random task whose operators require, set and read mostly neighbouring propositions.
     pub(in crate::search) fn switches(seed: u64) -> (String, String) {
         let mut random = Random(seed);
         let mut below = move |limit: i64| random.below(limit.unsigned_abs());

@@ -1,39 +1,40 @@
-//! Successor generator: a decision tree over required variables that returns the applicable operators \[1\].
+//! Successor generator: a decision tree over required values that returns the applicable operators \[1\].
 //!
-//! A node holds the operators without further preconditions. It tests one variable, and has one child for
-//! each value and one for the operators that do not require the variable.
+//! A node stores the operators that have no further preconditions. It tests one variable and has a child for
+//! each required value, and one child for operators that do not require the variable.
 //!
 //! \[1\] M. Helmert: The Fast Downward planning system, JAIR 26, 2006, section 5.3.
 
 use task::number::dense;
 use task::task::{OperatorId, State, Task};
 
-/// No further node.
+/// Index of a missing node.
 const NONE: u32 = u32::MAX;
 
 #[derive(Default)]
 struct Node {
-    /// Operators whose preconditions are complete at this node: a range of `operators`.
+    /// Operators whose preconditions have all been tested at this node, as a range of `operators`.
     complete: (u32, u32),
-    /// Variable that this node tests.
+    /// Variable whose value this node tests.
     variable: u32,
-    /// Children by value, ascending: a range of `children`.
+    /// Children by ascending value, as a range of `children`.
     children: (u32, u32),
-    /// Child for operators that do not require the tested variable, or `NONE`.
+    /// Child node for operators that do not require the tested variable, or `NONE`.
     others: u32,
 }
 
-/// The operators of a task, indexed by their preconditions.
+/// Index that finds the applicable operators of a task by their required facts.
 pub struct SuccessorGenerator {
     nodes: Vec<Node>,
     operators: Vec<OperatorId>,
     children: Vec<(u32, u32)>,
 }
 
-/// Required values, ascending by variable, and the operator.
+/// Required values as pairs (variable, value) in ascending order, and the operator.
 type Precondition = (Vec<(u32, u32)>, OperatorId);
 
-/// Operators with the same preconditions up to `depth`, and the link that their node is stored in.
+/// A subtree to be built: the range of operators with equal first `depth` preconditions, and the link that
+/// will point to its root.
 struct PendingSubtree {
     from: usize,
     to: usize,
@@ -53,7 +54,7 @@ impl SuccessorGenerator {
         Self::over(task, OperatorId::all(task.operators.len()))
     }
 
-    /// Builds a generator for some operators, given in ascending order.
+    /// Builds a generator for a subset of the operators, given in ascending order.
     #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     pub fn over<N>(task: &Task<N>, operators: impl Iterator<Item = OperatorId>) -> Self {
         let required = |id: OperatorId| {
@@ -106,7 +107,7 @@ impl SuccessorGenerator {
         index
     }
 
-    /// Operators whose propositional condition holds, ascending.
+    /// Returns the operators whose propositional conditions hold in a state, in ascending order.
     pub fn applicable<N>(&self, task: &Task<N>, state: &State<N>) -> Vec<OperatorId> {
         let mut operators = Vec::new();
         let mut stack = vec![0_u32];
@@ -124,7 +125,7 @@ impl SuccessorGenerator {
                 at = *others;
             }
         }
-        // The tree checks facts only; clauses are checked here.
+        // The tree tests required facts only; clauses are tested here.
         operators.retain(|id| {
             let clauses = &task.operators[id.index()].condition.clauses;
             clauses.iter().all(|clause| clause.iter().any(|literal| literal.holds(&state.values)))

@@ -1,10 +1,10 @@
-//! Symmetry reduction: one state represents all states that differ only in interchangeable objects.
+//! Symmetry reduction: a canonical state represents all states that differ only by exchanges of
+//! interchangeable objects.
 //!
-//! Orbit search \[1\]: every plan from a state has an image, of the same cost, from the image of
-//! the state under an exchange of objects that changes neither operators nor goal. A state is made
-//! canonical by exchanges of neighbouring objects as long as they lower it in the lexicographic
-//! order. Symmetric states usually get the same canonical state; completeness is not needed for
-//! soundness.
+//! Orbit search \[1\]: if an exchange of objects maps the operators and the goal to themselves, every plan
+//! from a state is mapped to a plan of equal cost from the image of the state. A state is made canonical by
+//! applying exchanges of neighbouring objects as long as the state becomes lexicographically smaller.
+//! Symmetric states usually get equal canonical states; soundness does not depend on this.
 //!
 //! \[1\] C. Domshlak, M. Katz, A. Shleyfman: Enhanced symmetry breaking in cost-optimal planning as forward
 //! search, ICAPS 2012.
@@ -14,22 +14,22 @@ use task::limits::Interrupted;
 use task::number::Int;
 use task::task::object_symmetry::symmetry_generators;
 
-/// Moves the value of one variable to another one.
+/// Part of an exchange: the value of variable `target` in the image is computed from variable `source`.
 struct Move {
     target: usize,
     source: usize,
-    /// Value of the target, by value of the source.
+    /// Value of the target variable for each value of the source variable.
     values: Vec<u32>,
 }
 
-/// The symmetries of a task: exchanges of interchangeable objects.
+/// Symmetries of a task: exchanges of two interchangeable objects.
 pub struct Orbits {
-    /// Moves of each exchange, ascending by target.
+    /// For each exchange: its moves in ascending order of their target variables.
     exchanges: Vec<Vec<Move>>,
 }
 
 impl Orbits {
-    /// Returns `None` if no objects are interchangeable.
+    /// Computes the symmetries of a task. Returns `None` if no objects are interchangeable.
     pub(crate) fn new(context: Context<'_, Int>) -> Result<Option<Self>, Interrupted> {
         let mut exchanges = Vec::new();
         for exchange in symmetry_generators(context, false)? {
@@ -49,8 +49,8 @@ impl Orbits {
         Ok((!exchanges.is_empty()).then_some(Self { exchanges }))
     }
 
-    /// Replaces values by a canonical representative: applies exchanges as long as they make the
-    /// values lexicographically smaller.
+    /// Replaces the values of a state by a canonical representative: applies exchanges as long as the values
+    /// become lexicographically smaller. `image` is a scratch buffer.
     pub(crate) fn canonicalize(&self, values: &mut [u32], image: &mut Vec<u32>) {
         let mut changed = true;
         while std::mem::take(&mut changed) {

@@ -6,12 +6,13 @@ use pddl::ast::{ActionBody, Condition, Domain, Effect, Problem};
 use super::simplify::{all, flag, holds, not};
 use super::syntax_edits::{declare, hidden};
 
-/// A deadline: after each state with the first condition, the second condition must hold within a
-/// time.
+/// A deadline from `always-within`: after each state in which the first condition holds, the second condition
+/// must hold within a given time.
 #[derive(Debug, Clone)]
 pub struct Deadline {
+    /// Longest time between a state with the first condition and a state with the second condition.
     pub within: BigRational,
-    /// `true` if plans must satisfy the deadline.
+    /// `true` for a constraint, which every plan must satisfy; `false` for a preference.
     pub is_hard: bool,
     number: usize,
 }
@@ -21,17 +22,19 @@ impl Deadline {
         Self { within, is_hard, number }
     }
 
-    /// Returns the names of the auxiliary actions whose preconditions are the two conditions. They
-    /// are never executed. The effect of the second one records a satisfied soft deadline.
+    /// Returns the names of two auxiliary actions, one for each condition of the deadline. The condition is
+    /// the precondition of its action. Neither action is ever executed; the effect of the second action
+    /// records that a soft deadline is satisfied.
     pub fn actions(&self) -> [String; 2] {
         ["begins", "ends"].map(|what| format!("deadline {} {what}", self.number))
     }
 }
 
-/// Auxiliary atom that is never true.
+/// Auxiliary atom that is never true. The auxiliary actions add it, so that they have an effect.
 pub(super) const LOOKED_AT: &str = "a deadline was looked at";
 
-/// Adds the auxiliary actions of deadlines.
+/// Adds two auxiliary actions to the domain for each deadline. Returns the deadlines without their conditions
+/// and effects.
 pub(super) fn install(
     domain: &mut Domain,
     problem: &Problem,

@@ -1,4 +1,4 @@
-//! Evaluation of closed conditions in the initial state.
+//! Evaluates conditions without free variables in the initial state.
 
 use num_rational::BigRational;
 use num_traits::Zero;
@@ -15,7 +15,7 @@ use super::syntax_edits::unsupported;
 
 type Key = (Name, Vec<Name>);
 
-/// The initial state, without derived predicates.
+/// Facts and numeric values of the initial state, without derived predicates.
 pub(super) struct Initial<'t> {
     objects: &'t Objects<'t>,
     domain: &'t Domain,
@@ -48,14 +48,14 @@ impl<'t> Initial<'t> {
         Self { objects, domain, facts, values }
     }
 
-    /// Returns `true` if a condition holds. Conditions that depend on an undefined value do not
-    /// hold.
+    /// Returns `true` if the condition holds in the initial state. A condition whose truth depends on an
+    /// undefined numeric value does not hold.
     pub(super) fn holds(&self, condition: &Condition) -> bool {
         self.truth(condition, &mut Vec::new()) == Some(true)
     }
 
-    /// Checks that a condition is always true or false. Otherwise an unsatisfied condition differs
-    /// from its negation.
+    /// Checks that all numeric functions in a condition have initial values. Otherwise a negated condition
+    /// could fail together with the condition. Returns an error at `place` if a value is missing.
     pub(super) fn is_defined(&self, condition: &Condition, place: (File, Span)) -> Result<(), Error> {
         match self.undefined(condition, &mut Vec::new()) {
             None => Ok(()),
@@ -69,8 +69,8 @@ impl<'t> Initial<'t> {
         }
     }
 
-    /// Returns a possibly undefined function that a condition reads. Unbound variables range over
-    /// all objects.
+    /// Returns a numeric function in the condition that may have no value, or `None` if all values are
+    /// defined. Free variables range over all objects.
     fn undefined<'c>(&self, condition: &'c Condition, binding: &mut Binding) -> Option<&'c Name> {
         match condition {
             Condition::Exists(variables, body) | Condition::ForAll(variables, body) => {
@@ -107,7 +107,8 @@ impl<'t> Initial<'t> {
         instances.is_some_and(|instances| with_value >= instances)
     }
 
-    /// Returns the truth value in Kleene's logic, or `None` if it depends on an undefined value.
+    /// Returns the truth value of a condition in Kleene's three-valued logic. `None` means that it depends on
+    /// an undefined value.
     fn truth(&self, condition: &Condition, binding: &mut Binding) -> Option<bool> {
         match condition {
             Condition::And(parts) | Condition::Or(parts) => {
@@ -171,7 +172,7 @@ impl<'t> Initial<'t> {
     }
 }
 
-/// Disjunction or conjunction of truth values in Kleene's logic.
+/// Disjunction or conjunction of truth values in Kleene's three-valued logic; `None` is the unknown value.
 fn kleene(truths: &[Option<bool>], is_disjunction: bool) -> Option<bool> {
     if truths.contains(&Some(is_disjunction)) {
         return Some(is_disjunction);

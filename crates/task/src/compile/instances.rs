@@ -1,4 +1,4 @@
-//! Objects by type, and substitution of objects for variables.
+//! Enumerates objects by type, and substitutes objects for the variables of conditions.
 
 use crate::limits::Limits;
 use pddl::TypeHierarchy;
@@ -6,14 +6,15 @@ use pddl::ast::{Atom, Condition, Domain, Expression, Name, Problem, Term, TypeEx
 
 use super::simplify::identifier;
 
-/// The objects of a task with the types of their declarations.
+/// The objects of a task, each with the types of all its declarations.
 pub(super) struct Objects<'t> {
     types: TypeHierarchy,
     all: Vec<(&'t Name, Vec<&'t TypeExpression>)>,
     limits: &'t Limits,
 }
 
-/// Terms of variables, innermost last.
+/// Terms assigned to variables. The innermost variable comes last and shadows earlier variables with an equal
+/// name.
 pub(super) type Binding = Vec<(Name, Term)>;
 
 impl<'t> Objects<'t> {
@@ -30,14 +31,14 @@ impl<'t> Objects<'t> {
         Self { types: TypeHierarchy::of(domain), all: objects, limits }
     }
 
-    /// Returns the objects of a type.
+    /// Returns the objects that belong to the type `wanted` or to a subtype.
     pub(super) fn members(&self, wanted: &TypeExpression) -> impl Iterator<Item = &'t Name> {
         let fits = |types: &[&TypeExpression]| types.iter().any(|given| self.types.fits(given, wanted));
         self.all.iter().filter(move |(_, types)| fits(types)).map(|(name, _)| *name)
     }
 
-    /// Returns all bindings of some variables, each appended to a binding. The iterator ends at a
-    /// limit, so callers must check the limits afterwards.
+    /// Returns every extension of `binding` by objects for `variables`. The iterator stops early if a limit
+    /// is reached, so callers must check the limits afterwards.
     pub(super) fn bindings(
         &self,
         variables: &[TypedName],
@@ -58,7 +59,8 @@ impl<'t> Objects<'t> {
     }
 }
 
-/// Returns the next positions in lists of these sizes, in lexicographic order.
+/// Returns the position tuple after `positions` in lexicographic order, or `None` after the last tuple. Each
+/// position is less than its size.
 fn following(positions: &[usize], sizes: &[usize]) -> Option<Vec<usize>> {
     let mut next = positions.to_vec();
     for (position, size) in next.iter_mut().zip(sizes).rev() {
@@ -71,8 +73,8 @@ fn following(positions: &[usize], sizes: &[usize]) -> Option<Vec<usize>> {
     None
 }
 
-/// Substitutes objects for the variables of a condition. Quantified variables are renamed to names
-/// that no action uses; `fresh` counts them.
+/// Returns the condition with objects substituted for its variables. Quantified variables get new names that
+/// no action uses; `fresh` is the counter for these names.
 #[expect(clippy::arithmetic_side_effects, reason = "as many bindings were pushed as are taken off")]
 pub(super) fn instance(condition: &Condition, binding: &mut Binding, fresh: &mut u64) -> Condition {
     use Condition as C;

@@ -1,18 +1,20 @@
-//! Compiles preferences and trajectory constraints of PDDL 3 to PDDL 2, on the syntax tree before
-//! names are resolved.
+//! Compiles preferences and trajectory constraints of PDDL 3 to PDDL 2. Works on the syntax tree before names
+//! are resolved.
 //!
-//! Each instance of a constraint gets atoms that store the state of its automaton, and each action
-//! gets effects on them. A condition on the state *after* an action is regressed to the state
-//! before it (`regress`), so plans have no additional states. Requirements become conditions of
-//! actions and of the goal. Preferences are evaluated after the plan by hidden actions
-//! (`preferences`): each one is either satisfied or costs what the metric specifies (A. Gerevini et
-//! al.: Deterministic planning in the fifth international planning competition, Artificial
-//! Intelligence 173, 2009; regression after L. Bonassi et al.: On planning with qualitative
-//! state-trajectory constraints in PDDL3 by compiling them away, ICAPS 2021; preferences after E.
-//! Keyder, H. Geffner: Soft goals can be compiled away, JAIR 36, 2009). With overlapping actions,
-//! the hidden actions are never executed: their conditions are evaluated in the last state.
+//! Each instance of a constraint is an automaton. Auxiliary atoms store its state, and additional effects of
+//! the actions update these atoms. A condition on the state *after* an action is regressed to the state
+//! before the action (`regress`) [1], so plans have no additional states. Hard constraints become conditions
+//! of actions and of the goal. Preferences are evaluated after the plan by hidden actions (`preferences`)
+//! [2]: each preference is satisfied or costs what the metric specifies [3]. If actions may overlap, the
+//! hidden actions are never executed; their conditions are evaluated in the last state.
 //!
-//! Auxiliary names contain a space, so no file can use them.
+//! \[1\] L. Bonassi et al.: On planning with qualitative state-trajectory constraints in PDDL3 by compiling
+//! them away, ICAPS 2021.
+//! \[2\] E. Keyder, H. Geffner: Soft goals can be compiled away, JAIR 36, 2009.
+//! \[3\] A. Gerevini et al.: Deterministic planning in the fifth international planning competition,
+//! Artificial Intelligence 173, 2009.
+//!
+//! Names of auxiliary atoms and actions contain a space, so no name in a PDDL file can equal them.
 
 mod deadline;
 mod initial;
@@ -36,38 +38,39 @@ pub use semantics::PlanSemantics;
 use syntax_edits::unsupported;
 use trajectory_monitors::Monitors;
 
-/// A task without preferences and constraints.
+/// A task whose preferences and trajectory constraints have been compiled away.
 pub struct CompiledTask<'t> {
     pub domain: Cow<'t, Domain>,
     pub problem: Cow<'t, Problem>,
     pub objectives: Cow<'t, [Metric]>,
-    /// Deadlines, which are checked when the times of a plan are known.
+    /// Deadlines (`always-within`), which are checked once the times of a plan are known.
     pub deadlines: Vec<Deadline>,
-    /// `true` if the compilation adds no separation between happenings. Irrelevant for sequential
-    /// plans.
+    /// `true` if the compilation does not constrain the times of happenings beyond the original task.
+    /// Irrelevant for sequential plans.
     pub is_exact: bool,
 }
 
-/// Returns `true` if there is anything to compile.
+/// Returns `true` if the task has trajectory constraints or preferences, i.e. if [`compile`] would change the
+/// task.
 pub fn is_needed(domain: &Domain, problem: &Problem) -> bool {
     constraints(domain, problem).next().is_some()
         || domain.actions.iter().any(|action| !action.preferences.is_empty())
 }
 
-/// Returns `true` for the name of an auxiliary action that evaluates preferences.
+/// Returns `true` if the name belongs to an auxiliary action, which evaluates a preference or deadline.
 pub fn is_hidden(action: &str) -> bool {
     action.contains(' ')
 }
 
-/// Returns `true` for the name of an action that evaluates a preference as violated.
+/// Returns `true` if the name belongs to an auxiliary action that evaluates a preference as violated.
 pub fn is_violation(action: &str) -> bool {
     is_hidden(action) && action.ends_with(preferences::VIOLATION)
 }
 
-/// Compiles preferences and constraints away. Preferences that no objective uses are dropped.
+/// Compiles preferences and trajectory constraints away. Preferences that no objective mentions are dropped.
 ///
 /// # Errors
-/// All unsupported constraints with their source locations, or a reached limit.
+/// Returns all unsupported constraints with their source locations, or an error if a limit is reached.
 pub fn compile<'t>(
     domain: &'t Domain,
     problem: &'t Problem,
@@ -122,7 +125,7 @@ pub fn compile<'t>(
         name_violations(&mut metric.expression);
     }
     if !used_preferences.is_empty() {
-        // The preconditions of preferences of an action count as reads.
+        // The separation of happenings applies to the conditions of action preferences as to all conditions.
         let mut preferences = task.0.actions.iter().flat_map(|action| &action.preferences);
         is_exact &= !preferences.any(|preference| used_preferences.contains(&preference.name.name));
         preferences::install(&mut task.0, &mut task.1, (wanted, &used_preferences), course);
@@ -142,7 +145,7 @@ fn constraints<'t>(
     of_domain.chain(problem.constraints.iter().map(|constraint| (File::Problem, constraint)))
 }
 
-/// Returns the preference of `(is-violated NAME)`.
+/// Returns the preference name of an expression `(is-violated NAME)`, and `None` for other expressions.
 fn violation(expression: &Expression) -> Option<&Name> {
     match expression {
         Expression::Fluent(atom) if atom.predicate.name == Name::new("is-violated") => {
@@ -155,7 +158,7 @@ fn violation(expression: &Expression) -> Option<&Name> {
     }
 }
 
-/// Returns the preferences that some objectives use, without duplicates.
+/// Returns the names of the preferences that the objectives mention, without duplicates.
 fn preferences_in(objectives: &[Metric]) -> Vec<Name> {
     fn walk(expression: &Expression, found: &mut Vec<Name>) {
         if let Some(name) = violation(expression).filter(|name| !found.contains(name)) {
@@ -174,7 +177,7 @@ fn preferences_in(objectives: &[Metric]) -> Vec<Name> {
     preferences
 }
 
-/// Replaces the number of violations of each preference by a numeric function.
+/// Replaces each `(is-violated NAME)` by the numeric function that counts the violations of the preference.
 fn name_violations(expression: &mut Expression) {
     if let Some(name) = violation(expression).cloned() {
         *expression = Expression::Fluent(preferences::count(&name));

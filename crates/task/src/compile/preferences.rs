@@ -1,13 +1,13 @@
-//! Compiles preferences to hidden actions that evaluate the preferences after the plan.
+//! Compiles preferences to hidden actions that evaluate the preferences after the last action of the plan.
 //!
-//! Each instance gets two hidden actions: one for its satisfaction, and one for its violation, which
-//! has a cost. Exactly one of the two is applicable. The instances have a fixed order, and the hidden
-//! actions change only their own atoms and the counts of violations. Every plan thus has exactly one
-//! evaluation.
+//! Each preference instance gets two hidden actions. One requires that the instance is satisfied; the other
+//! requires that the instance is violated, and increases the count of violations. Exactly one of the two is
+//! applicable. The instances are evaluated in a fixed order, and the hidden actions change only auxiliary
+//! atoms and the counts. Every plan thus has exactly one evaluation.
 //!
-//! If actions can overlap, hidden actions would extend the makespan. Each instance then gets one
-//! action that is never executed. Its precondition is the violation of the instance, and is
-//! evaluated in the last state.
+//! If actions may overlap, executed hidden actions would extend the makespan. Each instance then gets one
+//! hidden action that is never executed. Its precondition is the violation of the instance, and is evaluated
+//! in the last state.
 
 use num_rational::BigRational;
 use num_traits::{One, Zero};
@@ -21,16 +21,17 @@ use super::semantics::PlanSemantics;
 use super::simplify::{all, flag, holds, not};
 use super::syntax_edits::{PreferenceInstance, declare, happen, hidden, require};
 
-/// Auxiliary atom that holds while actions can be executed.
+/// Auxiliary atom that holds until the evaluation of preferences begins. Actions of the domain require it.
 const GOING_ON: &str = "the plan goes on";
 
-/// Suffix of the names of actions that evaluate an instance as violated.
+/// Suffix of the name of each hidden action that evaluates a preference instance as violated.
 pub(super) const VIOLATION: &str = " is violated";
 
-/// Auxiliary atom that is never true.
+/// Auxiliary atom that is never true. Hidden actions that are never executed add it, so that they have an
+/// effect.
 const VIOLATED: &str = "a preference is violated";
 
-/// Returns the function that counts the violations of a preference.
+/// Returns the numeric function that counts the violations of a preference.
 pub(super) fn count(preference: &Name) -> Atom {
     flag(&format!("violations of {preference}"))
 }
@@ -40,7 +41,8 @@ fn violate(preference: &Name) -> Effect {
     Effect::Assign(Assignment::Increase, count(preference), unit, Span::default())
 }
 
-/// Adds the preferences that objectives use.
+/// Adds the hidden actions and violation counts of preferences to the task. Only preferences that the
+/// objectives mention are added.
 pub(super) fn install(
     domain: &mut Domain,
     problem: &mut Problem,
@@ -62,7 +64,8 @@ pub(super) fn install(
     }
 }
 
-/// Adds the actions that evaluate preferences after the plan.
+/// Adds hidden actions that are executed after a sequential plan and evaluate the preferences in a fixed
+/// order.
 fn follow(domain: &mut Domain, problem: &mut Problem, wanted: Vec<PreferenceInstance>) {
     declare(domain, GOING_ON);
     problem.init.push(InitialElement::Fact(flag(GOING_ON)));
@@ -75,7 +78,7 @@ fn follow(domain: &mut Domain, problem: &mut Problem, wanted: Vec<PreferenceInst
     for ((name, condition), number) in wanted.into_iter().zip(1_u64..) {
         let after = format!("{number} preferences are judged");
         declare(domain, &after);
-        // The goal must hold at the first evaluation, and the state is unchanged afterwards.
+        // The goal must hold at the first evaluation. The later evaluations change no atom of the goal.
         let ready = all([holds(&before)].into_iter().chain(first.take()));
         let pass = [Effect::Delete(flag(&before)), Effect::Add(flag(&after))];
         let met = (format!("preference {number} is met"), condition.clone(), None);
@@ -92,7 +95,8 @@ fn follow(domain: &mut Domain, problem: &mut Problem, wanted: Vec<PreferenceInst
     problem.goal = holds(&before);
 }
 
-/// Adds the actions whose precondition is the violation of an instance.
+/// Adds one hidden action for each preference instance. Its precondition is the violation of the instance; it
+/// is never executed.
 fn look_up(domain: &mut Domain, span: Span, wanted: Vec<PreferenceInstance>) {
     if !wanted.is_empty() {
         declare(domain, VIOLATED);
@@ -106,7 +110,7 @@ fn look_up(domain: &mut Domain, span: Span, wanted: Vec<PreferenceInstance>) {
     }
 }
 
-/// Makes an action count the violations of its own preferences.
+/// Adds conditional effects to an action, which count the violations of the preferences in its preconditions.
 fn count_preferences(action: &mut Action, used_preferences: &[Name]) {
     let preferences = std::mem::take(&mut action.preferences);
     for preference in

@@ -8,30 +8,32 @@ use pddl::ast::{
 
 use super::simplify::{all, any, equal, exists, falsity, is_false, not};
 
-/// Limit on the number of cases of a comparison, by which of its functions change.
+/// Limit on the number of cases of a regressed comparison. A case fixes which of the compared functions
+/// change.
 const MAX_CASES: usize = 64;
 
-/// Changes of a happening of an action.
+/// The effects of one happening of an action: its start or its end.
 pub(super) struct Happening {
     changes: Vec<Change>,
 }
 
-/// An effect with its quantifiers and conditions.
+/// A single effect with the quantified variables and conditions around it.
 struct Change {
     bound: Vec<TypedName>,
     conditions: Vec<Condition>,
     effect: Effect,
 }
 
-/// A case of how functions change: its condition and the new value of each function.
+/// One case of a case distinction over numeric effects: the condition of the case, and the value of each
+/// function after the happening.
 type Way = (Condition, Vec<(Atom, Expression)>);
 
-/// Reason why a condition cannot be regressed.
+/// Reason why a condition cannot be regressed, as a noun phrase for the error message.
 pub(super) struct NotRegressable(pub(super) &'static str);
 
 impl Happening {
-    /// Returns the changes of an action at a time. All changes of an instantaneous action are at
-    /// its start.
+    /// Collects the effects of an action at its start or end. An instantaneous action has effects at its
+    /// start only.
     pub(super) fn of(action: &Action, time: EffectTime) -> Self {
         let mut changes = Vec::new();
         match &action.body {
@@ -48,7 +50,7 @@ impl Happening {
         Self { changes }
     }
 
-    /// Returns `true` if the happening changes a value of the function.
+    /// Returns `true` if an effect of the happening assigns to a numeric function with this name.
     pub(super) fn changes_function(&self, name: &Name) -> bool {
         self.changes
             .iter()
@@ -56,7 +58,8 @@ impl Happening {
             .any(|(own, numeric)| numeric && own.predicate.name == *name)
     }
 
-    /// Returns the condition under which the happening may change the truth of a closed condition.
+    /// Returns the condition under which the happening may change the truth value of `condition`, which has
+    /// no free variables.
     pub(super) fn touches(&self, condition: &Condition) -> Condition {
         let mut conditions_of_change = Vec::new();
         self.touching(condition, &mut Vec::new(), &mut conditions_of_change);
@@ -84,8 +87,8 @@ impl Happening {
         }
     }
 
-    /// Adds the conditions under which an atom or a function changes, for any values of the
-    /// variables in `inner`.
+    /// Adds to `found` the conditions under which an effect changes the atom or function. The variables in
+    /// `inner` may have any value.
     fn touched(&self, atom: &Atom, is_function: bool, inner: &[TypedName], found: &mut Vec<Condition>) {
         for change in &self.changes {
             let (target, numeric) = target(&change.effect);
@@ -105,7 +108,7 @@ impl Happening {
         }
     }
 
-    /// Regresses a condition to the state before the happening.
+    /// Returns the condition on the state before the happening that is equivalent to `condition` after it.
     pub(super) fn regress(&self, condition: &Condition) -> Result<Condition, NotRegressable> {
         let each =
             |parts: &[Condition]| parts.iter().map(|part| self.regress(part)).collect::<Result<Vec<_>, _>>();
@@ -142,7 +145,7 @@ impl Happening {
         })
     }
 
-    /// Returns the condition under which an atom changes.
+    /// Returns the condition under which an effect for which `is_kind` returns `true` changes the atom.
     fn occurs(&self, atom: &Atom, is_kind: impl Fn(&Effect) -> bool) -> Condition {
         let changes = self.changes.iter().filter(|change| is_kind(&change.effect));
         any(changes.map(|change| {
@@ -155,7 +158,8 @@ impl Happening {
         }))
     }
 
-    /// Returns all cases of how functions change.
+    /// Returns all cases of a case distinction over the effects on the functions. Each case gives a new value
+    /// for every function.
     fn ways(&self, functions: &[Atom]) -> Result<Vec<Way>, NotRegressable> {
         let mut ways = vec![(super::simplify::truth(), Vec::new())];
         for function in functions {
@@ -195,7 +199,7 @@ impl Happening {
 }
 
 impl Change {
-    /// Returns the condition under which the change affects this atom.
+    /// Returns the condition under which this change applies, and `target` and `atom` have equal arguments.
     fn hits(&self, target: &Atom, atom: &Atom) -> Condition {
         let matches = target.arguments.iter().zip(&atom.arguments).map(|(changed, own)| equal(changed, own));
         all(self.conditions.iter().cloned().chain(matches))
@@ -224,7 +228,7 @@ fn flatten(effect: &Effect, bound: &[TypedName], conditions: &[Condition], out: 
     }
 }
 
-/// Returns the target of an effect, and `true` if the target is a number.
+/// Returns the atom or function that an effect changes. The second part is `true` for a numeric function.
 fn target(effect: &Effect) -> (&Atom, bool) {
     match effect {
         Effect::Assign(_, target, ..) => (target, true),
@@ -247,7 +251,7 @@ fn is_same(left: &Atom, right: &Atom) -> bool {
     is_same_symbol(left, right) && left.arguments.iter().zip(&right.arguments).all(is_equal)
 }
 
-/// Collects the functions of an expression without duplicates.
+/// Adds the numeric functions of an expression to `found`, without duplicates.
 fn functions_of(expression: &Expression, found: &mut Vec<Atom>) {
     expression.walk_fluents(&mut |atom| {
         if !found.iter().any(|known| is_same(known, atom)) {
@@ -270,7 +274,8 @@ fn substitute(expression: &Expression, values: &[(Atom, Expression)]) -> Express
     }
 }
 
-/// Returns the value after an assignment.
+/// Returns the value of a function after an assignment, where `value` is its value before and `by` is the
+/// operand.
 fn changed(kind: Assignment, value: &Expression, by: &Expression) -> Expression {
     let with = |operation| Expression::Operation(operation, vec![value.clone(), by.clone()], Span::default());
     match kind {

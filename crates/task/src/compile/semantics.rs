@@ -2,11 +2,11 @@
 
 use num_rational::BigRational;
 
-/// Execution semantics of a plan.
+/// Execution semantics of plans.
 #[derive(Clone, Copy)]
 pub enum PlanSemantics<'c> {
-    /// Sequential execution.
+    /// Actions are executed one after another.
     Sequence,
-    /// Actions may overlap. Interfering happenings are separated by this time.
+    /// Actions may overlap. The number is the minimum time between interfering happenings.
     Overlapping(&'c BigRational),
 }

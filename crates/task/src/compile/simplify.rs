@@ -1,4 +1,4 @@
-//! Simplifies generated conditions.
+//! Constructors of conditions that simplify their operands.
 
 use pddl::ast::{Atom, Condition, Identifier, Name, Span, Term, TypedName};
 
@@ -6,7 +6,7 @@ pub(super) fn identifier(name: &str) -> Identifier {
     Identifier { name: Name::new(name), span: Span::default() }
 }
 
-/// Returns an atom without arguments.
+/// Returns an atom without arguments with this predicate name.
 pub(super) fn flag(name: &str) -> Atom {
     Atom { predicate: identifier(name), arguments: Vec::new(), span: Span::default() }
 }
@@ -80,12 +80,12 @@ pub(super) fn exists(variables: &[TypedName], body: Condition) -> Condition {
     Condition::Exists(variables.to_vec(), Box::new(body))
 }
 
-/// Returns the disjuncts of a condition.
+/// Returns the disjuncts of a disjunction. Another condition is its only disjunct.
 pub(super) fn ways(condition: Condition) -> Vec<Condition> {
     if let Condition::Or(parts) = condition { parts } else { vec![condition] }
 }
 
-/// Simplifies a condition under the assumption that another one holds.
+/// Simplifies `condition` under the assumption that `known` holds.
 pub(super) fn assume(condition: &Condition, known: &Condition) -> Condition {
     if format!("{condition:?}") == format!("{known:?}") {
         return truth();

@@ -1,4 +1,4 @@
-//! Additions to the syntax trees of actions and domains.
+//! Adds conditions and effects to actions, and predicates and hidden actions to domains.
 
 use crate::error::{Error, File, Place};
 use pddl::ast::{
@@ -7,20 +7,20 @@ use pddl::ast::{
 
 use super::simplify::{all, identifier};
 
-/// An instance of a preference: its name and the condition on the last state.
+/// A preference instance: the name of the preference, and its condition on the last state.
 pub(super) type PreferenceInstance = (Name, Condition);
 
-/// Declares a predicate without parameters.
+/// Adds a predicate without parameters to the domain.
 pub(super) fn declare(domain: &mut Domain, name: &str) {
     domain.predicates.push(Declaration { identifier: identifier(name), parameters: Vec::new() });
 }
 
-/// Returns an auxiliary action without parameters, hidden from users.
+/// Returns an auxiliary action without parameters, which plans do not show.
 pub(super) fn hidden(name: &str, body: ActionBody, span: Span) -> Action {
     Action { identifier: identifier(name), parameters: Vec::new(), body, preferences: Vec::new(), span }
 }
 
-/// Adds a condition to an action, on the state before its happening at a time.
+/// Adds a condition to an action. It must hold in the state before the start or the end of the action.
 pub(super) fn require(action: &mut Action, time: EffectTime, condition: Condition) {
     match &mut action.body {
         ActionBody::Instantaneous { precondition, .. } => {
@@ -37,7 +37,7 @@ pub(super) fn require(action: &mut Action, time: EffectTime, condition: Conditio
     }
 }
 
-/// Adds an effect to an action at a time.
+/// Adds an effect to an action, at its start or its end.
 pub(super) fn happen(action: &mut Action, time: EffectTime, more: Effect) {
     match &mut action.body {
         ActionBody::Instantaneous { effect, .. } => {
@@ -48,7 +48,7 @@ pub(super) fn happen(action: &mut Action, time: EffectTime, more: Effect) {
     }
 }
 
-/// Error about an unsupported construct.
+/// Creates an error about an unsupported construct; `instead` describes a supported alternative.
 pub(super) fn unsupported(
     construct: impl Into<String>,
     instead: impl Into<String>,

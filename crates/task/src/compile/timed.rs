@@ -1,7 +1,9 @@
-//! Constraints on times with overlapping actions: timed initial literals mark the times.
+//! Compiles trajectory constraints that mention times (`within`, `hold-during`, `hold-after`,
+//! `always-within`). Timed initial literals mark these times, and actions may overlap.
 //!
-//! Happenings read these literals, so they are separated from them. The literals are therefore
-//! shifted by the separation, so that happenings at the specified time remain possible.
+//! The added effects of actions read these literals, so every happening is separated from each literal by
+//! epsilon. The literals are shifted by this separation, so that actions can still happen at the specified
+//! times.
 
 use num_rational::BigRational;
 use num_traits::{Signed, Zero};
@@ -16,7 +18,8 @@ use super::syntax_edits::unsupported;
 use super::trajectory_monitors::{Addition, Monitors, decided};
 
 impl Monitors<'_> {
-    /// Returns the separation of interfering happenings.
+    /// Returns the minimum time between interfering happenings. Sequential plans have no times, so they cause
+    /// an error.
     fn separation(&self, place: (File, Span)) -> Result<BigRational, Error> {
         match self.course {
             PlanSemantics::Overlapping(separation) => Ok(separation.clone()),
@@ -28,7 +31,7 @@ impl Monitors<'_> {
         }
     }
 
-    /// Returns the atom that is added at a time above 0.
+    /// Returns an atom that a timed initial literal adds at `time`, which is above 0.
     fn moment(&mut self, time: BigRational) -> Condition {
         let name = format!("time {time} has come");
         let is_declared = self.moments.iter().any(|(is_declared, _)| *is_declared == name);
@@ -55,8 +58,8 @@ impl Monitors<'_> {
         Ok(holds(&met))
     }
 
-    /// Monitors a condition that must hold in the state at a time and in all later states,
-    /// optionally until another time.
+    /// Monitors `what`, which must hold in the state at time `from` and in all later states, until time
+    /// `until` if given. Returns the condition on the last state.
     pub(super) fn hold(
         &mut self,
         (from, until): (&BigRational, Option<&BigRational>),
@@ -70,7 +73,7 @@ impl Monitors<'_> {
         if from.is_negative() && !is_asked(&zero) {
             return Ok(decided(true));
         }
-        // The initial state and a later one may both have time 0.
+        // The initial state and later states may all have time 0.
         let at_first = from.is_positive() || !is_asked(&zero) || self.initial.holds(what);
         let broken = if hard { None } else { Some(self.remember("is broken", !at_first)) };
         let looked_at = self.remember("was looked at", false);
@@ -96,8 +99,8 @@ impl Monitors<'_> {
         Ok(all([satisfied, any([holds(&looked_at), what.clone()])]))
     }
 
-    /// During search, the constraint counts as satisfied while no deadline is pending. The
-    /// deadlines are checked when the times are known.
+    /// Monitors a deadline and returns the condition on the last state. During search, the constraint counts
+    /// as satisfied while no deadline is pending; the deadlines are checked once the times are known.
     pub(super) fn always_within(
         &mut self,
         within: &BigRational,
@@ -111,15 +114,14 @@ impl Monitors<'_> {
         }
         let deadline = Deadline::new(within.clone(), hard, self.deadlines.len());
         let begun = self.remember("has begun", self.initial.holds(first) && !self.initial.holds(second));
-        // Starts of the deadline are separated from its ends, so that a start can be delayed after
-        // the end.
+        // Happenings that may start the deadline are separated from happenings that may end it, so that a
+        // start can be delayed until after an end.
         self.after_each(&[first, second], place, |touched, after| {
             let begins = all([touched, after[0].clone(), not(after[1].clone())]);
             Addition::notes(begins, Effect::Add(flag(&begun)))
         })?;
         let (noted, last) = if hard {
-            // The search evaluates this effect to detect pending deadlines; the action is never
-            // executed.
+            // This action is never executed. The search evaluates the effect to detect a pending deadline.
             (Effect::When(holds(&begun), Box::new(Effect::Add(flag(LOOKED_AT)))), truth())
         } else {
             let satisfied = self.remember("is kept", false);

@@ -1,5 +1,5 @@
-//! Monitors of trajectory constraints: the atoms that store the state of each automaton, and the
-//! effects that update them.
+//! Monitors of trajectory constraints: auxiliary atoms store the state of an automaton for each constraint,
+//! and additional effects of actions update them.
 
 use num_rational::BigRational;
 use num_traits::{Signed, Zero};
@@ -20,34 +20,34 @@ use super::semantics::PlanSemantics;
 use super::simplify::{all, any, assume, flag, holds, is_false, is_true, not, ways};
 use super::syntax_edits::{PreferenceInstance, declare, happen, require, unsupported};
 
-/// Limit on the total number of instances of constraints.
+/// Limit on the total number of ground instances of trajectory constraints and preferences.
 const INSTANCES: usize = 20_000;
 
-/// Monitors of the added constraints.
+/// Collects the auxiliary atoms, conditions and effects for all trajectory constraints of a task.
 pub(super) struct Monitors<'t> {
     domain: &'t Domain,
     problem: &'t Problem,
     objects: &'t Objects<'t>,
     pub(super) initial: Initial<'t>,
-    /// Additional conditions and effects by action and time.
+    /// Additional conditions and effects of each action: at its start, and at its end.
     additions: Vec<[Addition; 2]>,
-    /// Monitor atoms with their initial truth values.
+    /// Names of the auxiliary atoms, with their initial truth values.
     memory: Vec<(String, bool)>,
-    /// Conditions on the last state.
+    /// Additional goal conditions from hard constraints.
     goals: Vec<Condition>,
     wanted: Vec<PreferenceInstance>,
-    /// Atoms that timed initial literals add, with their times.
+    /// Names of the auxiliary atoms that timed initial literals add, with their times.
     pub(super) moments: Vec<(String, BigRational)>,
     pub(super) course: PlanSemantics<'t>,
-    /// Deadlines: the two conditions, and the effect that records satisfaction.
+    /// Deadlines, each with its two conditions and the effect that records its satisfaction.
     pub(super) deadlines: Vec<(Deadline, [Condition; 2], Effect)>,
-    /// `true` if the compilation restricts durations further than the files.
+    /// `true` if an action gets a condition that its duration is positive, although the PDDL files allow 0.
     narrows: bool,
     instances: usize,
     fresh: u64,
 }
 
-/// Additional conditions and effects of a happening.
+/// Conditions and effects that monitors add to the start or the end of an action.
 #[derive(Default)]
 pub(super) struct Addition {
     conditions: Vec<Condition>,
@@ -81,12 +81,13 @@ impl<'t> Monitors<'t> {
         }
     }
 
-    /// Whether a condition of an action always is true or false.
+    /// Checks that all numeric functions in a condition have initial values. Returns an error at `place` if
+    /// not.
     pub(super) fn is_defined(&self, condition: &Condition, place: (File, Span)) -> Result<(), Error> {
         self.initial.is_defined(condition, place)
     }
 
-    /// Adds a constraint.
+    /// Adds monitors for all instances of a constraint.
     pub(super) fn add_constraint(&mut self, file: File, constraint: &Constraint) -> Result<(), Error> {
         for binding in self.objects.bindings(&constraint.variables, &Vec::new()) {
             let place = (file, constraint.span);
@@ -100,8 +101,8 @@ impl<'t> Monitors<'t> {
         Ok(())
     }
 
-    /// Adds the monitor of a trajectory and returns the condition on the last state. A `hard`
-    /// trajectory may also restrict actions.
+    /// Adds the monitor of a ground trajectory constraint and returns its condition on the last state. Only a
+    /// `hard` constraint may add preconditions to actions.
     fn trajectory(
         &mut self,
         trajectory: &Trajectory,
@@ -169,16 +170,17 @@ impl<'t> Monitors<'t> {
         }
     }
 
-    /// Adds an atom for the state of the current instance.
+    /// Declares an auxiliary atom for the monitor of the current constraint instance and returns its name.
+    /// `at_first` is its initial truth value.
     pub(super) fn remember(&mut self, what: &str, at_first: bool) -> String {
         let name = format!("instance {} {what}", self.instances);
         self.memory.push((name.clone(), at_first));
         name
     }
 
-    /// Calls `make` for each happening of each action that may change one of the conditions, with
-    /// the condition of the change and the regressed conditions, and adds the result to the
-    /// happening.
+    /// Calls `make` for each start or end of an action that may change one of the conditions, and adds the
+    /// result to the action. The arguments of `make` are the condition under which a change occurs, and the
+    /// regressed conditions.
     pub(super) fn after_each(
         &mut self,
         conditions: &[&Condition],
@@ -234,7 +236,8 @@ impl<'t> Monitors<'t> {
         Ok(())
     }
 
-    /// Returns `true` if the monitors neither forbid a happening nor make two happenings interfere.
+    /// Returns `true` if the monitors neither add preconditions nor make two actions interfere, so that they
+    /// do not restrict the times of actions.
     pub(super) fn keeps_apart_nothing(&self) -> bool {
         let is_plain = |addition: &Addition| {
             addition.conditions.is_empty()
@@ -248,7 +251,8 @@ impl<'t> Monitors<'t> {
         !self.narrows && self.deadlines.is_empty() && self.additions.iter().flatten().all(is_plain)
     }
 
-    /// Checks that only actions change a condition.
+    /// Checks that only effects of actions can change a condition: it has no derived predicates and no timed
+    /// initial literals.
     pub(super) fn can_be_watched(&self, condition: &Condition, place: (File, Span)) -> Result<(), Error> {
         let mut predicates = FxHashSet::default();
         predicates_of(condition, &mut predicates);
@@ -349,8 +353,8 @@ impl<'t> Monitors<'t> {
         Ok(broken.map_or(decided(!at_first), |broken| not(holds(&broken))))
     }
 
-    /// Applies the monitors to the task. Returns the preferences with their conditions on the last
-    /// state, and the deadlines.
+    /// Adds the collected atoms, conditions, effects and goals to the task. Returns the preference instances
+    /// and the deadlines.
     pub(super) fn install(
         self,
         domain: &mut Domain,
@@ -397,7 +401,8 @@ impl Addition {
         Self { conditions: Vec::new(), effects: vec![effect] }
     }
 
-    /// Excludes a violation, or records it in an atom.
+    /// Forbids the state transition in which `what` holds, or records the violation in the atom `broken` if
+    /// one is given.
     pub(super) fn forbid(&mut self, what: Condition, broken: Option<&str>) {
         match broken {
             None => self.conditions.push(not(what)),
@@ -406,7 +411,8 @@ impl Addition {
     }
 }
 
-/// Returns `true` if a condition depends only on the objects of an action.
+/// Returns `true` if a condition contains no atoms and no numeric comparisons, and so does not depend on the
+/// state.
 fn reads_nothing(condition: &Condition) -> bool {
     let mut reads = false;
     condition.walk(&mut |node| {
@@ -423,7 +429,8 @@ fn predicates_of<'c>(condition: &'c Condition, found: &mut FxHashSet<&'c pddl::a
     condition.walk(&mut |node| found.extend(node.atom().map(|atom| &atom.predicate.name)));
 }
 
-/// Returns the condition that an action with a fixed duration takes time.
+/// Returns the condition that the fixed duration of an action is above 0. Returns `None` without a fixed
+/// duration.
 fn positive(action: &Action) -> Option<Condition> {
     let ActionBody::Durative { duration, .. } = &action.body else { return None };
     let [DurationConstraint { operator: Comparison::Equal, expression, span, .. }] = &duration[..] else {
@@ -433,7 +440,7 @@ fn positive(action: &Action) -> Option<Condition> {
     Some(Condition::Compare(Comparison::Greater, expression.clone(), zero, *span))
 }
 
-/// Returns `true` if the start and end of an action are always distinct.
+/// Returns `true` if an action never starts and ends at equal times. The check is conservative.
 fn takes_time(domain: &Domain, problem: &Problem, action: &Action) -> bool {
     let ActionBody::Durative { duration, .. } = &action.body else { return true };
     let [DurationConstraint { operator, expression, .. }] = &duration[..] else { return false };

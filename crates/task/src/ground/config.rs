@@ -1,23 +1,23 @@
-//! Configuration of grounding: the roles of the domain's symbols, and the generality of the ground task.
+//! Configuration of grounding: the roles of the domain's symbols, and generality beyond the given problem.
 
 use crate::limits::Limits;
 use crate::number::Int;
 use pddl::ast::{Metric, Name};
 
-/// Interpretation of the domain's symbols. Each `with_` method changes a single setting.
+/// Configuration of grounding: the roles of predicates, the objectives and the limits.
 #[derive(Debug, Clone)]
 pub struct GroundConfig {
     /// Predicates `(p DESIGN FUNCTION)` that state which design solves which function.
     pub solves: Vec<Name>,
-    /// Objectives in lexicographic order that replace the metric of the problem; empty for that
-    /// metric.
+    /// Objectives in lexicographic order, which replace the metric of the problem. If empty, the metric is
+    /// used.
     pub objectives: Vec<Metric>,
-    /// Limits of grounding.
+    /// Time and memory limits of grounding.
     pub limits: Limits,
 }
 
 impl Default for GroundConfig {
-    /// Returns the names of the Metaplan paper and of the files of kas-lab.
+    /// Uses the predicate names of the Metaplan paper and of the PDDL files of kas-lab.
     fn default() -> Self {
         Self {
             solves: ["fd_solve_f", "fd_solves_f", "inferred-SolvesF", "solvesF"].map(Name::new).to_vec(),
@@ -47,18 +47,19 @@ impl GroundConfig {
     }
 }
 
-/// Requirements on a ground task beyond the given problem.
+/// Requirements on a ground task that must stay valid for changed initial values, not only for the given
+/// problem.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Generality {
-    /// If set, the initial numbers may be replaced by other multiples of the reciprocal of this
-    /// factor. Nothing is then inferred from the initial numbers of the problem.
+    /// If set, each initial number may be replaced by any multiple of 1/factor. Grounding then infers nothing
+    /// from the initial numbers of the problem.
     pub numbers: Option<Int>,
-    /// If set, multiplying by this factor makes all numbers integers.
+    /// If set, a factor whose product with each number of the task is an integer.
     pub precision: Option<Int>,
-    /// If set, a metric may contain fluents whose changes depend on the state. Optimality is then
-    /// not provable.
+    /// If set, the metric may contain fluents that effects change by state-dependent amounts. Optimality is
+    /// then not provable.
     pub measures_ends: bool,
-    /// If set, fluents by which actions improve the metric are treated like state-dependent
-    /// fluents.
+    /// If set, fluents that actions change so as to improve the metric are treated like fluents with
+    /// state-dependent changes.
     pub measures_rewards: bool,
 }

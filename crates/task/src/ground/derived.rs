@@ -1,8 +1,9 @@
-//! Simplifies derived atoms: those of derived predicates, and auxiliary atoms of conditions.
+//! Simplifies derived atoms, i.e. atoms of derived predicates and auxiliary atoms that represent
+//! subconditions.
 //!
-//! Derived atoms stay rules over the state [1]: their truth values are the least fixpoint of the
-//! stratified rules over the other variables. Constant atoms are folded, and an atom with a single
-//! rule is replaced by the rule's body.
+//! Derived atoms stay rules over the state [1]: their truth values are the least fixpoint of the stratified
+//! rules, given the state variables. Constant derived atoms are folded, and a derived atom with a single rule
+//! is replaced by the rule's body.
 //!
 //! \[1\] S. Thiébaux, J. Hoffmann, B. Nebel: In defense of PDDL axioms, Artificial Intelligence
 //! 168, 2005.
@@ -16,7 +17,8 @@ use crate::ground::vocabulary::task::GroundTask;
 use crate::limits::{Interrupted, Limits};
 use crate::number::dense;
 
-/// Folds constant atoms, and inlines atoms with a single rule.
+/// Replaces constant derived atoms by their truth values, and derived atoms with a single rule by the rule's
+/// body.
 pub fn simplify(task: &mut GroundTask<'_>) -> Result<(), Interrupted> {
     let limits = task.world.limits;
     let mut axioms = std::mem::take(&mut task.axioms);
@@ -44,7 +46,7 @@ pub fn simplify(task: &mut GroundTask<'_>) -> Result<(), Interrupted> {
     Ok(())
 }
 
-/// Keeps the items for which the predicate returns `true`, while no limit is reached.
+/// Keeps the items for which `keep` returns `true`. Returns an error once a limit is reached.
 fn retain<T>(
     items: &mut Vec<T>,
     limits: &Limits,
@@ -59,7 +61,7 @@ fn retain<T>(
     outcome
 }
 
-/// Folds derived atoms with a constant truth value, until no more are found.
+/// Replaces derived atoms with a constant truth value in all rules, operators and the goal, until a fixpoint.
 fn fold(task: &mut GroundTask<'_>, axioms: &mut Vec<GroundAxiom>) -> Result<(), Interrupted> {
     let (world, limits) = (&task.world, task.world.limits);
     let derived: Vec<AtomId> =
@@ -96,7 +98,7 @@ fn fold(task: &mut GroundTask<'_>, axioms: &mut Vec<GroundAxiom>) -> Result<(), 
     Ok(())
 }
 
-/// Removes decided literals from a conjunction. Returns `false` if one of them fails.
+/// Removes literals with known truth values from a conjunction. Returns `false` if one of them is false.
 fn conjunction(literals: &mut Vec<GroundLiteral>, known: &FxHashMap<AtomId, bool>) -> bool {
     let fails =
         literals.iter().any(|(atom, positive)| known.get(atom).is_some_and(|value| value != positive));
@@ -104,7 +106,7 @@ fn conjunction(literals: &mut Vec<GroundLiteral>, known: &FxHashMap<AtomId, bool
     !fails
 }
 
-/// Removes decided literals from a condition. Returns `false` if it fails.
+/// Removes literals with known truth values from a condition. Returns `false` if the condition is then false.
 fn substitute(condition: &mut GroundCondition, known: &FxHashMap<AtomId, bool>) -> bool {
     if !conjunction(&mut condition.literals, known) {
         return false;
@@ -124,8 +126,8 @@ fn substitute(condition: &mut GroundCondition, known: &FxHashMap<AtomId, bool>) 
     condition.tidy()
 }
 
-/// Returns the body of each non-recursive atom with exactly one rule, with other such atoms
-/// inlined.
+/// Maps each non-recursive derived atom with exactly one rule to the rule's body. Atoms in the body that also
+/// have a single rule are already inlined.
 #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
 fn single_bodies(
     axioms: &[GroundAxiom],
@@ -152,7 +154,8 @@ fn single_bodies(
     Ok(bodies)
 }
 
-/// Inlines atoms with a single rule. Returns `false` if the condition then contradicts itself.
+/// Replaces atoms by the bodies of their single rules. Returns `false` if the condition then contradicts
+/// itself.
 fn inline(condition: &mut GroundCondition, bodies: &FxHashMap<AtomId, GroundCondition>) -> bool {
     let mut literals = Vec::with_capacity(condition.literals.len());
     for mut literal in std::mem::take(&mut condition.literals) {
@@ -173,7 +176,7 @@ fn inline(condition: &mut GroundCondition, bodies: &FxHashMap<AtomId, GroundCond
     condition.tidy()
 }
 
-/// Replaces a literal if the only rule of its atom has a single literal as its body.
+/// Replaces a literal if the only rule of its atom has exactly one literal and no comparison as its body.
 fn rename(literal: &mut GroundLiteral, bodies: &FxHashMap<AtomId, GroundCondition>) {
     if let Some(body) = bodies.get(&literal.0)
         && let [(atom, positive)] = body.literals[..]

@@ -1,9 +1,10 @@
-//! Compiles metrics to operator costs.
+//! Compiles metrics to operator costs, which are minimised.
 //!
-//! A metric is linear in fluents and total time. A fluent whose changes are state-independent
-//! becomes an offset plus a sum of operator costs. The final values of other fluents are added at
-//! the end, and optimality for such a metric is not claimed. Maximisation is negated. Without a
-//! metric, the cost is total time for plans with durative actions, and plan length otherwise.
+//! A metric is a linear expression over fluents and total time. A fluent whose changes are state-independent
+//! becomes a constant offset plus a sum of operator costs. The final values of other fluents are added to the
+//! cost of a plan at its end; optimality is not claimed for such a metric. A metric to be maximised is
+//! negated. Without a metric, the cost is the total duration if the plan has durative actions, and the number
+//! of actions otherwise.
 use std::collections::BTreeMap;
 use std::convert::Infallible;
 
@@ -21,10 +22,12 @@ use crate::task::quantity::{Linear, NumericId, Quantity};
 use crate::task::table_map::TableMap;
 use pddl::ast::Direction;
 
-/// Attaches costs to the operators, and the remaining parts of the metrics to the task.
+/// Computes the costs of all operators, and stores the parts of the metrics that are not operator costs in
+/// the task.
 ///
 /// # Errors
-/// A metric is not linear, or contains a fluent with state-dependent changes.
+/// A metric is not linear, or contains a fluent with state-dependent changes and `generality` does not allow
+/// this.
 pub fn attach_costs(task: &mut GroundTask<'_>, generality: &Generality) -> Result<(), Errors> {
     let lifted = task.world.lifted;
     if lifted.metrics.is_empty() {
@@ -44,7 +47,7 @@ pub fn attach_costs(task: &mut GroundTask<'_>, generality: &Generality) -> Resul
     if errors.is_empty() { Ok(()) } else { Err(errors.into()) }
 }
 
-/// Attaches the costs by a single metric.
+/// Computes the operator costs of a single metric and adds the metric as an objective.
 fn attach(task: &mut GroundTask<'_>, metric: &Metric, generality: &Generality) -> Result<(), Error> {
     let limits = task.world.limits;
     let (mut linear, mut time) = split(&mut task.world, &metric.expression, metric.place)?;
@@ -55,7 +58,7 @@ fn attach(task: &mut GroundTask<'_>, metric: &Metric, generality: &Generality) -
         time = -time;
     }
     let rest = rest(task, &mut linear, (metric, generality))?;
-    // Costs count changes of fluents, so that their initial values are a constant offset.
+    // Costs are changes of fluents, so the initial values of the fluents become a constant offset.
     let initial: Vec<_> = linear
         .coefficients
         .iter()
@@ -71,10 +74,10 @@ fn attach(task: &mut GroundTask<'_>, metric: &Metric, generality: &Generality) -
     Ok(())
 }
 
-/// Removes the fluents with state-dependent changes from a metric.
+/// Removes the fluents with state-dependent changes from a metric and returns them with their factors.
 ///
 /// # Errors
-/// There is such a fluent although the task needs costs that are exact.
+/// Such a fluent exists, but `generality` requires costs that are exact.
 fn rest(
     task: &GroundTask<'_>,
     linear: &mut Linear<Rational>,
@@ -107,14 +110,14 @@ fn rest(
     Ok(rest)
 }
 
-/// Returns `true` if a change of a fluent, weighted by a factor, may decrease the metric.
+/// Returns `true` if the change of a fluent, multiplied by `factor`, may decrease the metric.
 fn lowers(value: &Linear<Rational>, factor: &Rational) -> bool {
     let mut change = value.quantity.clone();
     change.scale(factor);
     change.minimum().is_negative()
 }
 
-/// Splits a metric into its linear part over fluents and the factor of total time.
+/// Splits a metric into a linear expression over fluents and the factor of `total-time`.
 fn split(
     world: &mut World<'_>,
     expression: &Expression,
@@ -181,7 +184,7 @@ fn multiply(
     Some((linear, time * &factor.quantity.constant))
 }
 
-/// Cache of scaled quantities. Quantities that operators share remain shared.
+/// Cache of multiplied quantities, so that tables shared between operators remain shared.
 #[derive(Default)]
 struct ScaledQuantities {
     by_factor: BTreeMap<Rational, TableMap<Rational>>,
@@ -201,7 +204,7 @@ impl ScaledQuantities {
     }
 }
 
-/// Cost of an application of the operator.
+/// Returns the cost of applying the operator: its weighted duration and its weighted changes of fluents.
 fn cost(
     operator: &GroundOperator,
     metric: &Linear<Rational>,

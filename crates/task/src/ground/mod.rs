@@ -1,20 +1,20 @@
-//! Grounding: lifted task to ground task.
+//! Grounding: converts the lifted task to a ground task with finite-domain variables and integers.
 //!
-//! Relaxed reachability (a Datalog program on the rule engine, after Helmert \[1\]) computes the
-//! instances of each schema, without its separable design parameters. Each instance becomes an
-//! operator with slots, mutex groups become finite-domain variables, and all numbers become exact
-//! integers.
+//! Relaxed reachability, a Datalog program after Helmert \[1\], computes the reachable instances of each
+//! action schema. Design parameters that can be chosen independently are slots and are not instantiated. Each
+//! instance becomes an operator with slots, mutex groups become finite-domain variables, and all numbers
+//! become exact integers.
 //!
-//! The passes exchange the types in `vocabulary`:
+//! The passes exchange the types in the module `vocabulary`:
 //!
 //! | pass | from | to |
 //! |---|---|---|
 //! | `relaxed_reachability` | `Lifted`, slots | `RelaxedReachability`: instances of schemas, atoms that can hold |
-//! | `instantiate` | the `World` of these | `GroundTask`: operators, rules and a goal over atoms |
-//! | `derived` | derived atoms that are decided, or have one rule | truth values, and the body of the rule in their place |
-//! | `metric` | metrics | the costs of operators, and objectives |
-//! | `prune` | operators, rules | those that can matter; or why the goal is out of reach |
-//! | `finalize` | `GroundTask` | `Task`: variables for atoms, integers for rationals |
+//! | `instantiate` | the `World` of these instances and atoms | `GroundTask`: operators, rules and a goal over atoms |
+//! | `derived` | constant derived atoms, and those with a single rule | truth values, or the rule bodies in their place |
+//! | `metric` | metrics | operator costs and objectives |
+//! | `prune` | operators and rules | the relevant and reachable ones, or the reason why the goal is unreachable |
+//! | `finalize` | `GroundTask` | `Task`: finite-domain variables for atoms, integers for rationals |
 //!
 //! \[1\] M. Helmert: Concise finite-domain representations for PDDL planning tasks, Artificial Intelligence 173, 2009.
 
@@ -69,16 +69,17 @@ use vocabulary::world::World;
 /// ```
 ///
 /// # Errors
-/// All unsupported constructs with their source locations.
+/// Returns all unsupported constructs with their source locations, or an error if a limit is reached.
 pub fn ground(domain: &Domain, problem: &Problem, config: &GroundConfig) -> Result<Task, Errors> {
     let measures_ends = config.objectives.len() <= 1;
     ground_for(domain, problem, config, &Generality { measures_ends, ..Generality::default() })
 }
 
-/// Grounds a problem for use with other initial states as well.
+/// Grounds a problem such that the ground task is also valid for other initial states, as specified by
+/// `generality`.
 ///
 /// # Errors
-/// All unsupported constructs, or a reached limit.
+/// Returns all unsupported constructs, or an error if a limit is reached.
 pub fn ground_for<N: TaskNumber>(
     domain: &Domain,
     problem: &Problem,
@@ -101,7 +102,8 @@ pub fn ground_for<N: TaskNumber>(
     }
 }
 
-/// Grounds a task in which actions of duration 0 still have separate start and end.
+/// Grounds a normalized task. Splits actions that may have duration 0 and prepares timed events before
+/// grounding.
 fn ground_normal<N: TaskNumber>(
     mut lifted: Lifted,
     config: &GroundConfig,
@@ -120,7 +122,8 @@ fn ground_normal<N: TaskNumber>(
     ground_lifted(&lifted, &designs, &slots, generality, &config.limits).map(|(task, _)| task)
 }
 
-/// Grounds a lifted task. `designs` has the design parameters of each schema that become slots.
+/// Grounds a lifted task. `designs` holds the design parameters of each schema, and `slots` those of them
+/// that become slots. Also returns the result of relaxed reachability.
 ///
 /// # Errors
 /// See [`ground`].

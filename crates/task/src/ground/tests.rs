@@ -12,8 +12,8 @@ use crate::task::Task;
 use crate::task::quantity::Quantity;
 use pddl::{Source, read};
 
-/// A domain with two roads, a lamp that walking requires, and a jump whose fuel requirement is
-/// never met.
+/// A domain in which `go` and `fly` move between places, `go` requires light, and `jump` and `fly` are never
+/// applicable: no road is a loop, and the fuel does not suffice.
 const DOMAIN: &str = "(define (domain d)
   (:predicates (at ?p) (way ?a ?b) (lit) (ready))
   (:functions (fuel))
@@ -34,7 +34,7 @@ fn lifted() -> Lifted {
     normalize(&domain, &problem, &[]).expect("a lifted task")
 }
 
-/// Declares no parameter as a design.
+/// Returns empty slot lists, so that no parameter is a design.
 fn none(lifted: &Lifted) -> Vec<Vec<SlotParameter>> {
     vec![Vec::new(); lifted.schemas.len()]
 }
@@ -43,14 +43,14 @@ fn reached(lifted: &Lifted) -> RelaxedReachability {
     relaxed_reachability::reach(lifted, &none(lifted), &Limits::none()).expect("no limit")
 }
 
-/// Number of operators of each schema.
+/// Returns the number of operators of each schema.
 fn counts(lifted: &Lifted, task: &GroundTask<'_>) -> Vec<(String, usize)> {
     let schemas = lifted.schemas.iter().zip(0_u32..);
     let count = |schema| task.operators.iter().filter(|operator| operator.schema == schema).count();
     schemas.map(|(schema, number)| (schema.name.to_string(), count(number))).collect()
 }
 
-/// Calls `check` with the task after all passes before the costs.
+/// Calls `check` with the lifted task and with the ground task after instantiation.
 fn instantiated(check: impl FnOnce(&Lifted, GroundTask<'_>)) {
     let (lifted, limits) = (lifted(), Limits::none());
     let reached = reached(&lifted);
@@ -64,7 +64,7 @@ fn reach_finds_instances_and_atoms_as_if_nothing_were_deleted() {
     let lifted = lifted();
     let reached = reached(&lifted);
     let instances: Vec<usize> = reached.instances.iter().map(Vec::len).collect();
-    // Relaxed reachability ignores numbers, and no road leads from a place to itself.
+    // The relaxation ignores fuel, and no road leads from a place to itself.
     assert_eq!(instances, [2, 1, 0, 4]);
     let name = |predicate: usize| lifted.predicates[predicate].name.to_string();
     let mut atoms: Vec<String> = reached.atoms.iter().map(|(predicate, _)| name(predicate.index())).collect();
@@ -114,7 +114,7 @@ fn prune_drops_what_numbers_rule_out_and_finish_makes_variables() {
         metric::attach_costs(&mut task, &Generality::default()).expect("costs");
         let generality = Generality::default();
         assert_eq!(prune::prune(&mut task, &generality).expect("no limit"), None);
-        // The head of the rule is no longer used.
+        // No condition reads the head of the rule any more.
         assert!(task.axioms.is_empty());
         let expected = [("go", 2), ("light", 1), ("jump", 0), ("fly", 0)];
         assert_eq!(counts(lifted, &task), expected.map(|(name, count)| (name.to_owned(), count)));

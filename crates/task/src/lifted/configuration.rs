@@ -1,8 +1,9 @@
-//! Separable design parameters, which need not be grounded.
+//! Separable design parameters: parameters of action schemas that are function designs and need not be
+//! grounded.
 //!
-//! In the explicit form (Metaplan paper, Listings 1 and 2) a schema has parameters `?fd` with
-//! `(fd_solve_f ?fd ?f)`. Such a parameter is *separable*, and becomes a slot, if no fluent
-//! mentions it. The designs of an action instance then do not multiply the ground operators.
+//! In the explicit form (Metaplan paper, Listings 1 and 2), a schema has parameters `?fd` with a condition
+//! `(fd_solve_f ?fd ?f)`. Such a parameter is *separable* and becomes a slot if no fluent has it as an
+//! argument. The number of designs then does not multiply the number of ground operators.
 
 use rustc_hash::FxHashSet;
 use smallvec::SmallVec;
@@ -12,16 +13,15 @@ use crate::number::dense;
 use crate::task::quantity::SlotSet;
 use pddl::ast::Name;
 
-/// A design parameter with the function that the design solves.
+/// A design parameter of an action schema, with the function that the design solves.
 #[derive(Debug, Clone, Copy)]
 pub struct SlotParameter {
     pub(crate) parameter: u32,
     pub(crate) function: Term,
 }
 
-/// Returns the design parameters of a schema with their functions, in ascending order. `solves` has
-/// the predicates whose first argument is a design and whose second argument is a function that it
-/// solves.
+/// Returns the design parameters of a schema with their functions, in ascending order. `solves` lists the
+/// predicates `(p DESIGN FUNCTION)` which state that a design solves a function.
 pub fn design_parameters(lifted: &Lifted, schema: &Schema, solves: &[Name]) -> Vec<SlotParameter> {
     let conjuncts = conjuncts(&schema.start_condition).into_iter().chain(conjuncts(&schema.middle_condition));
     let mut designs: Vec<SlotParameter> = Vec::new();
@@ -31,8 +31,8 @@ pub fn design_parameters(lifted: &Lifted, schema: &Schema, solves: &[Name]) -> V
             && let [Term::Parameter(parameter), function] = terms[..]
             && function != Term::Parameter(parameter)
             && designs.iter().all(|slot| {
-                // Functions must be known before designs are chosen, so no function may itself be a
-                // design parameter.
+                // Functions must be fixed before designs are chosen, so no function may itself be a design
+                // parameter.
                 slot.parameter != parameter
                     && Term::Parameter(slot.parameter) != function
                     && slot.function != Term::Parameter(parameter)
@@ -45,12 +45,12 @@ pub fn design_parameters(lifted: &Lifted, schema: &Schema, solves: &[Name]) -> V
     designs
 }
 
-/// Returns the separable design parameters.
+/// Returns the design parameters that are separable: they are not arguments of fluents and become slots.
 pub fn slot_parameters(lifted: &Lifted, schema: &Schema, designs: &[SlotParameter]) -> Vec<SlotParameter> {
     designs.iter().filter(|design| is_separable(lifted, schema, design.parameter)).copied().collect()
 }
 
-/// Returns the flattened conjuncts of a condition.
+/// Returns the conjuncts of a condition, with nested conjunctions flattened.
 pub fn conjuncts(formula: &Formula) -> Vec<&Formula> {
     match formula {
         Formula::And(parts) => parts.iter().flat_map(conjuncts).collect(),
@@ -79,7 +79,7 @@ fn is_separable(lifted: &Lifted, schema: &Schema, parameter: u32) -> bool {
     }) && schema.duration.as_ref().is_none_or(|duration| expression_separable(lifted, duration, parameter))
 }
 
-/// Returns `true` if the parameter occurs only below static functions, and not in a factor of a
+/// Returns `true` if the parameter occurs only as an argument of static functions, and not in a factor of a
 /// fluent.
 fn expression_separable(lifted: &Lifted, expression: &Expression, parameter: u32) -> bool {
     match expression {
@@ -89,7 +89,7 @@ fn expression_separable(lifted: &Lifted, expression: &Expression, parameter: u32
     }
 }
 
-/// Returns `true` if a condition contains no fluent.
+/// Returns `true` if a condition contains no fluent predicates and no fluent functions.
 pub fn is_static(lifted: &Lifted, formula: &Formula) -> bool {
     match formula {
         Formula::And(parts) | Formula::Or(parts) => parts.iter().all(|part| is_static(lifted, part)),
@@ -128,14 +128,14 @@ fn expression_mentions(expression: &Expression, parameter: u32) -> bool {
     is_mentioned
 }
 
-/// Returns the positions (in `slots`) of the slot parameters in a condition.
+/// Returns the positions in `slots` of all slot parameters that occur in a condition.
 pub fn slots_of_formula(formula: &Formula, slots: &[SlotParameter]) -> SlotSet {
     let mut set = SmallVec::new();
     formula_terms(formula, &mut |term| insert(&mut set, term, slots));
     set
 }
 
-/// Returns the positions (in `slots`) of the slot parameters in an expression.
+/// Returns the positions in `slots` of all slot parameters that occur in an expression.
 pub fn slots_of_expression(expression: &Expression, slots: &[SlotParameter]) -> SlotSet {
     let mut set = SmallVec::new();
     expression_terms(expression, &mut |term| insert(&mut set, term, slots));
@@ -151,8 +151,8 @@ fn insert(set: &mut SlotSet, term: Term, slots: &[SlotParameter]) {
     }
 }
 
-/// Returns `true` if a condition after the start of a durative action contains a derived predicate
-/// that its start effects or timed events may change.
+/// Returns `true` if a condition on the middle or end of a durative action contains a derived predicate whose
+/// truth the action's start effects or timed events may change.
 pub fn depends_on_own_start(lifted: &Lifted, schema: &Schema) -> bool {
     let (mut open, mut seen, mut numbers) = (Vec::new(), FxHashSet::default(), false);
     let conditions =
@@ -180,7 +180,7 @@ pub fn depends_on_own_start(lifted: &Lifted, schema: &Schema) -> bool {
         || changes.into_iter().any(|(predicate, ..)| schema.duration.is_some() && seen.contains(predicate))
 }
 
-/// Returns the derived predicates that recur through a universal quantifier.
+/// Returns the derived predicates that depend on themselves through a universal quantifier.
 pub fn recursive_through_forall(lifted: &Lifted) -> Vec<PredicateId> {
     let depends = |from: PredicateId, on: PredicateId| {
         let (mut open, mut seen) = (vec![from], FxHashSet::default());
@@ -209,7 +209,7 @@ pub fn recursive_through_forall(lifted: &Lifted) -> Vec<PredicateId> {
     recursive
 }
 
-/// Calls `visit` for the predicate of every atom below a universal quantifier.
+/// Calls `visit` with the predicate of every atom below a universal quantifier.
 fn universal_atoms(formula: &Formula, visit: &mut dyn FnMut(PredicateId)) {
     match formula {
         Formula::And(parts) | Formula::Or(parts) => {
@@ -223,7 +223,7 @@ fn universal_atoms(formula: &Formula, visit: &mut dyn FnMut(PredicateId)) {
     }
 }
 
-/// Calls `visit` for the predicate of every atom in a condition.
+/// Calls `visit` with the predicate of every atom in a condition.
 pub fn atoms(formula: &Formula, visit: &mut dyn FnMut(PredicateId)) {
     match formula {
         Formula::And(parts) | Formula::Or(parts) => {
@@ -237,7 +237,7 @@ pub fn atoms(formula: &Formula, visit: &mut dyn FnMut(PredicateId)) {
     }
 }
 
-/// Returns `true` if a condition compares numbers.
+/// Returns `true` if a condition contains a numeric comparison.
 pub fn has_numbers(formula: &Formula) -> bool {
     match formula {
         Formula::And(parts) | Formula::Or(parts) => parts.iter().any(has_numbers),
@@ -247,7 +247,7 @@ pub fn has_numbers(formula: &Formula) -> bool {
     }
 }
 
-/// Calls `visit` for every term in a condition.
+/// Calls `visit` with every term in a condition.
 pub fn formula_terms(formula: &Formula, visit: &mut dyn FnMut(Term)) {
     match formula {
         Formula::Exists(_, body) | Formula::ForAll(_, body) => formula_terms(body, visit),
@@ -268,6 +268,7 @@ pub fn formula_terms(formula: &Formula, visit: &mut dyn FnMut(Term)) {
     }
 }
 
+/// Calls `visit` with every term in an expression.
 pub fn expression_terms(expression: &Expression, visit: &mut dyn FnMut(Term)) {
     match expression {
         Expression::Number(_) | Expression::TotalTime => {}

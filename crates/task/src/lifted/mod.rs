@@ -1,4 +1,4 @@
-//! The lifted task, and the parameters that are function designs.
+//! The lifted task, and the detection of parameters that are function designs.
 
 pub mod configuration;
 mod task;

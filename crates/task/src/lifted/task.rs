@@ -1,8 +1,9 @@
-//! The lifted task: PDDL with names resolved to ids, in negation normal form.
+//! The lifted task: a PDDL task whose names are resolved to ids and whose conditions are in negation normal
+//! form.
 //!
-//! Objects, predicates, functions and parameters are dense ids in declaration order, so later
-//! stages are independent of names. A durative action keeps its start and end. `ground` composes
-//! both into a single operator, because execution is sequential.
+//! Objects, predicates, functions and parameters have dense ids in declaration order, so later stages do not
+//! use names. A durative action keeps separate conditions and effects for start and end. `ground` composes
+//! them into a single operator, because execution is sequential.
 
 use std::sync::Arc;
 
@@ -10,15 +11,15 @@ use crate::error::Place;
 use crate::number::Rational;
 use pddl::ast::{Assignment, Comparison, Direction, Name};
 
-/// An object or constant, by order of declaration.
+/// Id of an object or constant, in declaration order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct ObjectId(pub u32);
 
-/// A predicate, by order of declaration.
+/// Id of a predicate, in declaration order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct PredicateId(pub u32);
 
-/// A numeric function, by order of declaration.
+/// Id of a numeric function, in declaration order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct FunctionId(pub u32);
 
@@ -43,7 +44,7 @@ impl FunctionId {
 /// The arguments of a ground atom.
 pub type Arguments = Box<[ObjectId]>;
 
-/// A lifted task.
+/// A lifted task: names are resolved to ids, and action schemas are not instantiated.
 #[derive(Debug)]
 pub struct Lifted {
     pub(crate) objects: Vec<Name>,
@@ -51,8 +52,9 @@ pub struct Lifted {
     pub functions: Vec<Function>,
     pub schemas: Vec<Schema>,
     pub axioms: Vec<Axiom>,
-    /// Initial facts in the order of the file, without duplicates.
+    /// Initial facts in file order, without duplicates.
     pub(crate) facts: Vec<(PredicateId, Arguments)>,
+    /// Initial values of numeric functions.
     pub(crate) values: Vec<(FunctionId, Arguments, Rational)>,
     /// Timed initial literals in chronological order.
     pub events: Vec<Event>,
@@ -64,112 +66,117 @@ pub struct Lifted {
     pub metrics: Vec<Metric>,
 }
 
-/// A predicate. It is a fluent if an action changes it or if it is derived from fluents, otherwise
-/// static.
+/// A predicate. It is a fluent if an action or timed event changes it or if it is derived from fluents;
+/// otherwise it is static.
 #[derive(Debug, Clone)]
 pub struct Predicate {
     pub name: Name,
     pub arity: usize,
     pub fluent: bool,
     pub derived: bool,
-    /// `true` if the predicate marks running instances of a schema. It has the parameters of the
-    /// schema, and no name in the files.
+    /// `true` for an auxiliary predicate that marks running instances of an action schema. Its arguments are
+    /// the parameters of the schema; it has no name in PDDL files.
     pub running: bool,
 }
 
-/// A numeric function. It is a fluent if an action changes it, otherwise static.
+/// A numeric function. It is a fluent if an action changes it; otherwise it is static.
 #[derive(Debug, Clone)]
 pub struct Function {
     pub name: Name,
     pub fluent: bool,
-    /// `true` if it may be undefined. Conditions then guard its uses.
+    /// `true` if the function may be undefined for some arguments. Guard conditions then precede its uses.
     pub partial: bool,
 }
 
-/// An action schema, whose parameters are `Term::Parameter` indices.
+/// An action schema. `Term::Parameter` refers to parameters by their index.
 #[derive(Debug, Clone)]
 pub struct Schema {
     pub name: Name,
     pub parameters: Vec<Parameter>,
-    /// Number of parameters and bound variables.
+    /// Number of parameters and quantified variables.
     pub variables: usize,
-    /// Condition before the action.
+    /// Condition on the state before the action.
     pub start_condition: Formula,
     pub start_effects: Vec<Effect>,
-    /// Condition after the start effects: `over all` and `at end` of a durative action.
+    /// Condition on the state after the start effects: `over all` and `at end` conditions of a durative
+    /// action.
     pub middle_condition: Formula,
-    /// Part of the condition for the whole interval, used only with timed events.
+    /// The `over all` condition. Used only in tasks with timed events.
     pub over_all: Formula,
-    /// Part of the condition at the end.
+    /// The `at end` condition.
     pub at_end: Formula,
     pub end_effects: Vec<Effect>,
     /// Duration in the domain's time unit; `None` for an instantaneous action.
     pub duration: Option<Expression>,
-    /// `true` if the planner has chosen the shortest admissible duration.
+    /// `true` if the duration is variable in the domain and the planner chose the shortest admissible one.
     pub is_chosen: bool,
-    /// Set if start and end of a durative action are simultaneous, because its duration is 0.
+    /// Set if start and end are simultaneous, because the duration is 0. `end_effects` then contains both
+    /// sets of effects.
     pub joint: Option<Box<Joint>>,
-    /// Position of the action in the domain. Several schemas may represent an action.
+    /// Index of the action in the domain. Several schemas may represent one action.
     pub action: u32,
     pub place: Place,
 }
 
-/// Parts of a simultaneous start and end.
+/// Separate conditions of the start and end of an action with duration 0, and the split of their effects.
 #[derive(Debug, Clone)]
 pub struct Joint {
     /// Condition of the start.
     pub(crate) start: Formula,
     /// Condition of the end.
     pub(crate) end: Formula,
-    /// Number of leading effects that belong to the start.
+    /// Number of effects that belong to the start; they precede those of the end in `end_effects`.
     pub(crate) start_effects: usize,
 }
 
-/// Auxiliary symbols for time in a task with timed events.
+/// Auxiliary symbols that represent time in a task with timed events.
 #[derive(Debug, Clone, Copy)]
 pub struct Time {
     pub(crate) clock: FunctionId,
-    /// Duration of a moment: distinct times differ by at least two moments.
+    /// Length of one moment: an interval so short that distinct times differ by at least two moments.
     pub(crate) moment: FunctionId,
-    /// `(phase NUMBER)`: number of past events.
+    /// Predicate `(phase NUMBER)`: the number of past events.
     pub phase: PredicateId,
-    /// Object of phase 0; the objects of later phases follow.
+    /// Object that represents phase 0; the objects of later phases follow it.
     pub first_phase: ObjectId,
+    /// True if the last step was a wait.
     pub waited: PredicateId,
 }
 
-/// Timed initial literals of the same time.
+/// The timed initial literals of one point in time.
 #[derive(Debug, Clone)]
 pub struct Event {
     /// Time from the start of the plan, in the domain's time unit.
     pub time: Rational,
+    /// Changed atoms with their new truth values.
     pub changes: Vec<(PredicateId, Arguments, bool)>,
 }
 
-/// A rule of a derived predicate: the atom over the parameters holds if the condition does.
+/// An axiom of a derived predicate: the atom over the parameters is true if the condition is true.
 #[derive(Debug, Clone)]
 pub struct Axiom {
     pub(crate) predicate: PredicateId,
     pub(crate) parameters: Vec<Parameter>,
-    /// Number of parameters and bound variables.
+    /// Number of parameters and quantified variables.
     pub(crate) variables: usize,
     pub condition: Formula,
 }
 
-/// A parameter with the objects of its type, ascending.
+/// A parameter of a schema or axiom, with the ids of all objects of its type in ascending order.
 #[derive(Debug, Clone)]
 pub struct Parameter {
     pub(crate) candidates: Arc<[ObjectId]>,
 }
 
-/// A bound variable, numbered after the parameters, with the objects of its type, ascending.
+/// A quantified variable with its number and the objects of its type in ascending order. Numbers continue
+/// after the parameters.
 #[derive(Debug, Clone)]
 pub struct Bound {
     pub(crate) variable: u32,
     pub(crate) candidates: Arc<[ObjectId]>,
 }
 
-/// A schema parameter, bound variable or object.
+/// A parameter, a quantified variable (both by number) or an object.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Term {
     Parameter(u32),
@@ -223,7 +230,7 @@ impl Formula {
     }
 }
 
-/// An effect: the change for all objects of the bound variables for which the condition holds.
+/// An effect: for all objects of the bound variables for which the condition holds, the change occurs.
 #[derive(Debug, Clone)]
 pub struct Effect {
     pub bound: Vec<Bound>,
@@ -231,7 +238,7 @@ pub struct Effect {
     pub change: Change,
 }
 
-/// Change of an effect.
+/// The change that an effect makes: an added or deleted atom, or an assigned number.
 #[derive(Debug, Clone)]
 pub enum Change {
     Add(PredicateId, Vec<Term>),
@@ -257,7 +264,7 @@ pub enum Expression {
     Quotient(Box<Expression>, Box<Expression>, Place),
 }
 
-/// Metric of plans.
+/// A metric by which plans are compared.
 #[derive(Debug, Clone)]
 pub struct Metric {
     pub direction: Direction,

@@ -1,4 +1,5 @@
-//! Resolves conditions, effects and expressions of the syntax tree.
+//! Converts conditions, effects and expressions of the syntax tree to lifted ones, and resolves their names
+//! to ids.
 
 use crate::lifted::configuration::formula_terms;
 use crate::lifted::{Bound, Change, Effect, Expression, Formula, Rational, Term};
@@ -6,7 +7,8 @@ use crate::normalize::names::{Duration, Names, Scope};
 use pddl::ast;
 use rustc_hash::FxHashSet;
 
-/// Resolves a condition, or its negation, to negation normal form.
+/// Converts a condition to negation normal form and resolves its names. Converts the negation of the
+/// condition if `positive` is `false`.
 pub(super) fn condition(
     names: &mut Names,
     written: &ast::Condition,
@@ -46,7 +48,8 @@ pub(super) fn condition(
     }
 }
 
-/// Builds a quantified condition without unused variables, unless their types are empty.
+/// Builds a quantified condition. Variables that the body does not use are dropped, unless their type is
+/// empty.
 fn quantified(universal: bool, mut bound: Vec<Bound>, body: Formula) -> Formula {
     let mut used = FxHashSet::default();
     formula_terms(&body, &mut |term| {
@@ -62,7 +65,8 @@ fn quantified(universal: bool, mut bound: Vec<Bound>, body: Formula) -> Formula 
     }
 }
 
-/// Flattens an effect into changes, each with its bound variables and its condition.
+/// Flattens an effect into single changes and appends them to `out`, each with its quantified variables and
+/// its condition.
 pub(super) fn effect(names: &mut Names, written: &ast::Effect, scope: &mut Scope, out: &mut Vec<Effect>) {
     let change = match written {
         ast::Effect::And(parts) => return parts.iter().for_each(|part| effect(names, part, scope, out)),
@@ -103,7 +107,7 @@ pub(super) fn effect(names: &mut Names, written: &ast::Effect, scope: &mut Scope
     out.push(Effect { bound: Vec::new(), condition: Formula::truth(), change });
 }
 
-/// Resolves an expression.
+/// Converts a numeric expression and resolves its names.
 pub(super) fn expression(names: &mut Names, written: &ast::Expression, scope: &mut Scope) -> Expression {
     use ast::Arithmetic as Op;
     match written {

@@ -1,8 +1,8 @@
-//! Durations with constraints other than equations.
+//! Duration constraints of durative actions, in particular variable durations.
 //!
-//! In sequential execution without timed events, an action takes the shortest admissible duration,
-//! or the longest one if the metric rewards time, provided that no effect depends on the duration.
-//! If actions overlap, the planner chooses a duration when the action starts.
+//! In sequential execution without timed events, an action takes its shortest admissible duration, or its
+//! longest if the metric rewards time. This requires that no effect depends on the duration. If actions may
+//! overlap, the planner chooses a duration when the action starts.
 
 use crate::error::{File, Place};
 use crate::lifted::{Expression, Formula, Function, FunctionId, Metric, Rational, Term};
@@ -11,11 +11,12 @@ use crate::normalize::names::{Duration, Names, Scope};
 use crate::number::dense;
 use pddl::ast::{self, Comparison, Direction, Name, Span};
 
-/// Prefix of the names of chosen durations. Names in files contain no blanks, so there are no
-/// conflicts.
+/// Prefix of the names of auxiliary numeric functions that hold chosen durations. Names in PDDL files contain
+/// no spaces, so there are no conflicts.
 pub const CHOSEN: &str = "chosen duration of ";
 
-/// Returns `true` if the metrics reward time, or `None` if they do not determine it or disagree.
+/// Returns `true` if all metrics reward longer plans, and `false` if none does. Returns `None` if this cannot
+/// be determined or the metrics disagree.
 pub(super) fn rewards_time(metrics: &[Metric]) -> Option<bool> {
     let zero = Rational::from_integer(0);
     let mut rewards = Vec::new();
@@ -30,7 +31,8 @@ pub(super) fn rewards_time(metrics: &[Metric]) -> Option<bool> {
     rewards.iter().all(|other| *other == rewarded).then_some(rewarded)
 }
 
-/// Returns the factor of total time in an expression.
+/// Returns the constant coefficient of `total-time` in an expression, or `None` if the coefficient is not
+/// constant.
 pub fn time_factor(expression: &Expression) -> Option<Rational> {
     let number = |expression: &Expression| match expression {
         Expression::Number(number) => Some(number.clone()),
@@ -62,8 +64,9 @@ pub fn time_factor(expression: &Expression) -> Option<Rational> {
     }
 }
 
-/// Returns the duration of an action, chosen if it is not fixed, and the conditions of the choice.
-/// `longest` is `true` if the metric rewards time.
+/// Returns the duration of an action, and conditions that ensure its bounds. A variable duration is replaced
+/// by its longest or shortest value; `longest` is `true` if the metric rewards time. If durations may be
+/// chosen freely, it becomes an auxiliary numeric function.
 pub(super) fn duration(
     names: &mut Names,
     (constraints, span): (&[ast::DurationConstraint], Span),
@@ -130,7 +133,8 @@ pub(super) fn duration(
     (chosen, conditions)
 }
 
-/// Creates the numeric function for the chosen duration of an action.
+/// Creates the auxiliary numeric function for the chosen duration of an action, and returns the expression
+/// that reads it.
 fn chosen(names: &mut Names, (action, parameters): (&Name, usize), place: Place) -> Expression {
     let id = FunctionId(dense(names.functions.len()));
     let name = Name::new(&format!("{CHOSEN}{action}"));

@@ -1,8 +1,8 @@
-//! Timed initial literals of time 0.
+//! Applies timed initial literals of time 0.
 
 use crate::lifted::{Arguments, Lifted, ObjectId};
 
-/// Applies the events of time 0 to the initial state.
+/// Applies the events at or before time 0 to the initial facts, and advances the phase accordingly.
 #[expect(clippy::arithmetic_side_effects, reason = "phases are objects, which are held in memory")]
 pub fn begin(lifted: &mut Lifted) {
     let phases = (lifted.time.first_phase.0..).map(ObjectId);

@@ -1,10 +1,10 @@
-//! Determines the fluents: predicates and functions that actions change.
+//! Determines the fluents: predicates and functions that actions or timed events change.
 
 use crate::lifted::configuration::{is_static, recursive_through_forall};
 use crate::lifted::{Axiom, Change, Formula, Lifted};
 
-/// Marks predicates and functions that actions change, and derived predicates that depend on
-/// fluents.
+/// Marks as fluents: predicates and functions that actions or timed events change, and derived predicates
+/// that depend on fluents.
 pub(super) fn mark_fluents(lifted: &mut Lifted) {
     for effect in
         lifted.schemas.iter().flat_map(|schema| schema.start_effects.iter().chain(&schema.end_effects))
@@ -19,9 +19,9 @@ pub(super) fn mark_fluents(lifted: &mut Lifted) {
     for (predicate, ..) in lifted.events.iter().flat_map(|event| &event.changes) {
         lifted.predicates[predicate.index()].fluent = true;
     }
-    // The rule engine requires stratified negation, so predicates that recur through a quantifier
-    // are evaluated separately. Comparisons below quantifiers are as well: with an undefined value,
-    // neither the comparison nor its negation holds.
+    // The Datalog engine requires stratified negation. Derived predicates that depend on themselves through a
+    // universal quantifier are therefore treated as fluents. The same applies to comparisons below a
+    // universal quantifier: if a value is undefined, neither the comparison nor its negation is true.
     let compares = lifted.axioms.iter().filter(|axiom| compares_for_all(&axiom.condition, false));
     let compares: Vec<_> = compares.map(|axiom| axiom.predicate).collect();
     for predicate in recursive_through_forall(lifted).into_iter().chain(compares) {
@@ -41,7 +41,7 @@ pub(super) fn mark_fluents(lifted: &mut Lifted) {
     }
 }
 
-/// Returns `true` if numbers are compared below a universal quantifier.
+/// Returns `true` if the condition contains a numeric comparison below a universal quantifier.
 fn compares_for_all(formula: &Formula, below: bool) -> bool {
     match formula {
         Formula::And(parts) | Formula::Or(parts) => parts.iter().any(|part| compares_for_all(part, below)),

@@ -1,4 +1,4 @@
-//! Initial state and timed events.
+//! Resolves the initial state and the timed initial literals.
 
 use rustc_hash::FxHashSet;
 
@@ -10,7 +10,7 @@ use crate::normalize::names::{Names, Scope};
 use crate::number::dense;
 use pddl::ast::{self, Name};
 
-/// Returns the initial facts without duplicates, and the values of functions.
+/// Returns the initial facts in file order without duplicates, and the initial values of functions.
 #[allow(clippy::type_complexity)]
 pub(super) fn initial_state(
     names: &mut Names,
@@ -36,7 +36,8 @@ pub(super) fn initial_state(
     (facts, values)
 }
 
-/// Creates the auxiliary symbols for time. Their names contain a space, so no file can use them.
+/// Creates the auxiliary symbols for time if there are timed events. Their names contain a space, so no name
+/// in a PDDL file can equal them.
 #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
 pub(super) fn time(names: &mut Names, events: &[Event]) -> Time {
     let time = Time {
@@ -62,8 +63,8 @@ pub(super) fn time(names: &mut Names, events: &[Event]) -> Time {
     time
 }
 
-/// Returns the timed initial literals in chronological order. Of two literals about an atom at the
-/// same time, the later one in the file prevails.
+/// Returns the timed initial literals grouped by time, in chronological order. Literals of equal time keep
+/// their file order, so that the last one about an atom takes effect.
 pub(super) fn events(names: &mut Names, problem: &ast::Problem) -> Vec<Event> {
     let mut events: Vec<Event> = Vec::new();
     for element in &problem.init {

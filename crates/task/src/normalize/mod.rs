@@ -1,8 +1,8 @@
-//! Normalisation: syntax tree to lifted task. Names become ids, negation is moved inwards, and the
-//! conditions and effects of durative actions are separated by time.
+//! Normalisation: converts the syntax tree to a lifted task. Names become ids, negation is moved inwards, and
+//! the conditions and effects of durative actions are separated by time.
 //!
-//! The files have passed `pddl::check`. Unsupported features (such as variable durations that
-//! effects depend on) are rejected here with their source locations.
+//! The syntax trees must have passed `pddl::check`. Unsupported features, such as variable durations on which
+//! effects depend, are rejected here with their source locations.
 
 mod condition;
 pub mod duration;
@@ -18,11 +18,11 @@ use crate::lifted::{Axiom, Formula, Lifted, Metric, Schema};
 use names::{Duration, Names, Scope};
 use pddl::ast::{self, ConditionTime, EffectTime};
 
-/// Normalises a domain and a problem. `objectives` in lexicographic order replace the metric of the
-/// problem; if empty, the metric is used.
+/// Normalises a domain and a problem for sequential execution. The `objectives`, in lexicographic order,
+/// replace the metric of the problem; if empty, the metric is used.
 ///
 /// # Errors
-/// All unsupported constructs and undeclared names.
+/// Returns all unsupported constructs and undeclared names with their source locations.
 pub fn normalize(
     domain: &ast::Domain,
     problem: &ast::Problem,
@@ -31,8 +31,9 @@ pub fn normalize(
     named(Names::new(domain, problem), (domain, problem), objectives)
 }
 
-/// Normalises a domain and a problem as [`normalize`] does, but keeps variable durations: each
-/// becomes a numeric function ([`duration::CHOSEN`]) with its bounds.
+/// Normalises a domain and a problem like [`normalize`], but the planner may choose variable durations. Each
+/// variable duration becomes an auxiliary numeric function ([`duration::CHOSEN`]), and its bounds become
+/// conditions.
 ///
 /// # Errors
 /// See [`normalize`].
@@ -61,8 +62,7 @@ fn named(
         })
         .collect();
     let has_events = problem.init.iter().any(|element| matches!(element, ast::InitialElement::Timed(..)));
-    // With timed events, a longer duration may serve as a wait, so the shortest one is not always
-    // best.
+    // With timed events, a longer duration may replace a wait, so the shortest duration is not always best.
     let longest = if has_events { None } else { duration::rewards_time(&metrics) };
     let schemas = domain.actions.iter().zip(0..);
     let schemas = schemas.map(|(action, index)| schema(&mut names, longest, action, index)).collect();
@@ -96,7 +96,7 @@ fn named(
     Ok(lifted)
 }
 
-/// Converts an action, with its conditions and effects separated by time.
+/// Converts an action to a lifted schema, with conditions and effects separated by time.
 fn schema(names: &mut Names, longest: Option<bool>, action: &ast::Action, index: u32) -> Schema {
     let mut scope = Scope::new(File::Domain);
     let mut schema = Schema {
@@ -152,7 +152,7 @@ fn schema(names: &mut Names, longest: Option<bool>, action: &ast::Action, index:
     schema
 }
 
-/// Converts a derived predicate.
+/// Converts a derived predicate rule to a lifted axiom.
 fn axiom(names: &mut Names, axiom: &ast::Derived) -> Axiom {
     let mut scope = Scope::new(File::Domain);
     let parameters = names.parameters(&axiom.head.parameters, &mut scope);

@@ -1,4 +1,4 @@
-//! Resolves names to ids: objects and types, predicates, functions, and variables in scope.
+//! Resolves names to ids: objects, predicates, functions, and variables in scope.
 
 use std::sync::Arc;
 
@@ -11,24 +11,25 @@ use crate::lifted::{
 use crate::number::dense;
 use pddl::ast::{self, Identifier, Name, Span, TypeExpression, TypedName};
 
-/// Meaning of `?duration`.
+/// Meaning of the variable `?duration` in an action.
 pub(super) enum Duration {
     /// The action has no duration.
     Instantaneous,
+    /// The value of an expression.
     Fixed(Expression),
     /// The planner chooses the duration.
     Open,
 }
 
-/// Variables in scope with their terms, and the current file.
+/// Variables in scope with their terms, and the current PDDL file.
 pub(super) struct Scope {
     pub(super) file: File,
     variables: Vec<Name>,
-    /// Terms of each variable in scope, innermost last.
+    /// Terms of each variable name in scope; the innermost declaration comes last.
     terms: FxHashMap<Name, Vec<Term>>,
-    /// Number of bound variables, including those out of scope.
+    /// Total number of bound variables, including those that are out of scope.
     pub(super) bound: u32,
-    /// Meaning of `?duration`.
+    /// Meaning of `?duration` in the current action.
     pub(super) duration: Duration,
 }
 
@@ -59,23 +60,23 @@ impl Scope {
     }
 }
 
-/// Symbol tables of the files, and the errors.
+/// Symbol tables of a domain and problem, and the errors found during normalisation.
 pub(super) struct Names {
     pub(super) objects: Vec<Name>,
     object_ids: FxHashMap<Name, ObjectId>,
-    /// Objects of each type including subtypes, ascending.
+    /// Objects of each type, including subtypes, in ascending order.
     members: FxHashMap<Name, Vec<ObjectId>>,
     pub(super) predicates: Vec<Predicate>,
     predicate_ids: FxHashMap<Name, PredicateId>,
     pub(super) functions: Vec<Function>,
     function_ids: FxHashMap<Name, FunctionId>,
-    /// `true` if the planner can choose durations within arbitrary bounds.
+    /// `true` if actions may overlap, so that the planner chooses variable durations.
     pub(super) is_free: bool,
     pub(super) errors: Vec<Error>,
 }
 
 impl Names {
-    /// Reads the declarations of the files.
+    /// Reads the declarations of a domain and a problem.
     pub(super) fn new(domain: &ast::Domain, problem: &ast::Problem) -> Self {
         let predicates: Vec<_> = domain
             .predicates
@@ -152,7 +153,7 @@ impl Names {
         }
     }
 
-    /// Returns the objects of a type, ascending.
+    /// Returns the objects of a type in ascending order.
     fn candidates(&self, expression: &TypeExpression) -> Arc<[ObjectId]> {
         let object = Identifier { name: Name::new("object"), span: Span::default() };
         let alternatives = if expression.alternatives.is_empty() {
@@ -180,8 +181,8 @@ impl Names {
         self.errors.push(Error::Unknown { kind, name: identifier.name.to_string(), place });
     }
 
-    /// Adds quantified variables to the scope. A variable whose type has a single object is
-    /// replaced by that object.
+    /// Adds quantified variables to the scope and returns them with their candidates. A variable whose type
+    /// has a single object is replaced by the object and not returned.
     #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(super) fn quantify(&mut self, variables: &[TypedName], scope: &mut Scope) -> Vec<Bound> {
         let mut bound_variables = Vec::new();
@@ -198,7 +199,7 @@ impl Names {
         bound_variables
     }
 
-    /// Adds parameters to the scope.
+    /// Adds the parameters of a schema or axiom to the scope and returns them with their candidates.
     #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(super) fn bind(&mut self, variables: &[TypedName], scope: &mut Scope) -> Vec<Bound> {
         let mut parameters = Vec::with_capacity(variables.len());

@@ -1,10 +1,10 @@
-//! Numeric functions without an initial value: undefined until assigned. Happenings that read
-//! undefined functions are inapplicable.
+//! Numeric functions without an initial value, which are undefined until an action assigns a value. An action
+//! that reads an undefined function is inapplicable.
 //!
-//! Each such function gets a guard predicate that holds where it has a value. A comparison holds if
-//! it is true and its functions have values. By Kleene's logic, a formula in negation normal form
-//! then holds exactly if it is true. The requirements of an effect become a condition of its
-//! action: the effect's condition is true or false, and if it is true, the functions that it reads
+//! Each such function gets a guard predicate, which is true where the function has a value. A comparison
+//! becomes the conjunction of itself and the guards of its functions. A formula in negation normal form is
+//! then true exactly if it is true in Kleene's three-valued logic. An effect adds a condition to its action:
+//! the condition of the effect must be defined, and if it is true, all functions that the effect reads must
 //! have values (`validate`, "One happening").
 
 use rustc_hash::FxHashMap;
@@ -15,10 +15,10 @@ use crate::lifted::{
 use crate::number::dense;
 use pddl::ast::{Assignment, Name};
 
-/// Guard predicates by function.
+/// Guard predicate of each numeric function that may be undefined.
 type Guards = FxHashMap<FunctionId, PredicateId>;
 
-/// Guards all numeric fluents except those that a metric reads.
+/// Adds guards to all numeric fluents except those that a metric reads and `total-cost`.
 pub fn guard(lifted: &mut Lifted) {
     let guards = declare(lifted);
     for schema in &mut lifted.schemas {
@@ -31,7 +31,7 @@ pub fn guard(lifted: &mut Lifted) {
     super::fluents::mark_fluents(lifted);
 }
 
-/// Declares the guard predicates with their initial facts.
+/// Declares the guard predicates and their initial facts. Returns the guard predicate of each function.
 fn declare(lifted: &mut Lifted) -> Guards {
     let mut measured = Vec::new();
     for metric in &lifted.metrics {
@@ -99,7 +99,7 @@ fn add(condition: &mut Formula, more: Vec<Formula>) {
     }
 }
 
-/// Returns the effect that sets the guard of an assigned function.
+/// Returns the effect that makes the guard true if the effect assigns a value, and `None` otherwise.
 fn gives_value(effect: &Effect, guards: &Guards) -> Option<Effect> {
     let Change::Assign { assignment: Assignment::Assign, function, terms, .. } = &effect.change else {
         return None;
@@ -112,7 +112,7 @@ fn needs_of_all(effects: &[Effect], guards: &Guards) -> Vec<Formula> {
     effects.iter().filter_map(|effect| needs(effect, guards)).collect()
 }
 
-/// Returns the condition that all values read by an effect are defined.
+/// Returns the condition that every value that an effect reads is defined, or `None` if it is always true.
 fn needs(effect: &Effect, guards: &Guards) -> Option<Formula> {
     let mut values = Vec::new();
     if let Change::Assign { assignment, function, terms, expression, .. } = &effect.change {
@@ -151,7 +151,7 @@ fn compares(formula: &Formula) -> bool {
     }
 }
 
-/// Adds to each comparison the condition that its functions have values.
+/// Adds the guards of its functions to each comparison in a condition.
 fn guarded(formula: &Formula, guards: &Guards) -> Formula {
     let each = |parts: &[Formula]| parts.iter().map(|part| guarded(part, guards)).collect();
     match formula {
@@ -167,7 +167,7 @@ fn guarded(formula: &Formula, guards: &Guards) -> Formula {
     }
 }
 
-/// Returns the conditions that all functions in an expression have values.
+/// Returns the guard atoms of all functions in an expression that have guards.
 fn values_of(expression: &Expression, guards: &Guards) -> Vec<Formula> {
     let mut conditions = Vec::new();
     functions(expression, &mut |function, terms| conditions.extend(has_value(function, terms, guards)));

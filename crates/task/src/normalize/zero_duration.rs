@@ -1,9 +1,9 @@
-//! Durative actions whose duration may be 0: start and end are then simultaneous.
+//! Durative actions whose duration may be 0, so that start and end are simultaneous.
 //!
-//! The conditions of start and end must hold in the state before the happening, the effects are
-//! simultaneous, and conditions over the interval are void, because the interval is empty
-//! (`validate`, clauses 1 and 4 of the definition). Such a schema gets a copy for duration 0; the
-//! original keeps the positive durations.
+//! If the duration is 0, the conditions of start and end must hold in the state before both, and all effects
+//! are simultaneous. `over all` conditions are void, because the interval is empty (`validate`, clauses 1 and
+//! 4 of the definition). Each such schema gets a copy for duration 0; the original keeps the positive
+//! durations.
 use num_traits::Zero;
 use rustc_hash::FxHashMap;
 
@@ -11,14 +11,14 @@ use crate::error::{Error, Errors};
 use crate::lifted::{Expression, Formula, FunctionId, Joint, Lifted, Rational, Schema};
 use pddl::ast::Comparison;
 
-/// Minimum and maximum of an expression, if known.
+/// Minimum and maximum of an expression, or `None` if they are unknown.
 type Range = Option<(Rational, Rational)>;
 
-/// Splits every schema whose duration may be 0. The copies are appended.
+/// Splits every schema whose duration may be 0 into two schemas. The schemas for duration 0 are appended.
 ///
 /// # Errors
-/// A duration that is chosen as short as possible may be 0 or less. The conditions for duration 0
-/// do not determine those for slightly longer durations.
+/// The duration is variable, the planner takes the shortest admissible value, and this value may be 0 or
+/// less. The conditions for duration 0 differ from those for slightly longer durations.
 pub fn split(lifted: &mut Lifted) -> Result<(), Errors> {
     let mut ranges: FxHashMap<FunctionId, (Rational, Rational)> = FxHashMap::default();
     for (function, _, value) in &lifted.values {
@@ -49,7 +49,7 @@ pub fn split(lifted: &mut Lifted) -> Result<(), Errors> {
                 };
                 let (is_zero, is_positive) = (compare(Comparison::Equal), compare(Comparison::Greater));
                 let mut copy = instant(schema);
-                // A happening reads its duration.
+                // The start reads the duration.
                 if let Some(joint) = &mut copy.joint {
                     joint.start = Formula::And(vec![is_zero.clone(), schema.start_condition.clone()]);
                 }
@@ -64,7 +64,7 @@ pub fn split(lifted: &mut Lifted) -> Result<(), Errors> {
     if errors.is_empty() { Ok(()) } else { Err(errors.into()) }
 }
 
-/// Returns the copy of a schema for duration 0.
+/// Returns the copy of a schema for duration 0, in which start and end are simultaneous.
 fn instant(schema: &Schema) -> Schema {
     let condition = Formula::And(vec![schema.start_condition.clone(), schema.at_end.clone()]);
     Schema {

@@ -1,7 +1,8 @@
-//! Decimals of up to 76 places in 256 bits. Sums and products of measured numbers are decimals,
-//! which need no greatest common divisors.
+//! Decimals of up to 76 decimal places, stored in 256 bits. Sums and products of measured numbers are
+//! decimals, and unlike fractions they need no greatest common divisors.
 //!
-//! The representation is unique: the mantissa is not a multiple of 10, unless there are no places.
+//! The representation is unique: the mantissa is not a multiple of 10, unless the number of decimal places is
+//! 0.
 
 use std::cmp::Ordering;
 
@@ -9,10 +10,10 @@ use ethnum::{I256, U256};
 use num_bigint::BigInt;
 use num_rational::{BigRational, Ratio};
 
-/// Maximum number of places; this power of 10 has fewer than 254 bits.
+/// Maximum number of decimal places; 10^76 has fewer than 254 bits.
 const PLACES: u32 = 76;
 
-/// Maximum number of bits of a mantissa.
+/// Maximum number of bits of the magnitude of a mantissa.
 const BITS: u32 = 254;
 
 /// Powers of 5 below 2^128.
@@ -32,7 +33,7 @@ const fn powers<const N: usize>(base: u128) -> [u128; N] {
     powers
 }
 
-/// `mantissa / 10^places`.
+/// A decimal number with the value `mantissa / 10^places`.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) struct Decimal {
     mantissa: I256,
@@ -48,13 +49,14 @@ fn fits(mantissa: I256) -> bool {
     mantissa.unsigned_abs().leading_zeros() >= U256::BITS - BITS
 }
 
-/// Returns the exponent of a power of 5.
+/// Returns the exponent e if the number is 5^e, and `None` otherwise.
 fn exponent_of_five(power: u128) -> Option<u32> {
     // Powers of 5 are sorted, so the exponent is found by binary search.
     FIVES.binary_search(&power).ok().and_then(|exponent| u32::try_from(exponent).ok())
 }
 
-/// Tests divisibility by 5. As 2^64 ≡ 1 (mod 5), a number is congruent to the sum of its words.
+/// Returns `true` if a number is divisible by 5. Because 2^64 ≡ 1 (mod 5), a number is congruent to the sum
+/// of its 64-bit words.
 fn is_multiple_of_five(number: I256) -> bool {
     let bytes = number.unsigned_abs().to_le_bytes();
     let (words, _) = bytes.as_chunks::<8>();
@@ -62,7 +64,8 @@ fn is_multiple_of_five(number: I256) -> bool {
 }
 
 impl Decimal {
-    /// Normalises a decimal. Returns `None` if it has too many digits.
+    /// Creates a decimal and removes trailing zeros after the decimal point. Returns `None` if it has too
+    /// many digits.
     fn new(mut mantissa: I256, mut places: u32) -> Option<Self> {
         // A multiple of 10 is divisible by 2 and by 5.
         while places > 0 && mantissa.trailing_zeros() > 0 && is_multiple_of_five(mantissa) {
@@ -72,7 +75,8 @@ impl Decimal {
         (places <= PLACES && fits(mantissa)).then_some(Self { mantissa, places })
     }
 
-    /// Converts a fraction. Returns `None` if it is not a decimal or has too many digits.
+    /// Converts a fraction. Returns `None` if the fraction has no finite decimal expansion or too many
+    /// digits.
     pub(super) fn from_small(small: &Ratio<i128>) -> Option<Self> {
         if *small.denom() == 1 {
             return Some(Self { mantissa: I256::from(*small.numer()), places: 0 });
@@ -81,14 +85,15 @@ impl Decimal {
         let twos = denominator.trailing_zeros();
         let fives = exponent_of_five(denominator >> twos)?;
         let places = twos.max(fives);
-        // At least one of the factors is 1.
+        // Either `twos` or `fives` equals `places`, so at least one of the two factors is 1.
         let missing_twos = I256::ONE.checked_shl(places.checked_sub(twos)?)?;
         let missing_fives = I256::new(5).checked_pow(places.checked_sub(fives)?)?;
         let mantissa = I256::from(*small.numer()).checked_mul(missing_twos)?.checked_mul(missing_fives)?;
         Self::new(mantissa, places)
     }
 
-    /// Converts a fraction. Returns `None` if it is not a decimal or has too many digits.
+    /// Converts a fraction of big integers. Returns `None` if it has no finite decimal expansion or too many
+    /// digits.
     pub(super) fn from_big(big: &BigRational) -> Option<Self> {
         let bits = |integer: &BigInt| integer.bits();
         if bits(big.numer()) > BITS.into() || bits(big.denom()) > U256::BITS.into() {
@@ -113,7 +118,7 @@ impl Decimal {
         Self::new(I256::from_le_bytes(padded), places)
     }
 
-    /// Converts to a reduced fraction. Returns `None` on overflow.
+    /// Converts to a reduced fraction. Returns `None` if the numerator or denominator exceeds 128 bits.
     pub(super) fn to_small(self) -> Option<Ratio<i128>> {
         let (mut mantissa, mut denominator) = (self.mantissa, power_of_ten(self.places)?);
         if self.places > 0 {
@@ -146,7 +151,8 @@ impl Decimal {
         self.mantissa.is_positive()
     }
 
-    /// Returns both mantissas with the same number of places, or `None` on overflow.
+    /// Returns both mantissas for a common number of decimal places, and this number. Returns `None` on
+    /// overflow.
     fn aligned(self, other: Self) -> Option<(I256, I256, u32)> {
         let widen =
             |own: Self, places: u32| own.mantissa.checked_mul(power_of_ten(places.checked_sub(own.places)?)?);

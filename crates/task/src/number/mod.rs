@@ -1,9 +1,8 @@
-//! Exact numbers: rationals of arbitrary size while files are read and ground, and integers of a
-//! ground task.
+//! Exact numbers: rationals of any size for reading and grounding, and integers for the ground task.
 //!
-//! No operation rounds, wraps or saturates. A rational that no longer fits two machine integers is
-//! stored with big integers. Integers of a task that may overflow are computed by checked
-//! operations, whose callers handle the overflow.
+//! No operation rounds, wraps or saturates. A rational that does not fit two machine integers is stored with
+//! big integers. Integers of a task that may overflow are computed by checked operations, and the callers
+//! handle the overflow.
 
 mod decimal;
 
@@ -19,24 +18,24 @@ use decimal::Decimal;
 
 /// A number of a ground task, scaled to an integer.
 ///
-/// Constants stay below [`LIMIT`] in magnitude. Values that may exceed the type (products with
-/// fluents, growing fluents, sums of costs) are computed by checked operations. `overflow-checks`
-/// are enabled in every profile.
+/// Constants stay below [`LIMIT`] in magnitude. Values that may exceed the type (products with fluents,
+/// growing fluents, sums of costs) are computed by checked operations. `overflow-checks` is enabled in every
+/// profile.
 pub type Int = i128;
 
 /// Limit on the magnitude of scaled constants.
 pub const LIMIT: Int = 1 << 118;
 
-/// Limit on the magnitude of fluents and sums of costs. States beyond are pruned, and the search is
-/// then incomplete.
+/// Limit on the magnitude of fluents and of sums of costs. A state that exceeds the limit is pruned, and the
+/// search is then incomplete.
 pub const GROWTH_LIMIT: Int = 1 << 124;
 
 /// An exact rational of any size.
 #[derive(Clone, PartialEq, Eq, Hash)]
 pub struct Rational(Repr);
 
-/// Unique representation: `Small` if it fits, else `Decimal` if it fits, so equal numbers have
-/// equal representations.
+/// Unique representation of a rational: `Small` if the number fits, otherwise `Decimal` if it fits, otherwise
+/// `Big`. Equal numbers thus have equal representations.
 #[derive(Clone, PartialEq, Eq, Hash)]
 enum Repr {
     Small(Ratio<i128>),
@@ -49,7 +48,7 @@ impl Rational {
         Self(Repr::Small(Ratio::new_raw(integer, 1)))
     }
 
-    /// `numerator / denominator`; the denominator must not be 0.
+    /// Returns `numerator / denominator`. The denominator must not be 0.
     pub(crate) fn new(numerator: Int, denominator: Int) -> Self {
         if numerator > Int::MIN && denominator > 0 {
             return Self(Repr::Small(Ratio::new(numerator, denominator)));
@@ -59,7 +58,7 @@ impl Rational {
 
     pub fn from_big(big: BigRational) -> Self {
         match (big.numer().to_i128(), big.denom().to_i128()) {
-            // The least integer has no negation.
+            // The least `i128` has no negation, so it is excluded.
             (Some(numerator), Some(denominator)) if numerator > i128::MIN => {
                 Self(Repr::Small(Ratio::new_raw(numerator, denominator)))
             }
@@ -71,7 +70,8 @@ impl Rational {
         Self(decimal.to_small().map_or(Repr::Decimal(decimal), Repr::Small))
     }
 
-    /// Converts to a decimal. Returns `None` if it is not a decimal or has too many digits.
+    /// Converts to a decimal. Returns `None` if the number has no finite decimal expansion or too many
+    /// digits.
     fn to_decimal(&self) -> Option<Decimal> {
         match &self.0 {
             Repr::Small(small) => Decimal::from_small(small),
@@ -107,7 +107,7 @@ impl Rational {
         }
     }
 
-    /// Converts to an integer. Returns `None` if it is no integer or overflows.
+    /// Converts to an integer. Returns `None` if the number is not an integer or exceeds 128 bits.
     pub fn to_int(&self) -> Option<Int> {
         match &self.0 {
             Repr::Small(small) => small.is_integer().then(|| *small.numer()),
@@ -115,7 +115,7 @@ impl Rational {
         }
     }
 
-    /// Returns `1 / self`, which must not be 0.
+    /// Returns `1 / self`. The number must not be 0.
     #[must_use]
     pub fn recip(&self) -> Self {
         Self::one() / self.clone()
@@ -133,7 +133,8 @@ impl Rational {
         !self.is_positive() && !self.is_zero()
     }
 
-    /// Returns an upper bound on the bits of numerator and denominator, at least 256.
+    /// Returns an upper bound on the number of bits of the numerator and of the denominator; the bound is at
+    /// least 256.
     pub(crate) fn bits(&self) -> u64 {
         match &self.0 {
             Repr::Small(_) | Repr::Decimal(_) => 256,
@@ -141,7 +142,8 @@ impl Rational {
         }
     }
 
-    /// Fast path for two small integers, which needs no greatest common divisor.
+    /// Applies an operation to two integers of up to 128 bits. Returns `None` if one of the numbers is not
+    /// such an integer or the result overflows.
     fn integers(&self, other: &Self, operation: impl Fn(i128, i128) -> Option<i128>) -> Option<Self> {
         let (a, b) = (self.to_int()?, other.to_int()?);
         operation(a, b).filter(|result| *result > i128::MIN).map(Self::from_integer)
@@ -171,7 +173,7 @@ impl Rational {
     }
 }
 
-/// Converts an index to 32 bits: of operators, atoms, values, designs or steps.
+/// Converts an index (of an operator, atom, value, design or step) to 32 bits.
 ///
 /// # Panics
 /// The index is at least 2^32, which exceeds the memory.
@@ -179,7 +181,7 @@ pub fn dense(index: usize) -> u32 {
     u32::try_from(index).expect("invariant: fewer than 2^32 of anything are held in memory")
 }
 
-/// Splits a number into 32-bit words, for keys.
+/// Splits a number into 32-bit words, lowest word first, for use in hash keys.
 pub fn words(number: Int) -> [u32; 4] {
     let bytes = number.to_le_bytes();
     let (words, _) = bytes.as_chunks::<4>();
@@ -270,7 +272,7 @@ impl Mul for Rational {
     }
 }
 
-/// Panics if the divisor is 0.
+/// Exact division. Panics if the divisor is 0.
 impl Div for Rational {
     type Output = Self;
 
@@ -319,7 +321,7 @@ impl Ord for Rational {
     }
 }
 
-/// Formats a fraction.
+/// Formats the number as a fraction or integer.
 impl std::fmt::Debug for Rational {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}", self.to_big())
@@ -332,7 +334,7 @@ mod tests {
 
     use super::*;
 
-    /// Numbers of all sizes, including those at the limits of small ones.
+    /// Generates rationals of all sizes, including numbers near the limits of 128-bit integers.
     fn number() -> impl Strategy<Value = BigRational> {
         let integer = prop_oneof![
             (-20_i128..20).prop_map(BigInt::from),

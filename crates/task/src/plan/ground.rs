@@ -1,18 +1,18 @@
-//! Plans over operators, and their execution.
+//! Plans over ground operators, and their execution.
 
 use crate::number::Int;
 use crate::task::number::TaskNumber;
 use crate::task::{OperatorId, State, Task};
 
-/// A step of a plan over operators.
+/// A step of a plan: an operator, and a design for each of its slots.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct GroundStep {
     pub operator: OperatorId,
-    /// An index into `SlotUse::designs` for each slot of the operator.
+    /// For each slot of the operator: an index into `SlotUse::designs`.
     pub choice: Vec<u32>,
 }
 
-/// A plan and the sum of its operator costs, in the task's integer unit.
+/// A plan over ground operators, with the sum of its operator costs in the task's integer unit.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct GroundPlan<N = Int> {
     pub steps: Vec<GroundStep>,
@@ -20,19 +20,20 @@ pub struct GroundPlan<N = Int> {
 }
 
 impl GroundPlan {
-    /// Greatest cost of strictly cheaper plans.
+    /// Returns the greatest cost that is strictly less than the cost of this plan.
     pub fn below(&self) -> Int {
         self.cost.saturating_sub(1)
     }
 }
 
-/// Returns the states of a plan, beginning with the initial one, and its cost. `None` if a step is
-/// not applicable, the last state is no goal state, or the cost overflows.
+/// Executes a plan in the initial state. Returns all states, beginning with the initial state, and the cost
+/// of the plan. Returns `None` if a step is not applicable, the last state is not a goal state, or the cost
+/// overflows.
 pub fn replay<N: TaskNumber>(task: &Task<N>, plan: &[GroundStep]) -> Option<(Vec<State<N>>, N)> {
     replay_from(task, &task.initial, plan)
 }
 
-/// Replays a plan from a given state, see [`replay`].
+/// Executes a plan in the state `initial`. Returns its states and its cost, see [`replay`].
 pub fn replay_from<N: TaskNumber>(
     task: &Task<N>,
     initial: &State<N>,
@@ -42,7 +43,7 @@ pub fn replay_from<N: TaskNumber>(
     Some((states, cost(task, plan)?))
 }
 
-/// Returns the sum of the costs of steps, or `None` on overflow.
+/// Returns the sum of the operator costs of the steps, or `None` on overflow.
 pub fn cost<N: TaskNumber>(task: &Task<N>, plan: &[GroundStep]) -> Option<N> {
     plan.iter().try_fold(N::zero(), |sum, step| {
         let operator = &task.operators[step.operator.index()];
@@ -50,8 +51,8 @@ pub fn cost<N: TaskNumber>(task: &Task<N>, plan: &[GroundStep]) -> Option<N> {
     })
 }
 
-/// Returns the states of a plan from a state on. `None` if a step is not applicable, or the last
-/// state is no goal state.
+/// Executes a plan in the state `initial` and returns all states, beginning with `initial`. Returns `None` if
+/// a step is not applicable or the last state is not a goal state.
 pub fn pass<N: TaskNumber>(task: &Task<N>, initial: &State<N>, plan: &[GroundStep]) -> Option<Vec<State<N>>> {
     let mut states = vec![initial.clone()];
     for step in plan {

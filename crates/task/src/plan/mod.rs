@@ -1,4 +1,4 @@
-//! Plans of the ground task, plans in names, and solutions with their proof.
+//! Plans over ground operators, plans with PDDL names, and solutions with their proofs.
 
 pub mod ground;
 mod named_plan;

@@ -1,4 +1,4 @@
-//! Plans with names: actions with their designs, as text and JSON.
+//! Plans with PDDL names: actions with their arguments and designs.
 
 use std::borrow::Cow;
 use std::str::FromStr;
@@ -23,7 +23,8 @@ use pddl::to_decimal;
 pub struct Exact(Rational);
 
 impl Exact {
-    /// Converts a number of a ground task that is scaled by `scale`.
+    /// Converts a number of a ground task to the unit of the PDDL files. `scale` is the factor between both
+    /// units.
     pub fn scaled<N: TaskNumber>(value: &N, scale: Int) -> Self {
         Self(value.to_rational() / Rational::from_integer(scale))
     }
@@ -33,12 +34,12 @@ impl Exact {
         Self(self.0.clone() + &other.0)
     }
 
-    /// Numerator of the reduced fraction.
+    /// Returns the numerator of the reduced fraction.
     pub fn numerator(&self) -> BigInt {
         self.0.to_big().numer().clone()
     }
 
-    /// Denominator of the reduced fraction, positive.
+    /// Returns the denominator of the reduced fraction, which is positive.
     pub fn denominator(&self) -> BigInt {
         self.0.to_big().denom().clone()
     }
@@ -53,7 +54,7 @@ impl Exact {
         self.0.to_big()
     }
 
-    /// Returns the nearest double.
+    /// Returns the nearest 64-bit floating-point number.
     pub fn to_f64(&self) -> f64 {
         self.to_rational().to_f64().unwrap_or(f64::NAN)
     }
@@ -99,7 +100,8 @@ impl FromStr for Exact {
 #[error("`{0}` is not a number: a decimal such as `2.5` or a fraction such as `7/3` would be one")]
 pub struct NotANumber(String);
 
-/// Serialises as text, because the numbers of most formats are binary: `"2.5"`, `"7/3"`.
+/// Serialises the number as a string such as `"2.5"` or `"7/3"`, because the numbers of most formats are
+/// binary floating-point numbers.
 impl Serialize for Exact {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_str(self)
@@ -113,7 +115,7 @@ impl<'de> Deserialize<'de> for Exact {
     }
 }
 
-/// Writes an exact decimal if there is one, otherwise a fraction.
+/// Writes the number as a decimal if it has a finite decimal expansion, otherwise as a fraction.
 impl std::fmt::Display for Exact {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let exact = self.to_rational();
@@ -128,16 +130,16 @@ pub struct Step {
     pub action: String,
     /// Arguments in the order of the schema's parameters, including designs.
     pub arguments: Vec<String>,
-    /// Functions with their chosen designs, in the order of the parameters.
+    /// Functions with their chosen designs, in the order of the design parameters.
     pub configuration: Vec<(String, String)>,
-    /// Functions whose design differs from that of their previous step.
+    /// Functions whose design differs from the design in the previous step that uses the function.
     pub reconfigured: Vec<String>,
-    /// Start in the domain's time unit, for sequential execution. Gaps between actions are waits
-    /// for timed initial literals only.
+    /// Start time for sequential execution, in the domain's time unit. Between actions there are gaps only
+    /// where the plan waits for timed initial literals.
     pub start: Exact,
-    /// Duration; 0 for an instantaneous action.
+    /// Duration in the domain's time unit; 0 for an instantaneous action.
     pub duration: Exact,
-    /// Contribution to the metric.
+    /// Contribution of the action to the metric.
     pub cost: Exact,
 }
 
@@ -146,11 +148,12 @@ pub struct Step {
 pub struct Plan {
     /// Actions in order of execution.
     pub steps: Vec<Step>,
-    /// Metric of the problem file.
+    /// Value of the plan under the metric of the problem file.
     pub cost: Exact,
 }
 
-/// Converts a plan to names, with each action as early as can be found within the limits.
+/// Converts a plan to PDDL names and computes start times. Each action starts as early as rescheduling within
+/// the limits can achieve.
 pub fn decode<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N>) -> Plan {
     let (task, plan) = (context.task, earliest(context, plan));
     let mut steps = Vec::new();
@@ -160,7 +163,7 @@ pub fn decode<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N>) -> P
     let actions = actions.filter(|(step, _)| task.operators[step.operator.index()].wait.is_none());
     for ((step, measured), start) in actions.zip(starts(task, &plan.steps)) {
         let operator = &task.operators[step.operator.index()];
-        // Auxiliary actions of compiled constraints and preferences are not part of the plan for users.
+        // Auxiliary actions of compiled constraints and preferences are not shown to users.
         if is_hidden(&task.schema_names[operator.schema as usize]) {
             continue;
         }
@@ -175,7 +178,7 @@ pub fn decode<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N>) -> P
     plan
 }
 
-/// Returns the value of the state-dependent part of the metric in a state, in cost units.
+/// Returns the value of the state-dependent part of the metric in a state, in the task's cost unit.
 pub fn rest<N: TaskNumber>(task: &Task<N>, state: &State<N>) -> Rational {
     let unit = Rational::from_integer(task.objective.scale) / Rational::from_integer(task.number_scale);
     let terms = task.objective.rest.iter();
@@ -183,8 +186,8 @@ pub fn rest<N: TaskNumber>(task: &Task<N>, state: &State<N>) -> Rational {
     terms.fold(Rational::zero(), |sum, term| sum + term) * &unit
 }
 
-/// Returns the contribution of each step to the state-dependent part of the metric, and its final
-/// value, in cost units.
+/// Executes the steps and returns their contributions to the state-dependent part of the metric. The second
+/// part is the final value of the state-dependent part. All values are in the task's cost unit.
 pub fn measured<'s, N: TaskNumber>(
     task: &Task<N>,
     steps: impl Iterator<Item = (OperatorId, &'s [u32])>,
@@ -195,7 +198,7 @@ pub fn measured<'s, N: TaskNumber>(
     let (mut state, mut added) = (task.initial.clone(), Vec::new());
     let mut before = rest(task, &state);
     for (operator, choice) in steps {
-        // A step outside of its plan may be inapplicable.
+        // A step may be inapplicable if it is examined outside its plan; the state then does not change.
         if let Some(next) = task.successor(&task.operators[operator.index()], &state, choice) {
             state = next;
         }
@@ -207,13 +210,13 @@ pub fn measured<'s, N: TaskNumber>(
 }
 
 impl Plan {
-    /// End of the last action, in the domain's time unit.
+    /// Returns the end time of the last action, in the domain's time unit.
     pub fn makespan(&self) -> Exact {
         let ends = self.steps.iter().map(|step| step.start.0.clone() + &step.duration.0);
         Exact(ends.max().unwrap_or_default())
     }
 
-    /// Recomputes the reconfigured functions of each step.
+    /// Recomputes the field `reconfigured` of each step.
     pub fn note_reconfigured(&mut self) {
         let mut current = Vec::new();
         for step in &mut self.steps {
@@ -224,8 +227,8 @@ impl Plan {
 }
 
 impl Step {
-    /// Converts an operator to names. Start and duration are in the task's time unit, the cost in
-    /// the task's cost unit.
+    /// Converts an operator with chosen designs to a step with PDDL names. Start and duration are given in
+    /// the task's time unit, the cost in the task's cost unit.
     pub fn new<N: TaskNumber>(
         task: &Task<N>,
         operator: &Operator<N>,
@@ -243,7 +246,7 @@ impl Step {
         }
     }
 
-    /// Records the functions whose design differs from the last one in `current`, and updates
+    /// Adds the functions whose design differs from their design in `current` to `reconfigured`, and updates
     /// `current`.
     fn note_reconfigured(&mut self, current: &mut Vec<(String, String)>) {
         for (function, design) in &self.configuration {
@@ -259,25 +262,26 @@ impl Step {
     }
 }
 
-/// Returns the metric of the problem file for a sum of operator costs.
+/// Converts a sum of operator costs to the value of the problem's metric.
 pub fn metric<N: TaskNumber>(task: &Task<N>, cost: &impl TaskNumber) -> Exact {
     task.objective.metric(cost)
 }
 
 impl<N: TaskNumber> Objective<N> {
-    /// Returns the metric in the file's terms for a sum of operator costs.
+    /// Converts a sum of operator costs to the value of the metric in the PDDL file.
     pub fn metric(&self, cost: &impl TaskNumber) -> Exact {
         Exact::scaled(&self.signed(&(cost.to_rational() + self.offset.to_rational())), self.scale)
     }
 
-    /// Converts a cost to the sign of the file.
+    /// Returns the cost, negated if the metric is maximised.
     fn signed(&self, cost: &impl TaskNumber) -> Rational {
         let cost = cost.to_rational();
         if self.maximize { -cost } else { cost }
     }
 }
 
-/// Returns the object of an argument for a combination of designs.
+/// Returns the object of an operator's argument. If the argument is a slot, the object is the design that
+/// `choice` selects.
 pub fn resolve<N>(task: &Task<N>, operator: &Operator<N>, choice: &[u32], argument: Argument) -> ObjectId {
     match argument {
         Argument::Object(object) => object,
@@ -293,6 +297,7 @@ fn argument<N>(task: &Task<N>, operator: &Operator<N>, choice: &[u32], argument:
     task.object_names[resolve(task, operator, choice, argument).index()].clone()
 }
 
+/// Returns the names of an operator's arguments, including the chosen designs.
 pub fn arguments<N>(task: &Task<N>, operator: &Operator<N>, choice: &[u32]) -> Vec<String> {
     operator.arguments.iter().map(|a| argument(task, operator, choice, *a)).collect()
 }

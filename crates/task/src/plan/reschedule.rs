@@ -1,9 +1,8 @@
-//! Rescheduling: a plan to the same plan with earlier starts.
+//! Rescheduling: starts the actions of a plan with timed events as early as possible.
 //!
-//! Waiting is free, so an optimal plan may delay an action unnecessarily until an event that only a
-//! later action needs. Each action is therefore tried in its earlier windows, with waits before the
-//! next one if events are required. A change is kept if the result is still a plan with at most the
-//! same cost.
+//! Waiting is free, so an optimal plan may delay an action until an event that only a later action needs. For
+//! each action, the operators of its earlier timeline windows are therefore tried; required waits are
+//! inserted before the next action. A change is kept if the result is still a plan and costs no more.
 
 use num_traits::Zero;
 
@@ -13,8 +12,8 @@ use crate::plan::ground::{GroundPlan, GroundStep, replay};
 use crate::task::number::TaskNumber;
 use crate::task::{Operator, OperatorId, Task};
 
-/// Returns the same actions, each as early as its predecessors and the remaining plan admit, within
-/// the limits.
+/// Returns a plan with the same actions, in which each action starts as early as the other actions allow.
+/// Stops improving once a limit is reached.
 pub fn earliest<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N>) -> GroundPlan<N> {
     let Context { task, limits } = context;
     let mut plan = plan.clone();
@@ -31,7 +30,7 @@ pub fn earliest<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N>) ->
             let best = tried.map(|tried| (starts(task, &tried.steps), tried)).min_by(|a, b| a.0.cmp(&b.0));
             if let Some((_, tried)) = best.filter(|(times, _)| *times < current_starts) {
                 plan = tried;
-                // The number of earlier waits may have changed.
+                // The change may have removed earlier waits.
                 position = 0;
                 continue;
             }
@@ -41,7 +40,8 @@ pub fn earliest<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N>) ->
     plan
 }
 
-/// Returns the other operators of an operator's action.
+/// Returns the other operators that represent the same action with the same arguments, for other windows or
+/// cases.
 fn same_action<N: TaskNumber>(task: &Task<N>, id: OperatorId) -> impl Iterator<Item = OperatorId> + '_ {
     let operator = &task.operators[id.index()];
     let is_same_action = move |other: &Operator<N>| {
@@ -53,8 +53,8 @@ fn same_action<N: TaskNumber>(task: &Task<N>, id: OperatorId) -> impl Iterator<I
     operators.filter(move |(other, other_id)| *other_id != id && is_same_action(other)).map(|(_, id)| id)
 }
 
-/// Replaces an operator of the plan and inserts the necessary waits. Returns `None` if the result
-/// is no plan or costs more.
+/// Replaces the operator at `position` and inserts the necessary waits. Returns `None` if the result is not a
+/// plan or costs more than `plan`.
 fn with<N: TaskNumber>(
     task: &Task<N>,
     plan: &GroundPlan<N>,
@@ -74,7 +74,7 @@ fn with<N: TaskNumber>(
     for (at, step) in plan.steps.iter().enumerate().filter(|(_, step)| !is_wait(step)) {
         let step = if at == position { GroundStep { operator: other, ..step.clone() } } else { step.clone() };
         let operator = &task.operators[step.operator.index()];
-        // At most one wait is applicable at a time, and each leads to a later event.
+        // At most one wait is applicable in a state, and each wait leads to a later event.
         while !operator.applicable(&state, &step.choice) {
             let wait = waits.iter().find(|wait| task.operators[wait.index()].applicable(&state, &[]))?;
             state = task.successor(&task.operators[wait.index()], &state, &[])?;
@@ -90,7 +90,7 @@ fn with<N: TaskNumber>(
     (cost <= plan.cost).then_some(GroundPlan { steps, cost })
 }
 
-/// Start times of the actions, in the task's time unit.
+/// Returns the start times of the actions (without waits) for sequential execution, in the task's time unit.
 pub fn starts<N: TaskNumber>(task: &Task<N>, steps: &[GroundStep]) -> Vec<Rational> {
     let mut clock = Rational::zero();
     let mut times = Vec::new();

@@ -6,7 +6,7 @@ use crate::plan::ground::GroundPlan;
 use crate::plan::named_plan::{Exact, Plan};
 use crate::words;
 
-/// Quality of the result.
+/// Status of a planning result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Status {
     /// The plan is proved optimal.
@@ -30,45 +30,45 @@ words! {
     Unknown = "unknown",
 }
 
-/// Justification of the status.
+/// Justification of an optimality or unsolvability claim.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Proof {
-    /// The formula for cheaper plans is unsatisfiable up to the step bound, and longer plans are
-    /// not cheaper.
+    /// The formula for cheaper plans of up to `step_bound` steps is unsatisfiable, and no longer plan is
+    /// cheaper.
     Sat {
-        /// Number of steps above which no plan is cheaper.
+        /// Number of steps above which no plan can be cheaper.
         step_bound: usize,
     },
-    /// The cost of the plan equals a lower bound on the cost of all plans: the goal distance in a
-    /// projection, or the sum of individual minimum costs.
+    /// The cost of the plan equals a lower bound on the cost of all plans. The bound is the goal distance in
+    /// a projection or the sum of individual minimum costs.
     Bound,
-    /// A* with an admissible heuristic has terminated; all pruned nodes are dominated.
+    /// A* with an admissible heuristic has terminated, and every pruned node is dominated by another node.
     Search,
-    /// The goal is unreachable in a relaxation or projection; contains the reason.
+    /// The goal is unreachable in a relaxation or projection of the task. The text describes the reason.
     Relaxation(String),
 }
 
-/// A better plan or a better lower bound.
+/// Progress report of the optimiser: a better plan or a higher lower bound.
 #[derive(Debug, Clone)]
 pub struct Improvement {
     /// Metric of the best known plan.
     pub cost: Exact,
     /// Lower bound on the metric of every plan.
     pub lower_bound: Exact,
-    /// Number of steps of the current formula.
+    /// Number of steps of the current SAT formula.
     pub horizon: usize,
 }
 
 impl Improvement {
-    /// Relative gap between the plan and the bound: 0 for an optimal plan. Infinite or not a number
-    /// if the metric is 0.
+    /// Returns the relative gap between the metric of the plan and the lower bound; 0 if both are equal. The
+    /// result is infinite if only the metric is 0.
     pub fn gap(&self) -> f64 {
         let (cost, bound) = (self.cost.to_f64(), self.lower_bound.to_f64());
         if self.cost == self.lower_bound { 0.0 } else { (cost - bound).abs() / cost.abs() }
     }
 }
 
-/// Reason why a metric has no best value.
+/// Reason why a metric may have no best value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MetricUnbounded {
     /// An action that improves the metric can be repeated forever in a state of the plan.
@@ -79,25 +79,25 @@ pub enum MetricUnbounded {
 
 words! { MetricUnbounded, "reason": Proved = "proved", Suspected = "suspected" }
 
-/// Component of the planner.
+/// Component of the planner that can find a plan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PlannerPart {
-    /// A\* with lower bounds.
+    /// A\* search with lower bounds.
     Search,
     /// Satisficing search with relaxed plans and landmarks.
     Satisficing,
-    /// SAT solver.
+    /// SAT-based planning.
     Sat,
 }
 
 words! { PlannerPart, "part of the planner": Search = "search", Satisficing = "satisficing", Sat = "sat" }
 
-/// Progress of a run at a point in time.
+/// Best plan and lower bound at a point in time.
 #[derive(Debug, Clone)]
 pub struct Moment {
     /// Time since the start of the optimiser.
     pub time: Duration,
-    /// Metric of the best known plan.
+    /// Metric of the best known plan; `None` before a plan is found.
     pub cost: Option<Exact>,
     /// Lower bound on the metric of every plan.
     pub lower_bound: Exact,
@@ -108,21 +108,22 @@ pub struct Moment {
 pub struct Statistics {
     /// Number of operators of the ground task.
     pub operators: usize,
-    /// Number of variables of the largest formula.
+    /// Number of variables of the largest SAT formula.
     pub variables: usize,
-    /// Number of clauses of the largest formula.
+    /// Number of clauses of the largest SAT formula.
     pub clauses: usize,
-    /// Number of clauses of the largest formula by family.
+    /// Number of clauses of the largest SAT formula for each clause family.
     pub families: Vec<(&'static str, usize)>,
-    /// Number of clauses that the SAT solver has learnt, over all formulas.
+    /// Number of conflicts of the SAT solver over all formulas; each conflict yields a learnt clause.
     pub conflicts: u64,
     /// Number of calls of the SAT solver.
     pub calls: usize,
-    /// Reason why a SAT solver stopped, other than a limit.
+    /// Reason, other than a limit, why a SAT solver stopped without a result.
     pub failure: Option<String>,
-    /// Contradiction between two components: a fault of the planner, for which no proof is claimed.
+    /// Contradiction between the results of two components. This is a bug of the planner, and no proof is
+    /// claimed.
     pub contradiction: Option<String>,
-    /// Name of the program on whose unchecked result the unsatisfiability of a formula rests.
+    /// Name of an external program that reported a formula as unsatisfiable without a checked proof.
     pub unchecked: Option<String>,
     /// Component that found the plan.
     pub found_by: Option<PlannerPart>,
@@ -134,33 +135,33 @@ pub struct Statistics {
     pub evaluated: u64,
     /// Number of restarts of the satisficing search.
     pub restarts: usize,
-    /// Better plans in chronological order, and bounds that increased by at least one percent.
+    /// Better plans in chronological order, and lower bounds that increased by at least one percent.
     pub history: Vec<Moment>,
-    /// Time of bounds and searches.
+    /// Time spent on lower bounds and searches.
     pub search: Duration,
-    /// Time of encoding.
+    /// Time spent on encoding SAT formulas.
     pub encode: Duration,
-    /// Time of the SAT solver.
+    /// Time spent in the SAT solver.
     pub solve: Duration,
 }
 
-/// Result of planning. `Display` writes the verdict and the plan, if there is one.
+/// Result of planning. `Display` writes the verdict and, if there is one, the plan.
 #[derive(Debug, Clone)]
 pub struct Solution {
-    /// Quality of the plan.
+    /// Status of the result.
     pub status: Status,
-    /// The best plan.
+    /// The best plan found, if any.
     pub plan: Option<Plan>,
+    /// The best plan over ground operators, if any.
     pub ground: Option<GroundPlan>,
-    /// Lower bound on the metric of every plan. `None` if the metric is unbounded or no bound is
-    /// known.
+    /// Lower bound on the metric of every plan. `None` if the metric may be unbounded or no bound is known.
     pub lower_bound: Option<Exact>,
     /// Number of steps up to which all plans were considered.
     pub horizon: usize,
     /// Justification of the status.
     pub proof: Option<Proof>,
-    /// Set if the metric has no best value: the plan has the fewest steps, and among those the best
-    /// metric.
+    /// Set if the metric may have no best value. The plan then has the fewest steps, and the best metric
+    /// among the plans with this number of steps.
     pub unbounded: Option<MetricUnbounded>,
     /// Statistics of the run.
     pub statistics: Statistics,

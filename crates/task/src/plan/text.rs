@@ -1,8 +1,8 @@
-//! Plan as text, with times as decimals that preserve their order.
+//! Text form of plans, with times as decimals that preserve the order of actions.
 //!
-//! A fraction such as 1/3 has no finite decimal. Starts and ends are rounded to the same grid, and
-//! a duration is their difference. Gaps of a thousandth are thus preserved, and no action starts
-//! before its predecessor ends.
+//! A fraction such as 1/3 has no finite decimal expansion. Starts and ends are rounded to the same grid, and
+//! the printed duration is the difference between rounded end and rounded start. Gaps of a thousandth are
+//! thus preserved, and no action starts before its predecessor ends.
 
 use std::fmt;
 
@@ -10,11 +10,11 @@ use num_rational::BigRational;
 
 use crate::plan::named_plan::{Exact, Plan, Step};
 
-/// Number of decimals of times without a finite decimal.
+/// Number of decimal places to which a time without a finite decimal expansion is rounded.
 const DECIMALS: u32 = 12;
 
 impl Step {
-    /// Returns start and duration as decimals, exact if possible.
+    /// Returns start and duration with finite decimal expansions; they are rounded only if necessary.
     pub fn times(&self) -> (Exact, Exact) {
         let start = self.start.to_rational();
         let end = rounded(&start + self.duration.to_rational());
@@ -32,8 +32,9 @@ impl Step {
 }
 
 impl Exact {
-    /// Formats the number as a time: with at least three decimals and all further ones, because an
-    /// action must not start before its preconditions hold. Infinite decimals are rounded to nine.
+    /// Formats the number as a time with at least three decimal places. Finite decimals are not rounded,
+    /// because an action must not start before its preconditions hold. Other numbers are rounded to nine
+    /// decimal places.
     pub fn as_time(&self) -> String {
         let text = self.to_string();
         match text.split_once('.') {
@@ -44,9 +45,8 @@ impl Exact {
     }
 }
 
-/// Writes the format of the planning competitions, which `pddl::validate::PlanText` parses: a line
-/// `(action arguments)` for each step, or `start: (action arguments)  [duration]` for plans with
-/// times.
+/// Writes the plan in the format of the planning competitions, which `pddl::validate::PlanText` parses. Each
+/// step is a line `(action arguments)`, or `start: (action arguments)  [duration]` if the plan has times.
 impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let timed = |step: &Step| !step.duration.is_zero() || !step.start.is_zero();

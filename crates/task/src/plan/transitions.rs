@@ -1,6 +1,7 @@
-//! The ground task as a transition system with PDDL names, for simulation, inspection and tests.
+//! The ground task as a transition system with PDDL names, used for simulation, inspection and tests.
 //!
-//! Function designs are chosen here, so an action occurs once for each combination of its designs.
+//! Designs are chosen as part of an action, so an operator yields one action for each combination of its
+//! designs.
 
 use crate::context::Context;
 use crate::limits::Limits;
@@ -10,7 +11,7 @@ use crate::plan::named_plan::{Exact, Step, decode, metric, rest};
 use crate::task::number::TaskNumber as _;
 use crate::task::{OperatorId, State, Task};
 
-/// A state with the cost of the path to it.
+/// A state of the task, with the cost of the path that leads to it.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct TaskState {
     state: State,
@@ -19,7 +20,7 @@ pub struct TaskState {
 }
 
 impl TaskState {
-    /// Resets the cost, for callers that compare states only.
+    /// Returns the state with cost 0, for callers that compare states independent of their paths.
     #[must_use]
     pub fn unpaid(mut self) -> Self {
         self.cost = 0;
@@ -27,7 +28,7 @@ impl TaskState {
     }
 }
 
-/// An applicable action.
+/// An applicable action with its successor state.
 #[derive(Debug, Clone)]
 pub struct Transition {
     /// Name of the action schema.
@@ -44,9 +45,9 @@ impl Task {
         TaskState { state: self.initial.clone(), cost: 0 }
     }
 
-    /// Returns the relevant fluent atoms of the task, as `(predicate objects)`.
+    /// Returns the relevant fluent atoms of the task in PDDL, as `(predicate objects)`.
     pub fn atoms(&self) -> impl Iterator<Item = &str> {
-        // The last value of each variable means "none of its atoms". Auxiliary atoms have no
+        // The last value of each variable represents "none of its atoms". Names of auxiliary atoms have no
         // parentheses.
         self.variables
             .iter()
@@ -56,7 +57,7 @@ impl Task {
             .filter(|atom| atom.starts_with('('))
     }
 
-    /// Returns all actions with their arguments, including inapplicable ones.
+    /// Returns all actions with their arguments and designs, including inapplicable actions.
     pub fn actions(&self) -> impl Iterator<Item = (String, Vec<String>)> {
         let steps = self.ids().flat_map(move |id| {
             self.operators[id.index()].admitted_combinations().filter_map(move |choice| self.step(id, choice))
@@ -69,17 +70,17 @@ impl Task {
     }
 
     fn step(&self, operator: OperatorId, choice: Vec<u32>) -> Option<Step> {
-        // Arguments and designs are named by the code for plans, with a plan of one step.
+        // The code for plans determines the names: the action is decoded as a plan of one step.
         let plan = GroundPlan { steps: vec![GroundStep { operator, choice }], cost: 0 };
         decode(Context::new(self, &Limits::none()), &plan).steps.pop()
     }
 
-    /// Number of operators, each of which represents all combinations of its designs.
+    /// Returns the number of operators. An operator represents all combinations of designs for its slots.
     pub fn operator_count(&self) -> usize {
         self.operators.len()
     }
 
-    /// Returns the atoms of [`Task::atoms`] that hold in a state.
+    /// Returns the atoms among [`Task::atoms`] that are true in a state.
     #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     pub fn holding(&self, situation: &TaskState) -> Vec<&str> {
         let values = self.variables.iter().zip(&situation.state.values);
@@ -90,18 +91,18 @@ impl Task {
             .collect()
     }
 
-    /// Returns the reason why the goal is unreachable, if grounding has found one. The transitions
-    /// may then be incomplete.
+    /// Returns the reason why the goal is unreachable if grounding found one, and `None` otherwise. In the
+    /// first case, the transitions may be incomplete.
     pub fn unreachable(&self) -> Option<&str> {
         self.unreachable.as_deref()
     }
 
-    /// Returns `true` if the goal holds.
+    /// Returns `true` if the state satisfies the goal.
     pub fn reaches_goal(&self, situation: &TaskState) -> bool {
         self.unreachable.is_none() && self.is_goal(&situation.state)
     }
 
-    /// Returns the metric of a plan that leads to this state.
+    /// Returns the value of the metric for the path that leads to this state.
     pub fn metric(&self, situation: &TaskState) -> Exact {
         metric(self, &(situation.cost.to_rational() + rest(self, &situation.state)))
     }

@@ -1,12 +1,12 @@
-//! The claim about a solution and its reason, in one sentence.
+//! Summarises a solution in one sentence: its status and the reason for it.
 
 use std::fmt;
 
 use crate::plan::solution::{MetricUnbounded, Proof, Solution, Status};
 
 impl Solution {
-    /// Returns the claim and its proof status: a sentence without a full stop, or two lines if the
-    /// metric has no best value.
+    /// Returns the status of the solution and its justification: a sentence without a full stop, or two lines
+    /// if the metric may have no best value.
     pub fn verdict(&self) -> String {
         verdict(self)
     }

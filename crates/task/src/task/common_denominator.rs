@@ -1,4 +1,4 @@
-//! Least common denominator of rationals of arbitrary size.
+//! Least common denominator of rationals of any size.
 
 use std::collections::hash_map::Entry;
 use std::sync::Arc;
@@ -11,12 +11,12 @@ use rustc_hash::FxHashMap;
 use crate::number::Rational;
 use crate::task::quantity::Quantity;
 
-/// Least common denominator of the added numbers.
+/// Accumulates the least common denominator of numbers.
 pub struct CommonDenominator {
-    /// `None` if it exceeds the limit of bits.
+    /// Least common denominator of the added numbers; `None` if it exceeds `most_bits` bits.
     common: Option<BigInt>,
     most_bits: u64,
-    /// Visited tables by address, because operators share them.
+    /// Visited tables by address, because operators share tables.
     seen: FxHashMap<*const Rational, Arc<[Rational]>>,
 }
 
@@ -43,7 +43,7 @@ impl CommonDenominator {
         }
     }
 
-    /// Returns the denominator, or `None` if it exceeds the limit of bits.
+    /// Returns the least common denominator, or `None` if it exceeds the limit on its bits.
     pub fn get(self) -> Option<BigInt> {
         self.common
     }

@@ -1,6 +1,6 @@
-//! Newtypes for dense ids.
+//! Macro that implements dense ids, i.e. newtypes of `u32` that count from 0.
 
-/// Implements conversions between ids and indices.
+/// Implements conversions between an id type and indices.
 macro_rules! dense_ids {
     ($($id:ident),+) => {$(
         impl $id {
@@ -8,12 +8,12 @@ macro_rules! dense_ids {
                 self.0 as usize
             }
 
-            /// Returns the id of an index.
+            /// Creates the id with this index.
             pub fn of(index: usize) -> Self {
                 Self($crate::number::dense(index))
             }
 
-            /// Returns the ids below `count`.
+            /// Returns all ids with an index below `count`.
             pub fn all(count: usize) -> impl Iterator<Item = Self> + Clone {
                 (0..$crate::number::dense(count)).map(Self)
             }

@@ -1,9 +1,9 @@
-//! The ground task: finite-domain and numeric variables, and operators with open design slots.
+//! The ground task: finite-domain and numeric variables, and operators with slots for designs.
 //!
-//! The formalism is SAS+ of Bäckström and Nebel \[1\] with two extensions. Numeric variables have
-//! exact integer values. Operators have *slots*, each of which takes a function design. Conditions,
-//! costs and consumption that depend on designs are tables over slots, so k functions with m
-//! designs each need k·m choices instead of m^k operators.
+//! The formalism is SAS+ by Bäckström and Nebel \[1\] with two extensions. Numeric variables have exact
+//! integer values. Operators have *slots*; a step of a plan chooses a function design for each slot.
+//! Conditions, costs and consumption that depend on designs are tables over slots. For k functions with m
+//! designs each, k·m choices thus replace m^k operators.
 //!
 //! \[1\] C. Bäckström, B. Nebel: Complexity results for SAS+ planning, Computational Intelligence
 //! 11(4), 1995.
@@ -18,21 +18,21 @@ use crate::task::number::{TaskNumber, sum_of_products};
 use crate::task::quantity::{Linear, NumericId, Quantity, SlotSet};
 use crate::task::timing::Timing;
 
-/// A finite-domain variable.
+/// Id of a finite-domain variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct VariableId(pub u32);
 
-/// An operator: an action schema with its arguments except the function designs.
+/// Id of an operator: an action schema with objects for all parameters except slots.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct OperatorId(pub u32);
 
-/// A function whose design is chosen at every step.
+/// Id of a slot: a function whose design is chosen in every step that uses it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct SlotId(pub u32);
 
 dense_ids!(VariableId, OperatorId, SlotId);
 
-/// Assignment of a value to a variable.
+/// A fact of SAS+: a variable has a particular value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Fact {
     /// The variable.
@@ -48,78 +48,80 @@ pub struct Literal {
     pub positive: bool,
 }
 
-/// A condition: all facts, a literal of every clause, and all comparisons must hold.
+/// A condition. It holds if all facts, at least one literal of every clause, and all comparisons hold.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Condition<N = Int> {
     pub facts: Vec<Fact>,
     pub clauses: Vec<Vec<Literal>>,
     /// Expressions that must be ≥ 0.
     pub comparisons: Vec<Linear<N>>,
-    /// Expressions that must be > 0. Empty for integers, where > 0 is expressed as ≥ 1.
+    /// Expressions that must be > 0. Empty for integers, where > 0 is written as ≥ 1.
     pub above: Vec<Linear<N>>,
 }
 
-/// A finite-domain variable, which has exactly one of its values in every state.
+/// A finite-domain variable. It has exactly one of its values in every state.
 #[derive(Debug, Clone)]
 pub struct Variable {
-    /// Names of ground atoms, or `none of these`.
+    /// Name of each value: a ground atom, or `none of these` for the last value.
     pub values: Vec<String>,
 }
 
-/// A function and its possible designs.
+/// A slot of the task, with all designs that some operator allows for it.
 #[derive(Debug, Clone)]
 pub struct Slot {
     pub designs: Vec<ObjectId>,
 }
 
-/// Use of a slot by an operator.
+/// The use of a slot by an operator.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct SlotUse {
     pub slot: SlotId,
-    /// Ascending indices of the slot's designs that suit the operator.
+    /// Indices of the slot's designs that are suitable for the operator, in ascending order.
     pub designs: Vec<u32>,
 }
 
-/// Combinations of designs with which an operator is not applicable.
+/// A constraint on designs: combinations with which the operator is not applicable.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct ForbiddenCombinations {
-    /// Positions in the operator's slot list.
+    /// Constrained slots, as positions in the operator's slot list.
     pub slots: SlotSet,
-    /// Combinations: for every slot of `slots` an index into `SlotUse::designs`.
+    /// Forbidden combinations. Each holds, for every slot in `slots`, an index into `SlotUse::designs`.
     pub combinations: Vec<SlotSet>,
 }
 
-/// Assignment of a new value to a numeric variable.
+/// Assignment of a new value to a numeric variable, as an expression over the state before the operator.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct NumericEffect<N = Int> {
     pub variable: NumericId,
     pub value: Linear<N>,
 }
 
-/// Facts that an operator sets if all literals hold before it.
+/// Facts that an operator sets if all literals of the condition hold before the operator.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct ConditionalEffect {
     pub condition: Vec<Literal>,
     pub effects: Vec<Fact>,
 }
 
-/// A rule of a derived variable: the variable has the value of the head if the body holds. If no
-/// body holds, it has its last value.
+/// A rule of a derived variable: the variable has the value in `head` if `body` holds. If no body of its
+/// rules holds, the variable has the last value of its domain.
 #[derive(Debug, Clone)]
 pub struct Axiom<N = Int> {
     pub head: Fact,
     pub body: Condition<N>,
 }
 
-/// A set of mutually dependent rules or a single rule. Negated variables and dependencies are in
-/// earlier layers.
+/// A layer of stratified rules: the rules of one derived variable, or of several mutually dependent derived
+/// variables. Derived variables that the rules read negatively, or that are not heads of this layer, belong
+/// to earlier layers.
 #[derive(Debug, Clone)]
 pub struct Layer<N = Int> {
     pub rules: Vec<Axiom<N>>,
+    /// `true` if a rule depends on a head of this layer.
     pub recursive: bool,
 }
 
-/// An argument of an action: an object, or the design of a slot (by position in the operator's slot
+/// An argument of an action: an object, or the design of a slot (given by its position in the operator's slot
 /// list).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Argument {
@@ -127,59 +129,58 @@ pub enum Argument {
     Slot(u32),
 }
 
-/// An operator. Design-dependent data is shared with other operators of the same schema.
+/// A ground operator. Operators of the same schema share data that depends on designs.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Operator<N = Int> {
     /// Index of the action schema in the domain.
     pub schema: u32,
     pub arguments: Vec<Argument>,
-    /// Required functions with the arguments that are their designs.
+    /// Functions that the action requires, each with the argument that is its design.
     pub configuration: Vec<(ObjectId, Argument)>,
     pub slots: Arc<[SlotUse]>,
     pub forbidden: Arc<[ForbiddenCombinations]>,
     pub condition: Condition<N>,
-    /// At most one value per variable, in ascending order of the variables.
+    /// Assigned facts: at most one value for each variable, in ascending order of the variables.
     pub effects: Vec<Fact>,
-    /// Conditional effects in order: later ones take precedence over earlier ones and over
-    /// `effects`.
+    /// Conditional effects in order: later ones take precedence over earlier ones and over `effects`.
     pub conditional: Vec<ConditionalEffect>,
     pub numeric_effects: Vec<NumericEffect<N>>,
-    /// Cost in the task's cost unit; negative if the metric rewards the operator.
+    /// Cost in the task's cost unit; negative if the operator improves a reward metric.
     pub cost: Quantity<N>,
-    /// Costs by the task's other objectives, in their units.
+    /// Costs under the other objectives of the task, in their units.
     pub others: Vec<Quantity<N>>,
     /// Duration in the task's time unit.
     pub duration: Quantity<N>,
-    /// Set for a wait instead of an action: its end in the task's time unit from the start of the
-    /// plan.
+    /// End of the wait if the operator is a wait, in the task's time unit since the start of the plan; `None`
+    /// for an action.
     pub wait: Option<N>,
-    /// Earliest times in the task's time unit from the start of the plan.
+    /// Earliest start and end, in the task's time unit since the start of the plan.
     pub timing: Timing<N>,
 }
 
-/// A state: a value for each variable.
+/// A state: values of all finite-domain and numeric variables.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct State<N = Int> {
     pub values: Vec<u32>,
     pub numbers: Vec<N>,
 }
 
-/// Relation between integer costs and the metric of the problem file.
+/// Conversion between operator costs and the metric of the problem file.
 #[derive(Debug, Clone)]
 pub struct Objective<N = Int> {
-    /// Factor between costs and the metric.
+    /// Factor by which values of the metric are multiplied to obtain costs.
     pub scale: Int,
-    /// Offset of the sum of operator costs, in scaled units.
+    /// Constant that is added to the sum of operator costs, in scaled units.
     pub offset: N,
-    /// `true` for maximisation; operator costs are then negated.
+    /// `true` if the metric is maximised; operator costs are then negated.
     pub maximize: bool,
-    /// Numeric variables whose final values are added, with their factors (negated for
+    /// Numeric variables whose final values are part of the metric, with their factors (negated for
     /// maximisation).
     pub rest: Vec<(NumericId, Rational)>,
 }
 
 impl Objective {
-    /// Returns the plain sum of costs.
+    /// Returns the objective that is the sum of operator costs, without scale or offset.
     pub fn sum() -> Self {
         Self { scale: 1, offset: 0, maximize: false, rest: Vec::new() }
     }
@@ -190,18 +191,19 @@ impl Objective {
 pub struct Task<N = Int> {
     pub object_names: Vec<String>,
     pub schema_names: Vec<String>,
-    /// Basic variables, followed by derived variables, whose values are true (0) and false (1).
+    /// Basic (non-derived) variables, followed by derived variables. A derived variable has the values true
+    /// (0) and false (1).
     pub variables: Vec<Variable>,
-    /// Number of basic variables.
+    /// Number of basic variables, i.e. variables that are not derived.
     pub basic: usize,
-    /// Mutex groups over several variables: at most one fact of a group holds in every reachable
-    /// state. The operators are correct only in states with this property.
+    /// Mutex groups that span several variables: at most one fact of a group holds in every reachable state.
+    /// The operators are correct only in states with this property.
     pub exclusive: Vec<Vec<Fact>>,
     /// Names of the numeric variables in PDDL.
     pub number_names: Vec<String>,
-    /// Factor between numbers of the task and values in the files.
+    /// Factor by which values in PDDL files are multiplied to obtain numbers of the task.
     pub number_scale: Int,
-    /// Additional factors of the numeric variables; empty if all are 1.
+    /// Additional factor of each numeric variable; empty if all factors are 1.
     pub number_multiples: Vec<Int>,
     /// Rules of the derived variables, in evaluation order.
     pub axioms: Vec<Layer<N>>,
@@ -212,13 +214,13 @@ pub struct Task<N = Int> {
     pub objective: Objective<N>,
     /// Further objectives in lexicographic order.
     pub others: Vec<Objective<N>>,
-    /// Factor between durations of the task and values in the files.
+    /// Factor by which durations in PDDL files are multiplied to obtain durations of the task.
     pub time_scale: Int,
-    /// Reason for unsolvability, if relaxed reachability shows that the goal is unreachable.
+    /// Reason why the task is unsolvable, if grounding shows that the goal is unreachable.
     pub unreachable: Option<String>,
 }
 
-/// Hashes only the most distinctive fields, because the others may be long.
+/// Hashes only the fields that differ most between operators, because the others may be long.
 impl<N> Hash for Operator<N> {
     fn hash<H: Hasher>(&self, state: &mut H) {
         (self.schema, &self.arguments, &self.condition.facts, &self.effects).hash(state);
@@ -232,13 +234,13 @@ impl<N> Default for Condition<N> {
 }
 
 impl<N> Operator<N> {
-    /// Number of admitted designs of each slot.
+    /// Returns the number of suitable designs of each slot.
     pub fn sizes(&self) -> Vec<usize> {
         self.slots.iter().map(|slot| slot.designs.len()).collect()
     }
 
-    /// Returns `true` if the combination (an index into `SlotUse::designs` for each slot) is not
-    /// forbidden.
+    /// Returns `true` if a combination of designs is not forbidden. `choice` is an index into
+    /// `SlotUse::designs` for each slot.
     pub fn admits(&self, choice: &[u32]) -> bool {
         self.forbidden.iter().all(|rule| {
             rule.combinations
@@ -247,14 +249,14 @@ impl<N> Operator<N> {
         })
     }
 
-    /// Returns all admitted combinations of designs in lexicographic order.
+    /// Returns all combinations of designs that are not forbidden, in lexicographic order.
     pub fn admitted_combinations(&self) -> Choices<'_, N> {
         let empty = self.slots.iter().any(|slot| slot.designs.is_empty());
         Choices { operator: self, sizes: self.sizes(), next: (!empty).then(|| vec![0; self.slots.len()]) }
     }
 }
 
-/// Iterator over the admitted combinations of an operator's designs.
+/// Iterator over the combinations of designs of an operator that are not forbidden.
 pub struct Choices<'a, N = Int> {
     operator: &'a Operator<N>,
     sizes: Vec<usize>,
@@ -286,37 +288,37 @@ impl<N> Iterator for Choices<'_, N> {
 }
 
 impl<N: TaskNumber> Linear<N> {
-    /// Returns the factors with the values of their variables.
+    /// Returns each coefficient together with the value of its variable.
     fn terms<'n>(&'n self, numbers: &'n [N]) -> impl Iterator<Item = (&'n N, &'n N)> + Clone {
         self.coefficients.iter().map(|(variable, factor)| (factor, &numbers[variable.index()]))
     }
 
-    /// Returns the value in a state for a combination of designs, or `None` on overflow.
+    /// Returns the value of the expression in a state for a combination of designs, or `None` on overflow.
     pub fn value(&self, numbers: &[N], choice: &[u32], sizes: &[usize]) -> Option<N> {
         sum_of_products(self.quantity.at(choice, sizes), self.terms(numbers))
     }
 
-    /// Returns `true` if the value is at least 0, or above 0 if `strict`.
+    /// Returns `true` if the value of the expression is ≥ 0, or > 0 if `strict`.
     fn compares(&self, numbers: &[N], choice: &[u32], sizes: &[usize], strict: bool) -> bool {
         N::compare(self.quantity.at(choice, sizes), self.terms(numbers), strict)
     }
 }
 
 impl<N> Condition<N> {
-    /// Returns `true` if the propositional part holds.
+    /// Returns `true` if all facts hold and every clause contains a literal that holds.
     pub fn holds_propositionally(&self, values: &[u32]) -> bool {
         self.facts.iter().all(|fact| fact.holds(values))
             && self.clauses.iter().all(|clause| clause.iter().any(|literal| literal.holds(values)))
     }
 
-    /// Returns the expressions of all comparisons, strict or not.
+    /// Returns the expressions of all comparisons, both ≥ 0 and > 0.
     pub fn linears(&self) -> impl Iterator<Item = &Linear<N>> {
         self.comparisons.iter().chain(&self.above)
     }
 }
 
 impl<N: TaskNumber> Condition<N> {
-    /// Returns `true` if the numeric part holds.
+    /// Returns `true` if all numeric comparisons hold for a combination of designs.
     pub fn holds_numerically(&self, numbers: &[N], choice: &[u32], sizes: &[usize]) -> bool {
         self.comparisons.iter().all(|linear| linear.compares(numbers, choice, sizes, false))
             && self.above.iter().all(|linear| linear.compares(numbers, choice, sizes, true))
@@ -324,21 +326,21 @@ impl<N: TaskNumber> Condition<N> {
 }
 
 impl Fact {
-    /// Returns `true` if the fact holds.
+    /// Returns `true` if the variable has the value of the fact in a state with these values.
     pub fn holds(self, values: &[u32]) -> bool {
         values[self.variable.index()] == self.value
     }
 }
 
 impl Literal {
-    /// Returns `true` if the literal holds.
+    /// Returns `true` if the literal is true in a state with these values.
     pub fn holds(&self, values: &[u32]) -> bool {
         self.fact.holds(values) == self.positive
     }
 }
 
 impl Operator {
-    /// Returns the cost for a combination of designs.
+    /// Returns the cost of the operator for a combination of designs.
     pub fn cost_of(&self, choice: &[u32]) -> Int {
         self.cost.at(choice, &self.sizes())
     }
@@ -351,8 +353,8 @@ impl<N: TaskNumber> Operator<N> {
             && self.condition.holds_numerically(&state.numbers, choice, &self.sizes())
     }
 
-    /// Applies the operator to `next`, which must equal `state`. Derived variables are not updated.
-    /// Returns `None` on overflow.
+    /// Applies the effects of the operator to `next`, which must initially equal `state`. Derived variables
+    /// are not updated. Returns `None` on numeric overflow.
     pub fn apply(&self, state: &State<N>, choice: &[u32], next: &mut State<N>) -> Option<()> {
         for effect in &self.effects {
             next.values[effect.variable.index()] = effect.value;
@@ -379,14 +381,14 @@ impl<N: TaskNumber> Operator<N> {
 }
 
 impl Task {
-    /// Returns `true` if plans without a metric are measured by total time instead of plan length.
+    /// Returns `true` if the costs of a task without metric are durations, and `false` if they count actions.
     pub fn is_timed(&self) -> bool {
         self.is_measured_by_time(&self.objective.scale)
     }
 }
 
 impl<N: TaskNumber> Task<N> {
-    /// Generalises [`Task::is_timed`] to steps of cost `step`.
+    /// Returns `true` if an operator that is not a wait costs anything but `step`; see [`Task::is_timed`].
     pub fn is_measured_by_time(&self, step: &N) -> bool {
         let step = |operator: &Operator<N>| if operator.wait.is_some() { N::zero() } else { step.clone() };
         self.operators.iter().any(|operator| operator.cost != Quantity::constant(step(operator)))
@@ -398,8 +400,8 @@ impl<N: TaskNumber> Task<N> {
             && self.goal.holds_numerically(&state.numbers, &[], &[])
     }
 
-    /// Returns the state after an operator, which must be applicable with this combination of
-    /// designs. `None` on overflow.
+    /// Returns the state after an operator, or `None` on numeric overflow. The operator must be applicable
+    /// with this combination of designs.
     pub fn successor(&self, operator: &Operator<N>, state: &State<N>, choice: &[u32]) -> Option<State<N>> {
         let mut next = state.clone();
         operator.apply(state, choice, &mut next)?;
@@ -407,7 +409,7 @@ impl<N: TaskNumber> Task<N> {
         Some(next)
     }
 
-    /// Evaluates the derived variables: the least fixpoint of the rules, layer by layer.
+    /// Computes the values of the derived variables: the least fixpoint of the rules, layer by layer.
     #[expect(clippy::arithmetic_side_effects, reason = "every variable has a value")]
     pub fn evaluate_axioms(&self, state: &mut State<N>) {
         if self.axioms.is_empty() {

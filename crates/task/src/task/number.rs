@@ -6,25 +6,27 @@ use num_traits::{Signed, ToPrimitive as _};
 use crate::number::{GROWTH_LIMIT, Int, LIMIT, Rational};
 use crate::task::quantity::{Number, Quantity, Table};
 
-/// Limit on the sum of the magnitudes of a quantity's numbers.
+/// Limit on the sum of the magnitudes of the numbers in a quantity.
 pub const QUANTITY_LIMIT: Int = 1 << 123;
 
-/// Number of values up to which [`LIMIT`] alone keeps a quantity below [`QUANTITY_LIMIT`].
+/// Number of summands (constant and tables) up to which [`LIMIT`] alone keeps a quantity below
+/// [`QUANTITY_LIMIT`].
 const SMALL_QUANTITY: usize = 32;
 
-/// Limit on the bits of rationals in a state. States beyond are pruned, and the search is then
-/// incomplete.
+/// Limit on the number of bits of rationals in a state. A state that exceeds the limit is pruned, and the
+/// search is then incomplete.
 const BIT_LIMIT: u64 = 4_096;
 
-/// Number type of a ground task: scaled integers, or rationals if integers would overflow.
+/// Number type of a ground task: scaled integers, or exact rationals if integers would overflow.
 pub trait TaskNumber: Number + std::fmt::Debug + std::hash::Hash + Default {
-    /// `true` if fractions are scaled to integers. Otherwise the factor is 1.
+    /// `true` if all numbers are multiplied by a common factor that makes them integers; `false` if the
+    /// factor is 1.
     const SCALED: bool;
 
-    /// Converts a rational times a factor. Returns `None` if the result is not of this type.
+    /// Converts `number * scale`. Returns `None` if this type cannot represent the result.
     fn from_rational(number: &Rational, scale: Int) -> Option<Self>;
 
-    /// Returns an approximation for estimates.
+    /// Returns a floating-point approximation, for estimates only.
     fn approximate(&self) -> f64;
 
     /// Converts the number to a rational.
@@ -36,19 +38,19 @@ pub trait TaskNumber: Number + std::fmt::Debug + std::hash::Hash + Default {
     /// Returns the product, or `None` on overflow.
     fn times(&self, other: &Self) -> Option<Self>;
 
-    /// Returns `true` if fluents and sums of costs may reach this magnitude.
+    /// Returns `true` if the magnitude is within the limit for fluents and sums of costs.
     fn is_moderate(&self) -> bool;
 
-    /// Lower bound on the number of summands `part` > 0 whose sum reaches this number; 0 if
-    /// unknown.
+    /// Returns a lower bound on n such that n·`part` ≥ this number, where `part` > 0. Returns 0 if no bound
+    /// is known.
     fn times_at_least(&self, part: &Self) -> u32;
 
-    /// Returns `true` if all sums over the numbers of a quantity fit: the sum of the tables'
-    /// greatest magnitudes and the constant does.
+    /// Returns `true` if no value of the quantity can overflow: the sum of the constant's magnitude and the
+    /// greatest magnitude in each table is within the limit.
     fn fits(quantity: &Quantity<Self>) -> bool;
 
-    /// Returns `true` if the sum of `start` and the products is at least 0 (above 0 if `strict`),
-    /// without overflow of intermediate results.
+    /// Returns `true` if the sum of `start` and all products is ≥ 0, or > 0 if `strict`. Intermediate results
+    /// do not overflow.
     fn compare<'n>(
         start: Self,
         terms: impl Iterator<Item = (&'n Self, &'n Self)> + Clone,
@@ -58,7 +60,7 @@ pub trait TaskNumber: Number + std::fmt::Debug + std::hash::Hash + Default {
         Self: 'n;
 }
 
-/// Returns the sum of a number and of products, or `None` on overflow.
+/// Returns the sum of `start` and all products, or `None` on overflow.
 pub fn sum_of_products<'n, N: TaskNumber + 'n>(
     start: N,
     mut terms: impl Iterator<Item = (&'n N, &'n N)>,

@@ -1,8 +1,8 @@
-//! Object symmetries: exchanges of two objects that map the task to itself.
+//! Object symmetries: transpositions of two objects that map the task to itself.
 //!
-//! Two objects are interchangeable if their exchange maps operators to operators and the goal to
-//! the goal \[1\]. Objects with different numeric variables, and tasks with derived variables, are
-//! not considered.
+//! Two objects are interchangeable if exchanging them maps operators to operators and the goal to itself
+//! \[1\]. Exchanges that would also have to exchange numeric variables are not found. Tasks with derived
+//! variables have no detected symmetries.
 //!
 //! \[1\] J. Rintanen: Symmetry reduction for SAT representations of transition systems, ICAPS 2003.
 
@@ -17,11 +17,12 @@ use crate::task::{
     Argument, Condition, ConditionalEffect, Fact, Literal, Operator, OperatorId, Task, VariableId,
 };
 
-/// Limit on the number of compared operators over all pairs of objects.
+/// Limit on the total number of operators that are compared, over all pairs of objects.
 const WORK_LIMIT: usize = 2_000_000;
 
-/// Returns the exchanges of neighbours within classes of pairwise interchangeable objects.
-/// Exchanges preserve operators and goal, and with `initially` also the initial state.
+/// Returns generators of the symmetry group: exchanges of neighbouring objects within classes of
+/// interchangeable objects. Every exchange preserves the operators and the goal. If `initially` is `true`, it
+/// also preserves the initial state.
 ///
 /// # Errors
 /// A limit is reached.
@@ -40,7 +41,7 @@ pub fn symmetry_generators(context: Context<'_>, initially: bool) -> Result<Vec<
             }
         }
     }
-    // Interchangeable objects occur as the same arguments of the same schemas, equally often.
+    // Interchangeable objects occur at the same argument positions of the same schemas, equally often.
     let mut alike: BTreeMap<Vec<(u32, usize)>, Vec<ObjectId>> = BTreeMap::new();
     for (object, mut places) in uses {
         places.sort_unstable();
@@ -59,7 +60,7 @@ pub fn symmetry_generators(context: Context<'_>, initially: bool) -> Result<Vec<
             for object in remaining.drain(1..) {
                 work += task.operators.len();
                 let exchange =
-                    // Beyond the limit, no further symmetries are found, which is sound.
+                    // Beyond the limit, no further symmetries are found. This is sound.
                     if work <= WORK_LIMIT { Exchange::new(&parts, last, object, limits)? } else { None };
                 match exchange {
                     Some(exchange) if exchange.keeps(&parts, initially, limits)? => {
@@ -75,18 +76,19 @@ pub fn symmetry_generators(context: Context<'_>, initially: bool) -> Result<Vec<
     Ok(exchanges)
 }
 
-/// Indices of a task by which images of its parts are looked up.
+/// Indices of a task, used to look up the images of its facts and operators under an exchange.
 struct Parts<'t> {
     task: &'t Task,
-    /// By variable and value: the words of the atom, as positions among all words. `None` for
-    /// values without an atom.
+    /// For each variable and value: the words of the atom as indices in `all_words`, or `None` for a value
+    /// without an atom.
     words: Vec<Vec<Option<Vec<usize>>>>,
-    /// Facts by the words of their atoms.
+    /// Fact of each atom, by the words of the atom.
     facts: FxHashMap<Vec<usize>, Fact>,
     all_words: FxHashMap<&'t str, usize>,
-    /// Operators by schema and arguments. `None` if several operators have them.
+    /// Operator for each schema and argument list, or `None` if several operators have this schema and these
+    /// arguments.
     calls: FxHashMap<(u32, Vec<Argument>), Option<OperatorId>>,
-    /// Operators in the normal form of [`Exchange::operator`].
+    /// All operators in the normal form that [`Exchange::operator`] produces.
     normal: Vec<Operator>,
     goal: Condition,
 }
@@ -133,15 +135,16 @@ impl<'t> Parts<'t> {
     }
 }
 
-/// Exchange of two objects with the image of each fact.
+/// An exchange of two objects, with the resulting image of each fact.
 pub struct Exchange {
     pub objects: (ObjectId, ObjectId),
-    /// Image by variable and value.
+    /// Image of each fact, by variable and value.
     pub facts: Vec<Vec<Fact>>,
 }
 
 impl Exchange {
-    /// Returns `None` if the variables do not match.
+    /// Creates the exchange of objects `a` and `b`. Returns `None` if the atoms of a variable are not all
+    /// mapped to atoms of one variable.
     fn new(
         parts: &Parts<'_>,
         a: ObjectId,
@@ -166,7 +169,7 @@ impl Exchange {
         let mut facts = Vec::with_capacity(task.variables.len());
         for atoms in limits.watch(&parts.words) {
             let atoms = atoms?;
-            // All atoms of a variable must have their images in one variable.
+            // All atoms of a variable must be mapped to atoms of one variable.
             let images: Option<Vec<Fact>> = atoms.iter().flatten().map(exchanged).collect();
             let Some(images) = images else { return Ok(None) };
             let Some(target) = images.first().map(|image| image.variable) else { return Ok(None) };
@@ -227,7 +230,8 @@ impl Exchange {
         Condition { facts: self.facts(&condition.facts), clauses, comparisons, above: Vec::new() }
     }
 
-    /// Returns `true` if exchanging the objects maps the task to itself.
+    /// Returns `true` if the exchange maps the operators and the goal to themselves and, if `initially`, also
+    /// the initial state.
     fn keeps(&self, parts: &Parts<'_>, initially: bool, limits: &Limits) -> Result<bool, Interrupted> {
         let task = parts.task;
         let initial = |(variable, value): (usize, &u32)| {
@@ -257,7 +261,7 @@ impl Exchange {
         Self { objects: (ObjectId(u32::MAX), ObjectId(u32::MAX)), facts: facts.collect() }
     }
 
-    /// Returns the image of an operator in normal form.
+    /// Returns the image of an operator, with sorted facts and clauses so that equal operators are identical.
     fn operator(&self, operator: &Operator) -> Operator {
         let mut image = operator.clone();
         for argument in &mut image.arguments {

@@ -1,7 +1,7 @@
-//! Quantities that depend on the function designs of an operator.
+//! Quantities, for example costs and durations, whose values depend on the designs that an operator selects.
 //!
-//! A quantity is a constant plus tables over slots. Tables keep the encoding factored: a sum over k
-//! functions of m designs each is k tables of m entries instead of a table of m^k entries.
+//! A quantity is a constant plus tables over slots. Tables keep the quantity factored: a sum over k functions
+//! with m designs each has k tables of m entries instead of one table of m^k entries.
 
 use crate::number::Int;
 use crate::task::dense_ids::dense_ids;
@@ -10,40 +10,40 @@ use std::sync::Arc;
 
 use smallvec::SmallVec;
 
-/// Positions in an operator's slot list, ascending.
+/// A set of slots, as ascending positions in an operator's slot list.
 pub type SlotSet = SmallVec<[u32; 2]>;
 
-/// A value for each combination of the admitted designs of some slots.
+/// A value for each combination of suitable designs of some slots.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Table<N> {
     pub slots: SlotSet,
-    /// Row-major: the last slot varies fastest. Shared by operators of a schema.
+    /// Values in row-major order: the last slot varies fastest. Operators of a schema share the values.
     pub values: Arc<[N]>,
 }
 
-/// Hashes the slots and the first value only: tables are long, and equal ones are rare.
+/// Hashes the slots and the first value only, because tables are long and rarely differ elsewhere.
 impl<N: Hash> Hash for Table<N> {
     fn hash<H: Hasher>(&self, state: &mut H) {
         (&self.slots, self.values.first()).hash(state);
     }
 }
 
-/// A constant plus tables: the sum of the contributions of the chosen designs.
+/// A quantity: a constant plus one table entry per table, selected by the designs of the slots.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
 pub struct Quantity<N> {
     pub constant: N,
     pub tables: Vec<Table<N>>,
 }
 
-/// A linear combination of numeric variables plus a quantity.
+/// A linear expression: a weighted sum of numeric variables plus a quantity that depends on designs.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
 pub struct Linear<N> {
-    /// Numeric variables with non-zero factors, in ascending order.
+    /// Numeric variables with their non-zero coefficients, in ascending order of the variables.
     pub coefficients: Vec<(NumericId, N)>,
     pub quantity: Quantity<N>,
 }
 
-/// A numeric variable of a ground task.
+/// Id of a numeric variable of a ground task.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct NumericId(pub u32);
 
@@ -92,8 +92,8 @@ impl<N: Number> Quantity<N> {
         }
     }
 
-    /// Adds a table. A constant table is added to the constant, a table over the same slots is
-    /// merged.
+    /// Adds a table. It is merged with an existing table over the same slots. A table with equal values is
+    /// added to the constant.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "where they are machine integers, the numbers of a quantity fit together (TaskNumber::fits), whatever their signs"
@@ -142,7 +142,7 @@ impl<N: Number> Quantity<N> {
         self.fold_constant_tables();
     }
 
-    /// Returns the contribution of the tables whose slots are all in `slots`.
+    /// Returns the sum of the tables whose slots are all contained in `slots`, for a combination of designs.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "where they are machine integers, the numbers of a quantity fit together (TaskNumber::fits), whatever their signs"
@@ -154,8 +154,8 @@ impl<N: Number> Quantity<N> {
             .fold(N::zero(), |sum, value| sum + value)
     }
 
-    /// Returns the value if the slot at position `i` has its `choice[i]`-th admitted design.
-    /// `sizes` has the numbers of admitted designs.
+    /// Returns the value for a combination of designs: the slot at position `i` has its suitable design
+    /// number `choice[i]`. `sizes` is the number of suitable designs of each slot.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "where they are machine integers, the numbers of a quantity fit together (TaskNumber::fits), whatever their signs"
@@ -167,7 +167,8 @@ impl<N: Number> Quantity<N> {
 }
 
 impl<N: Number> Quantity<N> {
-    /// Returns a lower bound that treats tables independently; exact if no two tables share a slot.
+    /// Returns the constant plus the minimum of each table. This is a lower bound, and exact if no two tables
+    /// share a slot.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "where they are machine integers, the numbers of a quantity fit together (TaskNumber::fits), whatever their signs"
@@ -179,7 +180,7 @@ impl<N: Number> Quantity<N> {
 }
 
 impl Quantity<Int> {
-    /// Returns an upper bound, analogous to `minimum`.
+    /// Returns the constant plus the maximum of each table, which is an upper bound.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "where they are machine integers, the numbers of a quantity fit together (TaskNumber::fits), whatever their signs"

@@ -1,4 +1,4 @@
-//! Maps the numbers of quantities. Tables that operators share remain shared.
+//! Applies a function to the numbers of quantities. Tables that operators share remain shared.
 
 use std::collections::hash_map::Entry;
 use std::sync::Arc;
@@ -8,13 +8,14 @@ use rustc_hash::FxHashMap;
 use crate::number::Rational;
 use crate::task::quantity::{Quantity, Table};
 
-/// Values of a table and their images.
+/// The original values of a table, and the mapped values.
 type MappedTable<M> = (Arc<[Rational]>, Arc<[M]>);
 
-/// Maps the numbers of quantities. Tables that operators share remain shared.
+/// Applies a function to the numbers of quantities. Tables that operators share remain shared.
 #[derive(Debug)]
 pub struct TableMap<M> {
-    /// Images by address of the table. The table is kept, so that its address is not reused.
+    /// Original and mapped values by address of the table. The original is kept, so that its address is not
+    /// reused.
     done: FxHashMap<*const Rational, MappedTable<M>>,
 }
 
@@ -25,10 +26,10 @@ impl<M> Default for TableMap<M> {
 }
 
 impl<M> TableMap<M> {
-    /// Maps the numbers of a quantity. Shared tables are mapped once.
+    /// Applies `f` to all numbers of a quantity. A shared table is mapped only once.
     ///
     /// # Errors
-    /// The first error of `f`.
+    /// Returns the first error of `f`.
     pub fn map<E>(
         &mut self,
         quantity: &Quantity<Rational>,

@@ -1,11 +1,11 @@
-//! Earliest starts of operators relative to timed initial literals.
+//! Lower bounds on the times of operators, caused by timed initial literals.
 
-/// Earliest start of an operator, in addition to the end of its predecessor.
+/// Earliest times of an operator, in addition to the end of the previous action.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Timing<N> {
-    /// Lower bound on the start.
+    /// Lower bound on the start time, if any.
     pub(crate) start: Option<N>,
-    /// Lower bound on the end.
+    /// Lower bound on the end time, if any.
     pub(crate) end: Option<N>,
 }
 

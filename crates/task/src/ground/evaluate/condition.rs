@@ -1,4 +1,5 @@
-//! Partial evaluation of a schema's condition under a binding: the residual after static facts are decided.
+//! Partial evaluation of a lifted condition under a binding of its parameters. Static facts are decided; the
+//! remaining condition over fluents is the residual.
 
 use crate::error::Error;
 use crate::ground::evaluate::expression::ground;
@@ -9,10 +10,10 @@ use crate::ground::vocabulary::partial_eval::{Residual, compare, truth};
 use crate::ground::vocabulary::world::World;
 use crate::lifted::{Bound, Formula};
 
-/// Evaluates a condition without open slots. A comparison with an undefined value is false.
+/// Evaluates a condition whose slot parameters are bound. A comparison with an undefined value is false.
 ///
 /// # Errors
-/// A limit is reached, or the input is not supported.
+/// A limit is reached, or the condition is not supported.
 pub fn residual(
     world: &mut World<'_>,
     formula: &Formula,
@@ -21,10 +22,10 @@ pub fn residual(
     Evaluation { refuses_undefined: false }.residual(world, formula, binding)
 }
 
-/// Evaluates the condition of an effect without open slots.
+/// Evaluates the condition of a conditional effect whose slot parameters are bound.
 ///
 /// # Errors
-/// A comparison has an undefined value.
+/// A comparison has an undefined value, a limit is reached, or the condition is not supported.
 pub fn residual_of_effect(
     world: &mut World<'_>,
     formula: &Formula,
@@ -33,10 +34,10 @@ pub fn residual_of_effect(
     Evaluation { refuses_undefined: true }.residual(world, formula, binding)
 }
 
-/// Treatment of undefined values.
+/// Treatment of undefined numeric values in comparisons.
 #[derive(Clone, Copy)]
 struct Evaluation {
-    /// `true` if compared values must be defined.
+    /// `true` if an undefined value in a comparison is an error; `false` if the comparison is then false.
     refuses_undefined: bool,
 }
 
@@ -61,7 +62,7 @@ impl Evaluation {
                 if !world.lifted.predicates[predicate.index()].fluent {
                     return Ok(truth(world.holds_initially(*predicate, &arguments) == *positive));
                 }
-                // An atom that is never reached in the relaxation is false in every state.
+                // The relaxed reachability analysis never reaches this atom, so it is false in every state.
                 if !world.is_reached(*predicate, &arguments) {
                     return Ok(truth(!positive));
                 }
@@ -70,7 +71,8 @@ impl Evaluation {
             Formula::Compare(comparison, left, right, place) => {
                 let difference = match (ground(world, left, binding), ground(world, right, binding)) {
                     (Ok(left), Ok(right)) => (left, right),
-                    // PDDL 2.1: an action with an undefined value in an effect is not executable.
+                    // PDDL 2.1: an action whose conditional effect reads an undefined value is not
+                    // executable.
                     (Err(Failure::Undefined), _) | (_, Err(Failure::Undefined)) if self.refuses_undefined => {
                         return Err(Failure::Error(Error::Unsupported {
                             construct: "a comparison in `when` with a value that is not defined".into(),

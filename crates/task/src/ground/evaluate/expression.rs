@@ -1,4 +1,4 @@
-//! Evaluation of expressions without open slots.
+//! Evaluates numeric expressions whose slot parameters are bound.
 
 use crate::error::{Error, Place};
 use crate::ground::vocabulary::atom::{Binding, arguments};
@@ -7,7 +7,8 @@ use crate::ground::vocabulary::world::World;
 use crate::lifted::{Expression, Rational};
 use crate::task::quantity::Linear;
 
-/// Evaluates an expression without open slots.
+/// Evaluates an expression under a binding to a linear expression over numeric fluents. Its slot parameters
+/// must be bound.
 ///
 /// # Errors
 /// A value is undefined, the expression is not linear, or a limit is reached.
@@ -18,7 +19,7 @@ pub fn ground(
 ) -> Result<Linear<Rational>, Failure> {
     match expression {
         Expression::Number(number) => Ok(Linear::constant(number.clone())),
-        // Only the metric contains it, and splits it off before this function.
+        // `total-time` occurs only in metrics, which split it off before they call this function.
         Expression::TotalTime => Err(Failure::Undefined),
         Expression::Function(function, terms, place) => {
             let arguments = arguments(terms, binding);

@@ -1,18 +1,19 @@
-//! Enumerates the bindings of quantified variables by a join over the atoms that must hold.
+//! Enumerates the bindings of quantified variables by a join over atoms that must hold.
 //!
-//! Quantifiers range over products of types, but most elements fail a static atom. The atoms of the
-//! body are therefore joined, each looked up by its bound arguments, and only the remaining
-//! variables are enumerated by type.
+//! Quantifiers range over the product of the types of their variables, but most bindings fail a static atom.
+//! The atoms of the quantified formula are therefore joined: the possible rows of each atom are looked up by
+//! its bound arguments. Only the remaining variables are enumerated by type.
 
 use crate::ground::vocabulary::atom::Binding;
 use crate::ground::vocabulary::world::World;
 use crate::lifted::{Arguments, Bound, Formula, ObjectId, PredicateId, Term};
 use crate::limits::Interrupted;
 
-/// An atom that must be possibly true.
+/// An atom that must be possibly true for a binding to matter: its predicate and its terms.
 type Guard<'f> = (PredicateId, &'f [Term]);
 
-/// Returns the necessary atoms of an existential quantifier: the body is false without them.
+/// Returns the atoms that are necessary for the body of an existential quantifier. The body is false for
+/// every binding for which one of the atoms is false.
 pub fn guards_of_exists(body: &Formula) -> Vec<Guard<'_>> {
     let mut guards = Vec::new();
     match body {
@@ -24,7 +25,8 @@ pub fn guards_of_exists(body: &Formula) -> Vec<Guard<'_>> {
     guards
 }
 
-/// Returns the guard atoms of a universal quantifier: the body is true without them.
+/// Returns the negated atoms among the disjuncts of the body of a universal quantifier. The body is true for
+/// a binding for which one of the atoms is false.
 pub fn guards_of_forall(body: &Formula) -> Vec<Guard<'_>> {
     let mut guards = Vec::new();
     match body {
@@ -36,9 +38,9 @@ pub fn guards_of_forall(body: &Formula) -> Vec<Guard<'_>> {
     guards
 }
 
-/// Calls `visit` with every binding of the variables under which all guards can hold, until it
-/// returns `false`. Returns `true` if `visit` always returned `true`. Afterwards the variables are
-/// unbound, unless a limit was reached.
+/// Calls `visit` with every binding of the variables in `bound` for which all guards can hold, until `visit`
+/// returns `false`. Returns `true` if `visit` always returned `true`. Afterwards the variables are unbound,
+/// unless a limit was reached.
 ///
 /// # Errors
 /// A limit is reached.
@@ -51,8 +53,7 @@ pub fn each_binding<'a>(
 ) -> Result<bool, Interrupted> {
     debug_assert!(bound.is_sorted_by_key(|bound| bound.variable));
     let mut join = Join { bound, guards, is_used: vec![false; guards.len()] };
-    // An explicit stack, because quantifiers may bind more variables than the call stack has
-    // frames.
+    // An explicit stack instead of recursion, because a quantifier may bind very many variables.
     let mut levels: Vec<Level> = Vec::new();
     loop {
         world.visit()?;
@@ -81,25 +82,25 @@ pub fn each_binding<'a>(
     }
 }
 
-/// Variables and guards of an enumeration.
+/// The variables and guard atoms of an enumeration of bindings.
 struct Join<'j> {
-    /// In ascending order of the variables.
+    /// Variables with their candidates, in ascending order of the variables.
     bound: &'j [Bound],
     guards: &'j [Guard<'j>],
-    /// `true` for each guard whose rows are being enumerated.
+    /// For each guard: `true` while the enumeration is inside a loop over its rows.
     is_used: Vec<bool>,
 }
 
-/// Remaining options of some variables, and the variables bound by the current option.
+/// A level of the backtracking search: its remaining options, and the variables bound by the current option.
 struct Level {
     options: Options,
     fresh: Vec<u32>,
 }
 
 enum Options {
-    /// The rows that match a guard, with the position of the guard.
+    /// The position of a guard, and its remaining rows.
     Rows(usize, std::vec::IntoIter<Arguments>),
-    /// The candidates of a variable, with its position and that of the next candidate.
+    /// The position of a variable, and the index of its next candidate.
     Candidates(usize, usize),
 }
 
@@ -112,8 +113,8 @@ impl Level {
 }
 
 impl Join<'_> {
-    /// Returns the next options: the rows of the guard with the fewest unbound variables, or the
-    /// candidates of a variable.
+    /// Returns the next level of the search: the rows of the guard with the fewest unbound variables, or the
+    /// candidates of the next variable. Returns `None` if all variables are bound.
     fn next_level(
         &mut self,
         world: &mut World<'_>,
@@ -140,14 +141,15 @@ impl Join<'_> {
         Some(Level { options, fresh: Vec::new() })
     }
 
-    /// Returns the guard with the fewest unbound variables, all of which belong to the quantifier.
+    /// Returns the position of the unused guard with the fewest unbound variables. Guards without unbound
+    /// variables, or with unbound variables of other quantifiers, are excluded.
     fn next_guard(&self, binding: &Binding) -> Option<usize> {
         let open_variables = |(position, (_, terms)): (usize, &Guard<'_>)| {
             let open = terms.iter().filter_map(|term| match term {
                 Term::Parameter(variable) if binding[*variable as usize].is_none() => Some(*variable),
                 _ => None,
             });
-            // The index of rows represents a set of columns by the bits of a word.
+            // The row index represents a set of argument positions by the bits of a 64-bit word.
             let (mut count, mut joins) = (0_usize, !self.is_used[position] && terms.len() <= 64);
             for variable in open {
                 count = count.saturating_add(1);
@@ -158,7 +160,7 @@ impl Join<'_> {
         self.guards.iter().enumerate().filter_map(open_variables).min().map(|(_, position)| position)
     }
 
-    /// Applies the next option. Returns `false` after the last one.
+    /// Applies the next option of a level to the binding. Returns `false` if no option remains.
     fn advance(
         &self,
         world: &mut World<'_>,

@@ -1,8 +1,8 @@
-//! Converts residual conditions to conjunctive normal form (CNF).
+//! Converts residual conditions, i.e. partially evaluated conditions, to conjunctive normal form (CNF).
 //!
-//! A disjunction of literals is a clause. Small disjunctions of conjunctions are distributed.
-//! Larger ones, and comparisons within disjunctions, are replaced by auxiliary derived atoms
-//! (Tseitin transformation), so that conditions grow by at most a constant factor.
+//! A disjunction of literals is a clause. Small disjunctions of conjunctions are distributed. Larger
+//! disjunctions, and disjunctions with comparisons, get auxiliary derived atoms for their parts (Tseitin
+//! transformation), so that conditions grow by at most a constant factor.
 
 use rustc_hash::FxHashMap;
 
@@ -15,10 +15,11 @@ use crate::ground::vocabulary::world::World;
 use crate::lifted::{ObjectId, PredicateId};
 use crate::number::dense;
 
-/// Limit on the clauses of a distributed disjunction; larger ones get an auxiliary atom.
+/// Limit on the number of clauses that distributing a disjunction may produce. Larger disjunctions get
+/// auxiliary atoms.
 const CLAUSE_LIMIT: usize = 16;
 
-/// Auxiliary atoms of subconditions, and the rules of all derived atoms.
+/// Auxiliary derived atoms that represent subconditions, and the rules of all derived atoms.
 #[derive(Debug, Default)]
 pub struct Definitions {
     named: FxHashMap<Residual, AtomId>,
@@ -26,7 +27,7 @@ pub struct Definitions {
 }
 
 impl Definitions {
-    /// Returns the CNF of a condition, or `Failure::Undefined` if it is false.
+    /// Returns the CNF of the conjunction of `parts`, or `Failure::Undefined` if it is false.
     pub(crate) fn condition(
         &mut self,
         world: &mut World<'_>,
@@ -69,7 +70,7 @@ impl Definitions {
         Ok(())
     }
 
-    /// Returns a clause with a literal for each part.
+    /// Returns the disjunction of the parts as a clause, with one literal for each part.
     fn clause(&mut self, world: &mut World<'_>, parts: &[Residual]) -> Vec<GroundLiteral> {
         let mut clause: Vec<_> = parts.iter().map(|part| self.literal(world, part)).collect();
         clause.sort_unstable();
@@ -77,8 +78,8 @@ impl Definitions {
         clause
     }
 
-    /// Returns a literal that is equivalent to the condition: the condition itself, or an auxiliary
-    /// atom.
+    /// Returns a literal that is equivalent to the residual condition. This is the condition itself if it is
+    /// a literal, and otherwise an auxiliary atom.
     pub(crate) fn literal(&mut self, world: &mut World<'_>, residual: &Residual) -> GroundLiteral {
         if let Residual::Literal { atom, positive } = residual {
             return (*atom, *positive);
@@ -91,9 +92,9 @@ impl Definitions {
         (atom, true)
     }
 
-    /// Creates an auxiliary atom for a subcondition.
+    /// Creates an auxiliary derived atom that represents a subcondition.
     fn name(&mut self, world: &mut World<'_>, residual: Residual) -> AtomId {
-        // Auxiliary atoms have a predicate number beyond the declared predicates.
+        // Auxiliary atoms use the first predicate id after those of the declared predicates.
         let predicate = PredicateId(dense(world.lifted.predicates.len()));
         let number = ObjectId(dense(self.named.len()));
         let atom = world.atom(predicate, &[number]);
@@ -101,7 +102,7 @@ impl Definitions {
         atom
     }
 
-    /// Adds rules that make an atom equivalent to the condition.
+    /// Adds rules that make the derived atom `head` true exactly if the residual condition holds.
     pub(crate) fn define(&mut self, world: &mut World<'_>, head: AtomId, residual: &Residual) {
         if let Residual::Or(parts) = residual {
             for part in parts {
@@ -126,8 +127,8 @@ impl Definitions {
     }
 }
 
-/// Returns the clauses of a condition without numbers by distribution, without tautologies. `None`
-/// if they exceed the limit.
+/// Distributes a condition without comparisons to CNF clauses, without tautologies. Returns `None` if there
+/// is a comparison or a disjunction has more than `CLAUSE_LIMIT` clauses.
 fn clauses(residual: &Residual) -> Option<Vec<Vec<GroundLiteral>>> {
     match residual {
         Residual::True => Some(Vec::new()),

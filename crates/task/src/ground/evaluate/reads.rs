@@ -1,9 +1,9 @@
-//! Computes the fluents and atoms that happenings read, for the rule of no moving targets in PDDL
-//! 2.1 \[1\].
+//! Computes the fluents and atoms that the start or end of an action reads. The rule of no moving targets in
+//! PDDL 2.1 \[1\] forbids that a simultaneous happening changes them.
 //!
-//! Everything in a condition or an effect counts as read, whether or not it matters in a state: all
-//! instances of an atom below a quantifier, and all dependencies of the axioms of a derived
-//! predicate.
+//! Every atom and fluent in a condition or effect counts as read, even if its value does not matter in a
+//! state. This includes all instances of an atom below a quantifier, and everything that the axioms of a
+//! derived predicate read.
 //!
 //! \[1\] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 8.4.
 
@@ -16,21 +16,23 @@ use crate::lifted::{
     Bound, Change, Effect, Expression, Formula, FunctionId, Lifted, ObjectId, PredicateId, Term,
 };
 
-/// A symbol with its arguments, where quantified variables are placeholders. `None` matches all
-/// arguments.
+/// A predicate or function with its arguments; quantified variables are placeholders. `None` as arguments
+/// matches all arguments.
 pub type Pattern<S> = (S, Option<Vec<Slot>>);
 
 /// An argument of a pattern.
 #[derive(Debug, Clone)]
 pub enum Slot {
+    /// An object at a fixed position.
     Object(ObjectId),
-    /// Each object of a quantified variable, with the same object at all its occurrences.
+    /// A quantified variable and its candidate objects. All occurrences of the variable match the same
+    /// object.
     Each(u32, Arc<[ObjectId]>),
-    /// Any object: an unbound parameter.
+    /// Any object, for an unbound parameter.
     Any,
 }
 
-/// Returns `true` if objects match the slots of a pattern.
+/// Returns `true` if the arguments match the slots of a pattern.
 pub fn fits(pattern: &[Slot], arguments: &[ObjectId]) -> bool {
     let is_consistent = |variable: u32, object: ObjectId| {
         let mut pairs = pattern.iter().zip(arguments);
@@ -44,22 +46,22 @@ pub fn fits(pattern: &[Slot], arguments: &[ObjectId]) -> bool {
     pattern.len() == arguments.len() && pattern.iter().zip(arguments).all(slot_fits)
 }
 
-/// Read atoms and fluents, before their look-up.
+/// Patterns of the atoms and numeric fluents that a condition, expression or effect reads.
 #[derive(Debug, Default)]
 pub struct Reads {
     pub atoms: Vec<Pattern<PredicateId>>,
     pub numbers: Vec<Pattern<FunctionId>>,
-    /// Variables of the enclosing quantifiers, innermost last.
+    /// Variables of the enclosing quantifiers; the innermost quantifier comes last.
     scope: Vec<Bound>,
 }
 
-/// Returns `true` if a pattern matches a symbol with arguments.
+/// Returns `true` if the pattern matches the symbol with these arguments.
 pub fn matches<S: PartialEq>(pattern: &Pattern<S>, symbol: &S, arguments: &[ObjectId]) -> bool {
     pattern.0 == *symbol && pattern.1.as_ref().is_none_or(|wanted| fits(wanted, arguments))
 }
 
 impl Reads {
-    /// Adds the reads of a condition under a binding of the parameters.
+    /// Adds all atoms and fluents that a condition reads under a binding of the parameters.
     pub fn condition(&mut self, lifted: &Lifted, formula: &Formula, binding: &Binding) {
         match formula {
             Formula::And(parts) | Formula::Or(parts) => {
@@ -69,7 +71,7 @@ impl Reads {
             }
             Formula::Exists(bound, body) | Formula::ForAll(bound, body) => {
                 let outer = self.scope.len();
-                // Inner quantifiers may reuse a variable, so that the scope is a stack.
+                // An inner quantifier may reuse a variable, so the scope is a stack.
                 self.scope.extend(bound.iter().cloned());
                 self.condition(lifted, body, binding);
                 self.scope.truncate(outer);
@@ -89,7 +91,8 @@ impl Reads {
         }
     }
 
-    /// Adds the reads of effects, without the targets of the effects.
+    /// Adds all atoms and fluents that the conditions and assigned values of effects read. The changed atoms
+    /// and fluents themselves are not added.
     pub fn effects(&mut self, lifted: &Lifted, effects: &[Effect], binding: &Binding) {
         for effect in effects {
             let outer = self.scope.len();
@@ -102,7 +105,7 @@ impl Reads {
         }
     }
 
-    /// Adds the reads of an expression.
+    /// Adds the fluents that an expression reads.
     pub fn expression(&mut self, expression: &Expression, binding: &Binding) {
         match expression {
             Expression::Number(_) | Expression::TotalTime => {}
@@ -128,7 +131,7 @@ impl Reads {
         while let Some(predicate) = open.pop() {
             for axiom in lifted.axioms.iter().filter(|axiom| axiom.predicate == predicate) {
                 let mut below = Self::default();
-                // The arguments of a body are not traced back to those of the head.
+                // Arguments in the body of an axiom are not related to the arguments of its head.
                 below.literals(&axiom.condition);
                 for (predicate, _) in below.atoms {
                     if seen.insert(predicate) {
@@ -141,7 +144,7 @@ impl Reads {
         }
     }
 
-    /// Adds the reads of a condition with arbitrary arguments.
+    /// Adds the predicates in a condition, for all arguments, and the functions.
     fn literals(&mut self, formula: &Formula) {
         match formula {
             Formula::And(parts) | Formula::Or(parts) => parts.iter().for_each(|part| self.literals(part)),

@@ -1,4 +1,5 @@
-//! Evaluates expressions with open slots to tables over the remaining designs.
+//! Evaluates expressions with unbound slot parameters to tables: one value for each combination of the
+//! remaining designs.
 
 use crate::error::Error;
 use crate::ground::evaluate::expression::ground;
@@ -10,21 +11,22 @@ use crate::lifted::{Expression, ObjectId, Rational};
 use crate::limits::{LimitPoll, Limits};
 use crate::task::quantity::{Linear, Quantity, SlotSet, Table};
 
-/// Open slots of the current schema, with the remaining designs of each.
+/// Unbound slot parameters of the current action schema, with the remaining designs of each slot.
 pub struct Slots<'a> {
     pub(crate) parameters: &'a [SlotParameter],
     pub(crate) designs: Vec<Vec<ObjectId>>,
 }
 
 impl Slots<'_> {
-    /// Number of remaining designs of each slot.
+    /// Returns the number of remaining designs of each slot.
     pub(crate) fn sizes(&self) -> Vec<usize> {
         self.designs.iter().map(Vec::len).collect()
     }
 }
 
-/// Evaluates an expression with open slots. Sums are split into tables over few slots each.
-/// Combinations with undefined values are passed to `undefined` and count as 0.
+/// Evaluates an expression with unbound slot parameters. Each summand becomes a separate table over the slots
+/// that it mentions. Design combinations with undefined values are passed to `undefined` as (slots, designs)
+/// and count as 0.
 ///
 /// # Errors
 /// The expression is not linear, or a limit is reached.
@@ -51,7 +53,7 @@ pub fn open(
         Expression::Product(parts, place) => {
             let (mentioning, closed): (Vec<_>, Vec<_>) =
                 parts.iter().partition(|part| !slots_of_expression(part, slots.parameters).is_empty());
-            // A product of several factors with slots has no sum of separate tables.
+            // Only a product with a single factor that mentions slots can be split into a sum of tables.
             let [part] = mentioning[..] else {
                 return table(world, expression, mentioned, binding, slots, undefined);
             };
@@ -69,7 +71,8 @@ pub fn open(
     }
 }
 
-/// Evaluates an expression for each combination of designs.
+/// Evaluates an expression for each combination of designs of the slots in `mentioned`, and returns the
+/// values as a table.
 fn table(
     world: &mut World<'_>,
     expression: &Expression,
@@ -83,8 +86,8 @@ fn table(
     for_each_combination(&mentioned, slots, binding, limits, &mut |binding, combination| {
         match ground(world, expression, binding) {
             Ok(linear) => {
-                // Factors of a slot in a product or quotient are static, otherwise the
-                // parameter would not be a slot.
+                // Fluents whose arguments mention a slot are static; otherwise the parameter would not be a
+                // slot.
                 assert!(linear.coefficients.is_empty(), "invariant: a table has no fluents");
                 values.push(linear.quantity.constant);
             }
@@ -101,11 +104,10 @@ fn table(
     Ok(Linear { coefficients: Vec::new(), quantity })
 }
 
-/// Callback for combinations of designs.
+/// Callback that receives the binding, and the index of the chosen design for each slot.
 type Visit<'v> = dyn FnMut(&Binding, &[u32]) -> Result<(), Failure> + 'v;
 
-/// Binds the slots in `mentioned` to every combination of their designs, the last slot varying
-/// fastest.
+/// Calls `visit` for every combination of designs of the slots in `mentioned`; the last slot varies fastest.
 ///
 /// # Errors
 /// A limit is reached, or `visit` fails.

@@ -1,4 +1,4 @@
-//! Converts conditions and axioms over atoms to conditions and axioms over variables.
+//! Converts conditions and axioms over atoms to conditions and axioms over finite-domain variables.
 
 use crate::error::Error;
 use crate::ground::finalize::numbers::Numbers;
@@ -10,7 +10,7 @@ use crate::number::checked_lcm;
 use crate::task::number::TaskNumber;
 use crate::task::{Axiom, Condition, Fact, Layer};
 
-/// Converts a condition.
+/// Converts a condition over atoms to a condition over finite-domain and numeric variables.
 #[expect(clippy::arithmetic_side_effects, reason = "above the least number of its type")]
 pub(super) fn condition<N: TaskNumber>(
     ground: &GroundCondition,
@@ -23,7 +23,7 @@ pub(super) fn condition<N: TaskNumber>(
         let no_value = atoms.none[literal.fact.variable.index()];
         if literal.positive {
             condition.facts.push(literal.fact);
-        // A variable with two values has only one alternative, which is a fact instead of a clause.
+        // If a variable has only one other value, a negative literal is a fact instead of a clause.
         } else if no_value == 1 {
             condition.facts.push(Fact { variable: literal.fact.variable, value: no_value });
         } else {
@@ -40,13 +40,13 @@ pub(super) fn condition<N: TaskNumber>(
             continue;
         }
         let mut linear = numbers.stored(linear, 1).into_owned();
-        // Comparisons may be scaled freely, so fractional factors are removed.
+        // A comparison with 0 may be multiplied by a positive factor, which removes fractional coefficients.
         let mut denominators = linear.coefficients.iter().map(|(_, factor)| factor.denominator());
         let common = denominators.try_fold(1, |common, next| checked_lcm(common, next?));
         let common = common.ok_or_else(|| Error::overflow("a factor of a numeric fluent"))?;
         linear.scale(&Rational::from_integer(common));
         let mut integers = numbers.linear(&linear)?;
-        // For integers, > 0 is ≥ 1.
+        // For integers, x > 0 is equivalent to x - 1 ≥ 0.
         if *strict {
             integers.quantity.constant = integers.quantity.constant + -N::one();
         }
@@ -57,12 +57,13 @@ pub(super) fn condition<N: TaskNumber>(
     Ok(condition)
 }
 
-/// Returns `true` if the condition requires two values of a variable.
+/// Returns `true` if the condition requires two different values of a variable. Its facts must be sorted and
+/// distinct.
 pub(super) fn contradictory<N>(condition: &Condition<N>) -> bool {
     condition.facts.windows(2).any(|pair| pair[0].variable == pair[1].variable)
 }
 
-/// Sorts the rules of derived variables into layers, each after its dependencies.
+/// Sorts the rules of derived variables into layers. Each layer comes after the layers on which it depends.
 pub(super) fn axioms<N: TaskNumber>(
     axioms: &[GroundAxiom],
     atoms: &Atoms,

@@ -1,5 +1,5 @@
-//! Scales exact rationals to integers, with a common factor per kind of number. Each table is
-//! converted once.
+//! Scales exact rationals to integers, with a common factor for each kind of number (for example costs).
+//! Shared tables are converted only once.
 
 use std::collections::hash_map::Entry;
 use std::sync::Arc;
@@ -13,20 +13,20 @@ use crate::task::number::TaskNumber;
 use crate::task::quantity::Quantity;
 use crate::task::table_map::TableMap;
 
-/// Least common denominator of all numbers of a kind.
+/// Accumulates the least common denominator of all numbers of a kind, for example of all durations.
 #[derive(Debug)]
 pub(super) struct Denominator {
     what: &'static str,
-    /// `None` on overflow.
+    /// Least common denominator of the visited numbers; `None` on overflow.
     common: Option<Int>,
-    /// Source location of the number that caused the overflow.
+    /// Description and source location of the number that caused the overflow.
     culprit: Option<(String, Option<Place>)>,
-    /// Tables that were already visited.
+    /// Visited tables by address. The values are stored so that the address stays unique.
     seen: FxHashMap<*const Rational, Arc<[Rational]>>,
 }
 
 impl Denominator {
-    /// Creates a denominator; `what` describes the numbers in errors.
+    /// Creates an empty accumulator; `what` describes the kind of numbers in error messages.
     pub(super) fn new(what: &'static str) -> Self {
         Self { what, common: Some(1), culprit: None, seen: FxHashMap::default() }
     }
@@ -51,17 +51,18 @@ impl Denominator {
         }
     }
 
-    /// Records the source location of the last number if it caused the overflow.
+    /// Records the name and source location of the most recent number if that number caused the overflow.
     pub(super) fn note(&mut self, place: impl FnOnce() -> (String, Option<Place>)) {
         if self.common.is_none() && self.culprit.is_none() {
             self.culprit = Some(place());
         }
     }
 
-    /// Returns the conversion to integers.
+    /// Returns the conversion of this kind of number to integers, with the accumulated denominator as the
+    /// scale.
     ///
     /// # Errors
-    /// `Error::Overflow` if the factor is too large.
+    /// `Error::Overflow` if the common denominator is too large.
     pub(super) fn integers<N: TaskNumber>(self) -> Result<Integers<N>, Error> {
         let common = if N::SCALED { self.common } else { Some(1) };
         let overflow = || {
@@ -73,7 +74,8 @@ impl Denominator {
     }
 }
 
-/// Converts numbers of a kind to integers, or leaves them unchanged.
+/// Converts rational numbers of a kind to the number type of the task. For integers, each number is
+/// multiplied by `scale`.
 #[derive(Debug)]
 pub(super) struct Integers<N> {
     what: &'static str,
@@ -104,7 +106,7 @@ mod tests {
     use super::*;
     use crate::task::quantity::Table;
 
-    /// Creates a quantity with `tables` tables over distinct slots, each with the values 0 and
+    /// Creates a sum of tables over distinct slots. Each of the `tables` tables has the values 0 and
     /// `number`.
     fn quantity(tables: u32, number: Int) -> Quantity<Rational> {
         let values: Arc<[Rational]> = [Rational::zero(), Rational::from_integer(number)].into();

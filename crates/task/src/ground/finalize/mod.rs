@@ -1,4 +1,4 @@
-//! Last grounding pass: atoms to finite-domain variables, rationals to integers.
+//! Last grounding stage: converts atoms to finite-domain variables, and rationals to integers.
 
 mod conditions;
 mod integers;
@@ -28,7 +28,8 @@ use crate::task::quantity::Quantity;
 use crate::task::timing::Timing;
 use crate::task::{Condition, Objective, Operator, State, Task};
 
-/// Builds the final task.
+/// Converts the ground task over atoms to the final task over finite-domain variables. `unreachable` is the
+/// reason why no plan exists, if known.
 ///
 /// # Errors
 /// `Error::Overflow` if numbers exceed exact integers.
@@ -97,7 +98,8 @@ pub fn finish<N: TaskNumber>(
     Ok(task)
 }
 
-/// Converts an operator. Returns `None` if its condition contradicts itself.
+/// Converts a ground operator. Returns `None` if its condition contradicts itself. The tuple holds the
+/// conversions of numeric fluents, of the costs of each objective, and of durations.
 fn operator<N: TaskNumber>(
     ground: GroundOperator,
     atoms: &Atoms,
@@ -131,17 +133,17 @@ fn operator<N: TaskNumber>(
     }))
 }
 
-/// Name and source location of the operator's action, for errors.
+/// Returns the name and source location of the operator's action schema, for error messages.
 fn schema_name(lifted: &Lifted, operator: &GroundOperator) -> (String, Option<Place>) {
     let schema = lifted.schemas.get(operator.schema as usize);
     let named = schema.map(|schema| (format!("`{}`", schema.name), Some(schema.place)));
     named.unwrap_or_else(|| ("a wait".to_owned(), None))
 }
 
-/// Ordered set of operators.
+/// Insertion-ordered set of operators.
 struct Distinct<N> {
     operators: Vec<Operator<N>>,
-    /// Positions by hash.
+    /// Positions in `operators` by hash of the operator.
     positions: FxHashMap<u64, SmallVec<[u32; 2]>>,
 }
 
@@ -161,7 +163,7 @@ impl<N: TaskNumber> Distinct<N> {
     }
 }
 
-/// Converts the objectives. Also returns the scales of their costs.
+/// Converts the objectives. Also returns, for each objective, the conversion of its costs to integers.
 #[expect(clippy::type_complexity, reason = "a list for each of two things")]
 fn objectives<N: TaskNumber>(
     task: &GroundTask<'_>,

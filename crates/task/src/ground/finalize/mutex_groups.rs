@@ -1,10 +1,11 @@
-//! Mutex groups: sets of atoms of which at most one holds, which become finite-domain variables.
+//! Mutex groups: sets of atoms at most one of which is true in each reachable state. They become
+//! finite-domain variables.
 //!
-//! Invariant synthesis after Helmert [1]: a candidate is a set of predicates that share some
-//! arguments and count another one. It is an invariant if no operator increases the number of true
-//! atoms of any instance. A candidate that an operator violates is refined by a predicate that this
-//! operator deletes. The check uses ground operators, so that statically impossible instances do
-//! not violate candidates.
+//! Invariant synthesis after Helmert [1]. A candidate is a set of predicates with key arguments; at most one
+//! further argument of each predicate is counted, i.e. ignored. An instance of the candidate fixes the
+//! objects of the key. The candidate is an invariant if no operator increases the number of true atoms of any
+//! instance. If an operator violates a candidate, the candidate is extended by a predicate that the operator
+//! deletes. The check uses ground operators, so statically impossible instances do not violate candidates.
 //!
 //! \[1\] M. Helmert: Concise finite-domain representations for PDDL planning tasks, Artificial
 //! Intelligence 173, 2009, section 5.
@@ -22,8 +23,8 @@ use crate::ground::vocabulary::task::GroundTask;
 use crate::lifted::{ObjectId, PredicateId};
 use crate::limits::{Interrupted, Limits};
 
-/// A predicate of a candidate: the argument positions of the key, in order. Another argument may be
-/// counted.
+/// A predicate of an invariant candidate, with the argument positions that form the key, in key order. A
+/// remaining argument is counted, i.e. may have any value.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
 struct Part {
     predicate: PredicateId,
@@ -33,19 +34,19 @@ struct Part {
 type Candidate = Vec<Part>;
 type Key = SmallVec<[ObjectId; 4]>;
 
-/// Limit on the number of candidates.
+/// Limit on the number of invariant candidates that are checked.
 const CANDIDATE_LIMIT: usize = 500;
 
-/// Atoms that become the values of a variable.
+/// A mutex group whose atoms become the values of a finite-domain variable.
 pub struct Group {
-    /// At least two atoms, which are in no other group.
+    /// Values of the variable: at least two atoms that belong to no other variable.
     pub(crate) atoms: Vec<AtomId>,
-    /// The whole mutex group: at most one of these atoms is true in every state. The operators on
-    /// the variable rely on this.
+    /// The whole mutex group, a superset of `atoms`: at most one of these atoms is true in every state.
+    /// Effects on the variable rely on this property.
     pub(crate) exclusive: Vec<AtomId>,
 }
 
-/// Returns disjoint groups, the largest first.
+/// Returns groups with pairwise disjoint `atoms`, the largest group first.
 #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
 pub fn groups(task: &GroundTask<'_>, relevant: &FxHashSet<AtomId>) -> Result<Vec<Group>, Interrupted> {
     let limits = task.world.limits;
@@ -66,12 +67,12 @@ pub fn groups(task: &GroundTask<'_>, relevant: &FxHashSet<AtomId>) -> Result<Vec
     cover(&instances, limits)
 }
 
-/// Greedy set cover: the group with most uncovered atoms first, ties broken by order.
+/// Greedy set cover: repeatedly selects the group with the most uncovered atoms; ties are broken by order.
 fn cover(instances: &[Vec<AtomId>], limits: &Limits) -> Result<Vec<Group>, Interrupted> {
     let mut covered: FxHashSet<AtomId> = FxHashSet::default();
     let mut selected = Vec::new();
-    // The number of uncovered atoms of a group only decreases. A group whose stored number is still
-    // correct is therefore the best.
+    // The number of uncovered atoms of a group only decreases. If the number stored in the heap is still
+    // correct, the group has the maximum.
     let filed = |(index, atoms): (usize, &Vec<AtomId>)| (atoms.len(), Reverse(index));
     let mut open: BinaryHeap<(usize, Reverse<usize>)> = instances.iter().enumerate().map(filed).collect();
     let mut pulse = limits.pulse();
@@ -79,7 +80,7 @@ fn cover(instances: &[Vec<AtomId>], limits: &Limits) -> Result<Vec<Group>, Inter
         pulse.beat()?;
         let group = &instances[index];
         let atoms: Vec<AtomId> = group.iter().filter(|atom| !covered.contains(*atom)).copied().collect();
-        // A single atom gains nothing from a group.
+        // A variable for a single atom needs no mutex group.
         if atoms.len() < 2 {
             continue;
         }
@@ -99,14 +100,15 @@ fn sorted(atoms: &FxHashSet<AtomId>) -> Vec<AtomId> {
     atoms_in_order
 }
 
-/// Returns the key of an atom under a candidate, if the candidate covers its predicate.
+/// Returns the objects at the key positions of an atom, or `None` if the candidate does not contain the
+/// atom's predicate.
 fn key_of(task: &GroundTask<'_>, candidate: &Candidate, atom: AtomId) -> Option<Key> {
     let ((predicate, arguments), ()) = task.world.atoms.get_index(atom.index())?;
     let part = candidate.iter().find(|part| part.predicate == *predicate)?;
     Some(part.key.iter().map(|position| arguments[*position]).collect())
 }
 
-/// Returns the candidates that are invariants.
+/// Returns the candidates that are invariants, i.e. that no operator violates.
 #[expect(clippy::arithmetic_side_effects, reason = "no more than the limit on candidates")]
 fn invariants(task: &GroundTask<'_>, relevant: &FxHashSet<AtomId>) -> Result<Vec<Candidate>, Interrupted> {
     let mut arities: BTreeMap<PredicateId, usize> = BTreeMap::new();
@@ -151,7 +153,8 @@ fn invariants(task: &GroundTask<'_>, relevant: &FxHashSet<AtomId>) -> Result<Vec
     Ok(accepted)
 }
 
-/// Conditions under which atoms are added and deleted together.
+/// An unconditional or conditional effect: the two conditions that must hold, and the added and deleted
+/// atoms.
 struct Change<'o> {
     conditions: [&'o [GroundLiteral]; 2],
     adds: &'o [AtomId],
@@ -164,7 +167,8 @@ impl Change<'_> {
     }
 }
 
-/// Returns the operator and a key whose weight it may increase.
+/// Returns the operator and the key of an instance whose number of true atoms it may increase. Returns `None`
+/// if the operator preserves the candidate.
 #[expect(clippy::arithmetic_side_effects, reason = "atoms of one operator are counted")]
 fn broken_by<'o>(
     task: &GroundTask<'_>,
@@ -183,8 +187,8 @@ fn broken_by<'o>(
         let mut effects = operator.conditional.iter().map(|effect| &effect.deletes);
         operator.deletes.contains(atom) || effects.any(|deletes| deletes.contains(atom))
     };
-    // Each change must preserve the weight individually, and no two of them may add to the same
-    // key.
+    // No change may increase the number of true atoms of a key, and no two changes may add atoms with equal
+    // keys.
     let mut adding: Vec<Key> = Vec::new();
     for change in std::iter::once(unconditional).chain(conditional) {
         let mut balance: SmallVec<[(Key, i32); 4]> = SmallVec::new();
@@ -192,14 +196,15 @@ fn broken_by<'o>(
             Some((_, sum)) => *sum += weight,
             None => balance.push((key, weight)),
         };
-        // An atom that already holds adds no weight, unless the operator deletes it as well.
+        // Adding a true atom does not increase the number, unless the operator also deletes the atom.
         let comes = |atom: &&AtomId| !change.requires(**atom) || deleted(atom);
         let added = change.adds.iter().filter(comes).filter_map(|atom| key_of(task, candidate, *atom));
         let added: SmallVec<[Key; 4]> = added.collect();
         added.iter().for_each(|key| weigh(key.clone(), 1));
         for atom in change.deletes {
             if let Some(key) = key_of(task, candidate, *atom) {
-                // A deletion sets the variable to "none of these", which is wrong if another atom of the group holds.
+                // A deletion sets the variable to "none of these". This is wrong if another atom of the group
+                // is true.
                 if !change.requires(*atom) {
                     return Some((operator, key));
                 }
@@ -218,8 +223,8 @@ fn broken_by<'o>(
     None
 }
 
-/// Returns the candidate extended by a predicate that the operator requires and deletes, with its
-/// arguments matched to the key.
+/// Returns extensions of a violated candidate. Each extension adds a predicate that the operator deletes,
+/// with argument positions whose objects equal the key.
 #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
 fn refinements(
     task: &GroundTask<'_>,
@@ -240,8 +245,8 @@ fn refinements(
             let free = (0..arguments.len()).find(|p| arguments[*p] == *object && !positions.contains(p));
             positions.extend(free);
         }
-        // Atoms of running actions are counted for all other arguments: they replace the value at
-        // the action's start.
+        // Atoms that represent running actions may have any number of counted arguments. Such an atom
+        // replaces the value of the variable at the start of the action.
         let is_running = task.world.lifted.predicates.get(predicate.index()).is_some_and(|p| p.running);
         if positions.len() == key.len() && (arguments.len() <= key.len() + 1 || is_running) {
             let mut parts = candidate.clone();

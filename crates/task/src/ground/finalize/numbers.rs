@@ -1,4 +1,4 @@
-//! Converts the numeric variables of a task to integers.
+//! Converts numeric variables, linear expressions and numeric effects to the number type of the final task.
 
 use std::borrow::Cow;
 
@@ -15,12 +15,13 @@ use crate::task::NumericEffect;
 use crate::task::number::TaskNumber;
 use crate::task::quantity::{Linear, NumericId};
 
-/// Numeric variables that conditions depend on, with the common scale of their values.
+/// The numeric variables that conditions, numeric effects or objectives use, with the common scale of their
+/// values.
 pub(super) struct Numbers<N> {
     pub(super) initial: Vec<N>,
     pub(super) names: Vec<String>,
     ids: FxHashMap<NumericId, NumericId>,
-    /// Multiples in which some fluents are stored.
+    /// Factors by which the stored values of some numeric variables are multiplied; 1 for missing variables.
     multiples: FxHashMap<NumericId, Int>,
     pub(super) integers: Integers<N>,
 }
@@ -53,7 +54,7 @@ impl<N: TaskNumber> Numbers<N> {
             denominator.number(number);
             denominator.note(|| (task.world.numeric_name(*variable), None));
         }
-        // Other initial states may have numbers of this precision.
+        // Values in other initial states are multiples of 1/precision.
         for precision in generality.numbers.into_iter().chain(generality.precision) {
             denominator.number(&Rational::new(1, precision));
         }
@@ -79,7 +80,7 @@ impl<N: TaskNumber> Numbers<N> {
         Ok(Linear { coefficients, quantity: self.integers.quantity(&linear.quantity)? })
     }
 
-    /// Converts weighted fluents of an objective.
+    /// Converts the weighted numeric variables of an objective to the ids and multiples of the final task.
     pub(super) fn rest(&self, rest: &[(NumericId, Rational)]) -> Vec<(NumericId, Rational)> {
         let converted = |(variable, factor): &(NumericId, Rational)| {
             (self.ids[variable], factor.clone() / Rational::from_integer(self.multiple(*variable)))
@@ -91,7 +92,7 @@ impl<N: TaskNumber> Numbers<N> {
         self.multiples.get(&variable).copied().unwrap_or(1)
     }
 
-    /// Returns the multiples of all fluents in order; empty if none is scaled.
+    /// Returns the multiple of each numeric variable by id. Empty if all multiples are 1.
     pub(super) fn multiples(&self) -> Vec<Int> {
         if self.multiples.is_empty() {
             return Vec::new();
@@ -105,7 +106,8 @@ impl<N: TaskNumber> Numbers<N> {
         multiples
     }
 
-    /// Scales an expression over stored fluents by `times`.
+    /// Converts an expression over original values to the stored multiples of the variables, and multiplies
+    /// the result by `times`.
     pub(super) fn stored<'l>(&self, linear: &'l Linear<Rational>, times: Int) -> Cow<'l, Linear<Rational>> {
         if self.multiples.is_empty() {
             return Cow::Borrowed(linear);
@@ -131,9 +133,9 @@ impl<N: TaskNumber> Numbers<N> {
     }
 }
 
-/// Computes the multiples in which fluents are stored, so that fractional factors between fluents
-/// become integers: for `(increase (x) (* 0.5 (y)))`, twice x is stored. Empty if no multiples
-/// exist.
+/// Computes a multiple for each numeric variable such that fractional coefficients in effects become
+/// integers. For `(increase (x) (* 0.5 (y)))`, twice the value of x is stored. Returns an empty map if no
+/// multiples are needed or none suffice.
 fn multiples(task: &GroundTask<'_>) -> FxHashMap<NumericId, Int> {
     let mut factors: Vec<(NumericId, NumericId, &Rational)> = Vec::new();
     for (variable, value) in task.operators.iter().flat_map(|operator| operator.numeric_effects.iter()) {
@@ -145,17 +147,18 @@ fn multiples(task: &GroundTask<'_>) -> FxHashMap<NumericId, Int> {
     factors.sort_unstable();
     factors.dedup();
     let mut multiples: FxHashMap<NumericId, Int> = FxHashMap::default();
-    // Propagation along acyclic dependencies ends within as many rounds as there are fluents.
+    // With acyclic dependencies, propagation ends after at most as many rounds as there are coefficients.
     for _ in 0..=factors.len() {
         let mut is_changed = false;
         for (variable, read, factor) in &factors {
             let of = |variable: &NumericId| multiples.get(variable).copied().unwrap_or(1);
-            // The factor between the stored multiples of both fluents.
+            // Coefficient between the stored multiples of the two variables.
             let stored = Rational::from_integer(of(variable)) * *factor / Rational::from_integer(of(read));
             if stored.is_integer() {
                 continue;
             }
-            // A fractional factor of a fluent on itself grows with each application: no multiple suffices.
+            // The coefficient of a variable on itself is the same for every multiple, so a fractional one
+            // cannot be removed.
             let denominator = if variable == read { None } else { stored.denominator() };
             let multiple = denominator
                 .and_then(|factor| of(variable).checked_mul(factor))

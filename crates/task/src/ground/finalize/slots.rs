@@ -1,4 +1,4 @@
-//! Slots of a task: the functions with open designs in operators.
+//! Collects the slots of a task, i.e. the functions for which operators have a choice of designs.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -10,8 +10,8 @@ use crate::lifted::ObjectId;
 use crate::number::dense;
 use crate::task::{Slot, SlotId, SlotUse};
 
-/// A function, and the index among the operator's slots for it, because an action may require a
-/// function twice.
+/// Identifies a slot: a function, and a counter that distinguishes several slots of one operator for the
+/// function.
 type SlotKey = (ObjectId, usize);
 
 fn slot_keys(slots: &GroundSlots) -> impl Iterator<Item = (SlotKey, &Vec<ObjectId>)> {
@@ -21,11 +21,11 @@ fn slot_keys(slots: &GroundSlots) -> impl Iterator<Item = (SlotKey, &Vec<ObjectI
     })
 }
 
-/// All slots in the order of the objects, with all their designs.
+/// All slots of a task in the order of their functions, each with the union of the designs of all operators.
 pub(super) struct Slots {
     pub(super) all: Vec<Slot>,
     ids: FxHashMap<SlotKey, SlotId>,
-    /// Slot uses by address, because operators share them.
+    /// Converted slot uses by address of the shared ground slots.
     uses: FxHashMap<*const (ObjectId, Vec<ObjectId>), Arc<[SlotUse]>>,
 }
 

@@ -1,4 +1,4 @@
-//! Assigns atoms to finite-domain variables.
+//! Assigns atoms to the values of finite-domain variables.
 
 use rustc_hash::FxHashSet;
 
@@ -11,17 +11,17 @@ use crate::limits::Interrupted;
 use crate::number::dense;
 use crate::task::{ConditionalEffect, Fact, Literal, Variable, VariableId};
 
-/// The finite-domain variables and the fact of each atom.
+/// The finite-domain variables of a task, and the variable and value of each atom.
 pub(super) struct Atoms {
     pub(super) variables: Vec<Variable>,
-    /// Number of variables that are not derived.
+    /// Number of non-derived variables, which precede the derived variables.
     pub(super) basic: usize,
     pub(super) initial: Vec<u32>,
-    /// Fact by atom.
+    /// Variable and value of each atom; `None` for an atom that nothing reads.
     facts: Vec<Option<Fact>>,
-    /// Value of each variable for "none of these atoms".
+    /// For each variable, the value for "none of these atoms".
     pub(super) none: Vec<u32>,
-    /// Mutex groups, see [`exclusive`](crate::task::Task::exclusive).
+    /// Mutex groups that are larger than their variable, see [`exclusive`](crate::task::Task::exclusive).
     pub(super) exclusive: Vec<Vec<Fact>>,
 }
 
@@ -36,7 +36,8 @@ impl Atoms {
         let mut exclusive = Vec::new();
         let mut groups = Vec::new();
         for group in mutex_groups::groups(task, &relevant)? {
-            // Atoms that are values of another variable still exclude those of this group.
+            // Some atoms of the group may be values of other variables, so the variable does not express the
+            // whole group.
             if group.exclusive.len() > group.atoms.len() {
                 exclusive.push(group.exclusive);
             }
@@ -83,7 +84,7 @@ impl Atoms {
         Literal { fact, positive }
     }
 
-    /// Returns the fact of an atom, or `None` if no condition reads it.
+    /// Returns the variable and value of an atom, or `None` if nothing reads the atom.
     pub(super) fn fact(&self, atom: AtomId) -> Option<Fact> {
         self.facts[atom.index()]
     }
@@ -111,14 +112,15 @@ impl Atoms {
             let literals = &operator.condition.literals;
             literals.iter().any(|(atom, positive)| *positive && self.fact(*atom) == Some(*fact))
         };
-        // An effect that the condition already implies matters only if a conditional effect may precede it.
+        // An effect that the condition implies matters only if a conditional effect changes the same
+        // variable.
         effects.retain(|fact| !required(fact) || overridden(fact));
         effects.sort_unstable();
         effects
     }
 
-    /// Converts conditional effects, deletions first. A deletion is dropped if the operator sets
-    /// the variable unconditionally, because only one atom of a variable holds.
+    /// Converts conditional effects; deletions precede additions. A deletion is dropped if an unconditional
+    /// effect sets the variable, because only one atom of a variable can be true.
     pub(super) fn conditional(&self, operator: &GroundOperator) -> Vec<ConditionalEffect> {
         if operator.conditional.is_empty() {
             return Vec::new();

@@ -1,4 +1,4 @@
-//! Instantiates the rules of derived atoms that are used.
+//! Instantiates the rules of the derived atoms that occur in the task.
 
 use crate::ground::evaluate::condition::residual;
 use crate::ground::evaluate::normal_form::Definitions;
@@ -7,7 +7,8 @@ use crate::ground::vocabulary::eval_error::Failure;
 use crate::ground::vocabulary::world::World;
 use crate::number::dense;
 
-/// Returns the rules of all used derived atoms and of their dependencies.
+/// Adds the rules of all derived atoms in `world` to `definitions`. Rule bodies may register further derived
+/// atoms, whose rules are added too.
 #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
 pub(super) fn instantiate_axioms(
     world: &mut World<'_>,

@@ -1,4 +1,5 @@
-//! Composes simultaneous changes into updates in terms of the state before an action (regression).
+//! Composes the changes of an action into the state after the action, in terms of the state before it
+//! (regression).
 
 use std::sync::Arc;
 
@@ -13,17 +14,18 @@ use crate::task::ForbiddenCombinations;
 use crate::task::quantity::{Linear, NumericId};
 use pddl::ast::Assignment;
 
-/// A change of an atom or of a number.
+/// A ground change of an atom or a numeric variable.
 #[derive(Clone)]
 pub(super) enum GroundChange {
+    /// Makes the atom true or false.
     Atom(AtomId, bool),
     Number {
         variable: NumericId,
         assignment: Assignment,
-        /// `None` if the value is undefined: the operator does not exist where the change would be
-        /// made.
+        /// Operand of the assignment. `None` if it is undefined; an operator with this change is then not
+        /// instantiated.
         operand: Option<Linear<Rational>>,
-        /// Combinations of designs for which the value is undefined.
+        /// Combinations of designs for which the operand is undefined.
         undefined: Arc<[ForbiddenCombinations]>,
         place: Place,
     },
@@ -37,7 +39,7 @@ impl GroundChange {
         }
     }
 
-    /// Returns `true` if the change interferes with the reads.
+    /// Returns `true` if the reads contain the changed atom or numeric variable.
     pub(super) fn disturbs(&self, world: &World<'_>, reads: &Reads) -> bool {
         match self {
             Self::Atom(atom, _) => {
@@ -52,8 +54,8 @@ impl GroundChange {
     }
 }
 
-/// Returns the atoms that changes make true and those that they make false. Adding takes
-/// precedence.
+/// Returns the atoms that the changes add, and the atoms that they delete. An atom that is both added and
+/// deleted counts as added.
 pub(super) fn atoms<'c>(changes: impl Iterator<Item = &'c GroundChange>) -> (Vec<AtomId>, Vec<AtomId>) {
     let (mut adds, mut deletes) = (Vec::new(), Vec::new());
     for change in changes {
@@ -65,7 +67,8 @@ pub(super) fn atoms<'c>(changes: impl Iterator<Item = &'c GroundChange>) -> (Vec
     (adds, deletes)
 }
 
-/// Kind of a numeric change; changes of the same kind commute, except assignments (0).
+/// Returns the kind of a numeric change: assignment (0), addition (1) or scaling (2). Changes of kind 1
+/// commute with each other, and so do changes of kind 2.
 pub(super) fn way_of(assignment: Assignment) -> u8 {
     match assignment {
         Assignment::Assign => 0,
@@ -74,9 +77,9 @@ pub(super) fn way_of(assignment: Assignment) -> u8 {
     }
 }
 
-/// Checks that changes of a number at the same time are compatible: additions, scalings, or
-/// assignments of the same value. Otherwise returns `Failure::Undefined`, which makes the action
-/// inapplicable (PDDL 2.1, section 8).
+/// Checks that two simultaneous changes of a number are compatible: both are additions, both are scalings, or
+/// both assign equal values. Otherwise returns `Failure::Undefined`, which makes the action inapplicable
+/// (PDDL 2.1, section 8).
 fn reconcile(earlier: &GroundChange, later: &GroundChange) -> Result<(), Failure> {
     let (
         GroundChange::Number { assignment: kind, operand: first_value, .. },
@@ -103,8 +106,8 @@ fn reconcile(earlier: &GroundChange, later: &GroundChange) -> Result<(), Failure
     }
 }
 
-/// Returns the new values of numeric variables in terms of the state before the action. `before`
-/// has the earlier changes of the action.
+/// Returns the changed numeric variables with their values after the changes, as expressions over the state
+/// before the action. `before` holds the values after earlier changes of the action.
 pub(super) fn numbers<'c>(
     changes: impl Iterator<Item = &'c GroundChange>,
     before: &Numbers,
@@ -121,7 +124,8 @@ pub(super) fn numbers<'c>(
             None => last.push((*variable, change)),
         }
         let mut operand = operand.clone().ok_or(Failure::Undefined)?;
-        // Values refer to the state before the action, so earlier changes are substituted.
+        // The result refers to the state before the action, so the results of earlier changes are
+        // substituted.
         substitute(&mut operand, before);
         let current = || {
             let old = changed.get(*variable).or_else(|| before.get(*variable));
@@ -162,7 +166,7 @@ fn scaled(
     Ok(value)
 }
 
-/// Substitutes the new values of numeric variables.
+/// Replaces each numeric variable in an expression by its value in `before`, if there is one.
 pub(super) fn substitute(linear: &mut Linear<Rational>, before: &Numbers) {
     if !linear.coefficients.iter().any(|(variable, _)| before.get(*variable).is_some()) {
         return;

@@ -1,5 +1,5 @@
-//! Case splitting: splits an instance into operators, one for each combination of outcomes of its
-//! conditions.
+//! Case distinction: splits an action instance into operators, one for each combination of truth values of
+//! the conditions of its effects.
 
 use std::sync::Arc;
 
@@ -21,23 +21,24 @@ use crate::lifted::Schema;
 use crate::limits::Limits;
 use crate::task::ForbiddenCombinations;
 
-/// Maximum number of operators of an instance.
+/// Limit on the number of operators of one action instance.
 const CASE_LIMIT: usize = 64;
 
-/// A combination of outcomes of an instance's conditions, in terms of the state before it.
+/// One combination of truth values of the effect conditions. All parts are expressed over the state before
+/// the instance.
 pub(super) struct Case {
     parts: Vec<Residual>,
     start: Start,
     end: Vec<(Residual, GroundChange)>,
 }
 
-/// Unconditional changes at the start of an instance.
+/// Changes at the start of an instance, without conditions.
 #[derive(Clone)]
 struct Start {
     adds: Vec<AtomId>,
     deletes: Vec<AtomId>,
     numbers: Numbers,
-    /// Combinations of designs for which a number has no value.
+    /// Combinations of designs for which a changed number is undefined.
     undefined: Vec<ForbiddenCombinations>,
 }
 
@@ -57,20 +58,20 @@ impl Start {
     }
 }
 
-/// Conditions between the start and the end, and timed events in between.
+/// Conditions between the start and end of an instance, and timed events in between.
 pub(super) struct Middle<'m> {
-    /// Conditions during the whole interval.
+    /// Conditions that must hold throughout the interval.
     pub(super) over_all: &'m [Residual],
-    /// Conditions before the end.
+    /// Conditions that must hold just before the end.
     pub(super) at_end: &'m [Residual],
-    /// With timed events: the window of the action, and the conditions under which events
-    /// interfere.
+    /// If the task has timed events: the window of the action, and the conditions under which events
+    /// interfere with it.
     pub(super) passage: Option<&'m (TimelineWindow<'m>, Interference)>,
 }
 
 impl Middle<'_> {
-    /// Adds the conditions in terms of the state before the start, and adds the timed events until
-    /// the end to `start`.
+    /// Adds all conditions to `parts`, rewritten over the state before the start. Adds the changes of the
+    /// timed events up to the end to `start`.
     fn pass(&self, start: &mut Start, parts: &mut Vec<Residual>) {
         let Some((passage, interference)) = self.passage else {
             let conditions = self.over_all.iter().chain(self.at_end);
@@ -94,9 +95,9 @@ impl Middle<'_> {
     }
 }
 
-/// Returns the cases of an instance: a single one, unless its start or its numbers are conditional.
-/// Contradictory cases and cases with undefined values are dropped (PDDL 2.1, section 8: an effect
-/// whose condition does not hold is not an effect).
+/// Returns the cases of an instance. There is a single case unless the start effects or numeric effects have
+/// conditions. Contradictory cases and cases with undefined values are dropped (PDDL 2.1, section 8: an
+/// effect whose condition is false does not occur).
 pub(super) fn cases(
     schema: &Schema,
     before: &[Residual],
@@ -123,7 +124,8 @@ pub(super) fn cases(
             .map(|(condition, change)| (after(condition), change.clone()))
             .filter(|(condition, _)| *condition != Residual::False)
             .collect();
-        // A conditional numeric effect would make costs state-dependent, so each outcome becomes a case.
+        // A conditional numeric effect would make the cost state-dependent. Each truth value of its condition
+        // therefore becomes a separate case.
         let numeric = end.iter().filter(|(_, change)| matches!(change, GroundChange::Number { .. }));
         let numeric: Vec<_> = numeric.map(|(condition, _)| condition.clone()).collect();
         for (decided, chosen) in split(schema, numeric.iter())? {
@@ -147,7 +149,7 @@ pub(super) fn cases(
     Ok(cases)
 }
 
-/// Returns `true` if the literals of the parts contradict each other.
+/// Returns `true` if a part is false, or two literals of the parts contradict each other.
 fn contradictory(parts: &[Residual]) -> bool {
     fn note(parts: &[Residual], known: &mut FxHashMap<AtomId, bool>) -> bool {
         parts.iter().any(|part| match part {
@@ -160,7 +162,8 @@ fn contradictory(parts: &[Residual]) -> bool {
     note(parts, &mut FxHashMap::default())
 }
 
-/// Returns every combination of outcomes: the required literals, and the conditions that hold.
+/// Returns all combinations of truth values of the conditions. Each entry holds the conditions or their
+/// negations, and the list of conditions that are true.
 #[allow(clippy::type_complexity)]
 #[expect(clippy::arithmetic_side_effects, reason = "cases are at most twice their limit")]
 fn split<'r>(
@@ -194,7 +197,8 @@ fn split<'r>(
 }
 
 impl Case {
-    /// Returns the forbidden combinations of designs, or `Failure::Undefined` if no other remains.
+    /// Returns the forbidden combinations of designs of this case. Returns `Failure::Undefined` if no
+    /// combination remains allowed.
     fn forbidden(
         &self,
         template: &GroundOperator,
@@ -216,8 +220,8 @@ impl Case {
         if admit_some(&forbidden, &sizes, limits)? { Ok(forbidden.into()) } else { Err(Failure::Undefined) }
     }
 
-    /// Returns the operator of this case. Everything except conditions and effects is taken from
-    /// the template.
+    /// Returns the operator of this case. The `template` provides all its fields except conditions, effects
+    /// and forbidden combinations.
     #[expect(clippy::arithmetic_side_effects, reason = "something was pushed before")]
     pub(super) fn operator(
         self,
@@ -268,7 +272,8 @@ impl Case {
     }
 }
 
-/// Returns the literals of a conjunction. Other parts are replaced by auxiliary atoms.
+/// Returns the conjunction as a list of literals. Conjuncts that are not literals are replaced by auxiliary
+/// atoms.
 fn literals(
     world: &mut World<'_>,
     definitions: &mut Definitions,
@@ -282,8 +287,8 @@ fn literals(
     literals
 }
 
-/// Rewrites a condition of the middle or end of a durative action in terms of the state before its
-/// start.
+/// Rewrites a condition on a state after the start of a durative action as a condition on the state before
+/// the start.
 fn after_start(residual: &Residual, Start { adds, deletes, numbers, .. }: &Start) -> Residual {
     if adds.is_empty() && deletes.is_empty() && numbers.is_empty() {
         return residual.clone();

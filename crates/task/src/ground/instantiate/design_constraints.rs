@@ -1,4 +1,4 @@
-//! Forbidden combinations of designs, and the test whether an admissible one remains.
+//! Forbidden combinations of designs, and the test whether any combination remains allowed.
 
 use rustc_hash::FxHashSet;
 
@@ -6,7 +6,7 @@ use crate::limits::{Interrupted, LimitPoll, Limits};
 use crate::task::ForbiddenCombinations;
 use crate::task::quantity::SlotSet;
 
-/// Adds a forbidden combination of designs.
+/// Adds a combination of designs for these slots to the forbidden combinations, without duplicates.
 pub(super) fn forbid(forbidden: &mut Vec<ForbiddenCombinations>, slots: &SlotSet, combination: SlotSet) {
     match forbidden.iter_mut().find(|rule| rule.slots == *slots) {
         Some(rule) if rule.combinations.contains(&combination) => {}
@@ -17,11 +17,11 @@ pub(super) fn forbid(forbidden: &mut Vec<ForbiddenCombinations>, slots: &SlotSet
     }
 }
 
-/// Returns `true` if a combination of designs is admissible. `sizes` has the number of designs of
-/// each slot.
+/// Returns `true` if there is a combination of designs that no constraint forbids. `sizes` is the number of
+/// designs of each slot.
 ///
-/// Only constrained slots are searched, separately for each connected component of the constraints.
-/// Backtracking search: a partial choice that violates a constraint is not extended.
+/// Backtracking search over the constrained slots only, separately for each connected component of
+/// constraints. A partial combination that violates a constraint is not extended.
 pub(super) fn admit_some(
     forbidden: &[ForbiddenCombinations],
     sizes: &[usize],
@@ -49,11 +49,11 @@ pub(super) fn admit_some(
     Ok(true)
 }
 
-/// Positions of the slots in their component, and the forbidden choices for them.
+/// A constraint: the positions of its slots within the component, and the forbidden combinations.
 type Rule<'f> = (Vec<usize>, FxHashSet<&'f SlotSet>);
 
-/// Returns `true` if designs for the first slots can be extended to all slots. Rules are indexed by
-/// the last slot that they mention.
+/// Returns `true` if the designs chosen for the first slots can be extended to all slots. `rules` is indexed
+/// by the last slot that a rule mentions.
 fn extends(
     chosen: &mut Vec<u32>,
     sizes: &[usize],
@@ -76,7 +76,7 @@ fn extends(
     Ok(false)
 }
 
-/// Returns the connected components of slots that share constraints, each in ascending order.
+/// Returns the connected components of slots that share constraints, each sorted in ascending order.
 fn joined(forbidden: &[ForbiddenCombinations]) -> Vec<Vec<u32>> {
     let mut groups: Vec<Vec<u32>> = Vec::new();
     for rule in forbidden {
@@ -132,7 +132,7 @@ mod tests {
         }
     }
 
-    /// Five slots of 100 designs, where no pair of the first two slots is admissible.
+    /// With five slots of 100 designs, every pair of designs of the first two slots is forbidden.
     #[test]
     fn a_large_product_is_not_enumerated() {
         let pairs = (0..100).flat_map(|a| (0..100).map(move |b| [a, b].into())).collect();

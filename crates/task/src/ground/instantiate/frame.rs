@@ -1,9 +1,8 @@
-//! Data about the designs of the slots, shared by several instances of an action schema.
+//! Design data that several instances of an action schema share.
 //!
-//! Suitable designs, forbidden combinations, costs and consumption depend on only a few parameters
-//! of the schema, the key parameters. For example, the battery use of a route depends on the route,
-//! but not on the battery level. The data are computed once for each combination of the key
-//! parameters.
+//! Suitable designs, forbidden combinations, costs and consumption depend on only a few parameters of the
+//! schema, the key parameters. For example, the battery use of a route depends on the route, but not on the
+//! battery level. The data are computed once for each combination of objects for the key parameters.
 
 use std::sync::Arc;
 
@@ -24,34 +23,37 @@ use crate::number::dense;
 use crate::task::ForbiddenCombinations;
 use crate::task::quantity::{Linear, Quantity};
 
-/// Data shared by instances with the same key parameters.
+/// Data that all instances with equal key parameters share.
 pub(super) struct SharedInstanceData<'a> {
+    /// Slots of the schema with their suitable designs.
     pub(super) designs: Slots<'a>,
+    /// Function and suitable designs of each slot.
     pub(super) slots: Arc<GroundSlots>,
     pub(super) forbidden: Arc<[ForbiddenCombinations]>,
-    /// Residuals of the open conjuncts.
+    /// Residuals of the conjuncts at the start that mention slots.
     pub(super) start: Vec<Residual>,
     pub(super) over_all: Vec<Residual>,
     pub(super) at_end: Vec<Residual>,
-    /// By the position of the effect.
+    /// Operands of the numeric start effects, by the position of the effect.
     pub(super) start_operands: Vec<Operand>,
     pub(super) end_operands: Vec<Operand>,
     pub(super) duration: Quantity<Rational>,
 }
 
-/// Operand of an effect, as far as it is determined by the shared parameters.
+/// Operand of a numeric effect, as far as the key parameters determine it.
 pub(super) enum Operand {
-    /// The operand mentions no slot, or the effect has bound variables.
+    /// The operand mentions no slot, or the effect has quantified variables. It is evaluated separately for
+    /// each instance.
     Closed,
     Undefined,
-    /// The operand, with the combinations of designs for which it is undefined, if the effect is
-    /// conditional.
+    /// The operand mentions slots. The second field holds the combinations of designs for which the operand
+    /// is undefined; it is empty for an unconditional effect, which forbids these combinations instead.
     Open(Linear<Rational>, Arc<[ForbiddenCombinations]>),
 }
 
 impl<'a> SharedInstanceData<'a> {
-    /// Computes the shared data of an instance. Returns `None` if no combination of designs is
-    /// suitable.
+    /// Computes the shared data for the key parameters in `core`. Returns `None` if no combination of designs
+    /// is possible.
     pub(super) fn new(
         world: &mut World<'_>,
         outline: &SplitSchema<'a>,
@@ -119,8 +121,8 @@ fn operands(build: &mut Build<'_, '_>, effects: &[Effect]) -> Result<Vec<Operand
     Ok(operands)
 }
 
-/// Returns the designs of a slot for which all conditions and expressions over this slot alone are
-/// true and defined.
+/// Returns the designs of a slot for which no condition that mentions only this slot is false, and every
+/// expression that mentions only this slot is defined.
 fn suitable_designs(
     world: &mut World<'_>,
     outline: &SplitSchema<'_>,

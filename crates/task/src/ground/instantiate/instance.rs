@@ -1,4 +1,4 @@
-//! Instantiation of a single instance of a schema.
+//! Instantiates an action schema under a binding of its parameters.
 
 use std::sync::Arc;
 
@@ -24,11 +24,11 @@ use crate::lifted::{Effect, Formula, Joint, Lifted, ObjectId, Schema, Term};
 use crate::task::timing::Timing;
 use crate::task::{Argument, ForbiddenCombinations};
 
-/// State shared by all instantiations.
+/// State that the instantiation of all schemas shares.
 pub(super) struct Instantiation<'a> {
     pub(super) world: World<'a>,
     pub(super) definitions: Definitions,
-    /// `None` if there are no timed events.
+    /// Timed events of the task; `None` for a task without timed events.
     pub(super) timeline: Option<Timeline>,
 }
 
@@ -38,8 +38,8 @@ impl<'a> Instantiation<'a> {
         Self { world, definitions: Definitions::default(), timeline }
     }
 
-    /// Returns the operators of an instance, one for each window and case, or `Failure::Undefined`
-    /// if it is never applicable.
+    /// Returns the operators of an instance, one for each timeline window and each case of its conditional
+    /// effects. Returns `Failure::Undefined` if the instance is never applicable.
     pub(super) fn operators(
         &mut self,
         outline: &SplitSchema<'_>,
@@ -82,8 +82,8 @@ impl<'a> Instantiation<'a> {
     }
 }
 
-/// Returns the forbidden combinations of an instance, including the shared ones, or fails if none
-/// remains.
+/// Returns the forbidden combinations of designs of an instance, including the shared ones. Returns `None` if
+/// every combination is forbidden.
 fn forbidden(
     build: &Build<'_, '_>,
     frame: &SharedInstanceData,
@@ -101,7 +101,8 @@ fn forbidden(
     Ok(is_admissible.then(|| forbidden.into()))
 }
 
-/// Returns the parts that all operators of an instance have in common.
+/// Returns an operator with the fields that all operators of an instance have in common; its conditions and
+/// effects are empty.
 fn template(
     build: &Build<'_, '_>,
     outline: &SplitSchema<'_>,
@@ -139,7 +140,7 @@ fn configuration(
         .collect()
 }
 
-/// Returns the conditions under which the simultaneous start and end of an instance interfere.
+/// Returns the conditions under which the simultaneous start and end actions of a joint schema interfere.
 fn joint_clashes(
     build: &mut Build<'_, '_>,
     schema: &Schema,
@@ -156,7 +157,7 @@ fn joint_clashes(
     Ok(clashes(build.world, (&first_reads, &first), (&second_reads, &second)))
 }
 
-/// Returns the conditions under which the start and the end of an instance interfere with events.
+/// Returns the conditions under which the start or the end of an instance interferes with a timed event.
 fn conflicts(
     world: &World<'_>,
     timeline: &Timeline,
@@ -176,7 +177,7 @@ fn conflicts(
     }
 }
 
-/// Returns the reads of a happening.
+/// Returns the atoms and fluents that the start or end of an action reads in its condition and effects.
 fn reads(lifted: &Lifted, condition: &Formula, effects: &[Effect], binding: &Binding) -> Reads {
     let mut reads = Reads::default();
     reads.condition(lifted, condition, binding);

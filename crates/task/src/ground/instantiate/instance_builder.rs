@@ -1,4 +1,4 @@
-//! Partially evaluates the conditions and expressions of an instance, and collects forbidden
+//! Partially evaluates the conditions and expressions of an action instance, and collects its forbidden
 //! combinations of designs.
 
 use std::collections::BTreeSet;
@@ -18,15 +18,15 @@ use crate::task::quantity::{Linear, Quantity, SlotSet};
 use crate::task::{Argument, ForbiddenCombinations};
 use pddl::ast::Span;
 
-/// An expression of a conditional effect.
+/// Value of an expression in a conditional effect, before the condition is decided.
 pub(super) struct Apart {
-    /// `None` if the value is undefined.
+    /// Value of the expression; `None` if it is undefined for every design.
     pub(super) operand: Option<Linear<Rational>>,
     /// Combinations of designs for which the value is undefined.
     pub(super) undefined: Arc<[ForbiddenCombinations]>,
 }
 
-/// An instance under construction.
+/// An action instance whose conditions and effects are being evaluated.
 pub(super) struct Build<'w, 'a> {
     pub(super) world: &'w mut World<'a>,
     pub(super) binding: Binding,
@@ -35,7 +35,8 @@ pub(super) struct Build<'w, 'a> {
 }
 
 impl Build<'_, '_> {
-    /// Returns the residuals of closed conjuncts, after those of open ones.
+    /// Returns the residuals in `open`, followed by the residuals of the conjuncts in `closed`, which mention
+    /// no slots.
     #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(super) fn conditions(
         &mut self,
@@ -50,14 +51,14 @@ impl Build<'_, '_> {
         Ok(parts)
     }
 
-    /// Returns the residuals of open conjuncts. Combinations of designs that violate a static
-    /// conjunct are forbidden.
+    /// Returns the residuals of comparisons that mention slots and depend on the state. Combinations of
+    /// designs that violate a static conjunct are forbidden.
     pub(super) fn open_conditions(&mut self, open: &[(&Formula, SlotSet)]) -> Result<Vec<Residual>, Failure> {
         let mut parts = Vec::new();
         for (conjunct, mentioned) in open {
             if let Formula::Compare(comparison, left, right, _) = conjunct {
                 let (left, right) = (self.open(left)?, self.open(right)?);
-                // A comparison over designs only is decided now.
+                // A comparison without fluents is decided for each combination of designs.
                 let static_part = left.coefficients.is_empty() && right.coefficients.is_empty();
                 match compare(*comparison, left, right) {
                     residual if static_part => self.forbid(mentioned, &residual)?,
@@ -70,8 +71,8 @@ impl Build<'_, '_> {
         Ok(parts)
     }
 
-    /// Evaluates an expression of a conditional effect. Undefined combinations are returned instead
-    /// of forbidden.
+    /// Evaluates an expression of a conditional effect. Combinations of designs for which the value is
+    /// undefined are returned, not forbidden.
     pub(super) fn open_apart(&mut self, expression: &Expression) -> Result<Apart, Failure> {
         let outer = std::mem::take(&mut self.forbidden);
         let operand = possible(self.open(expression));
@@ -85,7 +86,7 @@ impl Build<'_, '_> {
         open(self.world, expression, &mut self.binding, self.slots, &mut undefined)
     }
 
-    /// Forbids the combinations of designs for which a static comparison fails.
+    /// Forbids the combinations of designs for which a static comparison is false.
     fn forbid(&mut self, mentioned: &SlotSet, residual: &Residual) -> Result<(), Failure> {
         match residual {
             Residual::And(parts) => parts.iter().try_for_each(|part| self.forbid(mentioned, part)),
@@ -116,7 +117,7 @@ impl Build<'_, '_> {
         })
     }
 
-    /// Forbids the combinations of designs with a negative duration.
+    /// Forbids the combinations of designs for which the duration is negative.
     pub(super) fn forbid_negative(&mut self, duration: &Quantity<Rational>) -> Result<(), Failure> {
         let zero = Rational::from_integer(0);
         let least = duration.tables.iter().filter_map(|table| table.values.iter().min());
@@ -129,7 +130,7 @@ impl Build<'_, '_> {
         self.forbid_where(&slots.into_iter().collect(), &|choice| duration.at(choice, &sizes) < zero)
     }
 
-    /// Forbids the combinations of designs for which a static condition over several slots fails.
+    /// Forbids the combinations of designs for which a static condition over several slots is false.
     fn forbid_unless(&mut self, conjunct: &Formula, mentioned: &SlotSet) -> Result<(), Failure> {
         let (world, forbidden) = (&mut *self.world, &mut self.forbidden);
         let limits = world.limits;

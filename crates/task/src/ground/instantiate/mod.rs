@@ -1,17 +1,18 @@
-//! Instantiation: instances of schemas to ground operators with open design slots.
+//! Instantiates action schemas: each schema and binding becomes one or more ground operators whose slots are
+//! still open.
 //!
-//! A durative action is composed into a single step: conditions of its middle and end that its
-//! start effects provide are dropped, conditions that they destroy make the instance impossible,
-//! and numeric conditions and effects of the end are rewritten in terms of the state before the
-//! start (sequential execution of PDDL 2.1, section 8).
+//! A durative action becomes a single step (sequential execution of PDDL 2.1, section 8). Conditions on its
+//! middle and end that its start effects make true are dropped; conditions that its start effects make false
+//! make the instance impossible. Numeric conditions and effects of the end are rewritten over the state
+//! before the start.
 //!
-//! Conditional effects on atoms are kept. An instance with conditional numeric effects (including
-//! cost) or conditional start effects becomes an operator for each case.
+//! Conditional effects on atoms are kept. An instance with conditional numeric effects (including costs) or
+//! conditional start effects is split into one operator for each combination of truth values.
 //!
-//! `slot_split` separates the parts of a schema that mention its slots, and `frame` caches data of
-//! instances with the same design dependencies. `simultaneous_effects` has the effects of a start
-//! or an end. `timeline_windows` enumerates the positions of an action between timed initial
-//! literals, and `conditional_effects` splits each of them into operators.
+//! `slot_split` separates the parts of a schema that mention slots. `frame` caches data of instances with
+//! equal key parameters. `simultaneous_effects` evaluates the effects of a start or an end.
+//! `timeline_windows` enumerates the possible positions of an action between timed initial literals, and
+//! `conditional_effects` splits each position into operators.
 
 mod axioms;
 mod change;
@@ -47,11 +48,11 @@ use crate::lifted::Schema;
 use crate::lifted::configuration::{SlotParameter, depends_on_own_start};
 use crate::number::dense;
 
-/// Converts every reached instance into operators, the goal into a condition, and the used derived
-/// atoms into rules. `designs` has the design parameters of each schema.
+/// Converts every reached instance to operators, the goal to a condition, and the axioms of all derived atoms
+/// in use to rules. `designs` holds the design parameters of each schema, and `slots` those that are slots.
 ///
 /// # Errors
-/// All expressions and conditions that the planner does not handle.
+/// Returns all expressions and conditions that the planner does not support.
 pub fn instantiate<'a>(
     world: World<'a>,
     designs: &[Vec<SlotParameter>],
@@ -79,7 +80,8 @@ pub fn instantiate<'a>(
     Ok(GroundTask { world, operators, axioms: definitions.axioms, goal, objectives: Vec::new() })
 }
 
-/// Returns the operators of all instances. Records the first error of each schema.
+/// Returns the operators of all reached instances. For each schema, only the first error is added to
+/// `errors`.
 ///
 /// # Errors
 /// `Error::Interrupted` at a limit.
@@ -141,8 +143,8 @@ fn own_start(schema: &Schema) -> Error {
     }
 }
 
-/// Returns the goal and the rules of the used derived atoms, or `Failure::Undefined` if the goal is
-/// false in all states.
+/// Returns the goal condition and adds the rules of all derived atoms in use. Returns `Failure::Undefined` if
+/// the goal is false in all states.
 fn goal(instantiation: &mut Instantiation<'_>) -> Result<GroundCondition, Failure> {
     let Instantiation { world, definitions, timeline } = instantiation;
     let lifted = world.lifted;

@@ -1,4 +1,4 @@
-//! Simultaneous effects of the start or the end of an instance.
+//! Effects that occur simultaneously at the start or the end of an action instance.
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ use crate::ground::vocabulary::world::World;
 use crate::lifted::{Change, Effect};
 use crate::task::ForbiddenCombinations;
 
-/// Conditional changes at the start or the end of an instance.
+/// Ground changes at the start or the end of an instance, each with its condition.
 #[derive(Clone)]
 pub(super) struct SimultaneousEffects {
     pub(super) changes: Vec<(Residual, GroundChange)>,
@@ -27,7 +27,7 @@ impl SimultaneousEffects {
         Self { changes: Vec::new() }
     }
 
-    /// Evaluates simultaneous effects.
+    /// Evaluates simultaneous effects under a binding. Quantified effects are expanded.
     pub(super) fn new(
         build: &mut Build<'_, '_>,
         effects: &[Effect],
@@ -56,7 +56,8 @@ impl SimultaneousEffects {
     }
 }
 
-/// Adds the change of an effect whose bound variables have objects, unless its condition is false.
+/// Adds the change of an effect unless its condition is false. The quantified variables of the effect must be
+/// bound.
 fn ground_effect(
     build: &mut Build<'_, '_>,
     effect: &Effect,
@@ -101,9 +102,9 @@ fn ground_change(
     })
 }
 
-/// Returns the conditions under which two parts of a happening interfere: one changes a read of the
-/// other, they set an atom to different values, or they change a number in ways that do not
-/// commute.
+/// Returns the conditions under which two simultaneous sets of effects interfere: one set changes an atom or
+/// fluent that the other reads, both set an atom to different values, or both change a number in ways that do
+/// not commute.
 pub(super) fn clashes(
     world: &World<'_>,
     (first_reads, first): (&Reads, &SimultaneousEffects),

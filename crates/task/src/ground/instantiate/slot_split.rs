@@ -1,4 +1,4 @@
-//! Splits lifted schemas into the parts that mention slots and the others.
+//! Splits action schemas into the parts that mention slots and the parts that do not.
 
 use crate::ground::vocabulary::atom::{Binding, Row};
 use crate::lifted::configuration::{
@@ -7,26 +7,26 @@ use crate::lifted::configuration::{
 use crate::lifted::{Change, Effect, Expression, Formula, Lifted, Schema, Term};
 use crate::task::quantity::SlotSet;
 
-/// A schema with the parts that mention its slots separated.
+/// An action schema whose conjuncts are separated by whether they mention slots.
 pub(super) struct SplitSchema<'a> {
     pub(super) schema: &'a Schema,
-    /// The design parameters, with their functions.
+    /// The parameters that are designs, with their functions.
     pub(super) designs: &'a [SlotParameter],
-    /// The design parameters that are slots.
+    /// The design parameters that are slots, i.e. that selection assigns instead of grounding.
     pub(super) parameters: &'a [SlotParameter],
-    /// The parameters that determine the shared data of an instance, ascending.
+    /// Key parameters, in ascending order: they determine the data that instances share.
     key: Vec<u32>,
     pub(super) start: Conjuncts<'a>,
     pub(super) over_all: Conjuncts<'a>,
     pub(super) at_end: Conjuncts<'a>,
 }
 
-/// Conjuncts of a condition.
+/// The conjuncts of a condition, separated by whether they mention slots.
 pub(super) struct Conjuncts<'a> {
-    /// Conjuncts without slots, except the static atoms that relaxed reachability has already
-    /// decided.
+    /// Conjuncts that mention no slot. Static literals are omitted, because relaxed reachability has already
+    /// decided them.
     pub(super) closed: Vec<&'a Formula>,
-    /// Conjuncts with slots, with the positions of the slots.
+    /// Conjuncts that mention slots, each with the positions of its slots.
     pub(super) open: Vec<(&'a Formula, SlotSet)>,
 }
 
@@ -38,7 +38,7 @@ impl<'a> Conjuncts<'a> {
             if !mentioned.is_empty() {
                 conjuncts_by_kind.open.push((conjunct, mentioned));
             } else if !settled(lifted, conjunct) {
-                // Settled conjuncts hold in all reached instances, so they are dropped.
+                // Static literals hold in all reached instances, so they are dropped.
                 conjuncts_by_kind.closed.push(conjunct);
             }
         }
@@ -46,7 +46,7 @@ impl<'a> Conjuncts<'a> {
     }
 }
 
-/// Returns `true` if relaxed reachability decides a conjunct exactly.
+/// Returns `true` if relaxed reachability decides the conjunct exactly, i.e. if it is a static literal.
 fn settled(lifted: &Lifted, conjunct: &Formula) -> bool {
     match conjunct {
         Formula::Literal { predicate, .. } => {
@@ -93,12 +93,12 @@ impl<'a> SplitSchema<'a> {
         Self { schema, designs, parameters, key, start, over_all, at_end }
     }
 
-    /// Returns the objects that determine the shared data of an instance.
+    /// Returns the objects of the key parameters, which determine the shared data of an instance.
     pub(super) fn key(&self, binding: &Binding) -> Row {
         self.key.iter().filter_map(|parameter| binding[*parameter as usize]).collect()
     }
 
-    /// Returns the conditions and expressions that mention a single slot.
+    /// Returns the conditions and expressions that mention the slot at `position` and no other slot.
     pub(super) fn about(&self, position: u32) -> (Vec<&'a Formula>, Vec<&'a Expression>) {
         let only = SlotSet::from_slice(&[position]);
         let open = self.start.open.iter().chain(&self.over_all.open).chain(&self.at_end.open);
@@ -112,7 +112,8 @@ impl<'a> SplitSchema<'a> {
     }
 }
 
-/// Returns the operand of a numeric effect without bound variables, if it mentions slots.
+/// Returns the operand of a numeric effect if the operand mentions slots and the effect has no quantified
+/// variables.
 pub(super) fn open_operand<'a>(effect: &'a Effect, parameters: &[SlotParameter]) -> Option<&'a Expression> {
     match &effect.change {
         Change::Assign { expression, .. }

@@ -1,21 +1,22 @@
 //! Timed initial literals: events that occur during sequential execution.
 //!
-//! The semantics is that of `validate`: an action may start at any time, and waiting is free. The
-//! times of the events divide the plan into *phases*: phase i is the time from event i (inclusive)
-//! to event i + 1 (exclusive). The effect of an action depends only on the phases of its start and
-//! end, and on whether it ends exactly at an event. An earlier start within the phases is never
-//! worse, because waiting is possible. Each instance therefore becomes an operator for each
-//! *window* (see `timeline_windows`), which starts as early as possible. A finite-domain variable
-//! is the phase, a numeric variable the clock. A wait leads to the next event.
+//! The semantics equals that of `validate`: an action may start at any time, and waiting is free. The events
+//! divide the plan into *phases*: phase i is the time from event i (inclusive) to event i + 1 (exclusive).
+//! The effect of an action depends only on the phases of its start and end, and on whether it ends exactly at
+//! an event. For fixed phases, an earlier start is never worse, because waiting is possible. Each instance
+//! therefore becomes one operator for each *window* (see `timeline_windows`), and the operator starts as
+//! early as possible. A finite-domain variable holds the phase, and a numeric variable holds the clock. A
+//! wait operator advances to the next event.
 //!
-//! If "later than" has no earliest time, the action starts a *moment* later. The moment is so short
-//! that two distinct times, composed of events and durations, always differ by at least two
-//! moments. Anything possible at some later time within the phase is thus possible then.
+//! If an action must start later than an event, there is no earliest start time. The action then starts one
+//! *moment* after the event. The moment is so short that two distinct times, composed of events and
+//! durations, always differ by at least two moments. Everything that is possible at some later time in the
+//! phase is thus possible after one moment.
 //!
-//! Events change the state at their time. A start or an end that *interferes* with an event (one
-//! changes a read of the other, or they set an atom to different values) cannot be at its time [1,
-//! section 8.4; 2, section 2]. Otherwise it can be, and their order is irrelevant. An event at the
-//! time of an end is not part of the interval of an over-all condition.
+//! Events change the state at their time. A start or end *interferes* with an event if one of them changes an
+//! atom that the other reads, or both set an atom to different values. An interfering start or end cannot
+//! occur at the time of the event [1, section 8.4; 2, section 2]. Otherwise it can, and the order of the two
+//! is irrelevant. An over-all condition does not include an event at the time of the end.
 //!
 //! \[1\] M. Fox, D. Long: PDDL2.1: an extension to PDDL for expressing temporal planning domains,
 //! JAIR 20, 2003.
@@ -37,23 +38,24 @@ use crate::number::dense;
 use crate::task::quantity::{Linear, NumericId, Quantity};
 use crate::task::timing::Timing;
 
-/// Auxiliary atoms and numeric variables for time, without names in the files.
+/// The timed events of a task, and the auxiliary atoms and numeric variables that represent time. The
+/// auxiliary symbols have no names in PDDL files.
 #[derive(Debug, Clone)]
 pub(super) struct Timeline {
     pub(super) clock: NumericId,
-    /// Placeholder for the moment until all durations are known.
+    /// Placeholder variable for the length of the moment until all durations are known.
     pub(super) moment: NumericId,
     pub(super) phases: Vec<AtomId>,
-    /// Atom: the last step was a wait.
+    /// Auxiliary atom that is true if the last step was a wait.
     pub(super) waited: AtomId,
-    /// Times of the events with the changed atoms.
+    /// Time of each event, with the changed atoms and their new truth values.
     pub(super) events: Vec<(Rational, Vec<(AtomId, bool)>)>,
-    /// Number of events before the start of the plan.
+    /// Number of events at or before time 0.
     pub(super) first: usize,
 }
 
 impl Timeline {
-    /// Returns `None` if there are no timed events.
+    /// Returns the timed events of the task, or `None` for a task without timed events.
     #[expect(clippy::arithmetic_side_effects, reason = "phases are objects, which are held in memory")]
     pub(super) fn new(world: &mut World<'_>) -> Option<Self> {
         let events = &world.lifted.events[..];
@@ -81,7 +83,7 @@ impl Timeline {
         Some(Self { clock, moment, phases, waited, events, first })
     }
 
-    /// Additional goal: a plan must not end with a wait.
+    /// Returns an additional goal: the last step of a plan must not be a wait.
     pub(super) fn at_rest(&self) -> Residual {
         Residual::Literal { atom: self.waited, positive: false }
     }
@@ -118,15 +120,15 @@ impl Timeline {
         })
     }
 
-    /// Replaces the placeholder by the moment, once all durations are known. Operators that become
-    /// impossible are removed.
+    /// Computes the length of the moment from all durations, and substitutes it for the placeholder variable.
+    /// Operators that become impossible are removed.
     pub(super) fn settle(&self, operators: &mut Vec<GroundOperator>) {
         let durations = operators.iter().flat_map(|operator| {
             let tables = operator.duration.tables.iter().flat_map(|table| table.values.iter());
             tables.chain([&operator.duration.constant])
         });
         let times = self.events.iter().map(|(time, _)| time).chain(durations);
-        // The moment is at most the usual separation of validators, so that no start is later than
+        // The moment is at most 1/1000, the usual separation of validators, so that no start is later than
         // necessary.
         let unit =
             times.fold(BigInt::from(1000), |unit, time| num_integer::lcm(unit, time.to_big().denom() * 2_u8));
@@ -158,7 +160,8 @@ impl Timeline {
     }
 }
 
-/// Returns the atoms that ordered changes make true and false; the last change of an atom prevails.
+/// Returns the atoms that a sequence of changes makes true, and those that it makes false. The last change of
+/// an atom counts.
 fn prevailing(changes: &[(AtomId, bool)]) -> (Vec<AtomId>, Vec<AtomId>) {
     let (mut adds, mut deletes) = (Vec::new(), Vec::new());
     for (atom, holds) in changes {

@@ -1,5 +1,5 @@
-//! Windows of an action between timed events: the phases of its start and end, and the conditions
-//! under which events interfere (see `timeline` for the semantics).
+//! Timeline windows: the possible phases of an action's start and end relative to the timed events, and the
+//! conditions under which events interfere (see `timeline` for the semantics).
 
 use num_traits::One;
 
@@ -14,19 +14,20 @@ use crate::lifted::Rational;
 use crate::task::quantity::{Linear, NumericId, Quantity};
 use crate::task::timing::Timing;
 
-/// Phases of the start and the end of an action.
+/// A possible position of an action relative to the timed events: the phases of its start and end.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct TimelineWindow<'t> {
     timeline: &'t Timeline,
     duration: &'t Quantity<Rational>,
-    /// Phases of the start and the end.
+    /// Phase of the start.
     from: usize,
+    /// Phase of the end.
     to: usize,
     start: Start,
     end: End,
 }
 
-/// Determination of the start time.
+/// Rule that determines the start time of the action.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Start {
     /// At the end of the previous action, possibly at the time of an event.
@@ -35,23 +36,25 @@ enum Start {
     Later,
     /// A moment after the event that begins the phase.
     AfterEvent,
-    /// Determined by the required end of the action.
+    /// Computed from the required end of the action.
     ByEnd,
-    /// Determined by the required end, but later than the event that begins the phase of the start.
+    /// Computed from the required end of the action, and later than the event that begins the phase of the
+    /// start.
     LaterByEnd,
 }
 
-/// Position of the end.
+/// Position of the end relative to the event that begins its phase.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum End {
-    /// Within its phase, later than the event that begins it, or in the phase of the start.
+    /// Later than this event, or in the phase of the start.
     Inside,
-    /// Exactly at the event that begins its phase.
+    /// Exactly at the time of this event.
     AtEvent,
 }
 
 impl<'t> TimelineWindow<'t> {
-    /// Returns all windows of an action of this duration.
+    /// Returns all windows that are possible for an action of this duration, each with its interference
+    /// conditions.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"
@@ -74,8 +77,8 @@ impl<'t> TimelineWindow<'t> {
                 let apart = |later: usize, earlier: usize| {
                     timeline.events[later].0.clone() - &timeline.events[earlier].0
                 };
-                // The action starts before its phase ends, and ends in its phase or at the
-                // beginning of the end's phase.
+                // The action starts before the phase of its start ends. It ends in the phase `to`, or exactly
+                // at the event that begins this phase.
                 if to > from && most <= apart(to - 1, from) {
                     break;
                 }
@@ -106,7 +109,7 @@ impl<'t> TimelineWindow<'t> {
                     }
                 }
                 if to > from {
-                    // A moment after an event is not the time of any event.
+                    // One moment after an event, no other event occurs.
                     add(if own.is_empty() { Start::ByEnd } else { Start::LaterByEnd }, End::Inside);
                     add(Start::ByEnd, End::AtEvent);
                     if !own.is_empty() {
@@ -118,7 +121,7 @@ impl<'t> TimelineWindow<'t> {
         windows
     }
 
-    /// Start time, in terms of the previous clock.
+    /// Returns the start time as an expression over the clock before the action.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"
@@ -141,14 +144,14 @@ impl<'t> TimelineWindow<'t> {
         }
     }
 
-    /// Returns a moment after a time.
+    /// Returns the time one moment after `time`.
     fn later(&self, time: &Rational) -> Linear<Rational> {
         let mut later = Linear::variable(self.timeline.moment);
         later.quantity.constant = time.clone();
         later
     }
 
-    /// Conditions of this window.
+    /// Returns the conditions on phase and clock under which the action can use this window.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"
@@ -167,7 +170,7 @@ impl<'t> TimelineWindow<'t> {
         };
         let time = |event: usize| Linear::constant(events[event].0.clone());
         if self.from < events.len() {
-            // After the last event every start can be delayed.
+            // After the last event, every start can be delayed, so no order is required.
             if !matches!(self.start, Start::Free | Start::Later) {
                 require_order(&Linear::variable(*clock), start.clone(), false);
             }
@@ -185,7 +188,7 @@ impl<'t> TimelineWindow<'t> {
         conditions
     }
 
-    /// Events strictly between the start and the end, in order.
+    /// Returns the changes of each event strictly between the start and the end, in order.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"
@@ -195,7 +198,7 @@ impl<'t> TimelineWindow<'t> {
         self.timeline.events[self.from..last].iter().map(|(_, changes)| &changes[..])
     }
 
-    /// Event at the time of the end.
+    /// Returns the changes of the event at the time of the end, or `None` if the action ends at no event.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"
@@ -204,7 +207,7 @@ impl<'t> TimelineWindow<'t> {
         (self.end == End::AtEvent).then(|| &self.timeline.events[self.to - 1].1[..])
     }
 
-    /// Changes in addition to the action's own effects.
+    /// Returns the changes of the auxiliary time atoms: the phase advances, and the last step is not a wait.
     pub(super) fn changes(&self) -> Vec<(AtomId, bool)> {
         let phases = &self.timeline.phases;
         let mut changes = vec![(self.timeline.waited, false)];
@@ -214,8 +217,8 @@ impl<'t> TimelineWindow<'t> {
         changes
     }
 
-    /// Returns the clock after the action. It stops after the last event, which keeps the state
-    /// space finite.
+    /// Returns the clock variable and its value after the action, or `None` if the clock does not change. The
+    /// clock stops at the last event, which keeps the state space finite.
     pub(super) fn clock(&self) -> Option<(NumericId, Linear<Rational>)> {
         let Timeline { clock, events, .. } = self.timeline;
         if self.from == events.len() {
@@ -229,7 +232,8 @@ impl<'t> TimelineWindow<'t> {
         Some((*clock, end))
     }
 
-    /// Earliest start times, each with a flag whether a moment later is meant.
+    /// Returns the earliest times of the start and the end, if the window fixes them. The flag is `true` if
+    /// the time is one moment later.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"
@@ -244,15 +248,15 @@ impl<'t> TimelineWindow<'t> {
     }
 }
 
-/// Conditions under which the start and the end of an instance interfere with each event.
-/// [`Residual::True`] for unconditional interference.
+/// For each event, the conditions under which the start or the end of an instance interferes with the event.
+/// [`Residual::True`] represents unconditional interference.
 pub(super) struct Conflicts {
     start: Vec<Vec<Residual>>,
     end: Vec<Vec<Residual>>,
 }
 
 impl Conflicts {
-    /// Computes the conflicts from the reads and changes of the start and the end.
+    /// Computes the conflicts of all events. Each pair holds what the start or end reads, and its effects.
     pub(super) fn new(
         world: &World<'_>,
         timeline: &Timeline,
@@ -267,7 +271,8 @@ impl Conflicts {
     }
 }
 
-/// Returns the conditions before a happening under which it interferes with an event.
+/// Returns the conditions under which a start or end interferes with an event, evaluated in the state before
+/// it.
 fn interference(
     world: &World<'_>,
     event: &[(AtomId, bool)],
@@ -289,7 +294,7 @@ fn interference(
     changes.map(|(condition, _)| condition.clone()).collect()
 }
 
-/// Conditions that must not hold before the start and before the end.
+/// Conditions that must be false before the start and before the end if each is at the time of an event.
 pub(super) struct Interference {
     pub(super) start: Vec<Residual>,
     pub(super) end: Vec<Residual>,

@@ -1,4 +1,4 @@
-//! Forward pruning by relaxed reachability over the ground operators.
+//! Forward pruning: relaxed reachability over ground operators and axioms.
 
 use rustc_hash::FxHashMap;
 
@@ -7,8 +7,8 @@ use crate::ground::vocabulary::condition::GroundLiteral;
 use crate::ground::vocabulary::task::GroundTask;
 use crate::limits::Interrupted;
 
-/// Removes operators and rules that are unreachable in the delete relaxation. Returns the reachable
-/// atoms.
+/// Removes operators and rules that are unreachable in the delete relaxation. `initially` holds the initial
+/// truth value of each atom. Returns, for each atom, whether it is reachable.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "what is missing is counted before it is reached, each time once; indices of axioms come after those of operators"
@@ -48,7 +48,7 @@ pub(super) fn forward(task: &mut GroundTask<'_>, initially: &[bool]) -> Result<V
         };
         match task.operators.get(index) {
             Some(operator) => {
-                // Conditional effects are assumed to occur, which only weakens the pruning.
+                // Conditional effects are assumed to occur; this is sound and only weakens the pruning.
                 let conditional = operator.conditional.iter().flat_map(|effect| &effect.adds);
                 operator.adds.iter().chain(conditional).for_each(|atom| reach(*atom));
             }
@@ -58,7 +58,7 @@ pub(super) fn forward(task: &mut GroundTask<'_>, initially: &[bool]) -> Result<V
     let mut keep = missing.iter().map(|count| *count == 0);
     task.operators.retain(|_| keep.next().unwrap_or(true));
     task.axioms.retain(|_| keep.next().unwrap_or(true));
-    // Clauses were not counted above; a clause without a reachable literal removes its operator.
+    // Clauses are ignored above. A clause without a reachable literal makes its operator inapplicable.
     let possible = |&(atom, positive): &GroundLiteral| !positive || reached[atom.index()];
     task.operators
         .retain(|operator| operator.condition.clauses.iter().all(|clause| clause.iter().any(possible)));

@@ -1,9 +1,9 @@
-//! Interval analysis of numeric variables.
+//! Interval analysis of numeric variables: removes operators and rules whose comparisons can never hold.
 //!
-//! Relaxation of Hoffmann's Metric-FF \[1\] with an upper and a lower bound for each variable: an
-//! operator whose comparisons are satisfiable within the intervals widens the intervals of its
-//! numeric effects. For termination, a bound that still changes after a few rounds is widened to
-//! infinity.
+//! Uses the relaxation of Hoffmann's Metric-FF \[1\] with a lower and an upper bound for each variable. If
+//! the comparisons of an operator are satisfiable within the current intervals, its numeric effects extend
+//! the intervals. For termination, a bound that still changes after a few rounds is set to infinity
+//! (widening).
 //!
 //! \[1\] J. Hoffmann: The Metric-FF planning system, JAIR 20, 2003.
 
@@ -15,17 +15,17 @@ use crate::lifted::Rational;
 use crate::limits::Interrupted;
 use crate::task::quantity::{Linear, NumericId, Quantity};
 
-/// Number of rounds before widening.
+/// Number of rounds before bounds that still change are set to infinity.
 const ROUNDS: usize = 3;
 
-/// Range of numbers. `None` is an unbounded end.
+/// Range of a number. `None` represents an infinite bound.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Interval {
     low: Option<Rational>,
     high: Option<Rational>,
 }
 
-/// Removes operators and rules with unsatisfiable comparisons. Returns `true` if there were any.
+/// Removes operators and rules whose comparisons are unsatisfiable. Returns `true` if any were removed.
 pub fn prune_by_numbers(task: &mut GroundTask<'_>) -> Result<bool, Interrupted> {
     let conditions = task.operators.iter().map(|operator| &operator.condition);
     let bodies = task.axioms.iter().map(|axiom| &axiom.body);
@@ -39,7 +39,7 @@ pub fn prune_by_numbers(task: &mut GroundTask<'_>) -> Result<bool, Interrupted> 
     Ok(operators != task.operators.len() || axioms != task.axioms.len())
 }
 
-/// Returns `true` if the numeric part of the goal is satisfiable.
+/// Returns `true` if the comparisons of the goal are satisfiable within the reachable intervals.
 pub fn goal_can_hold(task: &GroundTask<'_>) -> Result<bool, Interrupted> {
     let Some(goal) = task.goal.as_ref().filter(|goal| !goal.comparisons.is_empty()) else {
         return Ok(true);
@@ -73,7 +73,7 @@ fn reachable(task: &GroundTask<'_>) -> Result<Vec<Interval>, Interrupted> {
             for (variable, value) in operator.numeric_effects.iter() {
                 let range = range(value, &before);
                 let interval = &mut intervals[variable.index()];
-                // An unbounded end (`None`) absorbs every value.
+                // `zip` keeps an infinite bound (`None`) infinite.
                 interval.low = interval.low.take().zip(range.low).map(|(a, b)| a.min(b));
                 interval.high = interval.high.take().zip(range.high).map(|(a, b)| a.max(b));
             }
@@ -83,7 +83,7 @@ fn reachable(task: &GroundTask<'_>) -> Result<Vec<Interval>, Interrupted> {
         }
         round += 1;
         if round > ROUNDS {
-            // Widening: an end that still moves becomes unbounded.
+            // Widening: a bound that still changes becomes infinite.
             for (interval, before) in intervals.iter_mut().zip(&before) {
                 interval.low = interval.low.take().filter(|low| before.low.as_ref() == Some(low));
                 interval.high = interval.high.take().filter(|high| before.high.as_ref() == Some(high));
@@ -100,7 +100,7 @@ fn can_hold(condition: &GroundCondition, intervals: &[Interval]) -> bool {
     })
 }
 
-/// Returns the range of an expression.
+/// Returns bounds for the value of an expression if each variable is within its interval.
 fn range(linear: &Linear<Rational>, intervals: &[Interval]) -> Interval {
     let mut low = Some(extreme(&linear.quantity, Iterator::min));
     let mut high = Some(extreme(&linear.quantity, Iterator::max));
@@ -117,7 +117,8 @@ fn range(linear: &Linear<Rational>, intervals: &[Interval]) -> Interval {
     Interval { low, high }
 }
 
-/// Sum of the extreme entries of all tables: a bound for every combination of designs.
+/// Returns the constant plus the minimum (or maximum) entry of each table. The sum is a bound for every
+/// combination of designs.
 fn extreme<'q>(
     quantity: &'q Quantity<Rational>,
     pick: impl Fn(std::slice::Iter<'q, Rational>) -> Option<&'q Rational>,

@@ -1,8 +1,7 @@
-//! Removal of irrelevant and unreachable operators and atoms.
+//! Pruning: removes irrelevant and unreachable operators, rules and effects.
 //!
-//! Forwards: relaxed reachability over the ground operators, whose static conditions are decided,
-//! and interval analysis of numbers. Backwards: effects on atoms that no condition reads, then
-//! operators without effects.
+//! Forward pruning uses relaxed reachability over the ground operators and interval analysis of numbers.
+//! Backward pruning removes effects on atoms that no condition reads, and then operators without effects.
 
 mod forward;
 mod intervals;
@@ -19,7 +18,8 @@ use crate::lifted::Formula;
 use crate::lifted::configuration::conjuncts;
 use crate::limits::Interrupted;
 
-/// Prunes the task in place. Returns a reason if the goal is unreachable in the delete relaxation.
+/// Prunes the task in place. Returns the reason why the goal is unreachable if this is detected, and `None`
+/// otherwise.
 pub fn prune(task: &mut GroundTask<'_>, generality: &Generality) -> Result<Option<String>, Interrupted> {
     let world = &task.world;
     let initially: Vec<bool> = world
@@ -28,7 +28,7 @@ pub fn prune(task: &mut GroundTask<'_>, generality: &Generality) -> Result<Optio
         .map(|(predicate, arguments)| world.holds_initially(*predicate, arguments))
         .collect();
     let mut reached = forward(task, &initially)?;
-    // Each kind of pruning may enable the other one.
+    // Numeric pruning and relaxed reachability may each enable further pruning by the other.
     while generality.numbers.is_none() && prune_by_numbers(task)? {
         simplify(task)?;
         reached = forward(task, &initially)?;
@@ -53,7 +53,7 @@ fn never_true(atom: &str) -> String {
     format!("no action can make {atom} true, even if nothing is ever deleted")
 }
 
-/// Describes a goal that is false in all states by its first unreachable atom.
+/// Returns the reason why a goal is false in all states: its first unreachable atom, or a general message.
 fn why_goal_is_false(task: &GroundTask<'_>) -> String {
     for conjunct in conjuncts(&task.world.lifted.goal) {
         if let Formula::Literal { positive: true, predicate, terms } = conjunct {

@@ -1,4 +1,5 @@
-//! Relevance analysis: removes effects that no condition reads, then operators without effects.
+//! Relevance analysis: removes effects on atoms and numbers that nothing reads, and then operators without
+//! effects.
 
 use rustc_hash::FxHashSet;
 
@@ -9,8 +10,8 @@ use crate::lifted::Rational;
 use crate::limits::Interrupted;
 use crate::task::quantity::{NumericId, Quantity};
 
-/// Removes effects on numeric variables that no condition or final metric reads. Costs are already
-/// compiled.
+/// Removes effects on numeric variables that no condition and no objective reads. Operator costs have already
+/// been computed.
 pub(super) fn drop_unread_numerics(task: &mut GroundTask<'_>) {
     let conditions = task.operators.iter().map(|operator| &operator.condition).chain(&task.goal);
     let bodies = task.axioms.iter().map(|axiom| &axiom.body);
@@ -21,7 +22,7 @@ pub(super) fn drop_unread_numerics(task: &mut GroundTask<'_>) {
     read.extend(
         task.objectives.iter().flat_map(|objective| objective.rest.iter().map(|(variable, _)| *variable)),
     );
-    // A fluent is also read if it determines the new value of a read fluent.
+    // A variable is also read if the new value of a read variable depends on it.
     let mut open: Vec<NumericId> = read.iter().copied().collect();
     while let Some(variable) = open.pop() {
         let values = task.operators.iter().filter_map(|operator| operator.numeric_effects.get(variable));
@@ -36,10 +37,10 @@ pub(super) fn drop_unread_numerics(task: &mut GroundTask<'_>) {
     }
 }
 
-/// Removes rules of unread atoms, effects on such atoms, and operators that neither change the
-/// state nor reduce the cost.
+/// Removes rules of unread atoms, effects on unread atoms, and operators that neither change the state nor
+/// reduce the cost. Repeats this until no more operators can be removed.
 pub(super) fn backward(task: &mut GroundTask<'_>) -> Result<(), Interrupted> {
-    // A removed operator no longer reads atoms, so that further effects may become unread.
+    // A removed operator reads no atoms, so further effects may become unread.
     loop {
         task.world.limits.check()?;
         let read = task.read_atoms();
@@ -61,7 +62,7 @@ pub(super) fn backward(task: &mut GroundTask<'_>) -> Result<(), Interrupted> {
     }
 }
 
-/// Returns `true` if the operator changes nothing and cannot reduce the cost of a plan.
+/// Returns `true` if the operator never changes the state and its cost is never negative.
 fn is_idle(operator: &GroundOperator) -> bool {
     let is_required =
         |atom: AtomId, value: bool| operator.condition.literals.binary_search(&(atom, value)).is_ok();

@@ -1,13 +1,13 @@
-//! Relaxed reachability: the instances of each schema that are applicable in the delete relaxation.
+//! Relaxed reachability: computes the instances of each action schema that are applicable in the delete
+//! relaxation.
 //!
-//! The lifted task becomes a Datalog program for the rule engine \[1\]. A schema with slots has an
-//! auxiliary relation for each slot, which contains the other arguments for which *some* design is
-//! suitable. Designs are not part of the schema's relation, so its size is independent of their
-//! number.
+//! The lifted task becomes a Datalog program \[1\]. A schema with slots has an auxiliary relation for each
+//! slot. This relation contains the values of the other parameters for which *some* design is suitable.
+//! Designs are no columns of the relation of applicable instances, so its size is independent of the number
+//! of designs.
 //!
-//! Static derived predicates are rules of the same program, with stratified negation. The engine
-//! evaluates them once, and afterwards they are facts. Derived fluents are relaxed like all other
-//! fluents.
+//! The rules of static derived predicates are part of the program, with stratified negation and without
+//! relaxation. Derived fluents are relaxed like all other fluents.
 //!
 //! \[1\] M. Helmert: Concise finite-domain representations for PDDL planning tasks, Artificial
 //! Intelligence 173, 2009.
@@ -27,7 +27,8 @@ use crate::lifted::configuration::SlotParameter;
 use crate::lifted::{Arguments, Lifted, ObjectId, PredicateId};
 use crate::limits::{Interrupted, Limits};
 
-/// Computes the fixpoint of the relaxed task.
+/// Computes the reachable instances of all schemas, the reachable fluent atoms, and the facts of static
+/// derived predicates.
 ///
 /// # Errors
 /// `Error::Rules` if the rule engine rejects the program, `Error::Interrupted` at a limit.
@@ -40,7 +41,7 @@ pub fn reach(
     limits.check()?;
     let variables = lifted.schemas.iter().map(|schema| schema.variables);
     let mut variables = variables.chain(lifted.axioms.iter().map(|axiom| axiom.variables));
-    // The rule engine numbers the variables of a rule with 16 bits.
+    // The Datalog engine uses 16-bit numbers for the variables of a rule.
     if variables.any(|count| u16::try_from(count).is_err()) {
         return Err(Error::Rules("an action or axiom with more than 65,535 variables".into()));
     }
@@ -95,7 +96,7 @@ pub fn reach(
     Ok(RelaxedReachability { instances, atoms, derived })
 }
 
-/// Converts errors of the rule engine.
+/// Converts errors of the Datalog engine to an error of this crate.
 fn refusal(errors: &[rules::Error]) -> Error {
     if errors.iter().any(|error| matches!(error, rules::Error::Interrupted { .. })) {
         return Error::Interrupted;

@@ -1,4 +1,4 @@
-//! Datalog rules of schemas and derived predicates for relaxed reachability.
+//! Datalog rules for action schemas and derived predicates, used by relaxed reachability.
 
 use rules::{Atom, Symbol};
 
@@ -10,7 +10,8 @@ use crate::lifted::{Axiom, Change, Effect, Formula, Lifted, PredicateId, Schema,
 use crate::limits::Interrupted;
 use crate::number::dense;
 
-/// Adds the rules of a derived predicate: exact if it is static, otherwise relaxed.
+/// Adds the rule for an axiom of a derived predicate. The rule is exact if the predicate is static, and
+/// relaxed otherwise.
 pub(super) fn add_axiom(
     relaxed: &mut ReachabilityProgramBuilder<'_>,
     axiom: &Axiom,
@@ -27,7 +28,8 @@ pub(super) fn add_axiom(
     Ok(())
 }
 
-/// Adds the rules of a schema. Returns the relation of its instances and their parameters.
+/// Adds the rules for an action schema. Returns the relation of its applicable instances, and the parameters
+/// that are its columns.
 pub(super) fn add_schema(
     relaxed: &mut ReachabilityProgramBuilder<'_>,
     schema: &Schema,
@@ -59,7 +61,7 @@ pub(super) fn add_schema(
         body.push(ReachabilityProgramBuilder::relation(relation, &other_parameters));
         relaxed.rule(vec![ReachabilityProgramBuilder::relation(relation, &other_parameters)], fits);
     }
-    // Conditions over several slots are ignored, which is a further relaxation.
+    // Conditions over several slots are ignored, which relaxes the problem further.
     for formula in needs.iter().filter(|formula| slots_in(formula, slots).is_empty()) {
         relaxed.body(formula, &candidates, false, &mut body)?;
     }
@@ -68,7 +70,8 @@ pub(super) fn add_schema(
     Ok((number, core))
 }
 
-/// Adds the rules of effects; unconditional effects share a rule.
+/// Adds rules that derive the added atoms from the applicability of the schema. All unconditional effects
+/// share one rule.
 fn add_effects(
     relaxed: &mut ReachabilityProgramBuilder<'_>,
     schema: &Schema,
@@ -102,8 +105,8 @@ fn slots_in(formula: &Formula, slots: &[SlotParameter]) -> Vec<u32> {
         .collect()
 }
 
-/// Returns the necessary conditions of every instance: its conjuncts, except those of the middle
-/// condition that its own start effects may provide.
+/// Returns the conjuncts that are necessary for every instance of the schema. Conjuncts of the middle
+/// condition are omitted if a start effect of the schema may add one of their atoms.
 fn needs<'a>(lifted: &Lifted, schema: &'a Schema) -> Vec<&'a Formula> {
     let provided: Vec<_> = schema
         .start_effects
@@ -119,7 +122,7 @@ fn needs<'a>(lifted: &Lifted, schema: &'a Schema) -> Vec<&'a Formula> {
     conjuncts(&schema.start_condition).into_iter().chain(middle).collect()
 }
 
-/// Returns `true` if a condition mentions one of the given predicates, or a derived one.
+/// Returns `true` if a condition mentions one of the given predicates or any derived predicate.
 fn mentions_fluent(lifted: &Lifted, formula: &Formula, predicates: &[PredicateId]) -> bool {
     let mut is_mentioned = false;
     atoms(formula, &mut |predicate| {

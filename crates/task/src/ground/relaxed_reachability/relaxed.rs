@@ -1,8 +1,7 @@
-//! Conditions as rule bodies: relaxed, or exact if everything is static.
+//! Translates conditions to Datalog rule bodies: exactly if they are static, otherwise relaxed.
 //!
-//! A relaxed body holds wherever the condition can hold: negative literals and numeric conditions
-//! are ignored. Disjunctions and negated quantifiers become auxiliary relations over their free
-//! variables.
+//! A relaxed rule body is true whenever the condition can be true; negated fluents and numeric comparisons
+//! are ignored. Disjunctions and universal quantifiers become auxiliary relations over their free variables.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -20,17 +19,17 @@ use crate::lifted::{Arguments, Bound, Formula, Lifted, ObjectId, PredicateId, Te
 use crate::limits::{Interrupted, Limits};
 use crate::number::dense;
 
-/// Candidate objects of variables.
+/// Candidate objects for each variable.
 pub(super) type Candidates = BTreeMap<u32, Arc<[ObjectId]>>;
 
-/// Symbols of a program.
+/// Symbols of the Datalog program for the objects and predicates of the task.
 pub(super) struct Names {
     pub(super) table: Symbols,
     pub(super) objects: Vec<Symbol>,
     pub(super) predicates: Vec<Symbol>,
 }
 
-/// A program under construction.
+/// Builder of the Datalog program for relaxed reachability: collects its facts and rules.
 pub(super) struct ReachabilityProgramBuilder<'a> {
     pub(super) lifted: &'a Lifted,
     limits: &'a Limits,
@@ -47,7 +46,7 @@ impl<'a> ReachabilityProgramBuilder<'a> {
         let objects: Vec<_> = (0..lifted.objects.len()).map(|i| table.name(&format!("object {i}"))).collect();
         let predicates: Vec<_> =
             (0..lifted.predicates.len()).map(|i| table.name(&format!("predicate {i}"))).collect();
-        // The relaxation ignores time, so that additions of timed events are initial facts.
+        // The relaxation ignores time, so atoms that timed events add count as initial facts.
         let events = lifted.events.iter().flat_map(|event| &event.changes).filter(|(_, _, holds)| *holds);
         let facts = lifted
             .facts
@@ -67,14 +66,14 @@ impl<'a> ReachabilityProgramBuilder<'a> {
         (self.names, self.rules, self.facts)
     }
 
-    /// Creates an unused relation.
+    /// Creates a relation symbol that the program does not use yet.
     #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(super) fn fresh(&mut self, kind: &str) -> Symbol {
         self.relations += 1;
         self.names.table.name(&format!("{kind} {}", self.relations))
     }
 
-    /// Returns atoms that restrict variables to their candidates.
+    /// Returns rule atoms that restrict each variable to its candidate objects.
     pub(super) fn types(&mut self, variables: &[u32], candidates: &Candidates) -> Vec<Atom> {
         variables
             .iter()
@@ -85,7 +84,7 @@ impl<'a> ReachabilityProgramBuilder<'a> {
             .collect()
     }
 
-    /// Returns the unary relation of some objects.
+    /// Returns the symbol of a unary relation that contains exactly the candidate objects.
     fn candidates(&mut self, candidates: &Arc<[ObjectId]>) -> Symbol {
         if let Some(symbol) = self.types.get(candidates) {
             return *symbol;
@@ -121,8 +120,8 @@ impl<'a> ReachabilityProgramBuilder<'a> {
         self.rules.push(Rule::new(identity, head, body));
     }
 
-    /// Adds the body atoms of a condition. With `exact`, the condition must be static and is
-    /// translated exactly, otherwise a relaxation is used.
+    /// Appends the rule body for a condition to `out`. If `exact` is `true`, the condition must be static and
+    /// is translated without relaxation; otherwise it is relaxed.
     pub(super) fn body(
         &mut self,
         formula: &Formula,
@@ -142,7 +141,7 @@ impl<'a> ReachabilityProgramBuilder<'a> {
                 {
                     out.push(Atom::Not { predicate: symbol, arguments });
                 }
-                // The relaxation ignores negated fluents.
+                // The relaxation ignores negated fluents, because it never deletes atoms.
                 _ => {}
             },
             Formula::Equal { positive, left, right } => {
@@ -155,14 +154,14 @@ impl<'a> ReachabilityProgramBuilder<'a> {
                 self.body(body, &candidates, exact, out)?;
             }
             Formula::Or(parts) => {
-                // A disjunction with a tautological part restricts nothing.
+                // A disjunction with a part that the relaxation ignores restricts nothing.
                 if exact || !parts.iter().any(|part| self.may_be_free(part)) {
                     let relation = self.auxiliary(formula, parts, candidates, exact)?;
                     out.push(Self::relation(relation, &free(formula)));
                 }
             }
             Formula::ForAll(..) => {
-                // ∀ is translated as ¬∃¬. Negation requires an exact, and therefore static, body.
+                // ∀x φ is translated to ¬∃x ¬φ. The negated relation must be exact, so φ must be static.
                 if exact || (is_static(self.lifted, formula) && !has_numbers(formula)) {
                     let relation = self.auxiliary(formula, &[formula.negated()], candidates, true)?;
                     let arguments = free(formula).into_iter().map(variable);
@@ -179,7 +178,8 @@ impl<'a> ReachabilityProgramBuilder<'a> {
         Ok(())
     }
 
-    /// Creates a relation over the free variables of a condition that holds if a part holds.
+    /// Creates a relation over the free variables of `formula` that contains the bindings for which one of
+    /// `parts` is true.
     fn auxiliary(
         &mut self,
         formula: &Formula,
@@ -197,7 +197,7 @@ impl<'a> ReachabilityProgramBuilder<'a> {
         Ok(relation)
     }
 
-    /// Returns `true` if the relaxed condition may be a tautology.
+    /// Returns `true` if the relaxation of the condition may be true for all bindings.
     fn may_be_free(&self, formula: &Formula) -> bool {
         match formula {
             Formula::And(parts) => parts.iter().all(|part| self.may_be_free(part)),
@@ -212,7 +212,8 @@ impl<'a> ReachabilityProgramBuilder<'a> {
         }
     }
 
-    /// Returns the relation of a static comparison: the objects that satisfy it.
+    /// Creates a relation over the free variables of a static comparison that contains the satisfying
+    /// bindings.
     fn comparison(&mut self, formula: &Formula, candidates: &Candidates) -> Result<Symbol, Interrupted> {
         let relation = self.fresh("comparison");
         let variables = free(formula);
@@ -225,12 +226,12 @@ impl<'a> ReachabilityProgramBuilder<'a> {
     }
 }
 
-/// Returns the rule variable of a parameter or bound variable.
+/// Returns the Datalog variable for a parameter or quantified variable.
 fn variable(number: u32) -> RuleTerm {
     RuleTerm::Variable(Variable(u16::try_from(number).expect("invariant: `reach` refuses more variables")))
 }
 
-/// Returns the objects that satisfy a static comparison, one for each variable.
+/// Returns all bindings of `variables` that satisfy a static comparison.
 #[expect(clippy::arithmetic_side_effects, reason = "variables of a condition are numbered in memory")]
 fn satisfying(
     lifted: &Lifted,
@@ -253,12 +254,12 @@ fn satisfying(
         }
         true
     })?;
-    // Enumeration that stopped at a limit is incomplete, so it must not be used.
+    // If a limit stopped the enumeration, its result is incomplete and must not be used.
     limits.check()?;
     Ok(rows)
 }
 
-/// Returns the variables that a quantifier binds, and all candidates in its scope.
+/// Returns the variables that a quantifier binds, and the candidates of all variables in its scope.
 pub(super) fn with_bound(candidates: &Candidates, bound: &[Bound]) -> (Vec<u32>, Candidates) {
     let mut inner = candidates.clone();
     inner.extend(bound.iter().map(|b| (b.variable, b.candidates.clone())));

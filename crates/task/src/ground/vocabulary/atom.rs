@@ -8,7 +8,7 @@ use smallvec::SmallVec;
 
 use crate::lifted::{Arguments, ObjectId, PredicateId, Term};
 
-/// A ground atom over a fluent predicate.
+/// Index of a ground atom in [`World::atoms`](super::world::World::atoms).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct AtomId(pub u32);
 
@@ -18,10 +18,10 @@ impl AtomId {
     }
 }
 
-/// Set of ground atoms, with look-up by borrowed keys.
+/// Set of ground atoms. A [`Key`] looks up an atom without allocating its arguments.
 pub type AtomSet = IndexSet<(PredicateId, Arguments), FxBuildHasher>;
 
-/// Borrowed key of a symbol with arguments; hashes like `(K, Arguments)`.
+/// A symbol and its arguments, borrowed for look-ups; hashes like the owned pair `(K, Arguments)`.
 #[derive(Hash)]
 pub struct Key<'k, K>(pub K, pub &'k [ObjectId]);
 
@@ -31,13 +31,13 @@ impl<K: PartialEq> Equivalent<(K, Arguments)> for Key<'_, K> {
     }
 }
 
-/// Temporary arguments for a look-up.
+/// A tuple of objects, for look-ups and as a temporary.
 pub type Row = SmallVec<[ObjectId; 8]>;
 
-/// Objects of the parameters. Slots are `None`.
+/// Object assigned to each parameter and quantified variable; `None` for an unassigned variable or a slot.
 pub type Binding = Vec<Option<ObjectId>>;
 
-/// Returns the arguments under a binding of all their variables.
+/// Returns the objects of the terms under a binding, which must assign all variables among the terms.
 pub fn arguments(terms: &[Term], binding: &Binding) -> Row {
     terms
         .iter()

@@ -1,4 +1,4 @@
-//! Rules of derived atoms.
+//! Ground rules of derived atoms.
 
 use petgraph::algo::tarjan_scc;
 use petgraph::graph::DiGraph;
@@ -7,14 +7,15 @@ use rustc_hash::FxHashMap;
 use crate::ground::vocabulary::atom::AtomId;
 use crate::ground::vocabulary::condition::GroundCondition;
 
-/// A rule: the head holds if the body holds. The body has no clauses.
+/// A ground rule: the head is true if the body is true. The body has no clauses (disjunctions).
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct GroundAxiom {
     pub(crate) head: AtomId,
     pub(crate) body: GroundCondition,
 }
 
-/// Returns the strongly connected components of derived atoms, dependencies first.
+/// Returns the strongly connected components of the dependency graph of derived atoms. Each component comes
+/// after the components on which it depends.
 pub fn components(axioms: &[GroundAxiom]) -> Vec<Vec<AtomId>> {
     let mut graph: DiGraph<AtomId, ()> = DiGraph::new();
     let mut nodes: FxHashMap<AtomId, _> = FxHashMap::default();
@@ -28,8 +29,8 @@ pub fn components(axioms: &[GroundAxiom]) -> Vec<Vec<AtomId>> {
             }
         }
     }
-    // Tarjan's algorithm yields components in reverse topological order: those without successors
-    // first.
+    // Tarjan's algorithm yields the components in reverse topological order, i.e. components without
+    // successors first.
     let sorted = |component: Vec<_>| {
         let mut atoms: Vec<AtomId> = component.into_iter().map(|node| graph[node]).collect();
         atoms.sort_unstable();

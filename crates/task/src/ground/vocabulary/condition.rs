@@ -4,7 +4,7 @@ use crate::ground::vocabulary::atom::AtomId;
 use crate::lifted::Rational;
 use crate::task::quantity::Linear;
 
-/// An atom or its negation.
+/// A ground atom and its required truth value.
 pub type GroundLiteral = (AtomId, bool);
 
 /// A conjunction of literals, clauses and comparisons.
@@ -12,11 +12,13 @@ pub type GroundLiteral = (AtomId, bool);
 pub struct GroundCondition {
     pub(crate) literals: Vec<GroundLiteral>,
     pub(crate) clauses: Vec<Vec<GroundLiteral>>,
+    /// Linear expressions that must be ≥ 0, or > 0 if the flag is `true`.
     pub(crate) comparisons: Vec<(Linear<Rational>, bool)>,
 }
 
 impl GroundCondition {
-    /// Sorts and removes duplicates. Returns `false` if literals contradict each other.
+    /// Sorts literals and clauses and removes duplicates. Returns `false` if two literals contradict each
+    /// other.
     pub(crate) fn tidy(&mut self) -> bool {
         self.literals.sort_unstable();
         self.literals.dedup();
@@ -25,7 +27,7 @@ impl GroundCondition {
         self.literals.windows(2).all(|pair| pair[0].0 != pair[1].0)
     }
 
-    /// Returns all atoms of the condition.
+    /// Returns all atoms in the literals and clauses of the condition.
     pub(crate) fn atoms(&self) -> impl Iterator<Item = AtomId> + '_ {
         self.literals.iter().chain(self.clauses.iter().flatten()).map(|(atom, _)| *atom)
     }

@@ -1,13 +1,12 @@
-//! Reasons why an expression of an instance has no value.
+//! Reasons why a condition or expression cannot be evaluated for an action instance.
 
 use crate::error::Error;
 use crate::limits::Interrupted;
 
-/// Reason for a missing value.
+/// Reason why a condition or expression cannot be evaluated.
 #[derive(Debug)]
 pub enum Failure {
-    /// The value is undefined: a fluent has no value, or a divisor is zero. The operator does not
-    /// exist.
+    /// A fluent has no value, a divisor is zero, or a condition is false. The instance then has no operator.
     Undefined,
     /// The expression is not supported.
     Error(Error),
@@ -19,7 +18,7 @@ impl From<Interrupted> for Failure {
     }
 }
 
-/// Converts [`Failure::Undefined`] to `None`.
+/// Converts [`Failure::Undefined`] to `Ok(None)`.
 ///
 /// # Errors
 /// All other failures.

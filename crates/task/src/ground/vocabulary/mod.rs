@@ -1,4 +1,4 @@
-//! Data types that the passes of grounding exchange. No file here imports a pass.
+//! Data types that the passes of grounding exchange. No file of this module imports a pass.
 
 pub mod atom;
 pub mod axiom;

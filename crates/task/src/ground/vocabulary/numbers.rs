@@ -3,10 +3,11 @@
 use crate::lifted::Rational;
 use crate::task::quantity::{Linear, NumericId};
 
-/// New values of numeric variables. A sorted list, because operators change few of them.
+/// Numeric variables that an operator changes, with their new values as expressions over the state before the
+/// operator. A sorted list, because an operator changes few variables.
 #[derive(Debug, Clone, Default)]
 pub struct Numbers {
-    /// In ascending order of the variables.
+    /// Changed variables in ascending order, with their new values.
     changes: Vec<(NumericId, Linear<Rational>)>,
 }
 
@@ -28,17 +29,17 @@ impl Numbers {
         self.changes.retain(|(variable, _)| keep(*variable));
     }
 
-    /// Creates a change of a single variable.
+    /// Creates the change of a single variable.
     pub(crate) fn one(variable: NumericId, value: Linear<Rational>) -> Self {
         Self { changes: vec![(variable, value)] }
     }
 
-    /// Applies a function to all new values.
+    /// Applies a function to every new value.
     pub(crate) fn each(&mut self, change: &mut dyn FnMut(&mut Linear<Rational>)) {
         self.changes.iter_mut().for_each(|(_, value)| change(value));
     }
 
-    /// Adds earlier changes of other variables.
+    /// Adds the changes in `earlier` for all variables that have no change yet.
     pub(crate) fn complete(&mut self, earlier: Self) {
         for (variable, value) in earlier.changes {
             if self.get(variable).is_none() {

@@ -1,4 +1,4 @@
-//! Operators over atoms, with open design slots.
+//! Ground operators over atoms, in which the designs of slots are still open.
 
 use std::sync::Arc;
 
@@ -10,35 +10,36 @@ use crate::task::quantity::Quantity;
 use crate::task::timing::Timing;
 use crate::task::{Argument, ForbiddenCombinations};
 
-/// Function and suitable designs of each slot.
+/// For each slot: its function and the designs that are suitable for it.
 pub type GroundSlots = [(ObjectId, Vec<ObjectId>)];
 
-/// An operator over atoms, with exact rationals.
+/// A ground operator over atoms, with exact rational numbers.
 #[derive(Debug, Clone)]
 pub struct GroundOperator {
     pub(crate) schema: u32,
     pub(crate) arguments: Vec<Argument>,
     pub(crate) slots: Arc<GroundSlots>,
     pub(crate) forbidden: Arc<[ForbiddenCombinations]>,
-    /// Required functions with the arguments that are their designs.
+    /// Functions that the action requires, each with the argument that is its design.
     pub(crate) configuration: Vec<(ObjectId, Argument)>,
     pub(crate) condition: GroundCondition,
     pub(crate) adds: Vec<AtomId>,
     pub(crate) deletes: Vec<AtomId>,
-    /// Conditional effects after `adds` and `deletes`. Those of an entry are simultaneous,
-    /// deletions first.
+    /// Conditional effects, which apply after `adds` and `deletes`. The changes of one entry are
+    /// simultaneous; additions take precedence over deletions.
     pub(crate) conditional: Vec<GroundConditional>,
     pub(crate) numeric_effects: Numbers,
-    /// Costs by objective.
+    /// Cost by objective.
     pub(crate) costs: Vec<Quantity<Rational>>,
     pub(crate) duration: Quantity<Rational>,
-    /// Set for a wait instead of an action: the time of its end.
+    /// Time of the end if the operator is a wait; `None` if it is an action.
     pub(crate) wait: Option<Rational>,
-    /// Times, each with a flag whether a moment later is meant, until all durations are known.
+    /// Earliest times of the start and end. The flag is `true` if the time is one moment later; it is
+    /// resolved once all durations are known.
     pub(crate) timing: Timing<(Rational, bool)>,
 }
 
-/// Changes of atoms if a conjunction holds before the operator.
+/// A conditional effect of an operator: changes of atoms if a conjunction holds before the operator.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct GroundConditional {
     pub(crate) condition: Vec<GroundLiteral>,

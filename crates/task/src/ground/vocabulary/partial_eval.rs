@@ -1,11 +1,11 @@
-//! Residual conditions after partial evaluation.
+//! Conditions over fluents that remain after partial evaluation.
 
 use crate::ground::vocabulary::atom::AtomId;
 use crate::lifted::Rational;
 use crate::task::quantity::Linear;
 use pddl::ast::Comparison;
 
-/// A condition after partial evaluation.
+/// A condition after partial evaluation: only fluents and slots are still open.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub enum Residual {
     True,
@@ -16,7 +16,7 @@ pub enum Residual {
         atom: AtomId,
         positive: bool,
     },
-    /// The expression is ≥ 0, or > 0 if strict.
+    /// True if the linear expression is ≥ 0, or > 0 if `strict` is `true`.
     Compare {
         linear: Linear<Rational>,
         strict: bool,
@@ -24,7 +24,7 @@ pub enum Residual {
 }
 
 impl Residual {
-    /// Builds a simplified conjunction or disjunction.
+    /// Returns the simplified conjunction or disjunction of the parts.
     pub(crate) fn junction(parts: impl IntoIterator<Item = Self>, conjunction: bool) -> Self {
         let mut simplified = Vec::new();
         for part in parts {
@@ -44,7 +44,7 @@ impl Residual {
         }
     }
 
-    /// Returns the negation. Comparisons with undefined values have already been decided as false.
+    /// Returns the negation. Comparisons with undefined values must already have been replaced by `False`.
     pub(crate) fn negated(&self) -> Self {
         match self {
             Self::True => Self::False,
@@ -58,7 +58,8 @@ impl Residual {
         }
     }
 
-    /// Replaces the leaves of the condition and simplifies it.
+    /// Applies a function to each leaf of the condition, i.e. to everything except `And` and `Or`, and
+    /// simplifies the result.
     pub(crate) fn mapped(self, leaf: &dyn Fn(Self) -> Self) -> Self {
         match self {
             Self::And(parts) => Self::junction(parts.into_iter().map(|part| part.mapped(leaf)), true),
@@ -68,7 +69,7 @@ impl Residual {
     }
 }
 
-/// Converts a comparison to `difference ≥ 0` or `difference > 0`; decided if it is constant.
+/// Converts a comparison to `left - right ≥ 0` or similar, or to a truth value if both sides are constant.
 pub fn compare(comparison: Comparison, left: Linear<Rational>, right: Linear<Rational>) -> Residual {
     match comparison {
         Comparison::Less => at_least_zero(right, left, true),
@@ -87,7 +88,8 @@ fn at_least_zero(mut linear: Linear<Rational>, subtrahend: Linear<Rational>, str
     constant_comparison(&linear, strict).unwrap_or(Residual::Compare { linear, strict })
 }
 
-/// Returns the truth value of a comparison without variables and tables.
+/// Returns the truth value of `linear ≥ 0` (or `> 0` if `strict`) if the expression is constant, and `None`
+/// otherwise.
 pub fn constant_comparison(linear: &Linear<Rational>, strict: bool) -> Option<Residual> {
     if !linear.coefficients.is_empty() || !linear.quantity.tables.is_empty() {
         return None;
@@ -96,7 +98,7 @@ pub fn constant_comparison(linear: &Linear<Rational>, strict: bool) -> Option<Re
     Some(truth(if strict { value > zero } else { value >= zero }))
 }
 
-/// Returns the constant residual.
+/// Returns `Residual::True` or `Residual::False`.
 pub fn truth(value: bool) -> Residual {
     if value { Residual::True } else { Residual::False }
 }

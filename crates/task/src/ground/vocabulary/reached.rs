@@ -3,13 +3,13 @@
 use crate::ground::vocabulary::atom::{AtomSet, Binding};
 use crate::lifted::{Arguments, PredicateId};
 
-/// Result of relaxed reachability.
+/// Reachable instances and atoms in the delete relaxation.
 #[derive(Default)]
 pub struct RelaxedReachability {
-    /// Bindings of the parameters of each schema except slots, ascending.
+    /// For each schema: the reachable bindings in ascending order. Slots are unassigned.
     pub(crate) instances: Vec<Vec<Binding>>,
     /// Reachable fluent atoms.
     pub(crate) atoms: AtomSet,
-    /// Facts of static derived predicates.
+    /// True atoms of static derived predicates.
     pub(crate) derived: Vec<(PredicateId, Arguments)>,
 }

@@ -1,4 +1,4 @@
-//! The task over atoms, which the passes transform one after another.
+//! The ground task over atoms, which the passes of grounding transform in sequence.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -10,7 +10,7 @@ use crate::ground::vocabulary::world::World;
 use crate::lifted::Rational;
 use crate::task::quantity::NumericId;
 
-/// The task over atoms.
+/// A ground task over atoms, before its atoms become finite-domain variables.
 pub struct GroundTask<'a> {
     pub(crate) world: World<'a>,
     pub(crate) operators: Vec<GroundOperator>,
@@ -18,23 +18,23 @@ pub struct GroundTask<'a> {
     pub(crate) axioms: Vec<GroundAxiom>,
     /// `None` if the goal is false in all states.
     pub(crate) goal: Option<GroundCondition>,
-    /// Objectives; empty until operators have their costs.
+    /// Objectives; empty until the operator costs have been computed.
     pub(crate) objectives: Vec<GroundObjective>,
 }
 
-/// Relation between operator costs and the metric.
+/// Parts of a metric that are not operator costs.
 #[derive(Debug, Clone, Default)]
 pub struct GroundObjective {
-    /// Metric of the initial state (negated for maximisation).
+    /// Value of the metric in the initial state, negated for maximisation.
     pub(crate) offset: Rational,
     pub(crate) maximize: bool,
-    /// Fluents with state-dependent changes and their factors (negated for maximisation). Their
-    /// final values are added.
+    /// Fluents with state-dependent changes, with their factors (negated for maximisation). Their final
+    /// values are added to the cost of a plan.
     pub(crate) rest: Vec<(NumericId, Rational)>,
 }
 
 impl GroundTask<'_> {
-    /// Returns the atoms that conditions read, directly or through rules.
+    /// Returns the atoms that operators, conditional effects or the goal read, directly or through axioms.
     pub(crate) fn read_atoms(&self) -> FxHashSet<AtomId> {
         let conditions = self.operators.iter().map(|operator| &operator.condition).chain(&self.goal);
         let conditional = self.operators.iter().flat_map(|operator| &operator.conditional);

@@ -1,4 +1,5 @@
-//! Static facts and values, and the fluent atoms and numeric variables found by grounding.
+//! Static facts and values of a task, and the tables of fluent atoms and numeric variables that grounding
+//! creates.
 
 use std::num::Wrapping;
 
@@ -21,10 +22,11 @@ const BETWEEN_LOOKS: u32 = 256;
 
 type AtomIndex<K> = IndexMap<(K, Arguments), (), FxBuildHasher>;
 
-/// Rows of a relation, indexed by the values of some of its columns.
+/// Tuples of a relation, indexed by the values of some of its columns.
 type Rows = FxHashMap<Arguments, Vec<Arguments>>;
 
-/// Static data and atom tables of grounding, with its limits.
+/// Working data of grounding: the lifted task, its facts and values, the ids of atoms and numeric variables,
+/// and the limits.
 pub struct World<'a> {
     pub(crate) lifted: &'a Lifted,
     pub(crate) limits: &'a Limits,
@@ -33,8 +35,7 @@ pub struct World<'a> {
     values: IndexMap<(FunctionId, Arguments), Rational, FxBuildHasher>,
     pub atoms: AtomIndex<PredicateId>,
     pub numerics: AtomIndex<FunctionId>,
-    /// Indices by predicate and column set (bit i for column i): rows by the values in these
-    /// columns.
+    /// Indices of relations. The key holds the predicate and the set of indexed columns (bit i for column i).
     joins: FxHashMap<(PredicateId, u64), Rows>,
     /// Number of enumeration steps, modulo 2^32.
     visited: Wrapping<u32>,
@@ -59,7 +60,7 @@ impl<'a> World<'a> {
         }
     }
 
-    /// Counts an enumeration step. Checks the limits every few hundred steps.
+    /// Counts an enumeration step, and checks the limits every `BETWEEN_LOOKS` steps.
     pub(crate) fn visit(&mut self) -> Result<(), Interrupted> {
         self.visited += 1;
         if self.visited.0.is_multiple_of(BETWEEN_LOOKS) {
@@ -68,15 +69,16 @@ impl<'a> World<'a> {
         Ok(())
     }
 
-    /// Returns the rows of a relation: the true ones of a static relation, the reachable ones of a
-    /// fluent.
+    /// Returns the tuples of a predicate: the true tuples if the predicate is static, and the reachable
+    /// tuples if it is a fluent.
     fn relation(&self, predicate: PredicateId) -> Vec<Arguments> {
         let facts =
             if self.lifted.predicates[predicate.index()].fluent { &self.reached.atoms } else { &self.facts };
         facts.iter().filter(|(own, _)| *own == predicate).map(|(_, arguments)| arguments.clone()).collect()
     }
 
-    /// Returns the rows of a relation that match the bound terms, in ascending order.
+    /// Returns the tuples of a predicate that match the objects and bound variables among `terms`, in
+    /// ascending order.
     pub(crate) fn rows(
         &mut self,
         predicate: PredicateId,
@@ -88,10 +90,10 @@ impl<'a> World<'a> {
             Term::Parameter(variable) => binding[*variable as usize],
         };
         let columns = terms.iter().enumerate().filter(|(_, term)| value(term).is_some());
-        // The mask suffices, because guards have at most 64 columns (see `Join::next_guard`).
+        // A 64-bit mask suffices, because guards have at most 64 columns (see `Join::next_guard`).
         let mask = columns.fold(0_u64, |mask, (column, _)| mask | (1 << column));
         let key: Vec<ObjectId> = terms.iter().filter_map(value).collect();
-        // The index is built when a set of columns is looked up for the first time.
+        // The index for a set of columns is built at its first use.
         if !self.joins.contains_key(&(predicate, mask)) {
             let mut rows = Rows::default();
             for row in self.relation(predicate) {
@@ -115,11 +117,12 @@ impl<'a> World<'a> {
         self.facts.contains(&Key(predicate, arguments))
     }
 
-    /// Returns `true` if an atom holds initially or is reachable in the delete relaxation.
+    /// Returns `true` if an atom is true initially or reachable in the delete relaxation.
     pub(crate) fn can_hold(&self, predicate: PredicateId, arguments: &[ObjectId]) -> bool {
         self.holds_initially(predicate, arguments) || self.is_reached(predicate, arguments)
     }
 
+    /// Returns the id of an atom; creates the id at the first call.
     pub fn atom(&mut self, predicate: PredicateId, arguments: &[ObjectId]) -> AtomId {
         let index = self.atoms.get_index_of(&Key(predicate, arguments));
         AtomId(dense(index.unwrap_or_else(|| self.atoms.insert_full((predicate, arguments.into()), ()).0)))
@@ -132,7 +135,7 @@ impl<'a> World<'a> {
         (predicate, arguments)
     }
 
-    /// Returns `true` if an atom is derived.
+    /// Returns `true` if an atom belongs to a derived predicate or is auxiliary.
     pub(crate) fn is_derived(&self, atom: AtomId) -> bool {
         let predicate = self.atoms.get_index(atom.index()).map(|((predicate, _), ())| *predicate);
         predicate.is_none_or(|predicate| {
@@ -147,19 +150,21 @@ impl<'a> World<'a> {
         (function, arguments)
     }
 
-    /// Returns the initial value of a numeric fluent, or the value of a static function.
+    /// Returns the initial value of a numeric fluent or the value of a static function; `None` if it is
+    /// undefined.
     pub(crate) fn value(&self, function: FunctionId, arguments: &[ObjectId]) -> Option<Rational> {
         self.values.get(&Key(function, arguments)).cloned()
     }
 
-    /// Returns the initial value of a numeric variable; 0 for `total-cost` without a value in the
-    /// file.
+    /// Returns the initial value of a numeric variable, or 0 if the problem specifies none (for example for
+    /// `total-cost`).
     pub(crate) fn initial_value(&self, variable: NumericId) -> Rational {
         let key = self.numerics.get_index(variable.index()).map(|(key, ())| key);
         key.and_then(|(function, arguments)| self.value(*function, arguments)).unwrap_or_else(Rational::zero)
     }
 
-    /// Returns the variable of a numeric fluent. `total-cost` is 0 by default.
+    /// Returns the id of a numeric fluent and creates the id at the first call. `total-cost` needs no initial
+    /// value.
     ///
     /// # Errors
     /// The fluent has no initial value.
@@ -180,12 +185,12 @@ impl<'a> World<'a> {
         Ok(NumericId(dense(self.numerics.insert_full((function, arguments.into()), ()).0)))
     }
 
-    /// Returns the variable of the clock, which starts at 0.
+    /// Returns the id of the clock variable, which is 0 initially.
     pub(crate) fn clock(&mut self, function: FunctionId) -> NumericId {
         NumericId(dense(self.numerics.insert_full((function, Box::default()), ()).0))
     }
 
-    /// Returns `true` if an atom holds initially.
+    /// Returns `true` if an atom is true initially.
     pub(crate) fn is_initial(&self, atom: AtomId) -> bool {
         let key = self.atoms.get_index(atom.index());
         key.is_some_and(|((predicate, arguments), ())| self.holds_initially(*predicate, arguments))
@@ -206,7 +211,7 @@ impl<'a> World<'a> {
         })
     }
 
-    /// Formats a predicate with arguments in PDDL. Auxiliary atoms get a generated name.
+    /// Formats a predicate with arguments in PDDL. Auxiliary atoms are formatted as `condition NUMBER`.
     pub(crate) fn name(&self, predicate: PredicateId, arguments: &[ObjectId]) -> String {
         let Some(symbol) = self.lifted.predicates.get(predicate.index()) else {
             let number = arguments.first().map_or(0, |number| number.0);
