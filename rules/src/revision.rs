@@ -72,7 +72,7 @@ impl Engine {
         change
     }
 
-    /// Changes the stated facts and the rules of an engine without equality. Deletes facts first, so
+    /// Changes the stated facts and the rules of an engine without equality; the new rules may have it. Deletes facts first, so
     /// that new rules do not match deleted facts.
     fn change_plainly(&mut self, delta: Delta, program: Program) -> Result<Delta, Errors> {
         let inserted: FxHashSet<&Fact> = delta.insert.iter().collect();
@@ -86,10 +86,20 @@ impl Engine {
     /// Changes facts and rules of an engine under equality, or switches equality on first.
     fn change_equally(&mut self, mut delta: Delta, mut program: Program) -> Result<Delta, Errors> {
         program.equality = true;
+        if self.equality.is_none() && self.derives_pairs() {
+            return self.change_plainly(delta, program);
+        }
         let switched = if self.equality.is_none() { self.switch_on(&mut delta)? } else { Delta::default() };
         let Some(equality) = self.equality.take() else { return Ok(switched) };
         let change = self.apply_equally(equality, &delta, Some(program)).map_err(|(error, _)| error)?;
         Ok(net([switched, change]))
+    }
+
+    /// Returns `true` if rules of an engine without equality have derived an `owl:sameAs` pair.
+    fn derives_pairs(&mut self) -> bool {
+        let same_as = self.symbols_mut().name(SAME_AS);
+        let mut pairs = self.matching_rows(same_as, &[None, None]);
+        pairs.any(|row| !self.is_asserted(&Fact::new(same_as, row.iter().copied())))
     }
 
     /// Switches equality on, under the condition that no rule derives an `owl:sameAs` pair yet. The

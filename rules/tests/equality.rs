@@ -303,6 +303,24 @@ fn equality_is_switched_on_by_a_change() {
     assert!(!displayed(&engine).contains("r(b)"));
 }
 
+#[test]
+fn pairs_that_were_derived_without_equality_join_when_it_is_switched_on() {
+    let mut symbols = Symbols::new();
+    let stated = facts(&mut symbols, "p(b, c), q(c)");
+    let program =
+        parse_rules("p(?x, ?y) -> sameAs(?x, ?y) .", "test", &mut symbols, &prefixes()).expect("rules");
+    let complete = program.with_equality(&mut symbols);
+    let mut engine = Engine::new(symbols, program, stated).expect("safe rules");
+    assert!(!displayed(&engine).contains("q(b)"));
+    let q = fact(&mut engine, "q(d)");
+    engine.change(Delta { insert: vec![q], delete: vec![] }, complete).expect("safe rules");
+    let now = displayed(&engine);
+    assert!(now.contains("q(b)") && now.contains("q(d)"), "{now:?}");
+    let p = fact(&mut engine, "p(b, c)");
+    engine.apply(Delta { insert: vec![], delete: vec![p] }).expect("within the budget");
+    assert!(!displayed(&engine).contains("q(b)"));
+}
+
 /// A derived pair that mentions a name is deleted when the name becomes equal to another name. Pairs
 /// that follow without that name must be derived again.
 #[test]

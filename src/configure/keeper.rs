@@ -357,7 +357,9 @@ impl Keeper {
             };
             answers.push(self.request(&objective.individual.name, reconfigure));
         }
-        // A failed change of a removed objective needs no undo.
+        // A failed change of a removed objective needs no undo. Changes are recorded under the name, and events may have
+        // the IRI.
+        let name = objective_by_name.map_or(name, |objective| objective.individual.name.as_str());
         self.pending_changes.retain(|_, pending_changes| pending_changes.objective != name);
         self.unserved.remove(name);
         Ok(())

@@ -287,6 +287,23 @@ fn a_failed_design_is_replaced_and_requested_again_once_realisable() {
 }
 
 #[test]
+fn changes_of_an_objective_removed_by_its_iri_are_forgotten() {
+    let mut keeper = Keeper::new(Configurator::new(robot(), Wishes::default()).expect("no wishes"), None);
+    keeper.start();
+    deliver(&mut keeper, r#"{"event":"objective_added","objective":"o1","function":"f_look"}"#);
+    let iri = keeper.configurator().objectives()[0].individual.iri.clone();
+    let removed = serde_json::json!({ "event": "objective_removed", "objective": iri });
+    assert_eq!(
+        reconfigurations(&deliver(&mut keeper, &removed.to_string())),
+        [("o1", Some("fd_look_close"), None)]
+    );
+    // A late failure of the change neither is an error nor rules the design out.
+    assert_eq!(deliver(&mut keeper, r#"{"event":"reconfiguration_failed","effect":1}"#), []);
+    let answers = deliver(&mut keeper, r#"{"event":"objective_added","objective":"o2","function":"f_look"}"#);
+    assert_eq!(reconfigurations(&answers), [("o2", None, Some("fd_look_close"))]);
+}
+
+#[test]
 fn a_contradiction_elsewhere_does_not_stop_adaptation() {
     let contradiction = "
 :Good a owl:Class ; owl:disjointWith :Bad . :Bad a owl:Class . :c_lamp a t:Component , :Good .

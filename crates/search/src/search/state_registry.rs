@@ -218,8 +218,8 @@ impl<N: TaskNumber> StateRegistry<N> {
 
     /// Returns the approximate memory use in bytes.
     pub(super) fn bytes(&self) -> usize {
-        let words =
-            [&self.keys, &self.fronts, &self.others].map(|list| list.len().saturating_mul(size_of::<u32>()));
+        let words = [&self.keys, &self.fronts, &self.others, &self.plain]
+            .map(|list| list.len().saturating_mul(size_of::<u32>()));
         let tables = [&self.table, &self.numbers.table].map(|table| table.capacity().saturating_mul(6));
         let nodes = self.nodes.len().saturating_mul(size_of::<Node>());
         let numbers = self.numbers.all.len().saturating_mul(size_of::<N>());
