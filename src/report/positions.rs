@@ -1,4 +1,4 @@
-//! Coordinates of places: the section `report` of a manifest.
+//! Coordinates of places for the map, from the section `report` of a manifest.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -73,7 +73,7 @@ impl Positions {
     }
 }
 
-/// Returns the values of a unary function by object.
+/// Returns the initial values of a numeric function with one argument, by object.
 fn values(problem: &Problem, function: &str) -> BTreeMap<Name, f64> {
     let function = Name::new(function);
     let value = |element: &InitialElement| match element {
@@ -87,7 +87,8 @@ fn values(problem: &Problem, function: &str) -> BTreeMap<Name, f64> {
     problem.init.iter().filter_map(value).collect()
 }
 
-/// Reads lines `place,x,y`; a first line without numbers is a heading.
+/// Reads the coordinates of places from a CSV file with lines `place,x,y`. A first line without
+/// numbers is a heading.
 fn read(file: &Path) -> Result<BTreeMap<Name, (f64, f64)>, Errors> {
     let source = source(file)?;
     let mut reader = csv::ReaderBuilder::new()
