@@ -10,10 +10,10 @@
 //! | `/metaplan/inferences`, `/metaplan/plans`, `/metaplan/effects`, `/metaplan/loop` |
 //! `metaplan.Answer` | the written answers, each on the topic of its kind |
 //!
-//! Times start with the system's clock when the file is created, and never decrease. A chunk is
-//! written to the file as a whole, at most [`INTERVAL`] after its first message. So a killed
-//! program leaves a file of complete chunks, and perhaps a part of one, and all readers of MCAP can
-//! read the complete chunks.
+//! Times begin with the system's clock when the file is created, and never decrease. A chunk is
+//! written to the file as a whole, at most [`INTERVAL`] after its first message. So if the program
+//! is killed, the file consists of complete chunks and perhaps an incomplete one. All readers of
+//! MCAP can read the complete chunks.
 //!
 //! - \[1\] Foxglove: MCAP file format specification, <https://mcap.dev/spec>.
 
@@ -29,5 +29,5 @@ pub use replay::{Replay, Replayed};
 pub use schema::answer_schema;
 pub use write::{Form, Recording};
 
-/// First byte of an MCAP file, with which no line of text begins.
+/// First byte of every MCAP file. No line of text begins with it.
 pub const FIRST_BYTE: u8 = mcap::MAGIC[0];
