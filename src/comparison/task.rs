@@ -30,9 +30,9 @@ const MAX_STATES: usize = 50_000;
 pub struct Tasked {
     /// The process.
     pub coadaptation: Coadaptation,
-    /// Predecessor of each place, with the action from there.
+    /// For each place, a predecessor and the action that leads from there. `None` for the start.
     origins: Vec<Option<(usize, Act)>>,
-    /// Effects of the actions at each place: the next place and the configuration.
+    /// For each place and each action of the task, the number of the arc and the configuration.
     moves: Vec<HashMap<Act, (usize, usize)>>,
 }
 

@@ -1,4 +1,4 @@
-//! Clauses under construction, with their families and the meanings of variables.
+//! Formula under construction: its clauses with their families, and the meanings of its variables.
 
 use std::fmt;
 
@@ -6,18 +6,19 @@ use task::number::{Int, dense};
 
 use crate::sat::Lit;
 
-/// Purpose of a clause. The file that writes a family documents it.
+/// Family of a clause, i.e. the purpose for which it is added. The file that adds a family
+/// documents its clauses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Family {
     /// State variables have exactly one value.
     Domain,
-    /// At most one operator per step, and none after the last one.
+    /// At most one operator per step in sequential semantics, and none after an idle step.
     Sequence,
     /// Operators at the same step do not interfere.
     Interference,
-    /// Operators require their conditions.
+    /// An executed operator requires its conditions.
     Condition,
-    /// Operators have their effects.
+    /// An executed operator has its effects.
     Effect,
     /// Conditional effects take place if their conditions hold.
     Conditional,
@@ -31,11 +32,11 @@ pub enum Family {
     Symmetry,
     /// Exact integer arithmetic for numeric variables.
     Numeric,
-    /// The accumulated cost.
+    /// The accumulated cost of the plan.
     Cost,
     /// The last state satisfies the goal.
     Goal,
-    /// The plan is cheaper than the incumbent.
+    /// The cost limit; usually the plan has to be cheaper than the incumbent.
     Bound,
 }
 
@@ -57,7 +58,7 @@ impl Family {
         Self::Bound,
     ];
 
-    /// Name in statistics.
+    /// Returns the name of the family in statistics.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Domain => "domain",
@@ -91,11 +92,12 @@ pub enum VariableMeaning {
     Value { variable: u32, value: u32, step: u32 },
     /// The slot is filled with its design at the step.
     Design { slot: u32, design: u32, step: u32 },
-    /// The operator at the step is one of a group.
+    /// An operator of the group is executed at the step.
     Group { group: u32, step: u32 },
     /// The accumulated cost before the step, minus its lower bound, is at least the amount.
     CostAtLeast { amount: Int, step: u32, stage: u32 },
-    /// The step adds at least the amount.
+    /// A source of cost at the step adds this amount. It is implied by the choices that cause the
+    /// amount.
     Increment { amount: Int, step: u32, stage: u32 },
     /// The conditional effect with this index of the operator takes place at the step.
     Fires { operator: u32, effect: u32, step: u32 },
@@ -103,13 +105,13 @@ pub enum VariableMeaning {
     Body { layer: u32, rule: u32, step: u32 },
     /// The derived variable follows in more than `rounds` rounds of its layer.
     Later { variable: u32, rounds: u32, step: u32 },
-    /// A bit of a number.
+    /// A bit of a number, or of an intermediate result.
     Bit { bit: u32 },
-    /// Known plans are excluded.
+    /// Selector that excludes known plans while it is assumed.
     Others,
-    /// A counted number of literals of a core is true.
+    /// A count of true literals in a core of the core-guided search.
     Paid,
-    /// Auxiliary variable, for example of an at-most-one constraint.
+    /// Auxiliary variable without a meaning in the task, for example of an at-most-one constraint.
     Ladder,
 }
 
@@ -118,14 +120,15 @@ pub enum VariableMeaning {
 pub struct Formula {
     meanings: Vec<VariableMeaning>,
     literals: Vec<Lit>,
-    /// End of each clause in `literals`, and its family.
+    /// For each clause: its end in `literals`, and its family.
     clauses: Vec<(u32, Family)>,
-    /// Per literal: number (plus 1) of the last clause that contains it.
+    /// For each literal: the number, from 1, of the last clause that contains it; 0 if no clause
+    /// does.
     last: Vec<u32>,
 }
 
 impl Formula {
-    /// An empty formula with the constant true.
+    /// Creates a formula that contains only the constant true.
     pub(crate) fn new() -> Self {
         let mut formula = Self::default();
         let truth = formula.fresh(VariableMeaning::True);
@@ -134,7 +137,7 @@ impl Formula {
         formula
     }
 
-    /// The literal that is always true.
+    /// Returns the literal that is always true.
     pub(crate) const fn truth() -> Lit {
         Lit::TRUE
     }
@@ -146,12 +149,12 @@ impl Formula {
         literal
     }
 
-    /// Adds a clause. Clauses with a true constant or complementary literals are dropped; false
-    /// constants and duplicates are omitted.
+    /// Adds a clause. The clause is dropped if it contains the constant true or complementary
+    /// literals. The constant false and duplicate literals are omitted from it.
     #[expect(clippy::arithmetic_side_effects, reason = "clauses are held in memory")]
     pub fn add(&mut self, family: Family, clause: impl IntoIterator<Item = Lit>) {
         let start = self.literals.len();
-        // Marks carry the number of the clause, so they need no reset between clauses.
+        // Marks in `last` carry the number of the clause, so they need no reset between clauses.
         let number = dense(self.clauses.len() + 1);
         for literal in clause {
             if literal == Self::truth() || self.last[(!literal).index()] == number {
@@ -166,15 +169,16 @@ impl Formula {
         self.clauses.push((dense(self.literals.len()), family));
     }
 
-    /// Drops the literals of an incomplete clause, so that the next clause can reuse its number.
+    /// Removes the literals from `start` on, which belong to an incomplete clause, and their marks.
     fn forget(&mut self, start: usize) {
         for literal in self.literals.drain(start..) {
             self.last[literal.index()] = 0;
         }
     }
 
-    /// Literal that is implied by each of the given ones (one direction only). Returns the literal
-    /// itself if there is only one.
+    /// Returns a literal that is implied by each of the given literals; the converse is not
+    /// encoded. Returns the given literal itself if there is only one, and the constant false if
+    /// there is none.
     pub(crate) fn any(&mut self, family: Family, meaning: VariableMeaning, literals: &[Lit]) -> Lit {
         match literals {
             [] => !Self::truth(),
@@ -189,7 +193,7 @@ impl Formula {
         }
     }
 
-    /// Literal that is equivalent to the conjunction of the premises.
+    /// Returns a literal that is equivalent to the conjunction of the premises.
     pub(crate) fn equivalent(&mut self, meaning: VariableMeaning, premises: &[Lit], family: Family) -> Lit {
         let premises: Vec<_> = premises.iter().copied().filter(|l| *l != Self::truth()).collect();
         match premises[..] {
@@ -206,13 +210,13 @@ impl Formula {
         }
     }
 
-    /// At-most-one constraint: pairwise for up to five literals, otherwise Sinz's sequential
-    /// counter \[1\].
+    /// Adds an at-most-one constraint: pairwise clauses for up to five literals, otherwise Sinz's
+    /// sequential counter \[1\].
     ///
     /// \[1\] C. Sinz: Towards an optimal CNF encoding of Boolean cardinality constraints, CP 2005.
     #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     pub(crate) fn at_most_one(&mut self, family: Family, literals: &[Lit]) {
-        // For few literals pairwise clauses are fewer than those of the counter and need no
+        // For few literals, pairwise clauses are fewer than the clauses of the counter and need no
         // variables.
         if literals.len() <= 5 {
             for (position, a) in literals.iter().enumerate() {
@@ -243,12 +247,12 @@ impl Formula {
         self.clauses.len()
     }
 
-    /// All clauses in the order of insertion.
+    /// Returns all clauses with their families, in the order of insertion.
     pub fn clauses(&self) -> impl Iterator<Item = (Family, &[Lit])> {
         self.clauses_from(0)
     }
 
-    /// Clauses from index `start` on.
+    /// Returns the clauses from index `start` on, with their families.
     #[expect(clippy::arithmetic_side_effects, reason = "the first clause is told apart")]
     pub fn clauses_from(&self, start: usize) -> impl Iterator<Item = (Family, &[Lit])> {
         (start..self.clauses.len()).map(|index| {
@@ -258,7 +262,7 @@ impl Formula {
         })
     }
 
-    /// Number of clauses per family.
+    /// Returns the number of clauses of each family, by the name of the family.
     pub fn counts(&self) -> Vec<(&'static str, usize)> {
         let count =
             |family| self.clauses.iter().filter(|(_, clause_family)| *clause_family == family).count();
