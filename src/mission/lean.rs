@@ -1,6 +1,6 @@
 //! Action elimination: removes superfluous actions from a plan [1].
 //!
-//! If the metric is the makespan, an action that runs beside another one may cost nothing, so the
+//! If the metric is the makespan, an action that overlaps with another one may cost nothing, so the
 //! planner may keep superfluous actions. Each action of cost 0, from the last to the first, is
 //! removed if the plan without it is valid and has the same cost.
 //!

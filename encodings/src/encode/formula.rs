@@ -177,8 +177,8 @@ impl Formula {
     }
 
     /// Returns a literal that is implied by each of the given literals; the converse is not
-    /// encoded. Returns the given literal itself if there is only one, and the constant false if
-    /// there is none.
+    /// encoded. Returns the given literal itself if there is only one, and the constant false for
+    /// an empty list.
     pub(crate) fn any(&mut self, family: Family, meaning: VariableMeaning, literals: &[Lit]) -> Lit {
         match literals {
             [] => !Self::truth(),

@@ -170,7 +170,7 @@ pub trait Store: Clone + Send + Sync + 'static {
         message: Message<'_>,
     ) -> impl Future<Output = Result<Receipt, Fault>> + Send;
 
-    /// Returns the last message of a subject, or `None` if there is none.
+    /// Returns the last message of a subject, or `None` if the subject has no message.
     fn last(
         &self,
         stream: Stream,
