@@ -37,7 +37,8 @@ pub struct Availability {
     pub functions: Vec<String>,
     /// `true` if the design is available.
     pub available: bool,
-    /// All rules and facts that rule the design out; empty if it is available.
+    /// Rules and facts that rule the design out, and reasons why no plan could use it even if it
+    /// were available.
     pub because: Vec<String>,
     /// Failed components and measurements that contribute to ruling the design out.
     pub causes: Vec<Cause>,

@@ -79,8 +79,7 @@ impl Experiment {
         &self.mission
     }
 
-    /// Adds warnings about probable mistakes in the numbers of the mission, such as units that do
-    /// not match.
+    /// Adds warnings about probable mistakes in the numbers of the mission, such as missing values.
     pub fn note_doubts(&mut self) {
         numbers::note_doubts(&mut self.mission);
     }

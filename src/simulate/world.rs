@@ -20,7 +20,7 @@ use crate::number;
 use crate::simulate::check::Watched;
 use crate::simulate::settings::{Disturbance, Simulation};
 
-/// Number of units into which times and shares are rounded: they are multiples of 1 / `GRAIN`.
+/// Times and shares are rounded to multiples of 1 / `GRAIN`.
 const GRAIN: f64 = 1e6;
 
 /// The running action.

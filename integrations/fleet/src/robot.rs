@@ -148,8 +148,8 @@ impl Robot {
     /// its plans are used, and the new answers must be equal. Returns the reason if the event is
     /// refused.
     ///
+    /// # Errors
     /// The robot cannot continue. Its state is unchanged, or is invalid and has to be recovered.
-    /// The robot cannot continue. Its state is unchanged, or is invalid and must be recovered.
     pub fn decide(
         &mut self,
         event: &Stored,
