@@ -17,7 +17,7 @@ use crate::number;
 /// A step in a path to an entry of a manifest: a key of a table, or an index of an array.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Key {
-    /// The key of a table.
+    /// Key of an entry in a table.
     Name(String),
     /// Index of an entry in an array, from 0.
     Index(usize),

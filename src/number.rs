@@ -48,7 +48,7 @@ pub(crate) fn decimal(value: &BigRational) -> String {
     rules::Decimal::from_rational(value).to_string()
 }
 
-/// Returns a number as a JSON number.
+/// Converts a number to a JSON number. A fraction without a finite decimal expansion is rounded.
 pub(crate) fn to_json(value: &BigRational) -> Value {
     decimal(value).parse::<serde_json::Number>().map_or(Value::Null, Value::Number)
 }

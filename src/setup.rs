@@ -61,7 +61,7 @@ pub struct Setup {
     pub description: String,
     /// Settings of the adaptation loop.
     pub settings: Settings,
-    /// The unit of the domain's times.
+    /// Unit of the times in the domain, e.g. of durations.
     pub time_unit: TimeUnit,
     /// Names of the PDDL symbols from which the co-adaptation process is built.
     pub roles: Roles,

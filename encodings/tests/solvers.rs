@@ -166,7 +166,8 @@ fn check_growing(backend: &Backend, seed: u64) -> (usize, usize, usize) {
     (satisfiable, unsatisfiable, smaller)
 }
 
-/// Regression test: repeated calls once returned cores that were not contradictory.
+/// Regression test: after several calls, a solver once returned a core (failed assumptions) that
+/// was satisfiable.
 #[test]
 fn cores_of_later_calls_are_contradictory() {
     for backend in backends() {

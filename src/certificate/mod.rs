@@ -68,7 +68,7 @@ pub struct Contents<'c> {
     pub problem: &'c Problem,
     /// The ground task of domain and problem.
     pub task: Ground<'c>,
-    /// The solution of the task.
+    /// The solution of the task, whose status the certificate proves.
     pub solution: &'c Solution,
     /// The plan in terms of the mission's domain: one line per action, with start and duration.
     pub plan: &'c str,

@@ -37,11 +37,12 @@ pub struct Config<'a> {
 /// A decision rule (policy or plan) with its values.
 #[derive(Debug, Clone)]
 pub struct Candidate {
-    /// Kind of the candidate: `a` to `f`.
+    /// Kind of the candidate: policy (`a`), plan without (`b`) or with replanning (`c`), published
+    /// procedure (`d`), or shortest route (`e`).
     pub kind: char,
-    /// Name of the candidate.
+    /// Description of the candidate for the table.
     pub name: String,
-    /// Values of the candidate.
+    /// Exact values of the candidate in the common process.
     pub measures: Measures,
 }
 

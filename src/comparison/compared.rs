@@ -16,7 +16,7 @@ use crate::mission::{Mission, Planning as _};
 /// A mission with the data of its decision process.
 #[derive(Debug, Clone, Copy)]
 pub struct Compared<'m> {
-    /// The mission.
+    /// The mission for which plans are computed.
     pub mission: &'m Mission,
     /// Names of the PDDL symbols from which the process is built.
     pub roles: &'m Roles,

@@ -11,7 +11,7 @@ use std::fmt::Write as _;
 use super::map::{Coordinates, Map, Measured, object};
 use crate::message::{Errors, Message, did_you_mean};
 
-/// Start and goal of the mission, and data that the map lacks.
+/// Options of [`import_map`]: start and goal of the mission, and data that the map lacks.
 #[derive(Debug, Clone)]
 pub struct MapOptions {
     /// The mission's name.
@@ -57,15 +57,15 @@ impl Default for MapOptions {
 /// The files of an imported mission, as texts.
 #[derive(Debug, Clone)]
 pub struct Files {
-    /// Text of `NAME.toml`.
+    /// Manifest of the mission, the text of `NAME.toml`.
     pub manifest: String,
-    /// Text of `NAME.ttl`.
+    /// Knowledge base, the text of `NAME.ttl`.
     pub knowledge: String,
-    /// Text of `domain.pddl`.
+    /// PDDL domain, the text of `domain.pddl`.
     pub domain: String,
-    /// Text of `problem.pddl`.
+    /// PDDL problem, the text of `problem.pddl`.
     pub problem: String,
-    /// Text of `positions.csv`.
+    /// Coordinates of the places, the text of `positions.csv`.
     pub positions: String,
     /// Warnings about parts of the map that are ignored or assumed.
     pub warnings: Vec<Message>,

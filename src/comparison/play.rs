@@ -59,7 +59,7 @@ impl<N: Number> Generator<N> for FixedProcess<'_, '_, N> {
 pub struct Measures {
     /// Probability of reaching the goal.
     pub goal: f64,
-    /// Probability of reaching the goal without using the battery's reserve.
+    /// Probability of reaching the goal with a battery level of at least the reserve.
     pub goal_with_reserve: f64,
     /// Probability that no collision happens during the mission.
     pub no_collision: f64,
@@ -67,7 +67,7 @@ pub struct Measures {
     pub collisions: f64,
     /// Expected time. `None` if the mission may never end.
     pub time: Option<f64>,
-    /// Expected energy.
+    /// Expected energy. `None` if the mission may never end.
     pub energy: Option<f64>,
     /// Expected number of reconfigurations.
     pub reconfigurations: Option<f64>,
@@ -77,7 +77,7 @@ pub struct Measures {
     pub energy_if_successful: Option<f64>,
     /// Expected time plus the penalty for missions that do not reach the goal.
     pub penalised_time: Option<f64>,
-    /// Expected number of replannings during the mission.
+    /// Expected number of states in which a new plan is needed.
     pub replans: f64,
     /// Number of reachable states.
     pub states: usize,

@@ -25,13 +25,13 @@ const MAX_PARTIAL_ROUTES: usize = 2_000_000;
 /// Decision of the published procedure, with its predicted values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Published {
-    /// The route, as numbers of arcs.
+    /// Numbers of the arcs of the route, in order.
     pub route: Vec<usize>,
     /// Number of the configuration for the whole route.
     pub configuration: usize,
     /// Utility of the decision, from 0 to 1.
     pub utility: f64,
-    /// Predicted time, in the mission's unit.
+    /// Predicted time, in the mission's time unit.
     pub time: f64,
     /// Predicted energy, in the mission's unit.
     pub energy: f64,

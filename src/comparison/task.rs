@@ -28,7 +28,7 @@ const MAX_STATES: usize = 50_000;
 /// the task to the process.
 #[derive(Debug, Clone)]
 pub struct Tasked {
-    /// The process.
+    /// Data of the process.
     pub coadaptation: Coadaptation,
     /// For each place, a predecessor and the action that leads from there. `None` for the start.
     origins: Vec<Option<(usize, Act)>>,

@@ -33,7 +33,7 @@ const MAX_TRIED: usize = 2_000;
 pub struct Availability {
     /// Local name of the design.
     pub design: String,
-    /// Functions that the design solves.
+    /// Local names of the functions that the design solves.
     pub functions: Vec<String>,
     /// `true` if the design is available.
     pub available: bool,

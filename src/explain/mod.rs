@@ -43,7 +43,7 @@ pub struct DesignExplanation {
     /// The best plan with this design as the only one for its functions. If the design is
     /// unavailable, it is assumed to be available.
     pub alone: BestPlan,
-    /// The best plan without the design.
+    /// The best plan if the design is not available.
     pub without: BestPlan,
     /// For each set of alterations in [`Availability::ways`], the best plan after all alterations
     /// of the set.

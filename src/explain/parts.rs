@@ -22,7 +22,7 @@ pub struct BestPlan {
 pub struct Alteration {
     /// Name of the changed attribute, numeric function or component.
     pub name: String,
-    /// The current value. `None` for a component.
+    /// Current value of the attribute or function. `None` for a component.
     pub from: Option<BigRational>,
     /// Bound for the new value, or the new state of the component.
     pub to: Target,
@@ -41,7 +41,7 @@ pub struct Repair {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Change {
-    /// The alteration.
+    /// The alteration of one value or one component.
     pub alteration: Alteration,
     /// Upper limit on the error of the alteration's bound. `None` if the bound is exact.
     pub within: Option<BigRational>,

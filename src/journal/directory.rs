@@ -24,17 +24,17 @@ pub(super) struct Segment {
     pub(super) before: Link,
     /// Link after the segment's last sound record.
     pub(super) after: Link,
-    /// Records without the header.
+    /// Sound records of the segment, without its header.
     pub(super) records: Vec<Record>,
     /// Number of bytes of the complete records at the beginning of the file.
     pub(super) sound: u64,
     pub(super) end: End,
 }
 
-/// End of a segment.
+/// State of the end of a segment file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum End {
-    /// The segment ends with a complete record.
+    /// The segment ends with a complete record and its line break.
     Whole,
     /// The segment ends with a complete record whose line break is missing or damaged.
     Unbroken,

@@ -59,11 +59,11 @@ pub enum Sync {
     /// Flushes only if the answers contain an effect, before they leave the program.
     #[default]
     Effects,
-    /// The operating system decides when to flush.
+    /// Never flushes; the operating system decides when data reaches the disk.
     Never,
 }
 
-/// Settings of a journal.
+/// Settings for writing a journal.
 #[derive(Debug, Clone, Copy)]
 pub struct Policy {
     /// Policy for flushing writes to the disk.

@@ -8,10 +8,10 @@
 use serde_json::{Value, json};
 use sha2::{Digest as _, Sha256};
 
-/// Version of the file format.
+/// Name and version of the journal's file format.
 pub(super) const FORMAT: &str = "metaplan-journal/3";
 
-/// Number of hexadecimal digits before a record.
+/// Number of hexadecimal digits of the hash in front of each record.
 const DIGITS: usize = 16;
 
 /// A position between two records: the number of the next record, and the chain digits of the
@@ -23,7 +23,7 @@ pub(super) struct Link {
 }
 
 impl Link {
-    /// Link before the first record.
+    /// Returns the link before the first record of a journal.
     pub(super) fn first() -> Self {
         Self { next: 0, digits: "0".repeat(DIGITS) }
     }

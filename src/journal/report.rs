@@ -17,7 +17,7 @@ pub struct JournalReport {
     pub parts: Vec<String>,
     /// Faults: an error if the journal cannot be used, a warning otherwise.
     pub messages: Vec<Message>,
-    /// All sound records in order.
+    /// All sound records of all segments, in order.
     pub entries: Vec<Entry>,
 }
 

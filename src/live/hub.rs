@@ -125,7 +125,7 @@ impl Hub {
 }
 
 impl RetainedLines {
-    /// Returns the number of the next line.
+    /// Returns the number that the next appended line will have.
     fn end(&self) -> u64 {
         self.first + self.lines.len() as u64
     }

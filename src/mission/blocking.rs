@@ -24,7 +24,7 @@ pub enum Blocking {
     /// of them are unavailable, even if every other design is available. If any one of them becomes
     /// available, in addition to all other designs, it has a plan.
     Designs(Vec<String>),
-    /// The mission has no plan even if every design is available.
+    /// Designs are not the reason: the mission has no plan even if every design is available.
     Other,
 }
 

@@ -14,9 +14,9 @@ use planner::{Plan, Step};
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, Event};
 
-/// Name of the node that changes the design of a function.
+/// Type of the behaviour-tree node that changes the design of a function.
 const CHANGE_NODE: &str = "ChangeMode";
-/// Attributes that BehaviorTree.CPP reserves.
+/// Attribute names that BehaviorTree.CPP reserves, so that ports cannot have them.
 const RESERVED: [&str; 2] = ["name", "ID"];
 
 /// A node of the tree: its type, its instance name, and the values of its ports.

@@ -14,7 +14,7 @@ use planner::{Exact, Limits, Plan, Step};
 
 use crate::mission::confirm::{Reading, verdict_of};
 
-/// An action of a plan for PlanSys2.
+/// A line of a plan for PlanSys2: one action with its times.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PlanLine {
     /// Start of the action, in the domain's time unit.
@@ -137,7 +137,8 @@ mod tests {
         check("", true, &twice, spaced);
     }
 
-    /// A fact that is true only from 5 to 7 fixes the times, so that no gap fits.
+    /// A fact that is true only from time 5 to time 7 fixes the times of both actions, so that no
+    /// gap fits between them.
     #[test]
     fn plans_without_room_for_gaps_are_unchanged() {
         let steps = [("now", 5000, 0), ("short", 5000, 2000)];

@@ -250,9 +250,9 @@ pub struct Scenario<S> {
 /// A mistake in a part of a section, with its place.
 #[derive(Debug, Clone)]
 pub struct Mistake {
-    /// Path to the part, relative to the section.
+    /// Keys that lead to the mistaken entry, relative to the section.
     pub path: Vec<Key>,
-    /// The part of the entry at the end of the path.
+    /// Mistaken part of the entry at the end of the path: its key, its value, or a position inside.
     pub part: Part,
     /// Message about the mistake.
     pub message: Message,

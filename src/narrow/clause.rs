@@ -22,7 +22,7 @@ pub(super) struct Clause {
 pub(super) enum Literal {
     /// An atom: predicate and arguments. Type tests are unary atoms, see [`of_type`].
     Holds(Name, Vec<Operand>),
-    /// An equality (`true`) or inequality (`false`) of two terms.
+    /// An equality (`true`) or inequality (`false`) of two operands.
     Equal(bool, Operand, Operand),
 }
 
@@ -42,7 +42,7 @@ impl Literal {
         }
     }
 
-    /// Returns `true` if the literal is a type test.
+    /// Returns `true` if the literal is a type test, i.e. its predicate is the relation of a type.
     pub fn is_type(&self) -> bool {
         matches!(self, Self::Holds(name, _) if name.as_str().contains(' '))
     }

@@ -31,7 +31,7 @@ pub use ::planner::{
 /// Callback with a short description of the work that follows the proof of the best plan.
 type Stage<'a> = dyn FnMut(&str) + 'a;
 
-/// Callback for a better plan or a better bound.
+/// Callback for each better plan or better lower bound. `Break` ends planning.
 type Report<'a> = dyn FnMut(&Improvement) -> ControlFlow<()> + 'a;
 
 /// Plans a mission in its present situation.
@@ -101,8 +101,8 @@ impl<'m, 'r> Planner<'m, 'r> {
         self
     }
 
-    /// Sets the limits. A limit ends planning with the best plan found. [`Limits::interrupt`] is a
-    /// flag that another thread can set.
+    /// Sets limits of time and memory. At a limit, planning ends with the best plan found.
+    /// [`Limits::interrupt`] is a flag by which another thread can end planning.
     #[must_use]
     pub fn limits(mut self, limits: Limits) -> Self {
         self.config.limits = limits;

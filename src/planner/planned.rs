@@ -37,9 +37,11 @@ pub struct Planned<'m> {
     pub values: Vec<Exact>,
     /// Further optimal plans, if requested and if the plan is proved optimal.
     pub alternatives: Option<Alternatives>,
-    /// Unavailable designs that prevent a plan, if the mission is proved unsolvable.
+    /// If the mission is proved unsolvable: unavailable designs that prevent a plan, or the
+    /// information that designs are not the reason.
     pub blocking: Option<Blocking>,
-    /// Numeric functions without a value that actions need, if the mission is proved unsolvable.
+    /// If the mission is proved unsolvable: numeric functions that actions need and that have no
+    /// value.
     pub missing_values: Vec<MissingValue>,
     /// Messages about numbers that are too large for integers. If there are any, planning used only
     /// search in exact rationals.
@@ -169,7 +171,7 @@ impl PlannedFront<'_> {
         ParetoAnswer::new(&self.mission.name, &self.objectives, &self.written(), &self.preparation)
     }
 
-    /// Returns an HTML page about the front.
+    /// Returns the data of a page about the front, with its plans.
     pub fn sheet(&self, positions: &Positions) -> picture::Sheet {
         let context = Seen { mission: self.mission, problem: &self.problem, positions };
         front_sheet(context, &self.objectives, &self.front)

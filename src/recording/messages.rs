@@ -15,7 +15,7 @@ pub(super) const DIAGNOSTICS: &str = "diagnostic_msgs/msg/DiagnosticArray";
 /// Name of the message type for a text.
 pub(super) const TEXT: &str = "std_msgs/msg/String";
 
-/// The definition of [`Text`].
+/// The definition of [`Text`], in the format `ros2msg`.
 pub(super) const TEXT_DEFINITION: &str = "string data\n";
 
 /// The definition of [`DiagnosticArray`] and the types of its parts, in the format `ros2msg`.
@@ -47,34 +47,34 @@ string key
 string value
 ";
 
-/// `std_msgs/msg/String`.
+/// The ROS 2 message `std_msgs/msg/String`.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Text {
     pub(super) data: String,
 }
 
-/// `builtin_interfaces/msg/Time`.
+/// The ROS 2 message `builtin_interfaces/msg/Time`.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Time {
     pub(super) sec: i32,
     pub(super) nanosec: u32,
 }
 
-/// `std_msgs/msg/Header`.
+/// The ROS 2 message `std_msgs/msg/Header`.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Header {
     pub(super) stamp: Time,
     pub(super) frame_id: String,
 }
 
-/// `diagnostic_msgs/msg/KeyValue`.
+/// The ROS 2 message `diagnostic_msgs/msg/KeyValue`.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct KeyValue {
     pub(super) key: String,
     pub(super) value: String,
 }
 
-/// `diagnostic_msgs/msg/DiagnosticStatus`.
+/// The ROS 2 message `diagnostic_msgs/msg/DiagnosticStatus`.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct DiagnosticStatus {
     pub(super) level: u8,
@@ -126,7 +126,7 @@ impl DiagnosticStatus {
     }
 }
 
-/// Encodes a message in plain CDR, little-endian.
+/// Encodes a message in plain CDR, little-endian, with the encapsulation header.
 pub(super) fn to_cdr(message: &impl Serialize) -> Vec<u8> {
     let mut bytes = vec![0, 1, 0, 0];
     // Encoding cannot fail for numbers, texts and lists of them.

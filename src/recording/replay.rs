@@ -52,7 +52,7 @@ enum State {
     Reading,
     /// The file was read to its end.
     Finished,
-    /// The file is truncated and was read up to that point.
+    /// The file is truncated and was read up to its end.
     Unfinished,
 }
 

@@ -22,7 +22,7 @@ pub struct Painter {
 }
 
 impl Painter {
-    /// Creates the painter for a mission.
+    /// Creates the painter for plans of a mission.
     pub fn new(mission: &Mission, positions: Positions) -> Self {
         Self { designs: known_designs(mission), positions }
     }

@@ -38,7 +38,8 @@ pub enum Positions {
     /// No coordinates are given.
     #[default]
     Unknown,
-    /// Two functions of the problem: the x and the y coordinate.
+    /// Names of two numeric functions of the problem, which give the x and the y coordinate of a
+    /// place.
     Functions([String; 2]),
     /// Coordinates of each place by name: x to the right, y upwards.
     Known(BTreeMap<Name, (f64, f64)>),
@@ -59,7 +60,7 @@ impl ReportSection {
 }
 
 impl Positions {
-    /// Returns the coordinates of the places, or `None` unless all are known.
+    /// Returns the coordinates of `places` by name, or `None` if a coordinate is unknown.
     pub(super) fn of(&self, problem: &Problem, places: &[Name]) -> Option<BTreeMap<Name, (f64, f64)>> {
         let coordinates = match self {
             Self::Unknown => return None,

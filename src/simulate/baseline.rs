@@ -32,18 +32,19 @@ use crate::mapek::{Answer, Event, Loop, Observation, PlannedStep};
 use crate::mission::Mission;
 use crate::simulate::admissible::Admission;
 
-/// A control strategy.
+/// A control strategy of a simulated robot: the adaptation loop or a baseline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Strategy {
     /// The adaptation loop.
     Joint,
     /// Executes its first plan, and stops when an action fails.
     None,
-    /// Chooses for each function a random design with which the action is possible.
+    /// Chooses for each function a random design with which the next action is possible.
     Random,
-    /// Chooses for each function separately the cheapest design with which the action is possible.
+    /// Chooses for each function separately the cheapest design with which the next action is
+    /// possible.
     Greedy,
-    /// Plans jointly again when an action has failed.
+    /// Plans actions and designs together again when an action has failed.
     Failure,
 }
 
@@ -76,7 +77,7 @@ pub(super) struct Controller {
     plan: VecDeque<PlannedStep>,
     random: fastrand::Rng,
     gave_up: bool,
-    /// The designs that were available at the last planning.
+    /// Local names of the designs that were available at the last planning.
     planned_with: BTreeSet<String>,
     /// Number of plans that were computed until now.
     pub(super) plans: usize,

@@ -124,7 +124,7 @@ impl Experiment {
 struct Stage {
     world: World,
     controller: Controller,
-    /// Number of seconds in a unit of the domain's time.
+    /// Length of the domain's time unit in seconds.
     second: f64,
     time_budget: f64,
     configuration: BTreeMap<String, String>,

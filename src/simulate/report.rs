@@ -37,7 +37,7 @@ impl fmt::Display for Ending {
 /// Result of a simulated mission. Times are in the domain's time unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {
-    /// The control strategy.
+    /// The control strategy of the run.
     pub strategy: Strategy,
     /// Seed of all random numbers.
     pub seed: u64,
@@ -59,7 +59,7 @@ pub struct Run {
     pub failed: usize,
     /// Number of actions that were cancelled.
     pub cancelled: usize,
-    /// Number of planning queries.
+    /// Number of plans that were requested or computed.
     pub plans: usize,
     /// Number of changes of a function's design.
     pub reconfigurations: usize,

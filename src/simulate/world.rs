@@ -23,14 +23,14 @@ use crate::simulate::settings::{Disturbance, Simulation};
 /// Times and shares are rounded to multiples of 1 / `GRAIN`.
 const GRAIN: f64 = 1e6;
 
-/// The running action.
+/// The running action of the simulated robot.
 #[derive(Debug, Clone)]
 struct Job {
     action: u64,
     step: PlannedStep,
     /// Completed share of the action, from 0 to 1.
     progress: f64,
-    /// Time for which the action has stalled.
+    /// Duration for which the action has stalled without interruption.
     waited: f64,
     /// `true` if the controller has suspended the action.
     suspended: bool,
@@ -305,7 +305,7 @@ impl World {
         }
     }
 
-    /// Returns `true` if a condition holds in the current state.
+    /// Returns `true` if a condition holds in the current true state.
     fn holds(&self, condition: &Condition) -> bool {
         let goal = condition.clone();
         is_valid(self.truth.domain(), &Problem { goal, constraints: Vec::new(), ..self.filled().clone() })

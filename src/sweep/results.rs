@@ -12,7 +12,7 @@ use serde_json::{Map, Value};
 use super::study::{Shard, Study};
 use crate::message::{Errors, Message};
 
-/// Version of the file format.
+/// Name and version of the format of result files.
 pub(super) const FORMAT: &str = "metaplan-sweep/1";
 
 /// Message about a file that belongs to another study.
@@ -22,14 +22,14 @@ const OTHER_STUDY: &str = "it belongs to another study, or the study or its file
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 struct Header {
     format: String,
-    /// Checksum of the study.
+    /// Checksum of the study, by which files of other studies are rejected.
     study: String,
     /// Number of runs of the study.
     runs: usize,
     shard: String,
 }
 
-/// Result of a finished run.
+/// Result of a finished run, a line of the file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Line {
     /// Number of the run in the study, from 0.

@@ -135,7 +135,7 @@ pub struct Study {
 /// One run of a study.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Planned {
-    /// Number of the run, from 0.
+    /// Number of the run in the study, from 0.
     pub number: usize,
     /// Varied keys with their values in this run.
     pub vary: Map<String, Value>,
@@ -146,7 +146,7 @@ pub struct Planned {
 pub struct Shard {
     /// Index of the shard, from 1 to `of`.
     pub index: usize,
-    /// Number of shards.
+    /// Number of shards into which the study is divided.
     pub of: usize,
 }
 

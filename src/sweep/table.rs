@@ -17,7 +17,7 @@ pub type Cell = Option<Value>;
 /// its answer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
-    /// Number of the run.
+    /// Number of the run to which the row belongs.
     pub run: usize,
     /// Cells in the order of the columns.
     pub cells: Vec<Cell>,
@@ -30,7 +30,7 @@ pub struct Table {
     pub columns: Vec<String>,
     /// Number of columns that are varied keys; they come first.
     pub keys: usize,
-    /// Rows by run, in the order of the answer.
+    /// Rows sorted by run; the rows of a run are in the order of its answer.
     pub rows: Vec<Row>,
 }
 
@@ -42,7 +42,7 @@ type Common = Vec<(String, Value)>;
 pub struct Group {
     /// Values that all rows of the group have: varied keys and texts.
     pub common: Common,
-    /// Number of rows.
+    /// Number of rows in the group.
     pub count: usize,
     /// Statistics of each numeric column over the rows.
     pub samples: Vec<(String, Sample)>,

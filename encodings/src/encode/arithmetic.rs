@@ -37,7 +37,7 @@ impl Arithmetic<'_> {
         (0..width).map(bit).collect()
     }
 
-    /// Sign-extends a number to more bits.
+    /// Sign-extends a number to at least `width` bits.
     pub(crate) fn extend(bits: &Bits, width: usize) -> Bits {
         let sign = bits.last().copied().unwrap_or(!Formula::truth());
         bits.iter().copied().chain(std::iter::repeat(sign)).take(width.max(bits.len())).collect()

@@ -53,7 +53,7 @@ type Increments = Vec<(Vec<Lit>, Int)>;
 /// other, or the design tables of a set of slots.
 struct Source {
     step: u32,
-    /// Index of the source within the step.
+    /// Index of this source of cost within its step.
     stage: u32,
     increments: Increments,
 }
@@ -144,7 +144,7 @@ struct Sum<'s, 'a> {
     builder: &'s mut Builder<'a>,
     cost: &'s CostLimit<'s>,
     interference: Option<&'s Interference>,
-    /// Amount that may be spent beyond the lower bound.
+    /// Cost that a plan may have beyond the lower bound.
     gap: Int,
 }
 

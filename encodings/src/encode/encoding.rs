@@ -29,7 +29,7 @@ pub struct PlanConstraints<'a> {
     /// `allowed[step][operator]` is `true` if the operator may occur at the step. The number of
     /// steps is the horizon.
     pub allowed: &'a [Vec<bool>],
-    /// Cost limit, if any.
+    /// Limit on the cost of the plans; `None` for plans of any cost.
     pub cost: Option<CostLimit<'a>>,
     /// Number and order of the operators within a step.
     pub semantics: StepSemantics,

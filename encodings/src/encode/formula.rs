@@ -10,33 +10,34 @@ use crate::sat::Lit;
 /// documents its clauses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Family {
-    /// State variables have exactly one value.
+    /// Clauses by which each state variable has exactly one value at each step.
     Domain,
-    /// At most one operator per step in sequential semantics, and none after an idle step.
+    /// Clauses for the sequence of operators: at most one per step in sequential semantics, and
+    /// none after an idle step.
     Sequence,
-    /// Operators at the same step do not interfere.
+    /// Clauses by which operators at the same step do not interfere.
     Interference,
-    /// An executed operator requires its conditions.
+    /// Clauses by which an executed operator requires its conditions.
     Condition,
-    /// An executed operator has its effects.
+    /// Clauses by which an executed operator has its effects.
     Effect,
-    /// Conditional effects take place if their conditions hold.
+    /// Clauses by which conditional effects take place if their conditions hold.
     Conditional,
-    /// A value changes only if an operator sets it.
+    /// Frame axioms: a value changes only if an operator sets another value.
     Frame,
-    /// Derived variables are the least fixpoint of their rules.
+    /// Clauses by which the derived variables are the least fixpoint of their rules.
     Axiom,
-    /// Each function in use has exactly one suitable design.
+    /// Clauses by which each function in use has exactly one suitable design.
     Selection,
-    /// Interchangeable designs and objects are used in a fixed order.
+    /// Symmetry breaking: interchangeable designs and objects are used in a fixed order.
     Symmetry,
-    /// Exact integer arithmetic for numeric variables.
+    /// Clauses for exact integer arithmetic on numeric variables.
     Numeric,
-    /// The accumulated cost of the plan.
+    /// Clauses that sum the cost of the plan.
     Cost,
-    /// The last state satisfies the goal.
+    /// Clauses by which the last state satisfies the goal.
     Goal,
-    /// The cost limit; usually the plan has to be cheaper than the incumbent.
+    /// Clauses for the cost limit; usually the plan has to be cheaper than the incumbent.
     Bound,
 }
 
@@ -90,7 +91,7 @@ pub enum VariableMeaning {
     Busy { step: u32 },
     /// The finite-domain variable has the value before the step.
     Value { variable: u32, value: u32, step: u32 },
-    /// The slot is filled with its design at the step.
+    /// The slot (a parameter for a function design) is filled with the design at the step.
     Design { slot: u32, design: u32, step: u32 },
     /// An operator of the group is executed at the step.
     Group { group: u32, step: u32 },

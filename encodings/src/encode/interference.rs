@@ -39,9 +39,9 @@ use crate::sat::Lit;
 pub enum StepSemantics {
     /// At most one operator per step.
     Sequential,
-    /// Several operators that can be executed in any order.
+    /// Several operators per step, which can be executed in any order with the same result.
     ForAllStep,
-    /// Several operators that can be executed in the order of the ground task.
+    /// Several operators per step, which can be executed in the order of the ground task.
     ExistsStep,
 }
 

@@ -46,7 +46,7 @@ pub enum Backend {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BackendError {
-    /// The name is blank.
+    /// The given name of the solver is blank.
     #[error("a solver needs a name; built in are: {}", Backend::BUILT_IN.join(", "))]
     Empty,
     /// The program does not behave like a SAT solver.

@@ -36,9 +36,9 @@ enum Control {
 /// Reason for refusing an event, which then changes nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Refused {
-    /// The robot is not enrolled.
+    /// The robot is not enrolled, so it has no mission.
     Unknown,
-    /// The robot is already enrolled.
+    /// The event enrols a robot that is already enrolled.
     Enrolled,
     /// The directory of missions has no mission of this name.
     Mission,

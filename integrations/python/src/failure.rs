@@ -22,7 +22,7 @@ pub(crate) fn raise_one(py: Python<'_>, message: Message) -> PyErr {
     raise(py, &[message])
 }
 
-/// Serialises warnings as a JSON list.
+/// Serialises messages as JSON, in the format of error answers.
 pub(crate) fn listed<'m>(messages: impl IntoIterator<Item = &'m Message>) -> String {
     let messages: Vec<Message> = messages.into_iter().cloned().collect();
     serde_json::to_string(&ErrorAnswer::new(&messages)).unwrap_or_default()

@@ -4,7 +4,7 @@ use pddl::ast::{
     Action, ActionBody, Assignment, Atom, Condition, Effect, Expression, Name, Term, TypeExpression,
 };
 
-/// Bindings of variables to objects.
+/// A binding: variables with the objects that they denote.
 pub(super) type Binding<'a> = Vec<(&'a Name, Name)>;
 
 pub(super) fn constants(atom: &Atom) -> Vec<Name> {

@@ -27,7 +27,7 @@ use crate::store::Store;
 pub(crate) use asking::pause;
 use own::Partition;
 
-/// Parameters of partitions.
+/// Parameters with which a worker runs its partitions.
 #[derive(Debug, Clone, Copy)]
 pub struct Settings {
     /// Maximum number of loops that run at the same time.
@@ -79,7 +79,7 @@ pub struct Shared<S> {
 /// Counters of a worker: current numbers of robots and events, and totals since the start.
 #[derive(Debug, Default)]
 pub struct Counts {
-    /// Number of robots.
+    /// Number of robots in the worker's partitions.
     pub robots: AtomicU64,
     /// Number of robots loaded in memory.
     pub warm: AtomicU64,
@@ -108,7 +108,7 @@ impl<S> Shared<S> {
 /// Order of the worker to a running partition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Order {
-    /// Continue.
+    /// Continue to handle events.
     Go,
     /// Finish running decisions, save everything and end.
     Drain,
@@ -116,7 +116,7 @@ pub enum Order {
     Abandon,
 }
 
-/// Reason why a partition has ended.
+/// Reason why the execution of a partition has ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum End {
     /// The worker has ordered the end.

@@ -32,7 +32,7 @@ const CACHE: usize = 64 << 20;
 /// Type of a stored message: (subject, id, time, payload). The key is (stream, sequence number).
 type Parts = (&'static str, &'static str, u64, &'static [u8]);
 const MESSAGES: TableDefinition<'static, (u8, u64), Parts> = TableDefinition::new("messages");
-/// Index of the messages of a partition: (stream, partition, sequence number).
+/// Index of messages by partition: (stream, partition, sequence number).
 const OF_PARTITION: TableDefinition<'static, (u8, u32, u64), ()> = TableDefinition::new("of_partition");
 /// Sequence number of the last message by (stream, subject).
 const LAST: TableDefinition<'static, (u8, &str), u64> = TableDefinition::new("last");

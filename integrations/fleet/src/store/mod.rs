@@ -13,7 +13,7 @@ use std::time::Duration;
 
 use futures::stream::BoxStream;
 
-/// The streams of a fleet.
+/// The two streams of messages of a fleet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Stream {
     /// Events of robots, with subjects `ev.PARTITION.ROBOT`.
@@ -112,7 +112,7 @@ pub struct Receipt {
 pub struct Entry {
     /// Key of the value.
     pub key: String,
-    /// The value.
+    /// Bytes of the value.
     pub value: Vec<u8>,
     /// Number of the write, which grows with every write in the bucket.
     pub revision: u64,
