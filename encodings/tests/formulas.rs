@@ -16,10 +16,10 @@ use task::task::Task;
 use testing::missions::Mission;
 use testing::{costs_by_steps, depot, fleet, ground_text, optimum};
 
-/// Minimum of the greatest number of steps that is tested.
+/// Lower limit on the step bound up to which formulas are tested.
 const STEPS: usize = 6;
 
-/// Maximum of the greatest number of steps that is tested.
+/// Upper limit on the step bound up to which formulas are tested.
 const MOST_STEPS: usize = 16;
 
 /// A cost that exceeds the cost of every plan of the small tasks in these tests.

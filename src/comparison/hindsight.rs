@@ -165,12 +165,12 @@ impl Spent {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[non_exhaustive]
 pub struct Hindsight {
-    /// Least value of a mission that reaches its goal without a loss. `None` if the goal cannot be
-    /// reached.
+    /// Least time or energy of a mission that reaches its goal without a loss. `None` if the goal
+    /// cannot be reached.
     pub least: Option<f64>,
-    /// Expected least value for a clairvoyant controller, which knows in advance the move after
-    /// which the component is lost. A mission that cannot reach its goal because of the loss costs
-    /// the penalty.
+    /// Expected least time or energy for a clairvoyant controller, which knows in advance the move
+    /// at which the component is lost. A mission that cannot reach its goal because of the loss
+    /// costs the penalty.
     pub expected: Option<f64>,
 }
 
@@ -200,9 +200,9 @@ pub fn hindsight(mission: &Coadaptation, risk: Risk, penalty: f64, spent: Spent)
     Hindsight { least, expected: Some(expected).filter(|value| value.is_finite()) }
 }
 
-/// Returns the least value from each pair of place and configuration to the goal. With `lost`,
-/// configurations that need the component cannot be used. If given, `later` has the values that
-/// apply after the next move.
+/// Returns the least time or energy from each pair of place and configuration to the goal. With
+/// `lost`, configurations that need the component cannot be used. If given, `later` has the values
+/// that apply after the next move.
 fn relaxed(mission: &Coadaptation, spent: Spent, lost: bool, later: Option<&[f64]>) -> Vec<f64> {
     let designs = mission.configurations.len();
     let at = |place: usize, design: usize| place * designs + design;

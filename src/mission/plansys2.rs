@@ -92,8 +92,8 @@ mod tests {
         BigRational::new(BigInt::from(numerator), BigInt::from(denominator)).into()
     }
 
-    /// Formats the plan with the steps `(name, start, duration)`, whose times are in thousandths,
-    /// for a problem with the elements `init` in `:init`.
+    /// Returns the output for PlanSys2 of a plan with the steps `(name, start, duration)`, whose
+    /// times are in thousandths. `init` is the text of the problem's `:init`.
     fn lines(init: &str, concurrent: bool, steps: &[(&str, i64, i64)]) -> String {
         let domain = "(define (domain d) (:predicates (p) (q) (r))
             (:durative-action aside :parameters () :duration (= ?duration 5) :condition () :effect (at end (r)))

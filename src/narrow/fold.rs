@@ -22,9 +22,10 @@ pub(super) struct Folded {
 }
 
 impl Folded {
-    /// Settles as many predicates as possible among those in `vocabulary_of_base` and those whose
-    /// axioms mention no others. `changed` contains the predicates that actions or timed initial
-    /// literals change, `timed` those that timed initial literals change.
+    /// Settles as many predicates as possible. Candidates are the predicates in
+    /// `vocabulary_of_base`, and predicates whose axioms mention only candidates and bind all their
+    /// variables. `changed` contains the predicates that actions or timed initial literals change,
+    /// `timed` those that timed initial literals change.
     pub fn new(
         domain: &Domain,
         (changed, timed): (&BTreeSet<Name>, &BTreeSet<Name>),

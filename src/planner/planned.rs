@@ -13,14 +13,15 @@ use crate::mission::{Blocking, Mission, Planning as _, Reading, spaced};
 use crate::planner::objectives::Objectives;
 use crate::report::{Positions, Seen, front_sheet, plan_picture};
 
-/// Ground task of a mission: its number type, or overlapping actions.
+/// Ground task of a mission by the kind of its plans. Tasks of sequential plans are retained for
+/// certificates.
 #[derive(Debug)]
 pub(super) enum Ground {
     /// Sequential steps, with integer costs and values.
     Integers(Task),
     /// Sequential steps, with costs and values that are rationals of any size.
     Exact(ExactTask),
-    /// Overlapping actions.
+    /// Overlapping actions; the task is not retained.
     Concurrent,
 }
 

@@ -92,7 +92,7 @@ pub(super) struct DiagnosticArray {
     pub(super) status: Vec<DiagnosticStatus>,
 }
 
-/// Values of the field `level` of a status.
+/// Value of the field `level` of a status without an error.
 const OK: u8 = 0;
 const ERROR: u8 = 2;
 

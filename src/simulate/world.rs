@@ -191,8 +191,8 @@ impl World {
         Some(number::to_f64(&advance.duration) * self.slowness(&job.step))
     }
 
-    /// Factor between the real and the expected duration of an action in this world. It depends on
-    /// the seed and on the action without its designs.
+    /// Returns the ratio of the real to the expected duration of an action in this world. The ratio
+    /// depends on the seed and on the action without its designs.
     fn slowness(&self, step: &PlannedStep) -> f64 {
         let mut text = step.action.clone();
         for word in step.context().into_iter().flatten() {

@@ -59,7 +59,8 @@ pub(super) fn axioms(builder: &mut Builder<'_>, step: usize, numbers: &[Bits]) -
     Some(())
 }
 
-/// Adds level constraints, by which variables that support only each other are false.
+/// Adds level constraints for a recursive layer: each true variable is derived in a round after the
+/// variables that support it. So variables that support only each other are false.
 #[expect(clippy::arithmetic_side_effects, reason = "rounds count from 1")]
 fn levels(
     builder: &mut Builder<'_>,

@@ -28,7 +28,7 @@ use crate::sat::Lit;
 const AMOUNT_LIMIT: usize = 1_000;
 
 /// Cost limit of an encoding: only plans with a cost of at most `limit` are admitted. `bounds`
-/// provides the projections.
+/// provides projections of the task, whose lower bounds reduce the costs that are summed.
 pub struct CostLimit<'a> {
     pub limit: Int,
     pub bounds: &'a Bounds,

@@ -104,7 +104,7 @@ pub enum VariableMeaning {
     Fires { operator: u32, effect: u32, step: u32 },
     /// The body of the rule with this index in a layer of derived variables holds before the step.
     Body { layer: u32, rule: u32, step: u32 },
-    /// The derived variable follows in more than `rounds` rounds of its layer.
+    /// The derived variable is derived in a later round of its layer than round `rounds`.
     Later { variable: u32, rounds: u32, step: u32 },
     /// A bit of a number, or of an intermediate result.
     Bit { bit: u32 },

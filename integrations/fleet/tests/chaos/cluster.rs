@@ -35,7 +35,7 @@ struct Inner {
     directory: tempfile::TempDir,
     clients: [u16; 3],
     monitors: [u16; 3],
-    /// Proxies for the connections between two servers, by the number of the third server.
+    /// For each of the three servers, the proxy for the connections between the two other servers.
     wires: [Wire; 3],
     own_disk: bool,
     processes: Mutex<BTreeMap<String, Child>>,
