@@ -36,7 +36,7 @@ pub mod simulate;
 pub mod sweep;
 pub mod templates;
 
-/// Compiles and runs the examples of the book as doc tests.
+/// Includes pages of the book, so that their examples are compiled and run as doc tests.
 #[cfg(doctest)]
 mod book {
     #[doc = include_str!("../docs/how-to/built-ins.md")]

@@ -1,4 +1,4 @@
-//! Collects all errors and warnings about a mission without planning.
+//! Collects all errors and warnings about a mission, without planning.
 
 use std::time::Duration;
 
@@ -9,7 +9,7 @@ use crate::message::Message;
 use crate::mission::{Mission, Planning as _, numbers};
 use crate::setup::Setup;
 
-/// Time limit of the grounding that detects constructs the planner does not support.
+/// Time limit for grounding, which detects constructs that the planner does not support.
 const TIME_LIMIT: Duration = Duration::from_secs(20);
 
 /// Returns all errors and warnings about a mission, errors first.
@@ -40,15 +40,16 @@ pub fn lint(setup: &Setup) -> Vec<Message> {
     in_order(messages)
 }
 
-/// Returns the constructs that the planner does not support. Numbers that are too large (E304) and
-/// an exceeded limit (E306) are not faults of a mission.
+/// Returns messages about constructs that the planner does not support. Omits numbers that are too
+/// large for integers (E304) and an exceeded time limit (E306), which are not faults of the
+/// mission.
 fn refused(mission: &Mission, problem: &Problem) -> impl Iterator<Item = Message> {
     let limits = Limits::none().with_time(TIME_LIMIT);
     let refused = mission.ground(problem, &[], &limits).err().into_iter().flatten();
     refused.filter(|message| !["E304", "E306"].contains(&message.code.as_str()))
 }
 
-/// Sorts messages, errors first, then by place in the files, and removes duplicates.
+/// Sorts messages: errors first, then by position in the files. Removes duplicates.
 pub fn in_order(mut messages: Vec<Message>) -> Vec<Message> {
     let key = |message: &Message| {
         let place = (message.file.clone(), message.line, message.column);

@@ -1,5 +1,5 @@
-//! Parses mission manifests (TOML) into the sections that the caller defines, and locates their
-//! entries for messages.
+//! Parses mission manifests (TOML) into the sections that the caller defines, and determines the
+//! positions of entries for messages.
 
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
@@ -14,12 +14,12 @@ use crate::file::{self, Kind, source};
 use crate::message::{Errors, Message, did_you_mean};
 use crate::number;
 
-/// A step of a path into a manifest: the key of a table, or the index of an entry of an array.
+/// A step in a path to an entry of a manifest: a key of a table, or an index of an array.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Key {
-    /// The key of a table.
+    /// Key of an entry in a table.
     Name(String),
-    /// The entry of an array, from 0.
+    /// Index of an entry in an array, from 0.
     Index(usize),
 }
 
@@ -35,19 +35,19 @@ impl From<usize> for Key {
     }
 }
 
-/// Part of the entry at the end of a path.
+/// Part of an entry of a manifest to which a message refers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Part {
-    /// The value at the end of a path.
+    /// The value of the entry.
     Value,
-    /// The key at the end of a path.
+    /// The key of the entry.
     Key,
-    /// The position at this number of bytes from the beginning of a string. It is the beginning of
-    /// the string if the file does not contain the text of the string literally.
+    /// Offset in bytes within a string value. If the file does not contain the string literally,
+    /// for example because of escapes, the beginning of the string is used.
     Inside(usize),
 }
 
-/// Origin of a manifest: its file, its directory and its text.
+/// File name, directory and text of a manifest.
 #[derive(Debug, Clone, Default)]
 pub struct ManifestPath {
     file: String,
@@ -55,7 +55,8 @@ pub struct ManifestPath {
     text: Arc<str>,
 }
 
-/// Reads a manifest. `-` reads standard input; paths are then relative to the current directory.
+/// Reads and parses a manifest. The path `-` denotes standard input; paths in the manifest are then
+/// relative to the current directory.
 ///
 /// # Errors
 /// The file cannot be read or is not a manifest; otherwise all faults of its sections and keys.
@@ -64,8 +65,8 @@ pub fn read<S: DeserializeOwned>(file: &Path) -> Result<(S, ManifestPath), Error
     parse(source.name(), source.text(), &file.parent().map(Path::to_owned).unwrap_or_default())
 }
 
-/// Parses the text of a manifest whose paths are relative to `directory`. Messages use `name` as
-/// the name of the file.
+/// Parses the text of a manifest whose relative paths start at `directory`. Messages use `name` as
+/// the file name.
 ///
 /// # Errors
 /// The text is not a manifest; otherwise all faults of its sections and keys.
@@ -95,7 +96,7 @@ impl ManifestPath {
         }
     }
 
-    /// Adds the quoted lines of the manifest to messages.
+    /// Adds the source lines of the manifest to those messages that refer to its file.
     pub fn quote(&self, messages: impl IntoIterator<Item = Message>) -> Vec<Message> {
         let is_own = |message: &Message| message.file.as_ref() == Some(&self.file);
         let quoted =
@@ -108,14 +109,14 @@ impl ManifestPath {
         &self.file
     }
 
-    /// Returns the line and the column, both from 1, of an offset in bytes.
+    /// Returns the line and the column, both from 1, of a byte offset in the manifest.
     pub fn place(&self, offset: usize) -> (usize, usize) {
         line_and_column(&self.text, offset)
     }
 
-    /// Returns the line and the column of an entry of the manifest. `None` for the manifest as a
-    /// whole, or if it cannot be parsed. If a part of the path is missing, returns the place of the
-    /// part before it.
+    /// Returns the line and the column of an entry of the manifest. Returns `None` for the empty
+    /// path, or if the text cannot be parsed. If the entry does not exist, returns the position of
+    /// the nearest existing table or array that would contain it.
     pub fn place_of(&self, path: &[Key], part: Part) -> Option<(usize, usize)> {
         let document = DeTable::parse(&self.text).ok()?;
         let mut span = document.span();
@@ -147,12 +148,12 @@ impl ManifestPath {
         (!path.is_empty()).then(|| self.place(span.start + inside))
     }
 
-    /// Error about the value at an offset in bytes.
+    /// Creates an error (M105) about the value at a byte offset.
     pub fn wrong(&self, offset: usize, text: impl Into<String>) -> Message {
         Message::at("M105", &self.file, Some(self.place(offset)), text).with_source(&self.text)
     }
 
-    /// Returns the value of a key as an exact, non-negative number.
+    /// Converts a value to an exact number. `key` is the name of the value for messages.
     ///
     /// # Errors
     /// The value is not a non-negative decimal.
@@ -171,12 +172,12 @@ impl ManifestPath {
     }
 }
 
-/// JSON Schema of a value that [`ManifestPath::number`] reads.
+/// JSON Schema of the values that [`ManifestPath::number`] accepts.
 pub fn decimal(_: &mut SchemaGenerator) -> Schema {
     json_schema!({ "type": ["number", "string"], "minimum": 0 })
 }
 
-/// Removes pairs of a directory and `..` from a path.
+/// Removes each component `..` together with the directory before it from a path.
 fn shortened(path: &Path) -> PathBuf {
     let mut parts: Vec<Component<'_>> = Vec::new();
     for part in path.components() {
@@ -189,8 +190,8 @@ fn shortened(path: &Path) -> PathBuf {
     parts.into_iter().collect()
 }
 
-/// Collects the faults of a manifest, sorted by place. The parser reports only the first fault, so
-/// each faulty entry is blanked and the text is parsed again.
+/// Returns all faults of a manifest, sorted by position. The parser reports only the first fault,
+/// so each faulty entry is overwritten with blanks and the text is parsed again.
 fn mistakes<S: DeserializeOwned>(text: &str, first: toml::de::Error, name: &str) -> Vec<Message> {
     let mut messages: Vec<(Option<(usize, usize)>, Message)> = Vec::new();
     let (mut remaining, mut error) = (text.to_owned(), first);
@@ -220,8 +221,8 @@ fn mistakes<S: DeserializeOwned>(text: &str, first: toml::de::Error, name: &str)
     messages.into_iter().map(|(_, message)| message).collect()
 }
 
-/// Returns the text with blanks in place of the entry (or the whole section) at `place`, so that
-/// all other places keep their offsets. `None` if the text does not change.
+/// Overwrites the entry at a byte range, or its section if it is a section heading, with blanks.
+/// Line numbers do not change. Returns `None` if the text does not change.
 fn without(text: &str, place: std::ops::Range<usize>) -> Option<String> {
     let begin = text.get(..place.start)?.rfind('\n').map_or(0, |at| at + 1);
     let line_end =
@@ -232,13 +233,14 @@ fn without(text: &str, place: std::ops::Range<usize>) -> Option<String> {
         end = next.map_or(text.len(), |(at, _)| end + at);
     }
     let blank: String = text.get(begin..end)?.chars().map(|c| if c == '\n' { c } else { ' ' }).collect();
-    // A blank may be shorter than a character that is not ASCII. Columns stay right, since whole
-    // lines are blanked.
+    // A blank may have fewer bytes than the character that it replaces. Columns stay right, since
+    // whole lines are overwritten.
     let blanked = format!("{}{blank}{}", text.get(..begin)?, text.get(end..)?);
     (blanked != text).then_some(blanked)
 }
 
-/// Suggestion for a misspelt key, if the parser's message lists the valid keys.
+/// Returns a suggestion for a misspelt key, if the parser's message lists the valid keys. Otherwise
+/// the text is empty.
 fn key_suggestion(message: &str) -> String {
     let mut quoted = message.split('`').skip(1).step_by(2);
     match (["unknown field", "unknown variant"].iter().any(|start| message.starts_with(start)), quoted.next())

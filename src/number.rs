@@ -4,15 +4,16 @@ use num_rational::BigRational;
 use num_traits::{ToPrimitive, Zero};
 use serde_json::Value;
 
-/// Maximum number of characters, and of powers of ten, of an accepted number; larger ones would
-/// only consume memory.
+/// Maximum number of characters of an accepted number, and maximum absolute value of its decimal
+/// exponent. Larger numbers would only consume memory.
 const MAX_CHARACTERS: usize = 40;
 
-/// Number of decimals of values in the problem. Floating-point numbers of a robot would otherwise
-/// make the planner's integers huge.
+/// Number of decimals to which values in the problem are rounded. Floating-point values of a robot
+/// would otherwise make the planner's integers huge.
 const DECIMALS: u32 = 6;
 
-/// Parses a decimal, with or without an exponent: `-12`, `0.25`, `1e-2`.
+/// Parses a decimal, with or without an exponent: `-12`, `0.25`, `1e-2`. Returns `None` for other
+/// text and for numbers above the limits.
 pub(crate) fn exact(text: &str) -> Option<BigRational> {
     let text = text.trim();
     if text.len() > MAX_CHARACTERS {
@@ -47,7 +48,7 @@ pub(crate) fn decimal(value: &BigRational) -> String {
     rules::Decimal::from_rational(value).to_string()
 }
 
-/// Returns a number as a JSON number.
+/// Converts a number to a JSON number. A fraction without a finite decimal expansion is rounded.
 pub(crate) fn to_json(value: &BigRational) -> Value {
     decimal(value).parse::<serde_json::Number>().map_or(Value::Null, Value::Number)
 }
@@ -58,12 +59,12 @@ pub(crate) fn exact_to_json(value: &planner::Exact) -> Value {
     value.to_string().parse::<serde_json::Number>().map_or_else(|_| value.to_f64().into(), Value::Number)
 }
 
-/// The nearest double.
+/// Converts a rational to the nearest double.
 pub(crate) fn to_f64(value: &BigRational) -> f64 {
     if value.is_zero() { 0.0 } else { value.to_f64().unwrap_or(f64::MAX) }
 }
 
-/// Converts an exact number of the planner.
+/// Converts a number of the planner to a rational.
 pub(crate) fn of_plan(value: &planner::Exact) -> BigRational {
     value.to_rational()
 }

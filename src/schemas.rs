@@ -15,11 +15,12 @@ use crate::recording::answer_schema;
 use crate::setup;
 use crate::sweep::{self, SweepAnswer};
 
-/// A format: its name, its title, and its schemas, one of which describes a document.
+/// Name of a format, its title, and a function that returns its alternative schemas. A document has
+/// to satisfy one of them.
 type Entry = (&'static str, &'static str, fn() -> Vec<Schema>);
 
-/// All formats by name. An answer of `metaplan` has the name of its `format` without `metaplan-`
-/// and the version.
+/// All formats by name. The answer formats have the name of their field `format` without the prefix
+/// `metaplan-` and without the version.
 pub const FORMATS: [Entry; 25] = [
     ("manifest", "a mission's manifest", || vec![setup::schema()]),
     ("study", "a study of metaplan sweep", || vec![sweep::schema()]),
@@ -62,8 +63,8 @@ pub fn schema(name: &str) -> Option<Value> {
     Some(schema)
 }
 
-/// Joins alternative schemas by `anyOf`. Their definitions move to the root, because their
-/// references are resolved there.
+/// Joins alternative schemas by `anyOf`. Moves their `$defs` to the root, where `$ref` paths are
+/// resolved.
 fn either(mut schemas: Vec<Value>) -> Value {
     let mut definitions = Map::new();
     for schema in schemas.iter_mut().filter_map(Value::as_object_mut) {

@@ -1,8 +1,8 @@
-//! Reads a manifest with all its sections: the mission and the settings of adaptation, comparison
+//! Reads a manifest with all its sections: the mission and the settings for adaptation, comparison
 //! and simulation.
 //!
-//! Each module defines its own section. `Sections` joins them, so that a key which no section
-//! defines is rejected.
+//! Each module defines its own section. `Sections` joins the sections, so that a key which no
+//! section defines is rejected.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -52,7 +52,7 @@ struct Sections {
     scenarios: BTreeMap<String, Scenario<Simulation>>,
 }
 
-/// A mission with the settings of its manifest.
+/// A mission with all settings of its manifest.
 #[derive(Debug, Clone)]
 pub struct Setup {
     /// The mission.
@@ -61,9 +61,9 @@ pub struct Setup {
     pub description: String,
     /// Settings of the adaptation loop.
     pub settings: Settings,
-    /// The unit of the domain's times.
+    /// Unit of the times in the domain, e.g. of durations.
     pub time_unit: TimeUnit,
-    /// The symbols of the co-adaptation process, where they differ from the defaults.
+    /// Names of the PDDL symbols from which the co-adaptation process is built.
     pub roles: Roles,
     /// Scenarios by name.
     pub scenarios: BTreeMap<String, Scenario<Simulation>>,
@@ -92,8 +92,8 @@ impl Setup {
         Self::of(sections, origin)
     }
 
-    /// Parses the text of a manifest and reads the files that it names by paths relative to
-    /// `directory`. Messages use `name` as the name of the manifest.
+    /// Parses the text of a manifest and reads the files that it names. Their paths are relative to
+    /// `directory`. Messages use `name` as the file name of the manifest.
     ///
     /// # Errors
     /// All faults of the manifest and of the files that it names.
@@ -134,7 +134,7 @@ impl Setup {
         Ok(Self { mission, description, settings, time_unit, roles, scenarios, report, origin })
     }
 
-    /// Applies a scenario of the manifest to the mission.
+    /// Applies a scenario of the manifest to the mission of this setup.
     ///
     /// # Errors
     /// M108 if the scenario does not exist; otherwise all settings of the scenario that do not fit
@@ -145,8 +145,8 @@ impl Setup {
         Errors::unless_empty(mistakes.into_iter().map(|mistake| self.in_scenario(scenario, mistake)))
     }
 
-    /// Returns the simulation of a scenario: the mission in its situation and the simulated robot's
-    /// environment.
+    /// Prepares the simulation of a scenario: the mission in the scenario's situation, with the
+    /// environment of the simulated robot.
     ///
     /// # Errors
     /// M108 if the scenario does not exist or has no section `simulation`; otherwise all its
@@ -164,13 +164,13 @@ impl Setup {
         Experiment::new(mission, self.settings.clone(), simulation.clone(), self.time_unit)
     }
 
-    /// Returns all faults of the scenarios, each with its place.
+    /// Returns all faults of the scenarios, each with its position in the manifest.
     pub fn mistakes(&self) -> Vec<Message> {
         self.scenarios.iter().flat_map(|(name, scenario)| self.situation(name, scenario).1).collect()
     }
 
-    /// Returns the mission in the situation of a scenario, and all faults of the scenario and of
-    /// its simulation.
+    /// Returns the mission in the situation of a scenario. Also returns all faults of the scenario
+    /// and its simulation.
     fn situation(&self, name: &str, scenario: &Scenario<Simulation>) -> (Mission, Vec<Message>) {
         let mut mission = self.mission.clone();
         let is_sound = mission.filled().is_ok();
@@ -209,7 +209,7 @@ impl Setup {
         Message::error("M108", format!("`{name}` cannot be simulated: {why}; {alternatives}{suggestion}"))
     }
 
-    /// Coordinates of the places, which only pictures need.
+    /// Reads the coordinates of places for pictures, from the section `report` of the manifest.
     ///
     /// # Errors
     /// The file of positions cannot be read or is faulty.
@@ -217,7 +217,7 @@ impl Setup {
         self.report.positions(&self.origin)
     }
 
-    /// Converts a mistake in a scenario to a message about the manifest.
+    /// Converts a mistake in a scenario to a message with a position in the manifest.
     fn in_scenario(&self, name: &str, Mistake { path, part, message }: Mistake) -> Message {
         let path: Vec<Key> = ["scenarios".into(), name.into()].into_iter().chain(path).collect();
         let text = format!("scenario `{name}`: {}", message.message);
@@ -240,7 +240,7 @@ pub fn schema() -> Schema {
     schema_for!(Sections)
 }
 
-/// A mission without a manifest, with default settings.
+/// A setup for a mission without a manifest, with default settings.
 impl From<Mission> for Setup {
     fn from(mission: Mission) -> Self {
         Self {

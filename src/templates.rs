@@ -11,7 +11,7 @@ use crate::file::create_directory;
 /// Name of the manifest's file in every template.
 pub const MANIFEST: &str = "mission.toml";
 
-/// Name of the JSON Schema file, by which editors complete the manifest's keys.
+/// File name of the JSON Schema of manifests, with which editors complete keys.
 pub const SCHEMA: &str = "mission.schema.json";
 
 /// A template of a mission.
@@ -39,8 +39,8 @@ impl Template {
         }
     }
 
-    /// Returns the names and texts of the template's files for a mission called `mission`; `schema`
-    /// is the JSON Schema of manifests.
+    /// Returns the names and texts of the template's files. `mission` becomes the mission's name,
+    /// `schema` is the text of the JSON Schema of manifests.
     pub fn files(self, mission: &str, schema: &str) -> Vec<(&'static str, String)> {
         let texts: &[(&str, &str)] = match self {
             Self::Blank => &[
@@ -70,7 +70,7 @@ impl Template {
         texts.iter().map(named).chain([(SCHEMA, schema.to_owned())]).collect()
     }
 
-    /// Writes the files into a new directory, atomically.
+    /// Writes the template's files into a new directory, atomically.
     ///
     /// # Errors
     /// The name already exists, the parent directory does not exist, or the directory cannot be
@@ -87,8 +87,8 @@ impl Template {
     }
 }
 
-/// Returns a manifest with another name of the mission, and with the line by which editors find its
-/// schema.
+/// Sets the mission's name in the text of a manifest, and adds the line by which editors find the
+/// JSON Schema.
 fn named(manifest: &str, mission: &str) -> String {
     let name = toml::Value::String(mission.to_owned());
     let line = |line: &str| match line.strip_prefix("name = ") {

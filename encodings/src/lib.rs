@@ -1,7 +1,7 @@
-//! SAT encodings of ground planning tasks with the selection of function designs in the same
-//! formula, and SAT solvers behind one trait.
+//! SAT encodings of ground planning tasks, in which function designs are selected together with the
+//! operators, and SAT solvers behind one trait.
 //!
-//! Absent: PDDL and OWL. Which designs are available is part of the ground task.
+//! Absent: PDDL and OWL. The ground task already contains which designs are available.
 
 #![allow(missing_docs, reason = "an interface of the workspace; names say what fields hold")]
 #![warn(

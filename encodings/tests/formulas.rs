@@ -1,5 +1,5 @@
-//! Formulas against an oracle: for every number of steps, a formula is satisfiable at the oracle's
-//! cost and unsatisfiable below.
+//! Compares formulas with an oracle: for every number of steps, a formula must be satisfiable at
+//! the oracle's cost and unsatisfiable below it.
 
 use std::cell::OnceCell;
 
@@ -16,17 +16,17 @@ use task::task::Task;
 use testing::missions::Mission;
 use testing::{costs_by_steps, depot, fleet, ground_text, optimum};
 
-/// Minimal horizon of the tests.
+/// Lower limit on the step bound up to which formulas are tested.
 const STEPS: usize = 6;
 
-/// Maximum horizon of the tests.
+/// Upper limit on the step bound up to which formulas are tested.
 const MOST_STEPS: usize = 16;
 
-/// A cost above that of any plan of the small tasks below.
+/// A cost that exceeds the cost of every plan of the small tasks in these tests.
 const MUCH: Int = 200;
 
-/// Returns `true` if there is a plan with at most `steps` steps and at most this cost, and checks
-/// the decoded plan.
+/// Returns `true` if the formula admits a plan with at most `steps` steps and a cost of at most
+/// `limit`. Also executes the decoded plan.
 fn is_solvable(
     task: &Task,
     bounds: &Bounds,
@@ -114,8 +114,8 @@ fn many_formulas_are_satisfiable_exactly_from_the_cost_of_the_oracle_on() {
     }
 }
 
-/// Checks a task's formulas in all semantics. Returns whether several operators shared a step, and
-/// whether there were symmetries.
+/// Checks the formulas of a task in all step semantics. Returns `true` in the first part if several
+/// operators shared a step, and in the second part if the task has symmetries.
 fn check_all(text: (String, String), backend: &Backend) -> (bool, bool) {
     let task = ground_text(text.clone());
     let text = text.1;

@@ -1,4 +1,4 @@
-//! Conformance suite for all back ends.
+//! Conformance tests for all SAT solvers (back ends).
 
 use std::time::{Duration, Instant};
 
@@ -6,7 +6,7 @@ use metaplan_encodings::sat::{Answer, Backend, BackendError, Lit, Solver};
 use task::limits::Limits;
 use testing::random::Random;
 
-/// Programs that distributions ship, with the arguments that a user would give.
+/// Command lines of SAT solvers that Linux distributions ship.
 const PROGRAMS: [&str; 6] = [
     "minisat -verb=0 /dev/stdin /dev/stdout",
     "glucose -verb=0 /dev/stdin /dev/stdout",
@@ -16,7 +16,7 @@ const PROGRAMS: [&str; 6] = [
     "cryptominisat5 --verb 0",
 ];
 
-/// Built-in solvers, and the programs that are installed.
+/// Returns the built-in solvers and those of [`PROGRAMS`] that are installed.
 #[allow(clippy::print_stdout)]
 pub fn backends() -> Vec<Backend> {
     let built_in = Backend::BUILT_IN.iter().map(|name| name.parse().expect("a name"));
@@ -45,7 +45,8 @@ fn solver(backend: &Backend, clauses: &[Vec<i32>]) -> Box<dyn Solver> {
     solver
 }
 
-/// Checks the answers of all back ends, and that their assignments satisfy the clauses.
+/// Checks that all back ends give the expected answer, and that their assignments satisfy the
+/// clauses.
 fn check(backends: &[Backend], clauses: &[Vec<i32>], expected: Answer) {
     for backend in backends {
         let mut solver = solver(backend, clauses);
@@ -57,7 +58,8 @@ fn check(backends: &[Backend], clauses: &[Vec<i32>], expected: Answer) {
     }
 }
 
-/// Pigeonhole formula: `holes + 1` pigeons do not fit. Hard for resolution.
+/// Pigeonhole formula: `holes + 1` pigeons do not fit into the holes. It is unsatisfiable and hard
+/// for resolution.
 fn pigeons(holes: i32) -> Vec<Vec<i32>> {
     let inside = |pigeon: i32, hole: i32| pigeon * holes + hole + 1;
     let mut clauses: Vec<Vec<i32>> =
@@ -84,7 +86,7 @@ fn every_back_end_decides_special_formulas() {
     check(&backends, &pigeons(4), Unsatisfiable);
 }
 
-/// Random formulas with three literals per clause.
+/// Generator of random formulas with three literals per clause.
 struct Formulas(Random);
 
 impl Formulas {
@@ -98,7 +100,8 @@ impl Formulas {
     }
 }
 
-/// Returns `true` if some assignment satisfies the clauses and the assumptions.
+/// Returns `true` if some assignment satisfies the clauses and the assumptions, by trying all
+/// assignments.
 fn by_enumeration(variables: u64, clauses: &[Vec<i32>], assumptions: &[i32]) -> bool {
     (0..1_u32 << variables).any(|bits| {
         let literal = |l: &i32| (bits >> (l.unsigned_abs() - 1) & 1 == 1) == (*l > 0);
@@ -122,8 +125,9 @@ fn answers_for_random_formulas_agree_with_enumeration() {
     assert!((10..50).contains(&satisfiable), "the formulas are of one kind: {satisfiable} of 60");
 }
 
-/// Adds clauses in portions, each followed by calls under several sets of assumptions. Returns the
-/// numbers of satisfiable calls, of unsatisfiable calls, and of cores that omit an assumption.
+/// Adds clauses in portions, and solves under several sets of assumptions after each portion.
+/// Checks all answers. Returns the number of satisfiable calls, of unsatisfiable calls, and of
+/// cores that omit an assumption.
 fn check_growing(backend: &Backend, seed: u64) -> (usize, usize, usize) {
     let mut formulas = Formulas(Random(seed));
     let variables = 4 + formulas.0.below(7) as u64;
@@ -162,7 +166,8 @@ fn check_growing(backend: &Backend, seed: u64) -> (usize, usize, usize) {
     (satisfiable, unsatisfiable, smaller)
 }
 
-/// Regression test: repeated calls once returned cores that were not contradictory.
+/// Regression test: after several calls, a solver once returned a core (failed assumptions) that
+/// was satisfiable.
 #[test]
 fn cores_of_later_calls_are_contradictory() {
     for backend in backends() {
@@ -195,8 +200,8 @@ fn many_incremental_answers_are_right_and_cores_are_contradictory() {
     check_many_growing(30..3_000);
 }
 
-/// Pigeonhole formula with a literal that lets one pigeon stay outside: learnt clauses must not
-/// outlive the assumptions that they depend on.
+/// Pigeonhole formula with an assumption that lets one pigeon stay outside. Learnt clauses must not
+/// depend on the assumptions of an earlier call.
 #[test]
 fn answers_do_not_depend_on_earlier_calls() {
     let holes = 6;

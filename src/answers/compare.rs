@@ -10,10 +10,10 @@ use crate::message::Message;
 
 const FORMAT: &str = "metaplan-compare/1";
 
-/// Start and goal of a comparison that is one of several.
+/// Names of the start and the goal of a mission, if several pairs of start and goal are compared.
 pub type Pair = (String, String);
 
-/// The measures of the table, in its order.
+/// Names of the measures of a candidate, in the order of the table's columns.
 pub const MEASURES: [&str; 12] = [
     "goal",
     "goal_with_reserve",
@@ -29,16 +29,17 @@ pub const MEASURES: [&str; 12] = [
     "states",
 ];
 
-/// A row of the table.
+/// Row of the table of `metaplan compare`: a candidate (a plan or policy) with its measures.
 #[derive(Debug, Clone)]
 pub struct Row {
-    /// The compared pair, if there are several comparisons.
+    /// Start and goal of the row's comparison; `None` if only one pair is compared.
     pub pair: Option<Pair>,
     /// Kind of the candidate: `a` to `f`, or `+`.
     pub kind: String,
     /// Name of the candidate.
     pub name: String,
-    /// Values of the row, in the order of [`MEASURES`].
+    /// Values of the measures, in the order of [`MEASURES`]. `None` if a measure is infinite or
+    /// undefined.
     pub values: Vec<Option<f64>>,
 }
 
@@ -75,7 +76,7 @@ fn values(measures: &Measures) -> [Option<f64>; 12] {
     ]
 }
 
-/// The rows of the candidates that have been measured.
+/// Returns one table row for each given candidate, without rows for the bounds.
 pub fn begun_rows(pair: Option<&Pair>, candidates: &[Candidate]) -> Vec<Row> {
     let measured = candidates
         .iter()
@@ -83,7 +84,7 @@ pub fn begun_rows(pair: Option<&Pair>, candidates: &[Candidate]) -> Vec<Row> {
     measured.collect()
 }
 
-/// Returns the rows of a comparison, including those of the bounds.
+/// Returns the table rows of a complete comparison: its candidates and the hindsight bounds.
 pub fn rows(pair: Option<&Pair>, comparison: &Comparison) -> Vec<Row> {
     let mut rows = begun_rows(pair, &comparison.candidates);
     let [time, energy] = comparison.hindsight;
@@ -117,7 +118,8 @@ pub struct CompareAnswer<'a> {
 }
 
 impl<'a> CompareAnswer<'a> {
-    /// Answer with additional rows of the user. It is incomplete if there is a message.
+    /// Creates the answer; `published` are rows that the user adds. The answer is incomplete if
+    /// there is a message.
     pub fn new(comparisons: Vec<ComparisonAnswer>, published: &'a [Row], messages: &'a [Message]) -> Self {
         let complete = messages.is_empty();
         Self { format: FORMAT, complete, comparisons, published, messages }
@@ -231,7 +233,7 @@ struct Milliseconds {
 }
 
 impl ComparisonAnswer {
-    /// Part for a finished comparison.
+    /// Part for a comparison in which all candidates were computed.
     pub fn new(pair: Option<&Pair>, comparison: &Comparison) -> Self {
         let figures = Figures {
             front: comparison.front.clone(),
@@ -245,7 +247,8 @@ impl ComparisonAnswer {
         Self::of(pair, rows(pair, comparison), Some(figures), &comparison.costs)
     }
 
-    /// Part for an unfinished comparison.
+    /// Part for a comparison that was stopped by the time limit, with the candidates measured until
+    /// then.
     pub fn begun(pair: Option<&Pair>, candidates: &[Candidate], costs: &Costs) -> Self {
         Self::of(pair, begun_rows(pair, candidates), None, costs)
     }

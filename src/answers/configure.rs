@@ -122,7 +122,8 @@ pub struct KeeperReadyLine {
 }
 
 impl KeeperReadyLine {
-    /// The first output line of a loop, with the state of its journal if there is one.
+    /// Creates the first output line of the loop. `recovery` is the state of the loop's journal, if
+    /// it has a journal.
     pub fn new(keeper: &Keeper, recovery: Option<&Recovery>) -> Self {
         let objectives = keeper.configurator().objectives().into_iter();
         let recovered = recovery

@@ -40,21 +40,21 @@ pub struct ImportAnswer {
 }
 
 impl MissionExport {
-    /// Answer with the texts of domain and problem.
+    /// Creates the answer from the PDDL text of a domain and of a problem.
     pub fn new(domain: String, problem: String) -> Self {
         Self { format: EXPORT, domain, problem }
     }
 }
 
 impl ModelExport {
-    /// Answer with the text of the model.
+    /// Creates the answer from the text of the model.
     pub fn new(model: String) -> Self {
         Self { format: EXPORT, model }
     }
 }
 
 impl ImportAnswer {
-    /// Answer with the path of the manifest.
+    /// Creates the answer from the path of the new manifest.
     pub fn new(mission: String) -> Self {
         Self { format: IMPORT, mission }
     }

@@ -28,7 +28,7 @@ impl<'a> LintAnswer<'a> {
         Self { format: FORMAT, errors, warnings: messages.len() - errors, messages }
     }
 
-    /// Returns the numbers of errors and of warnings.
+    /// Returns the number of errors and the number of warnings.
     pub fn counts(&self) -> (usize, usize) {
         (self.errors, self.warnings)
     }

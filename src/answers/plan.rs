@@ -233,7 +233,7 @@ pub struct Preparation {
     pub ground: Duration,
 }
 
-/// Milliseconds, to the microsecond.
+/// Converts a duration to milliseconds, rounded to microseconds.
 pub fn milliseconds(duration: Duration) -> f64 {
     (duration.as_secs_f64() * 1e6).round() / 1e3
 }
@@ -261,7 +261,8 @@ impl PlanAnswer {
         }
     }
 
-    /// Adds the values by objective. Empty for a plan by the mission's own metric.
+    /// Adds the value of each objective of `--minimize`. `objectives` is empty for a plan by the
+    /// mission's own metric.
     #[must_use]
     pub fn with_objectives(mut self, objectives: Vec<Objective>) -> Self {
         self.objectives = Some(objectives).filter(|objectives| !objectives.is_empty());
@@ -275,14 +276,15 @@ impl PlanAnswer {
         self
     }
 
-    /// Adds the duration of a plan whose actions overlap.
+    /// Adds the end time of the last action, for a plan whose actions may overlap.
     #[must_use]
     pub fn with_makespan(mut self, makespan: Option<&Exact>) -> Self {
         self.makespan = makespan.map(exact_to_json);
         self
     }
 
-    /// Adds the unavailable designs that prevent a plan, if designs are the reason.
+    /// Adds the unavailable designs that prevent every plan; `None` if the designs are not the
+    /// reason.
     #[must_use]
     pub fn with_blocking(mut self, blocking: Option<&Blocking>) -> Self {
         self.blocking = match blocking {
@@ -308,7 +310,8 @@ impl PlanAnswer {
 }
 
 impl ParetoAnswer {
-    /// Answer with the points that have a plan; `objectives` are the texts of the objectives.
+    /// Creates the answer from those points of the Pareto front that have a plan. `objectives` are
+    /// the texts of the objectives.
     pub fn new(mission: &str, objectives: &[String], front: &Front, preparation: &Preparation) -> Self {
         let solved = front.points.iter().filter(|point| point.solution.plan.is_some());
         let point = |point: &Point| {
@@ -326,7 +329,7 @@ impl ParetoAnswer {
 }
 
 impl Objective {
-    /// Returns the values of a plan by the objectives with these texts.
+    /// Pairs the texts of objectives with their values for one plan.
     pub fn all(texts: &[String], values: &[Exact]) -> Vec<Self> {
         let pairs = texts.iter().zip(values);
         pairs.map(|(text, value)| Self { minimize: text.clone(), value: exact_to_json(value) }).collect()

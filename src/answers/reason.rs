@@ -163,7 +163,7 @@ impl DesignPart {
     }
 }
 
-/// Returns the objectives with their statuses, by local name, sorted.
+/// Returns the objectives that have a status, as pairs of local name and status, sorted.
 pub fn statuses(knowledge: &Knowledge) -> Vec<(String, String)> {
     let symbols = knowledge.engine().symbols();
     let mut assertions: Vec<_> = knowledge

@@ -10,7 +10,7 @@ use crate::mapek::{Beliefs, FORMAT, Planning};
 use crate::number::to_json;
 use crate::simulate::Strategy;
 
-/// The first output line of a loop: its mission, and its position in the journal.
+/// First output line of a loop: name of its mission, and state of its journal if there is one.
 #[derive(Debug, Clone, Serialize)]
 pub struct ReadyLine {
     answer: &'static str,
@@ -38,8 +38,8 @@ pub(super) struct RecoveryPart {
 }
 
 impl RecoveryPart {
-    /// State after a recovery: the number of handled lines, their greatest sequence number, and the
-    /// skipped ones.
+    /// Creates the state from the number of handled lines, the greatest sequence number `seq` of a
+    /// line, and the ranges of skipped numbers.
     pub(super) fn new(lines: u64, seq: Option<u64>, missing: Vec<[u64; 2]>, recovery: &Recovery) -> Self {
         Self {
             resumed: recovery.replayed.is_some(),
@@ -58,14 +58,15 @@ impl ReadyLine {
         Self { answer: "ready", format: FORMAT, mission, recovered: None }
     }
 
-    /// Adds the state of an opened journal.
+    /// Adds the state of the journal from which the loop was started.
     pub fn resume(&mut self, beliefs: &Beliefs, recovery: &Recovery) {
         let (lines, seq, missing) = (beliefs.lines(), beliefs.sequence(), beliefs.missing());
         self.recovered = Some(RecoveryPart::new(lines, seq, missing, recovery));
     }
 }
 
-/// Heartbeat during planning.
+/// Output line that is repeated during planning, with the best plan's cost and the lower bound so
+/// far.
 #[derive(Debug, Clone, Serialize)]
 pub struct PlanningLine {
     answer: &'static str,
@@ -76,7 +77,7 @@ pub struct PlanningLine {
 }
 
 impl PlanningLine {
-    /// Heartbeat `seconds` seconds after planning for a line of input began.
+    /// Creates the line for planning that began `seconds` seconds ago because of input line `line`.
     pub fn new(planning: &Planning, seconds: u64, line: u64) -> Self {
         Self {
             answer: "planning",
@@ -103,7 +104,7 @@ impl<'a, A> NumberedAnswer<'a, A> {
     }
 }
 
-/// Acknowledgement of a line.
+/// Acknowledgement of an input line, with the time that handling the line took.
 #[derive(Debug, Clone, Serialize)]
 pub struct HandledLine {
     answer: &'static str,
@@ -127,7 +128,7 @@ pub struct LogLine {
 }
 
 impl LogLine {
-    /// Adds the strategy that decided to an object of the format.
+    /// Adds the name of the deciding strategy to a JSON object, which is an event or an answer.
     pub fn new(line: Value, strategy: Strategy) -> Self {
         Self { line, strategy: strategy.name() }
     }

@@ -129,8 +129,8 @@ impl SimulateAnswer<'_> {
         Self { time_unit, ..self }
     }
 
-    /// Sets the number of requested missions, and messages. The answer is incomplete if there is a
-    /// message.
+    /// Sets the number of requested missions and the messages. The answer is incomplete if there is
+    /// a message.
     #[must_use]
     pub fn of(self, missions: usize, messages: Vec<Message>) -> Self {
         Self { missions, complete: messages.is_empty(), messages, ..self }
@@ -190,8 +190,8 @@ pub fn runs_of(runs: &[Run], strategy: Strategy) -> impl Iterator<Item = &Run> +
     runs.iter().filter(move |run| run.strategy == strategy)
 }
 
-/// Returns the numbers of missions in which a strategy did better and worse than the loop. `None`
-/// if the loop has no runs.
+/// Returns the number of missions in which `strategy` did better than the loop, and the number in
+/// which it did worse. `None` if the loop has no runs.
 pub fn beside_joint(runs: &[Run], strategy: Strategy) -> Option<(usize, usize)> {
     let mut joint = runs_of(runs, Strategy::Joint).peekable();
     joint.peek()?;
@@ -201,12 +201,13 @@ pub fn beside_joint(runs: &[Run], strategy: Strategy) -> Option<(usize, usize)> 
     }))
 }
 
-/// Returns the statistics of a figure over the runs of a strategy that have this figure.
+/// Returns the statistics of `figure` over the runs of a strategy. Runs for which `figure` is
+/// `None` are ignored.
 pub fn sample(runs: &[Run], strategy: Strategy, figure: impl Fn(&Run) -> Option<f64>) -> Option<Sample> {
     Sample::of(&runs_of(runs, strategy).filter_map(figure).collect::<Vec<_>>())
 }
 
-/// Returns the cost of an accomplished mission.
+/// Returns the cost of a run that reached its goal, otherwise `None`.
 pub fn accomplished_cost(run: &Run) -> Option<f64> {
     run.accomplished.then_some(run.cost)
 }

@@ -1,11 +1,11 @@
-//! Exports all conclusions from a mission's knowledge with their derivations. `rules::replay`,
-//! which shares no code with the engine's evaluation, checks them.
+//! Exports all facts of a mission's knowledge base with their derivations. `rules::replay` checks
+//! the derivations; it shares no code with the evaluation of rules.
 
 use rules::{DerivationStep, Engine, Literal, Reason, Symbol, Value};
 
 use ::verify::derivations::{Document, FORMAT, Rule, Step, Term};
 
-/// Serialises the facts and derivations of an engine.
+/// Serialises all facts of an engine, stated and derived, with their derivations as JSON.
 pub(super) fn write(engine: &Engine) -> serde_json::Result<String> {
     let derivation = engine.everything();
     let mut terms: Vec<Option<u32>> = vec![None; engine.symbols().len()];

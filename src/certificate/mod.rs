@@ -1,5 +1,5 @@
-//! Writes certificates: directories that `metaplan-verify` checks. Its documentation specifies the
-//! files.
+//! Writes certificates: directories with a plan and its proof, which `metaplan-verify` checks. The
+//! documentation of `verify` specifies the files.
 
 mod derivations;
 mod knowledge;
@@ -31,10 +31,10 @@ use crate::file::create_directory;
 use crate::message::Message;
 use crate::mission::Mission;
 
-/// Proof as the solver writes it, before it is trimmed.
+/// File name of the clausal proof (DRAT) as the SAT solver writes it, before it is trimmed.
 const DRAFT: &str = "draft.drat";
 
-/// A ground task.
+/// Reference to a ground task, with integers or with rationals.
 #[derive(Debug, Clone, Copy)]
 pub enum Ground<'c> {
     /// A task with integers.
@@ -59,23 +59,23 @@ impl Ground<'_> {
     }
 }
 
-/// Contents of a certificate.
+/// Input of [`write`]: the mission, its task and the solution to certify.
 #[derive(Debug, Clone, Copy)]
 pub struct Contents<'c> {
     /// The mission.
     pub mission: &'c Mission,
-    /// The problem as it was planned, with its metric.
+    /// The problem as it was planned, with the metric that was optimised.
     pub problem: &'c Problem,
     /// The ground task of domain and problem.
     pub task: Ground<'c>,
-    /// The solution of the task.
+    /// The solution of the task, whose status the certificate proves.
     pub solution: &'c Solution,
-    /// The plan for the mission's domain, as lines with start and duration.
+    /// The plan in terms of the mission's domain: one line per action, with start and duration.
     pub plan: &'c str,
 }
 
 impl Contents<'_> {
-    /// Returns the validator's cost of the plan, or `None` without a plan.
+    /// Executes the plan with the validator and returns its cost, or `None` without a plan.
     fn metric(&self, limits: &Limits) -> Result<Option<BigRational>, String> {
         let Some(found) = &self.solution.plan else { return Ok(None) };
         let (domain, cost) = (self.mission.domain(), found.cost.to_string());
@@ -152,8 +152,8 @@ pub fn write(directory: &Path, contents: &Contents<'_>, limits: &Limits) -> Resu
     whole.commit().map_err(failed)
 }
 
-/// Creates the witness, and compares the task with the files as `verify` does. A task that cannot
-/// be compared gets no certificate.
+/// Creates the witness, which relates the ground task to the PDDL files, and compares task and
+/// files as `verify` does. Returns an error if they cannot be compared.
 fn compared((domain, problem): (&str, &str), task: &str, limits: &Limits) -> Result<String, String> {
     let (domain, problem) = read_pddl(domain, problem)?;
     let witness =
@@ -166,7 +166,8 @@ fn compared((domain, problem): (&str, &str), task: &str, limits: &Limits) -> Res
     Ok(witness)
 }
 
-/// Writes a formula and its refutation, if there is one.
+/// Writes the formula "there is a better plan" and its refutation. Returns `Refutation::None` with
+/// the reasons if no refutation is found.
 fn refutation(
     directory: &Path,
     documents: (&str, &str),

@@ -1,6 +1,6 @@
 //! Catalogue of the message codes of `metaplan-fleet`.
 
-/// Codes in order, each with meaning, cause and remedy.
+/// Message codes in ascending order, each with meaning, cause and remedy.
 pub const CODES: &[[&str; 4]] = &[
     [
         "N300",

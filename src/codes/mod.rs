@@ -1,11 +1,11 @@
-//! Catalogue of all message codes, with meaning, cause and remedy. It joins the catalogues of the
+//! Catalogue of all message codes, with meaning, cause and remedy. It joins the catalogues of all
 //! crates.
 
 mod fleet;
 mod own;
 mod ros;
 
-/// A code of a message. Codes are stable.
+/// A message code with its explanation. The meaning of a code never changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Code {
     /// Name of the code: a letter and three digits.
@@ -14,11 +14,11 @@ pub struct Code {
     pub meaning: &'static str,
     /// Cause of the message.
     pub cause: &'static str,
-    /// Remedy.
+    /// Remedy for the cause.
     pub remedy: &'static str,
 }
 
-/// Returns all codes, sorted.
+/// Returns all codes of all crates, sorted by name.
 pub fn all() -> Vec<Code> {
     let tables = [
         rules::CODES,
@@ -38,7 +38,7 @@ pub fn all() -> Vec<Code> {
     codes
 }
 
-/// The code of that name, in capitals or not.
+/// Returns the code with this name, in upper or lower case, or `None` if it does not exist.
 ///
 /// ```
 /// assert_eq!(metaplan::codes::find(&"M110".to_lowercase()).map(|code| code.code), Some("M110"));
@@ -47,7 +47,7 @@ pub fn find(name: &str) -> Option<Code> {
     all().into_iter().find(|code| code.code.eq_ignore_ascii_case(name))
 }
 
-/// Returns `true` if a text has the form of a code.
+/// Returns `true` if a text has the form of a code: a letter and three digits.
 pub fn is_code(text: &str) -> bool {
     let (letter, digits) = text.split_at_checked(1).unwrap_or(("", ""));
     letter.chars().all(|c| c.is_ascii_alphabetic())

@@ -1,7 +1,9 @@
-//! Extracts the data of the co-adaptation process from a filled problem: places, arcs,
-//! configurations and their costs.
+//! Extracts the data of a co-adaptation process from a filled problem: places, arcs, configurations
+//! and their costs. In this decision process, a robot moves between places and changes its
+//! configuration.
 //!
-//! The PDDL symbols have default names; a manifest's section `[probabilistic]` gives others.
+//! The PDDL symbols have default names; the section `[probabilistic]` of a manifest can give other
+//! names.
 use std::collections::BTreeMap;
 
 use num_bigint::BigInt;
@@ -78,7 +80,7 @@ impl Default for Roles {
     }
 }
 
-/// A traversal of an arc with one configuration.
+/// Cost and risks of traversing an arc with one configuration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Traversal {
     /// Time of the traversal, in the mission's time unit.
@@ -91,7 +93,7 @@ pub struct Traversal {
     pub hit: BigRational,
 }
 
-/// Cost and success probability of a change of configuration.
+/// Cost and success probability of a change between two configurations.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Switch {
     /// Time of the change, in the mission's time unit.
@@ -102,20 +104,21 @@ pub struct Switch {
     pub success: BigRational,
 }
 
-/// A directed arc.
+/// A directed arc between two places.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Arc {
     /// Number of the place at which the arc starts.
     pub from: usize,
     /// Number of the place at which the arc ends.
     pub to: usize,
-    /// The traversal with each configuration, if it is possible.
+    /// The traversal with each configuration, by the configuration's number. `None` if the arc
+    /// cannot be traversed with it.
     pub by: Vec<Option<Traversal>>,
 }
 
-/// Maximum number of places in the number of a state.
+/// Maximum number of places that the encoding of a state supports.
 const MAX_PLACES: usize = 1 << 16;
-/// Maximum number of configurations in the number of a state.
+/// Maximum number of configurations that the encoding of a state supports.
 const MAX_CONFIGURATIONS: usize = 1 << 12;
 
 /// A configuration: a design of the function that moving requires.
@@ -129,12 +132,12 @@ pub struct Configuration {
     pub available: bool,
 }
 
-/// A battery in whole levels.
+/// A battery whose charge is counted in whole levels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Battery {
     /// Number of levels at the start.
     pub initial: u32,
-    /// Minimum level after each move.
+    /// Level that the battery must still have after each move.
     pub reserve: u32,
     /// Size of a level, in the mission's unit of energy.
     pub unit: u32,
@@ -149,7 +152,7 @@ pub struct Loss {
     pub rate: BigRational,
 }
 
-/// A co-adaptation mission.
+/// Data of a co-adaptation mission: a robot moves between places and changes its configuration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Coadaptation {
     /// The names of the places.
@@ -160,23 +163,23 @@ pub struct Coadaptation {
     pub goal: usize,
     /// The configurations.
     pub configurations: Vec<Configuration>,
-    /// The initial configuration.
+    /// Number of the initial configuration.
     pub initial: usize,
-    /// The arcs, by start and end.
+    /// The arcs, sorted by start and end.
     pub arcs: Vec<Arc>,
-    /// Changes between each pair of configurations, where possible.
+    /// Change from each configuration to each other one, where possible: `switches[old][new]`.
     pub switches: Vec<Vec<Option<Switch>>>,
     /// The battery, if there is one.
     pub battery: Option<Battery>,
-    /// The component that may be lost.
+    /// The component that may be lost, if there is one.
     pub loss: Option<Loss>,
 }
 
 impl Coadaptation {
-    /// The co-adaptation process of a mission, as [`Mission::filled`] has filled its problem.
+    /// Extracts the data from `problem`, which [`Mission::filled`] returned.
     ///
     /// # Errors
-    /// Everything that is missing.
+    /// Everything that is missing in the problem, and all numbers out of range.
     pub fn new(mission: &Mission, problem: &Problem, roles: &Roles) -> Result<Self, Errors> {
         let facts = Facts::new(problem);
         let mut problems = Vec::new();
@@ -261,28 +264,28 @@ impl Coadaptation {
         .checked()
     }
 
-    /// Returns `true` if the problem declares places and configurations, as [`Coadaptation::new`]
-    /// reads them. Otherwise the states of the task are the places
+    /// Returns `true` if the problem declares places and configurations in the form that
+    /// [`Coadaptation::new`] reads. Otherwise the states of the task have to be used as places
     /// ([`Tasked`](crate::comparison::Tasked)).
     pub fn is_spelt_out(problem: &Problem, roles: &Roles) -> bool {
         let facts = Facts::new(problem);
         [&roles.configured, &roles.suits].iter().any(|role| !facts.of(role).is_empty())
     }
 
-    /// Returns `true` if the loss of the component makes the configuration unavailable.
+    /// Returns `true` if the configuration needs the component that may be lost.
     pub fn lost(&self, configuration: usize) -> bool {
         self.loss
             .as_ref()
             .is_some_and(|loss| self.configurations[configuration].components.contains(&loss.component))
     }
 
-    /// Converts energy to battery levels, rounded up.
+    /// Converts an energy to a number of battery levels, rounded up.
     pub(super) fn levels(&self, energy: &BigRational) -> u32 {
         let unit = self.battery.map_or(1, |battery| battery.unit);
         (energy / BigRational::from(BigInt::from(unit))).ceil().to_integer().to_u32().unwrap_or(u32::MAX)
     }
 
-    /// Checks that probabilities are from 0 to 1, and that no number is negative.
+    /// Checks that all probabilities are from 0 to 1, and that no time or energy is negative.
     ///
     /// # Errors
     /// All numbers out of range.
@@ -325,7 +328,7 @@ impl Coadaptation {
         if problems.is_empty() { Ok(self) } else { Err(problems.into()) }
     }
 
-    /// Returns the mission without a component and without the configurations that need it.
+    /// Returns the mission in which all configurations that need `component` are unavailable.
     #[must_use]
     pub fn without(&self, component: &str) -> Self {
         let mut result = self.clone();
@@ -336,7 +339,7 @@ impl Coadaptation {
     }
 }
 
-/// Checks that the number of a state can encode `places` and `configurations`.
+/// Checks that the encoding of a state supports these numbers of places and configurations.
 pub(super) fn fits(places: usize, configurations: usize) -> Result<(), Errors> {
     if places <= MAX_PLACES && configurations <= MAX_CONFIGURATIONS {
         return Ok(());
@@ -347,7 +350,7 @@ pub(super) fn fits(places: usize, configurations: usize) -> Result<(), Errors> {
     Err(vec![Message::error("M127", text)].into())
 }
 
-/// Sorts names with natural ordering of numbers: `l2` before `l10`.
+/// Sorts names, with numbers in natural order (`l2` before `l10`), and removes duplicates.
 fn natural(names: &mut Vec<String>) {
     let key = |name: &String| {
         let digits = name.trim_start_matches(|c: char| !c.is_ascii_digit());
@@ -364,7 +367,7 @@ pub(super) fn components(view: &View<'_>, design: &str) -> Vec<String> {
         .unwrap_or_default()
 }
 
-/// The facts and values of a problem by symbol.
+/// Initial facts and values of a problem, by symbol.
 pub(super) struct Facts {
     facts: BTreeMap<String, Vec<Vec<String>>>,
     values: BTreeMap<Vec<String>, BigRational>,
@@ -390,7 +393,7 @@ impl Facts {
         result
     }
 
-    /// The arcs with their traversals.
+    /// Returns the arcs with their traversals, which are given by the facts of the role `suits`.
     fn arcs(&self, roles: &Roles, places: &[String], designs: &[String]) -> Result<Vec<Arc>, Errors> {
         let index = |names: &[String], name: &str| {
             names.iter().position(|candidate| candidate == name).unwrap_or_default()
@@ -445,7 +448,7 @@ fn words(atom: &Atom) -> (String, Vec<String>) {
     (atom.predicate.name.as_str().to_ascii_lowercase(), atom.arguments.iter().map(argument).collect())
 }
 
-/// The last argument of the goal's atom with this predicate.
+/// Returns the last argument of the goal's first atom with the predicate `location`.
 fn goal(condition: &Condition, location: &str) -> Option<String> {
     match condition {
         Condition::Atom(atom) => {

@@ -1,5 +1,5 @@
-//! Evaluates both approaches in a common process: policies of model checking, and plans with and
-//! without replanning, are measured exactly in the same decision process.
+//! Evaluates both approaches exactly in one Markov decision process: policies computed by model
+//! checking, and plans with and without replanning.
 
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -16,86 +16,87 @@ use crate::comparison::published::{published, shortest_routes};
 use crate::comparison::referee::Referee;
 use crate::comparison::route::best_on_route;
 
-/// Callback for the evaluated candidates and the costs until then.
+/// Callback that receives the candidates evaluated so far, and the computational costs so far.
 pub type Listener<'a> = dyn FnMut(&[Candidate], &Costs) + 'a;
 
 /// Settings of a comparison.
 #[derive(Clone)]
 pub struct Config<'a> {
-    /// The uncertain parts of the common process.
+    /// The sources of uncertainty in the common process.
     pub risk: Risk,
-    /// Time that a failed mission costs; by default ten times the time of the fastest plan.
+    /// Time added for a failed mission. `None` for ten times the time of the fastest plan.
     pub penalty: Option<f64>,
-    /// The priority of the published procedure: time (0), energy (1) or safety (2).
+    /// Priority of the published procedure: time (0), energy (1) or safety (2).
     pub priority: usize,
-    /// Maximum number of states.
+    /// Maximum number of states of the process.
     pub states: usize,
-    /// Returns the peak memory in megabytes since the last call, if the platform reports it.
+    /// Returns the peak memory in megabytes since its previous call, if the platform reports it.
     pub memory: &'a dyn Fn() -> Option<u64>,
 }
 
-/// A decision rule with its values.
+/// A decision rule (policy or plan) with its values.
 #[derive(Debug, Clone)]
 pub struct Candidate {
-    /// Kind of the candidate: `a` to `f`.
+    /// Kind of the candidate: policy (`a`), plan without (`b`) or with replanning (`c`), published
+    /// procedure (`d`), or shortest route (`e`).
     pub kind: char,
-    /// Name of the candidate.
+    /// Description of the candidate for the table.
     pub name: String,
-    /// Values of the candidate.
+    /// Exact values of the candidate in the common process.
     pub measures: Measures,
 }
 
-/// The table.
+/// Result of a comparison: the evaluated candidates, bounds and costs.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Comparison {
-    /// The rows.
+    /// The evaluated decision rules.
     pub candidates: Vec<Candidate>,
-    /// Vertices of the front of time and probability of success without collision, where each time
-    /// is finite.
+    /// Vertices of the Pareto front, each with expected time and probability of success without
+    /// collision. Only vertices with a finite time are included.
     pub front: Vec<[f64; 2]>,
-    /// Lower bounds on time and energy of every decision rule, including a clairvoyant one.
+    /// Lower bounds on time and on energy of every decision rule, even a clairvoyant one.
     pub hindsight: [Hindsight; 2],
-    /// The penalty for failed missions.
+    /// Time added for a failed mission.
     pub penalty: f64,
-    /// Reason why replanning cannot be worse than the best policy, if that follows without
-    /// computation.
+    /// Reason why the plan with replanning cannot be worse than the best policy, if this follows
+    /// without computation.
     pub no_price: Option<&'static str>,
-    /// Consequences of losing the component, step by step.
+    /// Consequences of losing the component, for each number of moves before the loss.
     pub loss: Option<LossReport>,
     /// Computational costs of both approaches.
     pub costs: Costs,
 }
 
 impl Comparison {
-    /// The penalised time of a kind of candidate.
+    /// Returns the penalised time of the first candidate of a kind.
     fn penalised(&self, kind: char) -> Option<f64> {
         self.candidates.iter().find(|candidate| candidate.kind == kind)?.measures.penalised_time
     }
 
     /// Returns the price of determinism: the penalised time of the plan with replanning minus that
-    /// of the best policy.
+    /// of the best policy. `None` if a value is missing or infinite.
     pub fn price_of_determinism(&self) -> Option<f64> {
         Some(self.penalised('c')? - self.penalised('a')?)
     }
 
     /// Returns the price of the open loop: the penalised time of the plan without replanning minus
-    /// that of the best policy.
+    /// that of the best policy. `None` if a value is missing or infinite.
     pub fn price_of_open_loop(&self) -> Option<f64> {
         Some(self.penalised('b')? - self.penalised('a')?)
     }
 
-    /// Returns the penalised time that replanning saves.
+    /// Returns the penalised time that replanning saves. `None` if a value is missing or infinite.
     pub fn value_of_replanning(&self) -> Option<f64> {
         Some(self.penalised('b')? - self.penalised('c')?)
     }
 }
 
-/// Compares all candidates. The planner is called at the start, and whenever replanning is needed.
-/// `report` is called after each new result.
+/// Evaluates and compares all candidates. `planner` is called for the start, and for each state
+/// that needs a new plan. `report` is called after each new result.
 ///
 /// # Errors
-/// Errors of the planner, or a limit on states.
+/// Errors of the planner, or the process has more states than the limit.
 pub fn compare(
     mission: &Coadaptation,
     config: &Config<'_>,

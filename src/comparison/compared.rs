@@ -1,4 +1,4 @@
-//! Compares a mission's plans with its process.
+//! Compares the plans for a mission with policies of its decision process.
 
 use std::time::Instant;
 
@@ -13,21 +13,22 @@ use crate::comparison::task::Tasked;
 use crate::message::Errors;
 use crate::mission::{Mission, Planning as _};
 
-/// A mission with its process.
+/// A mission with the data of its decision process.
 #[derive(Debug, Clone, Copy)]
 pub struct Compared<'m> {
-    /// The mission.
+    /// The mission for which plans are computed.
     pub mission: &'m Mission,
-    /// The symbols of the process.
+    /// Names of the PDDL symbols from which the process is built.
     pub roles: &'m Roles,
-    /// The process.
+    /// Data of the process.
     pub coadaptation: &'m Coadaptation,
-    /// The process of a task whose problem does not declare places and configurations.
+    /// The mapping between the task's states and the process, if the problem does not declare
+    /// places and configurations.
     pub tasked: Option<&'m Tasked>,
 }
 
 impl Compared<'_> {
-    /// Compares plans of the SAT planner with policies of model checking in one process.
+    /// Compares plans of the planner with policies of model checking in one process.
     ///
     /// # Errors
     /// The process is too large or cannot be solved, or the planner cannot plan.
@@ -43,7 +44,7 @@ impl Compared<'_> {
         compare(self.coadaptation, config, &mut planner, report)
     }
 
-    /// Computes the SAT planner's plan from a situation.
+    /// Computes a plan from a state of the process.
     fn plan(&self, risk: Risk, situation: Valuation) -> Result<Planned, Errors> {
         let Self { roles, coadaptation, .. } = *self;
         let mut mission = self.mission.clone();
@@ -64,7 +65,8 @@ impl Compared<'_> {
     }
 }
 
-/// Computes the plan of a problem, and the effort.
+/// Computes a plan for the problem that `problem` returns, and the effort of planning. `actions`
+/// converts its steps.
 fn solve(
     mission: &Mission,
     problem: impl FnOnce(&Mission) -> Result<Problem, Errors>,
@@ -87,8 +89,8 @@ fn solve(
     })
 }
 
-/// Converts a step to an action: a move between two places, or a change to the last design that it
-/// names.
+/// Converts the arguments of a step to an action: a move if two arguments are places, otherwise a
+/// change to the last argument. `None` if no such arc or design exists.
 fn action(mission: &Coadaptation, arguments: &[String]) -> Option<Action> {
     let is_equal = |a: &str, b: &str| a.eq_ignore_ascii_case(b);
     let place = |name: &String| mission.places.iter().position(|place| is_equal(place, name));

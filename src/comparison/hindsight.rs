@@ -1,5 +1,6 @@
-//! Evaluates the loss of a component during a mission: after each move of the nominal run, and at a
-//! rate. The clairvoyant policy gives the lower bounds (hindsight optimization).
+//! Evaluates the loss of a component during a mission: after each move of the run without failures,
+//! and at a given rate. A clairvoyant policy, which knows the time of the loss, gives lower bounds
+//! (hindsight optimisation).
 
 use num_traits::ToPrimitive;
 use probabilistic::explore::{Bounds, explore};
@@ -12,32 +13,33 @@ use crate::comparison::planned::{NoResult, PlanTable};
 use crate::comparison::process::{Action, Process, Risk, Valuation};
 use crate::comparison::referee::Referee;
 
-/// Consequences of losing the component after some move of the nominal run.
+/// Consequences of losing a component after a number of moves of the plan's run without failures.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct LossAt {
     /// Number of moves before the loss.
     pub moves: usize,
-    /// Time of the plan if the loss does not prevent its remaining part.
+    /// Total time of the plan, if it can be continued after the loss without a change.
     pub open_loop: Option<f64>,
-    /// Time with a new plan from that state.
+    /// Total time if a new plan is computed after the loss. `None` if there is no plan.
     pub replanned: Option<f64>,
-    /// Time with an optimal policy from that state.
+    /// Total time if an optimal policy is computed after the loss. `None` if the goal cannot be
+    /// reached.
     pub solved_again: Option<f64>,
-    /// Time of the policy that anticipates the loss, which may have taken another route from the
-    /// start.
+    /// Total time of the policy that takes a possible loss into account from the start, and may
+    /// take another route.
     pub anticipated: Option<f64>,
 }
 
-/// The loss of a component on the nominal run.
+/// The consequences of losing a component, for each possible moment on the run without failures.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct LossReport {
-    /// The component.
+    /// Name of the component.
     pub component: String,
-    /// The probability of losing it, for each move.
+    /// Probability of losing the component at each move.
     pub rate: f64,
-    /// The consequences for each number of moves.
+    /// Consequences of the loss, for each number of moves before it.
     pub steps: Vec<LossAt>,
 }
 
@@ -82,11 +84,11 @@ pub(super) fn report(
     })
 }
 
-/// Number of actions after which a run counts as infinite.
+/// Number of actions after which a run is considered infinite.
 const MAX_ACTIONS: usize = 100_000;
 
-/// Returns the time of a policy if the component is lost after `moves` moves and nothing else
-/// fails.
+/// Returns the total time of a policy if the component is lost after `moves` moves and nothing else
+/// fails. `None` if the policy does not reach the goal.
 fn anticipated(referee: &Referee<'_>, policy: &[u32], start: Valuation, moves: usize) -> Option<f64> {
     let mission = referee.mission;
     let (mut at, mut left, mut time) = (start, moves, 0.0);
@@ -104,7 +106,8 @@ fn anticipated(referee: &Referee<'_>, policy: &[u32], start: Valuation, moves: u
     None
 }
 
-/// Returns `true` if the remaining plan does not need the component.
+/// Returns `true` if the remaining plan does not need the lost component, beginning with this
+/// configuration.
 fn carries_on(mission: &Coadaptation, configuration: usize, remaining_plan: &[Action]) -> bool {
     let mut configuration = configuration;
     remaining_plan.iter().all(|action| match action {
@@ -121,7 +124,8 @@ fn time_from(mission: &Coadaptation, configuration: usize, plan: &[Action]) -> f
     time_of(&from, plan)
 }
 
-/// Returns the least time to the goal from a situation if nothing else fails.
+/// Returns `spent` plus the least time from the state `from` to the goal if nothing else fails.
+/// `None` if the goal cannot be reached.
 fn solved_again(referee: &Referee<'_>, from: Valuation, spent: f64) -> Result<Option<f64>, NoResult> {
     let risk = Risk { collisions: false, failures: false, ..referee.risk };
     let process =
@@ -133,15 +137,15 @@ fn solved_again(referee: &Referee<'_>, from: Valuation, spent: f64) -> Result<Op
     Ok(solution.filter(|s| !s.infinite.contains(0)).map(|s| spent + s.values[0]))
 }
 
-/// Number of moves after which a loss that has not happened is neglected.
+/// Number of moves after which a loss is neglected.
 const HORIZON: usize = 2000;
 
-/// The quantity that is minimised: time or energy.
+/// The quantity that a bound is about: time or energy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Spent {
-    /// Time is minimised.
+    /// Time, in the mission's time unit.
     Time,
-    /// Energy is minimised.
+    /// Energy, in the mission's unit of energy.
     Energy,
 }
 
@@ -157,19 +161,21 @@ impl Spent {
     }
 }
 
-/// Lower bounds on the value of every policy.
+/// Lower bounds on the time or energy of every policy.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[non_exhaustive]
 pub struct Hindsight {
-    /// Least value of a mission that reaches its goal.
+    /// Least time or energy of a mission that reaches its goal without a loss. `None` if the goal
+    /// cannot be reached.
     pub least: Option<f64>,
-    /// Expected least value for a clairvoyant controller, which knows the move after which the
-    /// component is lost. A mission that then cannot reach its goal costs the penalty.
+    /// Expected least time or energy for a clairvoyant controller, which knows in advance the move
+    /// at which the component is lost. A mission that cannot reach its goal because of the loss
+    /// costs the penalty.
     pub expected: Option<f64>,
 }
 
-/// Computes the lower bounds. Collisions, failures and the battery are neglected, which can only
-/// decrease the bounds.
+/// Computes the lower bounds for time or energy. Neglects collisions, failures and the battery,
+/// which can only decrease the bounds.
 pub fn hindsight(mission: &Coadaptation, risk: Risk, penalty: f64, spent: Spent) -> Hindsight {
     let start = mission.start * mission.configurations.len() + mission.initial;
     let never = relaxed(mission, spent, false, None);
@@ -177,7 +183,7 @@ pub fn hindsight(mission: &Coadaptation, risk: Risk, penalty: f64, spent: Spent)
     let rate = mission.loss.as_ref().filter(|_| risk.loss).and_then(|loss| loss.rate.to_f64());
     let Some(rate) = rate else { return Hindsight { least, expected: least } };
     let mut bounds = relaxed(mission, spent, true, None);
-    // The first move is the earliest cause of a loss.
+    // The component is lost at the first move at the earliest.
     let (mut expected, mut left) = (0.0, 1.0);
     for _ in 0..HORIZON {
         bounds = relaxed(mission, spent, false, Some(&bounds));
@@ -189,13 +195,14 @@ pub fn hindsight(mission: &Coadaptation, risk: Risk, penalty: f64, spent: Spent)
             break;
         }
     }
-    // With the remaining probability, the component is not lost in time to matter.
+    // With the remaining probability, the loss comes too late to matter.
     let expected = expected + left * never[start].min(penalty);
     Hindsight { least, expected: Some(expected).filter(|value| value.is_finite()) }
 }
 
-/// Returns the least value from each state to the goal. `later` gives the values after one move, if
-/// known.
+/// Returns the least time or energy from each pair of place and configuration to the goal. With
+/// `lost`, configurations that need the component cannot be used. If given, `later` has the values
+/// that apply after the next move.
 fn relaxed(mission: &Coadaptation, spent: Spent, lost: bool, later: Option<&[f64]>) -> Vec<f64> {
     let designs = mission.configurations.len();
     let at = |place: usize, design: usize| place * designs + design;

@@ -1,9 +1,9 @@
 //! Converts a map of Cámara et al. (JSON) to a mission: a knowledge base, PDDL with probabilities,
 //! and a manifest.
 //!
-//! The map's licence forbids redistribution, so users bring their own copy. Data that the file
-//! lacks (the robot's configurations, their power, the dark corridors) is taken from options and
-//! from the table below.
+//! The map's licence forbids redistribution, so users provide their own copy. Data that the file
+//! lacks (the robot's configurations, their power, the dark corridors) is taken from [`MapOptions`]
+//! and from the tables `DESIGNS` and `SPEEDS`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -11,7 +11,7 @@ use std::fmt::Write as _;
 use super::map::{Coordinates, Map, Measured, object};
 use crate::message::{Errors, Message, did_you_mean};
 
-/// Start and goal of the mission, and data that the map lacks.
+/// Options of [`import_map`]: start and goal of the mission, and data that the map lacks.
 #[derive(Debug, Clone)]
 pub struct MapOptions {
     /// The mission's name.
@@ -20,20 +20,20 @@ pub struct MapOptions {
     pub start: String,
     /// The place of the map at which the mission ends.
     pub goal: String,
-    /// The configuration at the start.
+    /// Name of the configuration at the start, such as `amcl-lidar`.
     pub configuration: String,
-    /// Pairs of neighbouring places whose corridor is dark.
+    /// Pairs of neighbouring places with a dark corridor, in which some configurations do not work.
     pub dark: Vec<(String, String)>,
-    /// The battery at the start. `None` for a mission without battery.
+    /// Energy of the battery at the start, in the map's unit. `None` for a mission without battery.
     pub battery: Option<u32>,
     /// Seconds for enabling or disabling one component.
     pub switch_seconds: u32,
-    /// `true` if the probabilities of collisions are imported.
+    /// `true` if the probabilities of collisions are imported; otherwise there are no collisions.
     pub collisions: bool,
-    /// `true` if the probabilities of failing moves are imported.
+    /// `true` if the probabilities that a move fails are imported; otherwise moves never fail.
     pub failures: bool,
-    /// `true` if each configuration has all three speeds, as in the original; `false` for full
-    /// speed only.
+    /// `true` if each configuration exists with all three speeds, as in the original; `false` for
+    /// full speed only.
     pub speeds: bool,
 }
 
@@ -54,25 +54,25 @@ impl Default for MapOptions {
     }
 }
 
-/// The files of a mission as texts.
+/// The files of an imported mission, as texts.
 #[derive(Debug, Clone)]
 pub struct Files {
-    /// Text of `NAME.toml`.
+    /// Manifest of the mission, the text of `NAME.toml`.
     pub manifest: String,
-    /// Text of `NAME.ttl`.
+    /// Knowledge base, the text of `NAME.ttl`.
     pub knowledge: String,
-    /// Text of `domain.pddl`.
+    /// PDDL domain, the text of `domain.pddl`.
     pub domain: String,
-    /// Text of `problem.pddl`.
+    /// PDDL problem, the text of `problem.pddl`.
     pub problem: String,
-    /// Text of `positions.csv`.
+    /// Coordinates of the places, the text of `positions.csv`.
     pub positions: String,
     /// Warnings about parts of the map that are ignored or assumed.
     pub warnings: Vec<Message>,
 }
 
-/// A configuration of the robot: name, power in milliwatts, `true` if it works in the dark, the
-/// configuration whose measurements apply, and its components.
+/// A localisation method of the robot: name, power in milliwatts, `true` if it works in the dark,
+/// the name of the method whose measurements apply, and its components.
 struct Design(&'static str, f64, bool, &'static str, &'static [&'static str]);
 
 const DESIGNS: [Design; 6] = [
@@ -109,8 +109,8 @@ const DESIGNS: [Design; 6] = [
 ];
 
 /// A speed of the robot: name, metres per second, power in milliwatts in addition to that of the
-/// configuration, and `true` if collisions do harm. All measurements of the map are for full speed,
-/// the first entry.
+/// localisation method, and `true` if collisions count at this speed. All measurements of the map
+/// are for full speed, the first entry.
 struct Speed(&'static str, f64, f64, bool);
 
 const SPEEDS: [Speed; 3] = [
@@ -119,12 +119,12 @@ const SPEEDS: [Speed; 3] = [
     Speed("safe", 0.24, 4000.0, false),
 ];
 
-/// A legal configuration: a localisation method at a speed.
+/// A configuration of the imported mission: a localisation method at a speed.
 #[derive(Clone, Copy)]
 struct LegalConfiguration {
     design: &'static Design,
     speed: &'static Speed,
-    /// `true` if the speed is a component, because there are several speeds.
+    /// `true` if each speed is a component of its own, because there are several speeds.
     several: bool,
 }
 
@@ -150,24 +150,24 @@ impl LegalConfiguration {
         components.chain(self.several.then(|| format!("{}_speed", self.speed.0))).collect()
     }
 
-    /// Ratio of the time to that at full speed.
+    /// Ratio between the duration of a move at this speed and at full speed.
     fn slowness(self) -> f64 {
         SPEEDS[0].1 / self.speed.1
     }
 
-    /// Ratio of the energy to that at full speed.
+    /// Ratio between the energy of a move at this speed and at full speed.
     fn effort(self) -> f64 {
         self.slowness() * (self.design.1 + self.speed.2) / (self.design.1 + SPEEDS[0].2)
     }
 }
 
-/// Speed for the computation of energy, in metres per second.
+/// Speed in metres per second from which the energy of a move is computed.
 const SPEED: f64 = 0.68;
-/// Energy per metre and milliwatt at that speed, in the map's unit.
+/// Energy per metre and milliwatt at [`SPEED`], in the map's unit.
 const ENERGY: f64 = 0.01;
 /// Maximum number of places that the message about an unknown place lists.
 const MAX_LISTED_PLACES: usize = 20;
-/// Battery levels kept in reserve.
+/// Energy of the battery that is kept in reserve, in the map's unit.
 const RESERVE_LEVELS: u32 = 500;
 
 type Corridor = (String, String);
@@ -176,7 +176,8 @@ fn pair(a: &str, b: &str) -> Corridor {
     if a <= b { (a.to_owned(), b.to_owned()) } else { (b.to_owned(), a.to_owned()) }
 }
 
-/// Returns one measurement for each arc and configuration. Of several, the last one counts.
+/// Returns the measurement in `field` for each corridor and configuration, rounded to `digits`
+/// decimals. Of several measurements, the last one is used.
 fn measured(
     list: &[Measured<'_>],
     field: &str,
@@ -198,10 +199,10 @@ fn rounded(value: f64, digits: usize) -> f64 {
     format!("{value:.digits$}").parse().unwrap_or(value)
 }
 
-/// Reads a map and returns the files of a mission.
+/// Converts the text of a map to the files of a mission.
 ///
 /// # Errors
-/// The file is not such a map, or does not have the given places.
+/// The text is not a map of this form, or a place or configuration in `options` does not exist.
 pub fn import_map(file: &str, text: &str, options: &MapOptions) -> Result<Files, Errors> {
     let map = Map::read(file, text)?;
     let places = map.places();
@@ -245,7 +246,7 @@ fn manifest(name: &str) -> String {
     )
 }
 
-/// Returns the coordinates of the places, in metres.
+/// Returns a CSV file with the coordinates of the places, in metres.
 fn positions(map: &Map<'_>) -> String {
     map.nodes.iter().fold("place,x,y\n".to_owned(), |text, node| {
         text + &format!("{},{},{}\n", object(&node.id.text), node.coords.x, node.coords.y)
@@ -318,7 +319,7 @@ const DOMAIN: &str = "; A robot moves along arcs in one of its configurations. W
       (increase (total_time) (switch_time ?old ?new)))))
 ";
 
-/// Returns the domain. Without a battery, its lines about the battery are omitted.
+/// Returns the domain. Without a battery, the parts about the battery are omitted.
 fn domain(options: &MapOptions) -> String {
     if options.battery.is_some() {
         return DOMAIN.to_owned();

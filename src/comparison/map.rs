@@ -1,8 +1,9 @@
-//! Parses the maps of Cámara et al. (JSON) and records the place of everything that may be faulty.
+//! Parses the maps of Cámara et al. (JSON). Keeps the position in the text of everything that may
+//! be faulty, for messages.
 //!
-//! A place has `node-id`, `connected-to` and `coords`. Maps of 2017, for Rainbow's first robots,
-//! have `coord` instead, no measurements, and rectangles that the robot should avoid
-//! (`unsafe-rects`), which no corridor crosses.
+//! A place has `node-id`, `connected-to` and `coords`. Maps of 2017, for the first robots of the
+//! Rainbow project, differ: they have `coord` instead, no measurements, and rectangles that the
+//! robot should avoid (`unsafe-rects`). No corridor crosses these rectangles.
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Deserializer, de};
@@ -11,7 +12,7 @@ use serde_json::value::RawValue;
 
 use crate::message::{Errors, Message, did_you_mean};
 
-/// A map.
+/// A map: its places with their neighbours, and measurements on arcs.
 #[derive(Deserialize)]
 pub(super) struct Map<'t> {
     #[serde(rename = "map", borrow)]
@@ -43,7 +44,7 @@ pub(super) struct Coordinates {
     pub(super) y: f64,
 }
 
-/// A string with its place.
+/// A string with its position in the text.
 pub(super) struct Placed<'t> {
     pub(super) text: String,
     raw: &'t str,
@@ -58,7 +59,7 @@ impl<'de: 't, 't> Deserialize<'de> for Placed<'t> {
     }
 }
 
-/// Measurements on an arc.
+/// Measurements on an arc, by configuration.
 pub(super) struct Measured<'t> {
     pub(super) from: String,
     pub(super) to: String,
@@ -105,7 +106,7 @@ impl<'t> Map<'t> {
         if problems.is_empty() { Ok(map) } else { Err(problems.into()) }
     }
 
-    /// The names of all places.
+    /// Returns the names of all places.
     pub(super) fn places(&self) -> BTreeSet<&str> {
         self.nodes.iter().map(|node| node.id.text.as_str()).collect()
     }
@@ -157,7 +158,7 @@ impl<'t> Map<'t> {
         problems
     }
 
-    /// Warnings about parts of the map that are ignored or assumed.
+    /// Returns warnings about parts of the map that are ignored, and about values that are assumed.
     pub(super) fn warnings(&self, file: &str) -> Vec<Message> {
         let mut warnings = Vec::new();
         let mut warn = |text: &str| warnings.push(Message::warning("M132", format!("{file}: {text}")));
@@ -174,13 +175,14 @@ impl<'t> Map<'t> {
     }
 }
 
-/// Converts the name of a place or design to a PDDL object.
+/// Converts the name of a place or design to a PDDL name: lower case, with `_` in place of special
+/// characters.
 pub(super) fn object(name: &str) -> String {
     let safe: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
     safe.to_ascii_lowercase()
 }
 
-/// Line and column, both from 1, of a part of a text.
+/// Returns line and column, both from 1, at which `part`, a slice of `text`, begins.
 fn place(text: &str, part: &str) -> (usize, usize) {
     let offset = (part.as_ptr() as usize).saturating_sub(text.as_ptr() as usize);
     let before = text.get(..offset).unwrap_or_default();

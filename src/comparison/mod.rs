@@ -2,8 +2,8 @@
 //! and Task Plan Co-Adaptation for Mobile Service Robots, SEAMS 2020).
 //!
 //! A mission with routes and configurations is converted to a Markov decision process
-//! ([`Coadaptation`]). The plan of the SAT planner and the policies of probabilistic model checking
-//! are evaluated in that process ([`compare`]).
+//! ([`Coadaptation`]). The plan of Metaplan's planner and the policies of probabilistic model
+//! checking are evaluated in this process ([`compare`]).
 
 mod coadaptation;
 mod compare;

@@ -1,11 +1,11 @@
-//! Executes plans without any failure, and computes their end and their time.
+//! Executes plans without any failure, and computes their end state and their time.
 
 use num_rational::BigRational;
 
 use crate::comparison::coadaptation::Coadaptation;
 use crate::comparison::process::{Action, Risk, Valuation};
 
-/// Returns the time of a plan without failures.
+/// Returns the time that a plan takes if nothing fails.
 pub(super) fn time_of(mission: &Coadaptation, plan: &[Action]) -> f64 {
     use probabilistic::Number;
     let (mut configuration, mut time) = (mission.initial, 0.0);
@@ -24,7 +24,7 @@ pub(super) fn time_of(mission: &Coadaptation, plan: &[Action]) -> f64 {
     time
 }
 
-/// Returns the state after an action without failures.
+/// Returns the state after an action if nothing fails.
 pub(super) fn after(mission: &Coadaptation, at: Valuation, action: Action, risk: Risk) -> Valuation {
     let levels = |energy: &BigRational| if risk.battery { mission.levels(energy) } else { 0 };
     match action {

@@ -1,4 +1,5 @@
-//! Plans cached by situation, their costs of computation, and the decision rule that follows them.
+//! Plans of the planner, cached by state of the process, with their computational costs, and the
+//! decision rule that follows these plans.
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -13,27 +14,27 @@ use crate::comparison::process::{Action, Risk, State, Valuation};
 use crate::comparison::referee::Referee;
 use crate::message::Errors;
 
-/// A plan from a situation, and the effort of computing it.
+/// A plan from a state of the process, and the effort of computing the plan.
 #[derive(Debug, Clone, Default)]
 pub struct Planned {
-    /// The actions. `None` if there is no plan.
+    /// Actions of the plan. `None` if there is no plan.
     pub actions: Option<Vec<Action>>,
-    /// Variables of the largest formula.
+    /// Number of variables of the largest formula.
     pub variables: u64,
-    /// Number of clauses of the formula.
+    /// Number of clauses of the largest formula.
     pub clauses: u64,
     /// Time of planning, by stage.
     pub time: Stages,
 }
 
-/// Times of the stages of an answer.
+/// Running times by stage, for a solution of the process or for a plan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Stages {
     /// Time of building the process, or the ground task with its formulas.
     pub build: Duration,
-    /// Time of solving.
+    /// Time of solving the process, or of search and SAT solving.
     pub solve: Duration,
-    /// Time of extracting the decisions.
+    /// Time of extracting the policy or the plan from the solution.
     pub extract: Duration,
 }
 
@@ -44,10 +45,10 @@ impl Stages {
     }
 }
 
-/// Computes plans; called once for each situation.
+/// Callback that computes a plan from a state; called once for each state.
 pub type PlanFinder<'a> = dyn FnMut(&Valuation) -> Result<Planned, Errors> + 'a;
 
-/// Computational costs of both approaches.
+/// Computational costs of model checking and of planning.
 #[derive(Debug, Clone, Default)]
 #[non_exhaustive]
 pub struct Costs {
@@ -55,20 +56,21 @@ pub struct Costs {
     pub states: usize,
     /// Number of transitions of the process.
     pub transitions: usize,
-    /// Number of decisions of the policies of single objectives, over their reachable states.
+    /// Number of decisions of the policies for single objectives, in all states that the policies
+    /// reach.
     pub decisions: usize,
-    /// Times of the process, for all objectives together.
+    /// Running times for the process, for all objectives together.
     pub process: Stages,
     /// Peak memory in megabytes until the process was solved, including memory that the planner has
     /// not released.
     pub process_memory: Option<u64>,
     /// Number of computed plans.
     pub plans: usize,
-    /// Times of the first plan (cold caches).
+    /// Running times of the first plan, with cold caches.
     pub first_plan: Stages,
     /// Peak memory in megabytes during the first plan.
     pub plan_memory: Option<u64>,
-    /// Total time of the further plans (warm caches).
+    /// Total time of all further plans, with warm caches.
     pub more_plans: Duration,
     /// Number of variables of the largest formula.
     pub variables: u64,
@@ -76,12 +78,12 @@ pub struct Costs {
     pub clauses: u64,
 }
 
-/// Reason for a comparison without result.
+/// Reason why a comparison has no result.
 #[derive(Debug)]
 pub enum NoResult {
     /// The process cannot be built or solved.
     Process(Error),
-    /// The planner cannot plan.
+    /// The planner rejects the mission.
     Planner(Errors),
 }
 
@@ -97,7 +99,8 @@ impl From<Errors> for NoResult {
     }
 }
 
-/// Cache of plans by situation. Plans do not depend on the collision flag.
+/// Cache of plans by state of the process. The collision flag is ignored, because plans do not
+/// depend on it.
 pub(super) struct PlanTable<'a, 'b> {
     pub(super) planner: &'a mut PlanFinder<'b>,
     pub(super) plans: BTreeMap<Valuation, Option<Vec<Action>>>,
@@ -105,7 +108,7 @@ pub(super) struct PlanTable<'a, 'b> {
 }
 
 impl PlanTable<'_, '_> {
-    /// Returns the plan from a situation.
+    /// Returns the plan from a state, computed or from the cache. `None` if there is no plan.
     pub(super) fn plan(&mut self, situation: &Valuation) -> Result<Option<Vec<Action>>, Errors> {
         let key = Valuation { hit: false, ..*situation };
         if let Some(plan) = self.plans.get(&key) {
@@ -124,9 +127,10 @@ impl PlanTable<'_, '_> {
         Ok(planned.actions)
     }
 
-    /// Follows plans, and replans in every state that the last plan does not expect.
+    /// Evaluates the decision rule that follows plans and plans again in every state that the last
+    /// plan does not expect.
     pub(super) fn play(&mut self, referee: &Referee<'_>) -> Result<Measures, NoResult> {
-        // Actions of the current plan, for each state that it expects.
+        // Next action of a computed plan, by the state in which the plan expects to execute it.
         let mut expected: BTreeMap<Valuation, Action> = BTreeMap::new();
         let mut failure = None;
         let unexpected = RefCell::new(BTreeSet::new());
@@ -162,7 +166,8 @@ impl PlanTable<'_, '_> {
     }
 }
 
-/// Records the action of a plan in each state that it expects.
+/// Adds to `expected` the state before each action of a plan, with this action. Stops at a state
+/// that is already present.
 fn follow(
     mission: &Coadaptation,
     mut at: Valuation,

@@ -1,4 +1,4 @@
-//! Evaluates a decision rule (a policy, a plan or a planner) exactly in the process.
+//! Evaluates a decision rule (a policy, a plan or a planner) exactly in the decision process.
 
 use std::cell::RefCell;
 
@@ -10,15 +10,15 @@ use probabilistic::{Direction, Error, Mdp, Number, Problem};
 
 use crate::comparison::process::{Process, State};
 
-/// Decides on an action in a state after a number of steps, by the number of the action. `None`
-/// ends the mission.
+/// Decision rule: returns the number of the action for a state and a number of executed steps.
+/// `None` ends the mission.
 pub type Decide<'a> = dyn FnMut(State, u32) -> Option<u32> + 'a;
 
-/// The process with a fixed decision rule.
+/// The process with a fixed decision rule, which is a Markov chain.
 struct FixedProcess<'a, 'b, N> {
     process: &'a Process<N>,
     decide: RefCell<&'a mut Decide<'b>>,
-    /// `true` if decisions depend on the number of steps.
+    /// `true` if decisions depend on the number of executed steps.
     counts: bool,
 }
 
@@ -52,38 +52,41 @@ impl<N: Number> Generator<N> for FixedProcess<'_, '_, N> {
     }
 }
 
-/// Values of a decision rule. Sums are over the whole mission, until the goal or a failure.
+/// Values of a decision rule. Expected values are sums over the whole mission, until the goal or a
+/// failure. They are `None` if they are infinite or undefined.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Measures {
     /// Probability of reaching the goal.
     pub goal: f64,
-    /// Probability of reaching the goal without using the battery's reserve.
+    /// Probability of reaching the goal with a battery level of at least the reserve.
     pub goal_with_reserve: f64,
-    /// The probability of no collision at all.
+    /// Probability that no collision happens during the mission.
     pub no_collision: f64,
-    /// The expected number of collisions.
+    /// Expected number of collisions.
     pub collisions: f64,
     /// Expected time. `None` if the mission may never end.
     pub time: Option<f64>,
-    /// Expected energy.
+    /// Expected energy. `None` if the mission may never end.
     pub energy: Option<f64>,
-    /// Expected reconfigurations.
+    /// Expected number of reconfigurations.
     pub reconfigurations: Option<f64>,
     /// Expected time of missions that reach the goal. `None` if no mission does.
     pub time_if_successful: Option<f64>,
-    /// Expected energy of missions that reach the goal.
+    /// Expected energy of missions that reach the goal. `None` if no mission does.
     pub energy_if_successful: Option<f64>,
-    /// Expected time, where a failed mission costs the penalty.
+    /// Expected time plus the penalty for missions that do not reach the goal.
     pub penalised_time: Option<f64>,
-    /// Expected number of replannings during the mission.
+    /// Expected number of states in which a new plan is needed.
     pub replans: f64,
-    /// Number of visited states.
+    /// Number of reachable states.
     pub states: usize,
 }
 
-/// Evaluates a decision rule. The process must have all its rewards. After all decisions are made,
-/// `replans` returns the states in which a new plan was needed.
+/// Evaluates a decision rule. `process` must have all rewards. With `counts`, decisions depend on
+/// the number of steps. `penalty` is the time added for a failed mission. `reserve` is the battery
+/// level for [`Measures::goal_with_reserve`]. After all decisions are made, `replans` returns
+/// `true` for states in which a new plan was needed.
 ///
 /// # Errors
 /// There are too many states.

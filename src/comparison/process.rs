@@ -1,8 +1,8 @@
-//! Converts a co-adaptation mission to a Markov decision process whose successors are computed
-//! natively.
+//! Converts a co-adaptation mission to a Markov decision process whose successors are computed on
+//! demand.
 //!
-//! This is the corrected interpretation of the approach: every route, reconfiguration anywhere, a
-//! permanent collision flag, and moves only while the battery stays above the reserve.
+//! The process corrects the published procedure: it has every route, reconfigurations at every
+//! place, a permanent collision flag, and moves only while the battery stays above the reserve.
 
 use fixedbitset::FixedBitSet;
 use num_rational::BigRational;
@@ -12,10 +12,10 @@ use probabilistic::{Error, Number};
 
 use crate::comparison::coadaptation::Coadaptation;
 
-/// The rewards that the process has, in this order: time, energy, collisions, reconfigurations, moves.
+/// Names of the rewards of the process, in their order.
 pub const REWARDS: [&str; 5] = ["time", "energy", "collisions", "reconfigurations", "moves"];
 
-/// The uncertain parts of a mission.
+/// The sources of uncertainty that a process includes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[allow(clippy::struct_excessive_bools, reason = "each is a choice of its own")]
 pub struct Risk {
@@ -23,14 +23,14 @@ pub struct Risk {
     pub collisions: bool,
     /// `true` if moves may fail and end the mission.
     pub failures: bool,
-    /// `true` if the component may be lost.
+    /// `true` if the component may be lost during moves.
     pub loss: bool,
     /// `true` if the battery is part of the state.
     pub battery: bool,
 }
 
 impl Risk {
-    /// All risks that the mission has data for.
+    /// Returns the risks for which the mission has data.
     pub fn all(mission: &Coadaptation) -> Self {
         Self {
             collisions: true,
@@ -41,7 +41,7 @@ impl Risk {
     }
 }
 
-/// A state: place, configuration, flags and battery, packed into one number.
+/// A state of the process: place, configuration, flags and battery, packed into one number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct State(u64);
 
@@ -58,7 +58,7 @@ pub struct Valuation {
 }
 
 impl Valuation {
-    /// Returns the initial state of a mission.
+    /// Returns the initial state of a mission. The battery is 0 unless `risk` includes it.
     pub(super) fn start(mission: &Coadaptation, risk: Risk) -> Self {
         Self {
             place: mission.start,
@@ -72,7 +72,7 @@ impl Valuation {
 }
 
 impl State {
-    /// Decodes the state.
+    /// Decodes the packed state.
     pub fn situation(self) -> Valuation {
         Valuation {
             place: (self.0 & 0xFFFF) as usize,
@@ -97,10 +97,11 @@ struct Move<N> {
     action: u32,
     to: usize,
     levels: u32,
-    /// Probabilities of success without a collision, success with a collision, and failure; indexed
-    /// by the loss of the component.
+    /// Probabilities of success without a collision, success with a collision, and failure. The
+    /// first array is for moves at which the component is not lost, the second for moves at which
+    /// it is lost.
     outcomes: [[N; 3]; 2],
-    /// Rewards of the process.
+    /// Values of the selected rewards for this move.
     rewards: Vec<N>,
 }
 
@@ -114,27 +115,27 @@ struct Reconfiguration<N> {
     rewards: Vec<N>,
 }
 
-/// The process of a mission, with numbers of type `N`.
+/// The Markov decision process of a mission, with numbers of type `N`.
 #[derive(Debug, Clone)]
 pub struct Process<N> {
     goal: usize,
     initial: State,
     reserve: u32,
-    /// Moves for each place and configuration.
+    /// Possible moves, by place and configuration.
     moves: Vec<Vec<Vec<Move<N>>>>,
-    /// Reconfigurations for each configuration.
+    /// Possible reconfigurations, by configuration.
     changes: Vec<Vec<Reconfiguration<N>>>,
-    /// For each configuration, `true` if it needs the lost component.
+    /// For each configuration, `true` if it needs the component that may be lost.
     lost: Vec<bool>,
     risk: Risk,
-    /// Number of rewards that are computed.
+    /// Number of the selected rewards.
     rewards: usize,
     /// Number of battery levels, including the empty one.
     levels: usize,
 }
 
 impl<N: Number> Process<N> {
-    /// Builds the process with the given risks, and with some of the [`REWARDS`].
+    /// Builds the process with the given risks. `rewards` selects some of the [`REWARDS`] by name.
     pub fn new(mission: &Coadaptation, risk: Risk, rewards: &[&str]) -> Self {
         let number = |value: &BigRational| N::from_rational(value);
         let indices: Vec<usize> =
@@ -207,14 +208,14 @@ impl<N: Number> Process<N> {
         }
     }
 
-    /// Returns the process with another initial state.
+    /// Returns the process with `state` as initial state.
     #[must_use]
     pub fn starting(mut self, state: State) -> Self {
         self.initial = state;
         self
     }
 
-    /// Returns the set of states at the goal.
+    /// Returns the numbers of the states that are at the goal.
     pub fn goals(&self, states: &States<State>) -> FixedBitSet {
         let mut goals = FixedBitSet::with_capacity(states.len());
         for (number, state) in states.iter().enumerate() {
@@ -223,7 +224,7 @@ impl<N: Number> Process<N> {
         goals
     }
 
-    /// Returns `true` if the state is at the goal.
+    /// Returns `true` if the state is at the goal and the mission has not failed.
     pub fn is_goal(&self, state: State) -> bool {
         let situation = state.situation();
         situation.place == self.goal && !situation.failed
@@ -238,7 +239,7 @@ impl<N: Number> Process<N> {
     }
 }
 
-/// Meaning of an action number: a move along an arc, or a change to a configuration.
+/// An action of the process: a move along an arc, or a change of the configuration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Action {
     /// A move along the arc with this number.
@@ -274,8 +275,8 @@ impl<N: Number> Generator<N> for Process<N> {
         self.rewards
     }
 
-    /// Returns the number of state codes. Codes of states that are connected without moves are
-    /// adjacent, and codes of states that differ little in the battery are close.
+    /// Returns the number of state codes. States that differ only in the configuration have
+    /// adjacent codes; states with similar battery levels have close codes.
     fn codes(&self) -> Option<usize> {
         self.levels.checked_mul(self.moves.len())?.checked_mul(8)?.checked_mul(self.lost.len())
     }

@@ -1,5 +1,6 @@
 //! Converts a co-adaptation mission to a model in the PRISM language.
-//! [`Process`](crate::comparison::Process) builds the same process natively.
+//! [`Process`](crate::comparison::Process) is the same decision process with successors computed
+//! directly.
 
 use std::collections::BTreeSet;
 
@@ -15,8 +16,8 @@ use probabilistic::prism::identifier;
 use crate::comparison::coadaptation::{Battery, Coadaptation, Traversal};
 use crate::comparison::process::{REWARDS, Risk};
 
-/// Returns the model of a mission: `l` is the place, `c` the configuration, `b` the battery; `hit`,
-/// `failed` and `lost` are flags.
+/// Returns the PRISM model of a mission. Its variables are the place `l`, the configuration `c`,
+/// the battery `b`, and the flags `hit`, `failed` and `lost`.
 pub fn program(mission: &Coadaptation, risk: Risk) -> Model {
     let writer = ProcessWriter { mission, risk };
     model(
@@ -28,7 +29,7 @@ pub fn program(mission: &Coadaptation, risk: Risk) -> Model {
     )
 }
 
-/// A model of one module, with its variables and commands.
+/// Creates a PRISM model with one module.
 pub(super) fn model(
     remark: String,
     constants: Vec<Constant>,
@@ -50,7 +51,7 @@ pub(super) fn model(
     }
 }
 
-/// A variable from 0 to the greatest value.
+/// Creates an integer variable with values from 0 to `greatest`.
 pub(super) fn range(name: &str, greatest: usize, initial: usize) -> Variable {
     Variable {
         name: name.to_owned(),
@@ -60,7 +61,7 @@ pub(super) fn range(name: &str, greatest: usize, initial: usize) -> Variable {
     }
 }
 
-/// A truth value, false at first.
+/// Creates a Boolean variable that is initially false.
 pub(super) fn flag(name: &str) -> Variable {
     Variable { range: None, initial: Some(Expr::bool(false)), ..range(name, 0, 0) }
 }
@@ -122,13 +123,14 @@ impl ProcessWriter<'_> {
         variables
     }
 
-    /// Returns the guard of a running mission: not at the goal, and no failure.
+    /// Returns the guard "the mission is running": not at the goal, and no move has failed.
     fn running(&self) -> Expr {
         let away = Expr::name("l").op(BinaryOp::NotEqual, Expr::int(self.mission.goal as i64));
         all(std::iter::once(away).chain(self.risk.failures.then(|| not(Expr::name("failed")))))
     }
 
-    /// Returns the guard that the battery suffices, and the update of the battery.
+    /// Returns the guard that the battery suffices for an energy, and the assignment that subtracts
+    /// the energy.
     fn spend(&self, energy: &BigRational) -> (Option<Expr>, Assignments) {
         let Some(battery) = self.battery() else { return (None, Vec::new()) };
         let levels = i64::from(self.mission.levels(energy));
@@ -186,7 +188,7 @@ impl ProcessWriter<'_> {
         commands
     }
 
-    /// Returns the outcomes of a move, with their probabilities.
+    /// Returns the outcomes of a move: each probability with its assignments.
     fn ends(&self, traversal: &Traversal, to: usize, spent: &Assignments) -> Vec<(BigRational, Assignments)> {
         let certain = BigRational::one();
         let hit = if self.risk.collisions { traversal.hit.clone() } else { BigRational::zero() };
@@ -236,7 +238,7 @@ impl ProcessWriter<'_> {
                 if let Some(traversal) = traversal {
                     let success =
                         if self.risk.failures { traversal.success.clone() } else { BigRational::one() };
-                    // The expected number of collisions of a move is its probability of one.
+                    // The expected number of collisions of a move is its collision probability.
                     let hits = if self.risk.collisions { success * &traversal.hit } else { zero.clone() };
                     add_reward(
                         &self.go(index),
@@ -280,7 +282,8 @@ pub(super) fn command(action: String, guard: Expr, updates: Vec<Update>) -> Comm
     Command { action: Some(action), guard, updates, place: Place::default() }
 }
 
-/// Converts outcomes to updates. A certain outcome has no probability.
+/// Converts outcomes to updates, without those of probability 0. A single outcome has no explicit
+/// probability.
 pub(super) fn updates(ends: impl IntoIterator<Item = (BigRational, Assignments)>) -> Vec<Update> {
     let possible: Vec<_> = ends.into_iter().filter(|(probability, _)| !probability.is_zero()).collect();
     let certain = possible.len() == 1;

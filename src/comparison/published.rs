@@ -1,12 +1,12 @@
 //! The published procedure: the five shortest routes, one configuration for the whole route, and a
 //! utility.
 //!
-//! The description is by Cámara, Schmerl and Garlan (SEAMS 2020), the details by the public
-//! re-implementation. Simple paths are sorted by length and the first five are kept. For each,
-//! model checking determines the best configuration by the priority property, and evaluates the
-//! other properties with it. The route with the best utility wins. Two oddities are preserved: each
-//! move that can collide overwrites the flag `collided`, so only the last of these moves counts,
-//! and an empty battery does not end a mission.
+//! The procedure is described by Cámara, Schmerl and Garlan (SEAMS 2020); its details are those of
+//! the public re-implementation. Simple paths are sorted by length and the first five are kept. For
+//! each route, model checking determines the best configuration by the priority property, and
+//! evaluates the other properties with this configuration. The route with the best utility is
+//! chosen. Two peculiarities are preserved. Each move that can collide overwrites the flag
+//! `collided`, so only the last of these moves counts. An empty battery does not end a mission.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap};
@@ -15,25 +15,25 @@ use crate::comparison::coadaptation::{Coadaptation, Traversal};
 use crate::comparison::process::Action;
 use probabilistic::Number;
 
-/// Number of routes that are kept.
+/// Number of shortest routes that the procedure compares.
 pub(super) const ROUTES: usize = 5;
-/// Weight of the priority property, and of each other property.
+/// Weight of the priority property, and weight of each other property.
 const WEIGHTS: [f64; 2] = [0.6, 0.2];
-/// Maximum number of partial routes in the search for routes.
+/// Maximum number of partial routes that are examined in the search for routes.
 const MAX_PARTIAL_ROUTES: usize = 2_000_000;
 
-/// Decision of the procedure, with its predicted values.
+/// Decision of the published procedure, with its predicted values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Published {
-    /// The route, as numbers of arcs.
+    /// Numbers of the arcs of the route, in order.
     pub route: Vec<usize>,
-    /// The configuration for the whole way.
+    /// Number of the configuration for the whole route.
     pub configuration: usize,
     /// Utility of the decision, from 0 to 1.
     pub utility: f64,
-    /// Predicted time, in the mission's unit.
+    /// Predicted time, in the mission's time unit.
     pub time: f64,
-    /// Predicted energy.
+    /// Predicted energy, in the mission's unit.
     pub energy: f64,
     /// Predicted probability that the last risky move does not collide.
     pub not_collided: f64,
@@ -47,8 +47,8 @@ impl Published {
     }
 }
 
-/// Returns at most `wanted` simple routes in ascending length. The length of an arc is its least
-/// time over all configurations.
+/// Returns at most `wanted` simple routes from start to goal, in ascending length. The length of an
+/// arc is its least time over all configurations.
 pub fn shortest_routes(mission: &Coadaptation, wanted: usize) -> Vec<Vec<usize>> {
     let length = |arc: usize| {
         let by = mission.arcs[arc].by.iter().flatten().map(|traversal| traversal.time.to_f64());
@@ -97,7 +97,8 @@ pub fn shortest_routes(mission: &Coadaptation, wanted: usize) -> Vec<Vec<usize>>
     found
 }
 
-/// Returns the length of the shortest route from each place to the goal.
+/// Returns the length of the shortest route from each place to the goal. `None` if there is no
+/// route.
 fn to_goal(mission: &Coadaptation, length: &dyn Fn(usize) -> u64) -> Vec<Option<u64>> {
     let mut entering = vec![Vec::new(); mission.places.len()];
     for (number, arc) in mission.arcs.iter().enumerate() {
@@ -121,8 +122,8 @@ fn to_goal(mission: &Coadaptation, length: &dyn Fn(usize) -> u64) -> Vec<Option<
     best
 }
 
-/// Returns the published model's values of a route with one configuration. `None` if the
-/// configuration cannot traverse it.
+/// Returns time, energy and probability of no collision that the published model predicts for a
+/// route with one configuration. `None` if the route cannot be traversed with this configuration.
 fn believed(mission: &Coadaptation, route: &[usize], configuration: usize) -> Option<[f64; 3]> {
     let way: Option<Vec<&Traversal>> =
         route.iter().map(|arc| mission.arcs[*arc].by[configuration].as_ref()).collect();
@@ -136,8 +137,8 @@ fn believed(mission: &Coadaptation, route: &[usize], configuration: usize) -> Op
     Some([time, energy, 1.0 - last_risky.unwrap_or(0.0)])
 }
 
-/// Runs the procedure with the priority on time (0), energy (1) or safety (2). `None` if no route
-/// can be traversed.
+/// Runs the published procedure with the priority on time (0), energy (1) or safety (2). `None` if
+/// no route can be traversed.
 pub fn published(mission: &Coadaptation, priority: usize) -> Option<Published> {
     let available = |configuration: &usize| mission.configurations[*configuration].available;
     let mut candidates = Vec::new();

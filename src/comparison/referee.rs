@@ -1,4 +1,4 @@
-//! The common evaluation process, and its optimal policies.
+//! The decision process in which all candidates are evaluated, and its optimal policies.
 
 use fixedbitset::FixedBitSet;
 use num_rational::BigRational;
@@ -12,10 +12,11 @@ use crate::comparison::coadaptation::Coadaptation;
 use crate::comparison::play::{Measures, play};
 use crate::comparison::process::{Action, Process, REWARDS, Risk, State, Valuation};
 
-/// A policy, with the name of the objective that it optimises.
+/// Name of the objective that a policy optimises, and the policy: the number of a choice for each
+/// state.
 pub type NamedPolicy = (String, Vec<u32>);
 
-/// The process with its solutions.
+/// The decision process in which all candidates are evaluated, with its explored states.
 pub struct Referee<'a> {
     pub mission: &'a Coadaptation,
     pub risk: Risk,
@@ -51,7 +52,7 @@ impl Referee<'_> {
         Problem::new(&self.explored.mdp, direction, rewards, terminal)
     }
 
-    /// Returns the optimal policies for single objectives; the first one minimises penalised time.
+    /// Returns an optimal policy for each single objective. The first one minimises penalised time.
     pub fn policies(&self) -> Vec<NamedPolicy> {
         let (goal, safe) = (self.goal(), self.safe_goal());
         let mut policies = Vec::new();
@@ -78,7 +79,9 @@ impl Referee<'_> {
         policies
     }
 
-    /// Computes the least expected time, where states without a path to the goal cost the penalty.
+    /// Minimises the expected time to `goal`, where reaching a state without a path to the goal
+    /// costs the penalty. `reachable` has the greatest probability of reaching the goal for each
+    /// state.
     pub fn penalised(&self, goal: &FixedBitSet, reachable: &Solution<f64>) -> Option<Solution<f64>> {
         let n = self.explored.mdp.states();
         let mut terminal = goal.clone();
@@ -95,8 +98,8 @@ impl Referee<'_> {
         solve(problem, None)
     }
 
-    /// Computes the front of time and probability of success without collision, with policies of
-    /// its vertices.
+    /// Returns the vertices of the Pareto front of time and probability of success without
+    /// collision, and a policy for each vertex.
     pub fn front(&self) -> (Vec<[f64; 2]>, Vec<NamedPolicy>) {
         let objectives = [
             Objective { rewards: Some(self.explored.rewards[0].clone()), target: self.goal() },
@@ -119,7 +122,8 @@ impl Referee<'_> {
         self.mission.battery.filter(|_| self.risk.battery).map_or(0, |battery| battery.reserve)
     }
 
-    /// Returns the action of a policy in a situation.
+    /// Returns the action of a policy in a state. `None` if the state was not explored or the
+    /// mission has ended.
     pub fn decision(&self, policy: &[u32], situation: Valuation) -> Option<Action> {
         let state = State::from(situation);
         let number = self.explored.states.number(self.process.code(&state), &state)?;
@@ -127,7 +131,7 @@ impl Referee<'_> {
         Some(Action::from_number(self.explored.mdp.action(*choice as usize)))
     }
 
-    /// Returns the action of a policy in each of its reachable states.
+    /// Returns each state that a policy reaches, with the action of the policy in this state.
     pub fn decisions(&self, policy: &[u32]) -> Vec<(Valuation, Action)> {
         let mdp = &self.explored.mdp;
         let mut visited = FixedBitSet::with_capacity(mdp.states());
@@ -162,9 +166,8 @@ impl Referee<'_> {
         play(&self.exact(), true, self.penalty, self.reserve(), &|_| false, &mut decide)
     }
 
-    /// Returns the reason why determinism has no price: if transitions are deterministic except for
-    /// the collision flag, and no transition depends on that flag, the fastest plan is an optimal
-    /// policy.
+    /// Returns the reason why determinism has no price, if there is one. If only the collision flag
+    /// is uncertain, and no transition depends on it, the fastest plan is an optimal policy.
     pub fn no_price(&self) -> Option<&'static str> {
         use num_traits::One;
         let certain = |probability: &BigRational| probability.is_one();

@@ -1,11 +1,12 @@
-//! Exports a mission as a model of the published setting in the PRISM language.
-//! [`program`](super::program()) exports the corrected model.
+//! Exports a mission as a PRISM model of the published setting. [`program`](super::program())
+//! exports the corrected model.
 //!
-//! As in the models that Cámara, Schmerl and Garlan (SEAMS 2020) generate for each route, there is
-//! one reconfiguration at most, before the first move; then the robot follows one of the selected
-//! routes. Each move that can collide overwrites the flag `collided`, a move never fails, and an
-//! empty battery has no consequence. The authors generate one model per route. Here the route is
-//! the first choice, so a single query determines the best route, and a constant fixes it.
+//! The model follows those that Cámara, Schmerl and Garlan (SEAMS 2020) generate for each route.
+//! There is at most one reconfiguration, before the first move; then the robot follows one of the
+//! selected routes. Each move that can collide overwrites the flag `collided`, a move never fails,
+//! and an empty battery has no consequence. The authors generate one model per route. Here the
+//! route is the first choice, so a single query determines the best route, and the constant `ROUTE`
+//! can fix the route.
 
 use num_rational::BigRational;
 use num_traits::{One, Zero};
@@ -21,9 +22,9 @@ use crate::comparison::program::{
 };
 use crate::comparison::published::{ROUTES, shortest_routes};
 
-/// Returns the model of the published setting: `r` is the route (0 before it is chosen), `p` the
-/// number of its arcs behind the robot, `c` the configuration, `b` the battery; `rd` is set after a
-/// reconfiguration.
+/// Returns the model of the published setting. Its variables are the route `r` (0 before it is
+/// chosen), the number `p` of arcs that the robot has traversed, the configuration `c` and the
+/// battery `b`. The flag `rd` is set after a reconfiguration.
 pub fn published_program(mission: &Coadaptation) -> Model {
     let routes = shortest_routes(mission, ROUTES);
     let writer = RouteWriter { mission, routes };
@@ -76,7 +77,8 @@ impl RouteWriter<'_> {
         variables
     }
 
-    /// Updates the battery, with 0 as the lower limit.
+    /// Returns the update that subtracts an energy from the battery, with 0 as the lower limit.
+    /// Empty if nothing changes.
     fn spent(&self, energy: &BigRational) -> Vec<(String, Expr, Place)> {
         if self.mission.battery.is_none() {
             return Vec::new();

@@ -1,10 +1,10 @@
-//! Converts any mission to a co-adaptation process: places are the states of its ground task, and
-//! configurations the designs that its actions name.
+//! Converts any mission to a co-adaptation process. Its places are the states of the ground task,
+//! and its configurations are the designs in the arguments of actions.
 //!
 //! Missions that declare places and configurations are converted more directly
-//! ([`Coadaptation::new`]). For all others the reachable states of the task are enumerated, numbers
-//! included. Actions choose their designs freely, so reconfiguration costs nothing. The cost of an
-//! action is the increase of the metric.
+//! ([`Coadaptation::new`]). For all other missions, the reachable states of the task are
+//! enumerated, including numeric values. Actions choose their designs freely, so reconfiguration
+//! costs nothing. The cost of an action is the increase of the metric.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -24,25 +24,27 @@ use crate::mission::{Mission, Planning as _};
 /// Maximum number of states of a task that is converted to a process.
 const MAX_STATES: usize = 50_000;
 
-/// A mission as a process, with the mapping back to its actions.
+/// A mission as a process whose places are task states, with the mapping from places and actions of
+/// the task to the process.
 #[derive(Debug, Clone)]
 pub struct Tasked {
-    /// The process.
+    /// Data of the process.
     pub coadaptation: Coadaptation,
-    /// Predecessor of each place, with the action from there.
+    /// For each place, a predecessor and the action that leads from there. `None` for the start.
     origins: Vec<Option<(usize, Act)>>,
-    /// Effects of the actions at each place: the next place and the configuration.
+    /// For each place and each action of the task, the number of the arc and the configuration.
     moves: Vec<HashMap<Act, (usize, usize)>>,
 }
 
-/// An action of the ground task with its arguments.
+/// Name of a ground action and its arguments.
 type Act = (String, Vec<String>);
 
 impl Tasked {
-    /// Enumerates the states of a mission's task, whose problem [`Mission::filled`] has filled.
+    /// Enumerates the reachable states of a mission's task. `problem` was returned by
+    /// [`Mission::filled`].
     ///
     /// # Errors
-    /// Constructs that the planner does not support, or too many states.
+    /// Constructs that the planner does not support, timed initial literals, or too many states.
     pub fn new(mission: &Mission, problem: &Problem, roles: &Roles) -> Result<Self, Errors> {
         let timed = problem.init.iter().any(|element| matches!(element, InitialElement::Timed(..)));
         if timed {
@@ -75,10 +77,12 @@ impl Tasked {
         explorer.finish(parts)
     }
 
-    /// Returns the remaining problem in a situation, after the actions that lead to its place.
+    /// Returns the problem that remains in a state of the process: the mission's problem after the
+    /// actions that lead to the state's place.
     ///
     /// # Errors
-    /// The mission with the component lost does not fit its domain.
+    /// The mission does not fit its domain after the loss of the component, or an action cannot be
+    /// executed.
     pub fn problem(&self, mission: &Mission, situation: &Valuation) -> Result<Problem, Errors> {
         let mut way = Vec::new();
         let mut place = situation.place;
@@ -115,7 +119,8 @@ impl Tasked {
         Ok(left)
     }
 
-    /// Returns the effects of a plan's steps from a situation.
+    /// Converts the steps of a plan to actions of the process, beginning in a given state. `None`
+    /// if a step is not an action of the process.
     pub fn actions(&self, situation: &Valuation, steps: &[Step]) -> Option<Vec<Action>> {
         let (mut place, mut configuration) = (situation.place, situation.configuration);
         let mut actions = Vec::new();
@@ -145,10 +150,10 @@ struct Explorer<'a> {
     places: Vec<TaskState>,
     numbers: HashMap<TaskState, usize>,
     configurations: Vec<String>,
-    /// Traversals from one place to another, by configuration.
+    /// Traversals by configuration, for each pair of places.
     arcs: BTreeMap<(usize, usize), BTreeMap<usize, Traversal>>,
     origins: Vec<Option<(usize, Act)>>,
-    /// For each place and action, the next place and the configuration.
+    /// For each place and action, the number of the next place and the configuration.
     moves: Vec<HashMap<Act, (usize, usize)>>,
 }
 
@@ -222,8 +227,8 @@ impl Explorer<'_> {
         self.moves[from].insert((transition.action, transition.arguments), (to, configuration));
     }
 
-    /// Names each place by the objects of the only atom that holds, if these names are unique, and
-    /// by numbers otherwise.
+    /// Names the places. If exactly one atom holds in each place and the names are unique, a place
+    /// is named by the objects of this atom, otherwise by a number.
     fn names(&self) -> Vec<String> {
         let strip = |atom: &str| {
             let inner = atom.trim_matches(['(', ')']);

@@ -1,9 +1,11 @@
-//! Causes that rule a design out, and the smallest sets of alterations that make it available.
+//! Causes that rule a design out, and the smallest sets of alterations that make the design
+//! available. An alteration is a recovery of a component or a change of a measurement.
 //!
-//! Sets of alterations are tried in ascending order of size, by reasoning in a copy of the
-//! knowledge. So each listed set is known to suffice, and contains no other listed set. These sets
-//! are the diagnoses of \[1\]. Each alteration of such a set removes one cause. The conclusions
-//! that remain once all other alterations of the set have come true are due to that cause.
+//! Sets of alterations are tried in ascending order of size, by reasoning with a copy of the
+//! knowledge base. So each listed set is known to suffice, and contains no other listed set. These
+//! sets are the diagnoses of \[1\]. Each alteration of a set removes one cause. To explain a cause,
+//! all other alterations of its set are applied: whatever still rules the design out is due to this
+//! cause.
 //!
 //! \[1\] R. Reiter: A theory of diagnosis from first principles, Artificial Intelligence 32, 1987.
 
@@ -22,38 +24,39 @@ use crate::message::Errors;
 use crate::mission::Mission;
 use crate::mission::numbers::against;
 
-/// Upper limit on the sets of alterations that are tried.
+/// Upper limit on the number of sets of alterations that are tried.
 const MAX_TRIED: usize = 2_000;
 
-/// Availability of one design, as derived without planning.
+/// Availability of one design and its causes, derived without planning.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Availability {
     /// Local name of the design.
     pub design: String,
-    /// Functions that the design solves.
+    /// Local names of the functions that the design solves.
     pub functions: Vec<String>,
     /// `true` if the design is available.
     pub available: bool,
-    /// Rules and facts that rule the design out, over all causes.
+    /// Rules and facts that rule the design out, and reasons why no plan could use it even if it
+    /// were available.
     pub because: Vec<String>,
-    /// Failed components and measurements that contribute to the availability.
+    /// Failed components and measurements that contribute to ruling the design out.
     pub causes: Vec<Cause>,
-    /// If the design is not available: the smallest sets of alterations that make it available.
-    /// Each set suffices if all of its alterations come true, and no proper subset suffices. If the
-    /// design is available: single alterations, each of which makes it unavailable.
+    /// If the design is unavailable: the smallest sets of alterations that make it available. All
+    /// alterations of a set together suffice, and no proper subset suffices. If the design is
+    /// available: sets of one alteration, each of which makes it unavailable.
     pub ways: Vec<Vec<Alteration>>,
 }
 
-/// A cause that contributes to ruling a design out.
+/// A failed component or a measurement that contributes to ruling a design out.
 #[derive(Debug, Clone)]
 pub struct Cause {
     /// The alteration that removes this cause; other causes may remain.
     pub alteration: Alteration,
-    /// The rules and facts by which the design is ruled out once the other alterations of a
-    /// smallest set have come true.
+    /// The rules and facts by which this cause alone rules the design out, i.e. after the other
+    /// alterations of a smallest set.
     pub because: Vec<String>,
-    /// Knowledge after these other alterations, for further analysis.
+    /// The knowledge base after the other alterations of that set, for further analysis.
     pub knowledge: Knowledge,
 }
 
@@ -63,18 +66,18 @@ impl PartialEq for Cause {
     }
 }
 
-/// The causes that rule a design out.
+/// All causes that rule a design out.
 #[derive(Debug, Clone)]
 pub struct Causes {
     /// The causes. Empty if the design is available, or if neither a component nor a measurement is
     /// a cause.
     pub causes: Vec<Cause>,
-    /// `true` if the design becomes available only when all causes have gone; `false` if smaller
-    /// sets of them suffice.
+    /// `true` if the design becomes available only after all causes are removed; `false` if
+    /// removing some of them can suffice.
     pub are_all_needed: bool,
 }
 
-/// Returns all causes that contribute to ruling a design out.
+/// Returns all failed components and measurements that contribute to ruling a design out.
 pub fn causes(knowledge: &Knowledge, design: &FunctionDesign) -> Causes {
     if design.available {
         return Causes { causes: Vec::new(), are_all_needed: false };
@@ -83,8 +86,8 @@ pub fn causes(knowledge: &Knowledge, design: &FunctionDesign) -> Causes {
     Causes { causes: causes_of(knowledge, design, &ways), are_all_needed: ways.len() == 1 }
 }
 
-/// Causes in the smallest sets of alterations. Once all other alterations of a set have come true,
-/// the remaining conclusions are due to one cause.
+/// Returns a cause for each alteration in `ways`. Its reasons are the conclusions that remain after
+/// all other alterations of the set.
 fn causes_of(knowledge: &Knowledge, design: &FunctionDesign, ways: &[Vec<Alteration>]) -> Vec<Cause> {
     let mut causes: Vec<Cause> = Vec::new();
     for (way, alteration) in ways.iter().flat_map(|way| way.iter().map(move |alteration| (way, alteration))) {
@@ -98,7 +101,8 @@ fn causes_of(knowledge: &Knowledge, design: &FunctionDesign, ways: &[Vec<Alterat
     causes
 }
 
-/// Returns the smallest sets of alterations that make a design available.
+/// Returns the smallest sets of alterations that make a design available. Considers the design's
+/// own components and measurements first, then all of them.
 fn ways(knowledge: &Knowledge, design: &FunctionDesign) -> Vec<Vec<Alteration>> {
     let candidates = candidates(knowledge, design);
     let ways = repairs(knowledge, design, &candidates);
@@ -106,7 +110,7 @@ fn ways(knowledge: &Knowledge, design: &FunctionDesign) -> Vec<Vec<Alteration>> 
     if ways.is_empty() { repairs(knowledge, design, &all_candidates(knowledge, candidates)) } else { ways }
 }
 
-/// Derives the availability of a design without planning.
+/// Derives the availability of a design and its causes without planning.
 pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availability {
     let mut availability = Availability {
         design: design.individual.name.clone(),
@@ -138,7 +142,7 @@ pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availa
     availability
 }
 
-/// Returns the smallest sets of alterations that make a design available, in ascending order of
+/// Returns the smallest sets of `candidates` that make a design available, in ascending order of
 /// size.
 fn repairs(
     knowledge: &Knowledge,
@@ -185,7 +189,7 @@ fn repairs(
     minimal_sets.into_iter().map(|set| set.into_iter().cloned().collect()).collect()
 }
 
-/// Returns the non-empty subsets of `count` elements, as positions: smaller subsets first, then in
+/// Returns the non-empty subsets of the positions 0 to `count` − 1: smaller subsets first, then in
 /// lexicographic order.
 fn subsets(count: usize) -> impl Iterator<Item = Vec<usize>> {
     (1..=count).flat_map(move |size| {
@@ -201,7 +205,8 @@ fn subsets(count: usize) -> impl Iterator<Item = Vec<usize>> {
     })
 }
 
-/// Returns a minimal subset that suffices, by deletion: no proper subset of it suffices.
+/// Returns a subset of `set` that still suffices, although none of its proper subsets does. Removes
+/// alterations one by one.
 fn minimal<'a>(
     mut set: Vec<&'a Alteration>,
     suffice: &dyn Fn(&[&'a Alteration]) -> bool,
@@ -217,8 +222,8 @@ fn minimal<'a>(
     set
 }
 
-/// Returns the knowledge after the alterations. `None` if an alteration fails, for example because
-/// the rules do not terminate.
+/// Returns a copy of the knowledge base after the alterations. `None` if an alteration fails, for
+/// example because the rules do not terminate.
 fn altered<'a>(
     knowledge: &Knowledge,
     alterations: impl IntoIterator<Item = &'a Alteration>,
@@ -240,7 +245,8 @@ fn is_available(knowledge: &Knowledge, design: &FunctionDesign) -> bool {
     designs.iter().any(|candidate| candidate.individual == design.individual && candidate.available)
 }
 
-/// Computes the best plan after alterations. At a limit, returns the best plan found until then.
+/// Computes the best plan after alterations of the situation. At a limit, returns the best plan
+/// found until then.
 pub(super) fn in_situation(
     mission: &Mission,
     alterations: &[Alteration],
@@ -258,7 +264,7 @@ pub(super) fn in_situation(
     best(&mission, limits)
 }
 
-/// Returns each alteration of the repairs, with the best plan after this alteration alone.
+/// Returns each alteration of the repairs once, with the best plan after this alteration alone.
 pub(super) fn singly(mission: &Mission, repairs: &[Repair], limits: &Limits) -> Result<Vec<Change>, Errors> {
     let mut changes: Vec<Change> = Vec::new();
     for alteration in repairs.iter().flat_map(|repair| &repair.alterations) {
@@ -280,9 +286,9 @@ pub(super) fn singly(mission: &Mission, repairs: &[Repair], limits: &Limits) -> 
     Ok(changes)
 }
 
-/// Alterations that may change whether a design is available: of its components, and of
-/// measurements that it depends on, to the values at which its requirements and estimations begin
-/// or cease to hold.
+/// Returns alterations that may change whether a design is available. They concern its components,
+/// and measurements that it depends on. New measurements are the values at which its requirements
+/// or estimations begin or cease to hold.
 fn candidates(knowledge: &Knowledge, design: &FunctionDesign) -> Vec<Alteration> {
     let is_own = |component: &str| design.components.iter().any(|needed| needed.iri == component);
     let mut alterations = components(knowledge, design.available, &is_own);
@@ -301,8 +307,8 @@ fn candidates(knowledge: &Knowledge, design: &FunctionDesign) -> Vec<Alteration>
     alterations
 }
 
-/// Adds alterations of all failed components, and of the measurements that any design depends on,
-/// to the candidates.
+/// Adds alterations for all failed components, and for the measurements on which any design
+/// depends, to `candidates_found`.
 fn all_candidates(knowledge: &Knowledge, mut candidates_found: Vec<Alteration>) -> Vec<Alteration> {
     let designs = knowledge.view().function_designs();
     let additional = designs.iter().flat_map(|design| candidates(knowledge, design));
@@ -314,7 +320,8 @@ fn all_candidates(knowledge: &Knowledge, mut candidates_found: Vec<Alteration>) 
     candidates_found
 }
 
-/// Returns alterations of components: failed ones are repaired, or working ones fail.
+/// Returns an alteration for each component for which `is_own` returns `true`. Failed components
+/// are repaired, or, with `working`, working components fail.
 fn components(knowledge: &Knowledge, working: bool, is_own: &dyn Fn(&str) -> bool) -> Vec<Alteration> {
     let components = knowledge.view().components().into_iter();
     let components = components.filter(|component| is_own(&component.individual.iri));
@@ -326,8 +333,8 @@ fn components(knowledge: &Knowledge, working: bool, is_own: &dyn Fn(&str) -> boo
         .collect()
 }
 
-/// Returns the values at which all requirements on an attribute begin to hold or, with `hold` (they
-/// hold now), one of them becomes violated.
+/// Returns the values of an attribute at which all requirements `bounds` hold. With `hold`, i.e. if
+/// they hold at the current value `from`, returns the values at which one of them is violated.
 fn targets<'a>(bounds: impl Iterator<Item = &'a Requirement>, from: &BigRational, hold: bool) -> Vec<Target> {
     let (mut least, mut most): (Vec<&BigRational>, Vec<&BigRational>) = (Vec::new(), Vec::new());
     for requirement in bounds {
@@ -343,7 +350,7 @@ fn targets<'a>(bounds: impl Iterator<Item = &'a Requirement>, from: &BigRational
     least.into_iter().chain(most).collect()
 }
 
-/// Returns the values at a bound and beyond it, seen from a value.
+/// Returns targets at a bound and just beyond it, as seen from the current value `from`.
 fn around(bound: &BigRational, from: &BigRational) -> Vec<Target> {
     let bound = bound.clone();
     match from.cmp(&bound) {

@@ -1,12 +1,12 @@
-//! Explanations: why a design is available or not, why it is chosen or not, and which changes lead
-//! to another plan.
+//! Explanations: why a design is available or unavailable, why it is chosen or not chosen, and
+//! which changes lead to another plan.
 //!
-//! Availability is explained by reasoning alone: [`availability`]. "Why not this one?" is answered
-//! by planning again with the design as the only one for its functions, as if it were available.
-//! The difference of the metrics is the price of this design. "What would change the plan?" is
-//! answered by trying the values at which a requirement begins or ceases to hold. For values of the
-//! problem, such as a battery, bisection is used between a value with the same plan and one with
-//! another.
+//! Availability is explained by reasoning without planning: [`availability`]. "Why is this design
+//! not chosen?" is answered by planning again with this design as the only one for its functions,
+//! as if it were available. The difference of the two metrics is the price of the design. "What
+//! would change the plan?" is answered by trying the values at which a requirement begins or ceases
+//! to hold. For numeric values of the problem, such as a battery, bisection is used between a value
+//! with the current plan and a value with another plan.
 
 mod causes;
 mod parts;
@@ -30,30 +30,32 @@ pub use parts::{Alteration, BestPlan, Change, Repair, Target};
 pub use solve::best;
 pub use thresholds::{SmallestChanges, smallest_changes};
 
-/// Explanation of one design.
+/// Explanation of the availability and the choice of one design.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct DesignExplanation {
-    /// Availability, as derived without planning.
+    /// Availability of the design and its causes, derived without planning.
     pub availability: Availability,
-    /// The best plan for the mission as it is.
+    /// The best plan for the mission in its current situation.
     pub best: BestPlan,
-    /// Numbers of the steps of the best plan that use the design, from 1.
+    /// Numbers of the steps of `best` that use the design, from 1.
     pub used: Vec<usize>,
-    /// The best plan in which no other design solves its functions. An unavailable design is
-    /// assumed to be available.
+    /// The best plan with this design as the only one for its functions. If the design is
+    /// unavailable, it is assumed to be available.
     pub alone: BestPlan,
-    /// The best plan without the design.
+    /// The best plan if the design is not available.
     pub without: BestPlan,
-    /// For each of [`Availability::ways`], the best plan after all its alterations.
+    /// For each set of alterations in [`Availability::ways`], the best plan after all alterations
+    /// of the set.
     pub repairs: Vec<Repair>,
-    /// Single alterations of the ways, each with the best plan after this alteration alone.
+    /// Each single alteration in [`Availability::ways`], with the best plan after this alteration
+    /// alone.
     pub changes: Vec<Change>,
-    /// `true` if no limit was reached.
+    /// `true` if all plans of the explanation are proved; `false` if a limit was reached.
     pub complete: bool,
 }
 
-/// Finds a design by its local name or IRI.
+/// Finds a design of the mission by its local name or IRI. Also returns all designs.
 ///
 /// # Errors
 /// M112 if the design does not exist.
@@ -73,16 +75,18 @@ fn find(mission: &Mission, name: &str) -> Result<(FunctionDesign, Vec<FunctionDe
     Err(vec![Message::error("M112", text)].into())
 }
 
-/// Explains by reasoning alone whether one design, by its local name, is available.
+/// Explains, by reasoning without planning, whether the design with this local name or IRI is
+/// available.
 ///
 /// # Errors
-/// The design does not exist.
+/// M112 if the design does not exist.
 pub fn availability(mission: &Mission, name: &str) -> Result<Availability, Errors> {
     let (found, _) = find(mission, name)?;
     Ok(causes::availability(mission, &found))
 }
 
-/// Explains one design, by its local name. At a limit, returns the partial results.
+/// Explains availability and choice of the design with this local name or IRI. At a limit, returns
+/// the partial results.
 ///
 /// ```
 /// use std::path::Path;
@@ -104,8 +108,8 @@ pub fn design(mission: &Mission, name: &str, limits: &Limits) -> Result<DesignEx
 }
 
 impl Availability {
-    /// Adds the results of planning. `hear` is called with a short description of each planning
-    /// query before that starts.
+    /// Adds the best plans with and without the design, and after changes. `hear` is called with a
+    /// short description of each planning query before the query starts.
     ///
     /// # Errors
     /// The mission cannot be planned for.

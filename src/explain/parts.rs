@@ -1,57 +1,58 @@
-//! Parts of explanations: plans, and the alterations that lead to them.
+//! Parts of explanations: best plans, and the alterations of the situation that lead to them.
 
 use num_rational::BigRational;
 
 use crate::mapek::PlannedStep;
 
-/// The best plan for a mission under some condition.
+/// The best plan for a mission under some assumption, e.g. without a design.
 #[derive(Debug, Clone, Default, PartialEq)]
 #[non_exhaustive]
 pub struct BestPlan {
     /// The metric of the best plan, in its unit. `None` without a plan.
     pub cost: Option<BigRational>,
-    /// `true` if the cost is proved to be the lowest or, without a cost, if it is proved that there
-    /// is no plan. Otherwise a limit was reached.
+    /// `true` if it is proved that no plan is cheaper or, without a cost, that there is no plan.
+    /// `false` if a limit was reached.
     pub proved: bool,
-    /// The plan.
+    /// Steps of the plan; empty without a plan.
     pub steps: Vec<PlannedStep>,
 }
 
-/// A difference from the current situation.
+/// A change of one value or one component relative to the current situation.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Alteration {
-    /// The attribute, function or component.
+    /// Name of the changed attribute, numeric function or component.
     pub name: String,
-    /// The current value. `None` for a component.
+    /// Current value of the attribute or function. `None` for a component.
     pub from: Option<BigRational>,
-    /// The bound for the new value, or the new state.
+    /// Bound for the new value, or the new state of the component.
     pub to: Target,
 }
 
-/// Alterations that have to come true together.
+/// A set of alterations that only together make a design available or unavailable.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Repair {
-    /// All alterations of the change.
+    /// All alterations of the set.
     pub alterations: Vec<Alteration>,
-    /// The best plan after the alterations.
+    /// The best plan after all alterations.
     pub then: BestPlan,
 }
 
-/// A change that leads to another answer.
+/// A single alteration that changes the best plan or the availability of a design.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Change {
-    /// The alteration.
+    /// The alteration of one value or one component.
     pub alteration: Alteration,
-    /// Upper limit on the error of the bound. `None` if the bound is exact.
+    /// Upper limit on the error of the alteration's bound. `None` if the bound is exact.
     pub within: Option<BigRational>,
-    /// For a change of a design's availability, `true` if the alteration suffices by itself.
+    /// `true` if the alteration alone changes the availability of the explained design, or the
+    /// plan.
     pub suffices: bool,
-    /// The best plan after the change.
+    /// The best plan after this alteration.
     pub then: BestPlan,
 }
 
-/// Target of an alteration: a bound for the new value of a number, or the new state of a component.
+/// Target of an alteration: a bound for a numeric value, or the new state of a component.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Target {
     /// A value of at least this bound.
@@ -69,8 +70,8 @@ pub enum Target {
 }
 
 impl Target {
-    /// A value that meets the target: the bound itself, or, if the bound is strict, a value beyond
-    /// it by `little()`. Returns 0 for components.
+    /// Returns a value that meets the target: the bound itself or, if the bound is strict, a value
+    /// that differs from it by [`little`]. Returns 0 for components.
     pub(super) fn example(&self) -> BigRational {
         let little = little();
         match self {
@@ -82,7 +83,7 @@ impl Target {
     }
 }
 
-/// Smallest difference between values that are distinguished: one millionth.
+/// Smallest difference between two values that are treated as different: one millionth.
 pub(super) fn little() -> BigRational {
     BigRational::new(1.into(), 1_000_000.into())
 }

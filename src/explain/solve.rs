@@ -1,4 +1,4 @@
-//! Computes the best plan for a mission, optionally with a changed set of available designs.
+//! Computes the best plan for a mission, with all or with some of its designs.
 
 use planner::{Config, Limits, Status, optimize};
 
@@ -8,7 +8,8 @@ use crate::message::Errors;
 use crate::mission::{Mission, ground_with};
 use crate::number;
 
-/// Computes the best plan for a mission as it is. At a limit, returns the best plan found until then.
+/// Computes the best plan for a mission in its current situation. At a limit, returns the best plan
+/// found until then.
 ///
 /// # Errors
 /// The mission cannot be planned for.
@@ -16,8 +17,8 @@ pub fn best(mission: &Mission, limits: &Limits) -> Result<BestPlan, Errors> {
     solve(mission, limits, &|_, available| available)
 }
 
-/// Computes the best plan with the designs for which `allowed` returns `true`. The arguments of
-/// `allowed` are the name of a design, and `true` if the design is available.
+/// Computes the best plan with only the designs for which `allowed` returns `true`. The arguments
+/// of `allowed` are the name of a design, and `true` if the design is available.
 pub(super) fn solve(
     mission: &Mission,
     limits: &Limits,
@@ -28,7 +29,7 @@ pub(super) fn solve(
     }
     let (mut problem, _) = mission.filled()?;
     let domain = mission.allow(&mut problem, allowed);
-    // Half of the time is reserved for later queries.
+    // Half of the remaining time is reserved for later queries.
     let limits = &limits.half();
     let task = match ground_with(mission, &domain, &problem, &[], limits) {
         Ok(task) => task,

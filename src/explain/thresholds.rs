@@ -11,25 +11,25 @@ use crate::message::Errors;
 use crate::mission::Mission;
 use crate::number;
 
-/// Bisection ends at an interval of the value divided by this number; then a number with fewer
-/// digits is tried.
+/// Bisection ends if the interval is at most the current value divided by this number. Then a
+/// number with few decimals is searched for in the interval.
 const BISECTION_RESOLUTION: i64 = 1000;
 
-/// The smallest changes that lead to another plan.
+/// Result of [`smallest_changes`]: smallest changes of single values that lead to another plan.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct SmallestChanges {
-    /// The best plan for the mission as it is.
+    /// The best plan for the mission in its current situation.
     pub best: BestPlan,
-    /// The changes.
+    /// The changes found, at most one upwards and one downwards for each value.
     pub changes: Vec<Change>,
-    /// `true` if the list is complete: no limit was reached.
+    /// `true` if all values were examined; `false` if a limit was reached.
     pub complete: bool,
 }
 
-/// Searches for the smallest changes, upwards and downwards, of each measured attribute and each
-/// value of the problem that lead to another plan. At a limit, returns the partial results. `hear`
-/// is called with the name of each value before it is varied.
+/// Searches for the smallest changes of single values that lead to another plan. Each measured
+/// attribute and each numeric value of the problem is changed upwards and downwards. At a limit,
+/// returns the partial results. `hear` is called with the name of each value before it is varied.
 ///
 /// # Errors
 /// The mission cannot be planned for.
@@ -70,20 +70,20 @@ pub fn smallest_changes(
     Ok(result)
 }
 
-/// The measured attributes with their values.
+/// Returns the measured attributes that have a value, as pairs of name and value.
 pub(super) fn measured(knowledge: &Knowledge) -> Vec<(String, BigRational)> {
     let measurements = knowledge.view().measurements().into_iter();
     measurements.filter_map(|measurement| Some((measurement.attribute, measurement.value?))).collect()
 }
 
-/// Result of the search for a change in one direction.
+/// Result of the search for a change of one value in one direction.
 enum Outcome {
     Found(Box<Change>),
     None,
     AtLimit,
 }
 
-/// A mission whose values are varied, and its best plan for comparison.
+/// A mission with one value to vary, and its current best plan for comparison.
 struct VariedMission<'a> {
     mission: &'a Mission,
     base: BestPlan,
@@ -91,7 +91,8 @@ struct VariedMission<'a> {
 }
 
 impl VariedMission<'_> {
-    /// Computes the best plan with another value. Returns `None` at a limit.
+    /// Computes the best plan after a value of the mission is set. Returns `None` if a limit is
+    /// reached before the plan is proved optimal.
     fn with(&self, name: &str, value: &BigRational) -> Result<Option<BestPlan>, Errors> {
         if self.limits.reached() {
             return Ok(None);
@@ -107,7 +108,8 @@ impl VariedMission<'_> {
         Ok(Some(best(&mission, self.limits)?).filter(|plan| plan.proved))
     }
 
-    /// Returns `true` if a plan differs from the best plan of the mission as it is.
+    /// Returns `true` if a plan has other actions than the current best plan, or if only one of the
+    /// two exists.
     fn is_other(&self, plan: &BestPlan) -> bool {
         let steps = |plan: &BestPlan| -> Vec<_> {
             plan.steps.iter().map(|step| (step.action.clone(), step.arguments.clone())).collect()
@@ -115,8 +117,8 @@ impl VariedMission<'_> {
         steps(plan) != steps(&self.base) || plan.cost.is_some() != self.base.cost.is_some()
     }
 
-    /// Returns the nearest value of an attribute at which a requirement begins or ceases to hold
-    /// and the plan changes.
+    /// Searches upwards or downwards for the nearest value of an attribute at which a design's
+    /// requirement begins or ceases to hold and the best plan changes.
     fn first_threshold(&self, attribute: &str, from: &BigRational, upwards: bool) -> Result<Outcome, Errors> {
         for target in thresholds(self.mission, attribute, from, upwards) {
             let Some(then) = self.with(attribute, &target.example())? else { return Ok(Outcome::AtLimit) };
@@ -127,14 +129,16 @@ impl VariedMission<'_> {
         Ok(Outcome::None)
     }
 
-    /// Searches for the nearest value of a function, on one side, with another plan.
+    /// Searches upwards or downwards for the nearest value of a numeric function at which the best
+    /// plan changes: first in growing relative steps, then by bisection.
     fn bisected(&self, function: &str, from: &BigRational, upwards: bool) -> Result<Outcome, Errors> {
         // Relative steps need a positive start value.
         if *from <= BigRational::default() {
             return Ok(Outcome::None);
         }
         let whole = |value: i64| BigRational::from_integer(value.into());
-        // Exponential search brackets the change before bisection.
+        // Growing steps find an interval with a change of the plan, in which bisection then
+        // searches.
         let (mut same, mut other) = (from.clone(), None);
         for percent in [1, 2, 5, 10, 20, 50, 100] {
             let part = from * whole(percent) / whole(100);
@@ -164,9 +168,10 @@ impl VariedMission<'_> {
         self.simplest(function, from, (same, value), then)
     }
 
-    /// Returns the bound at which the plan changes, between `same`, a value with the same plan, and
-    /// `other`, a value with the plan `then`. The bound is the number with the fewest decimals in
-    /// this interval if the plan changes at this number or just beyond it. Otherwise it is `other`.
+    /// Determines the bound at which the plan changes between `same`, a value with the current
+    /// plan, and `other`, a value with the plan `then`. If the plan changes at the number with the
+    /// fewest decimals in this interval, or just beyond it, this number is the bound. Otherwise the
+    /// bound is `other`.
     fn simplest(
         &self,
         function: &str,
@@ -206,8 +211,7 @@ fn change(name: &str, from: &BigRational, to: Target, within: Option<BigRational
     Change { alteration, within, suffices: true, then }
 }
 
-/// Returns a number with the fewest decimals that is at least `low` and at most `high`, which is
-/// above 0.
+/// Returns a number with the fewest decimals in the interval from `low` to `high`, both included.
 fn shortest_decimal(low: &BigRational, high: &BigRational) -> BigRational {
     let mut unit = BigInt::from(1);
     loop {
@@ -220,8 +224,8 @@ fn shortest_decimal(low: &BigRational, high: &BigRational) -> BigRational {
     }
 }
 
-/// Returns the values of an attribute at which a requirement begins or ceases to hold, the nearest
-/// first.
+/// Returns the values of an attribute, above or below `from`, at which a requirement of a design
+/// begins or ceases to hold. The nearest value comes first.
 fn thresholds(mission: &Mission, attribute: &str, from: &BigRational, upwards: bool) -> Vec<Target> {
     let designs =
         mission.knowledge().map(|knowledge| knowledge.view().function_designs()).unwrap_or_default();

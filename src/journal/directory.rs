@@ -1,4 +1,5 @@
-//! Reads the segments and snapshots of a journal's directory, with all their faults.
+//! Reads the segment files and snapshot files of a journal's directory, and reports all their
+//! faults.
 
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
@@ -10,32 +11,32 @@ use serde_json::Value;
 use super::record::{FORMAT, Link, Record, opening};
 use crate::message::Message;
 
-/// Kind of a segment's file in place of `journal` if a write to the segment has failed and the loop
-/// continues. Both words have the same length, so that renaming needs no disk space.
+/// First part of the file name of a segment in place of `journal`, after a failed write with which
+/// the loop continued. Both words have the same length, so that renaming needs no disk space.
 pub(super) const INCOMPLETE: &str = "partial";
 
-/// A segment, up to its first fault.
+/// Content of a segment file, up to its first fault.
 #[derive(Debug)]
 pub(super) struct Segment {
     pub(super) number: u64,
     pub(super) digest: String,
-    /// Link before the segment, and link after it.
+    /// Link before the segment's first record.
     pub(super) before: Link,
+    /// Link after the segment's last sound record.
     pub(super) after: Link,
-    /// Records without the header.
+    /// Sound records of the segment, without its header.
     pub(super) records: Vec<Record>,
-    /// Number of bytes in complete records.
+    /// Number of bytes of the complete records at the beginning of the file.
     pub(super) sound: u64,
     pub(super) end: End,
 }
 
-/// End of a segment.
+/// State of the end of a segment file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum End {
-    /// The segment ends with a complete record.
+    /// The segment ends with a complete record and its line break.
     Whole,
-    /// The segment ends with a complete record whose line break is missing, or is another
-    /// character.
+    /// The segment ends with a complete record whose line break is missing or damaged.
     Unbroken,
     /// The segment ends with this number of bytes of an incomplete record.
     Incomplete(u64),
@@ -44,32 +45,35 @@ pub(super) enum End {
 }
 
 impl Segment {
-    /// Returns `true` if the segment ends with the record that another one follows.
+    /// Returns `true` if the segment's last record is an `end` record, which refers to the next
+    /// segment.
     pub(super) fn is_closed(&self) -> bool {
         self.records.last().is_some_and(|record| record.kind == "end")
     }
 }
 
-/// A snapshot.
+/// Content of a snapshot file: a stored state of the loop.
 #[derive(Debug)]
 pub(super) struct SnapshotFile {
-    /// Link before the snapshot; the segment with its number begins there.
+    /// Link at which the snapshot was taken; the segment with the same number begins at this link.
     pub(super) before: Link,
     pub(super) data: Value,
 }
 
-/// Files of a journal.
+/// Segments and snapshots of a journal's directory.
 #[derive(Debug, Default)]
 pub(super) struct JournalFiles {
-    /// Segments by number, or the fault that makes a segment unreadable.
+    /// Segments by number; for an unreadable segment, a description of its fault.
     pub(super) segments: BTreeMap<u64, Result<Segment, String>>,
+    /// Snapshots by number; for an unreadable snapshot, a description of its fault.
     pub(super) snapshots: BTreeMap<u64, Result<SnapshotFile, String>>,
-    /// Number of the segment at whose end a write has failed, if the loop continued.
+    /// Number of the segment whose last write failed, if the loop continued after the failure.
     pub(super) incomplete: Option<u64>,
 }
 
 impl JournalFiles {
-    /// Reads a directory.
+    /// Reads all segments and snapshots of a directory. Unreadable files are stored with their
+    /// fault.
     ///
     /// # Errors
     /// The directory cannot be listed.
@@ -94,12 +98,12 @@ impl JournalFiles {
         Ok(contents)
     }
 
-    /// Returns the name of a segment's file.
+    /// Returns the file name of the segment with this number.
     pub(super) fn name(&self, number: u64) -> String {
         name(if self.incomplete == Some(number) { INCOMPLETE } else { "journal" }, number)
     }
 
-    /// Checks that no write has failed.
+    /// Checks that no segment is marked as incomplete, i.e. that no write has failed.
     ///
     /// # Errors
     /// M324 if the loop continued after a failed write.
@@ -115,7 +119,8 @@ impl JournalFiles {
         Err(Message::at("M324", &directory.display().to_string(), None, text).with_help(help))
     }
 
-    /// Returns the sound snapshot with which the segment of this number begins.
+    /// Returns the snapshot at the beginning of the segment with this number, or a description of
+    /// its fault.
     pub(super) fn start(&self, number: u64) -> Result<&SnapshotFile, String> {
         let name = name("snapshot", number);
         let missing = || Err(format!("{name} is missing"));
@@ -131,7 +136,8 @@ impl JournalFiles {
         }
     }
 
-    /// Returns the contiguous segments from a number on, or the first fault.
+    /// Returns the segments from the given number to the last one, or a description of the first
+    /// fault. Each segment has to continue the record chain of its predecessor.
     pub(super) fn chain(&self, from: u64) -> Result<Vec<&Segment>, String> {
         let last = self.segments.keys().chain(self.snapshots.keys()).max().copied().unwrap_or(from);
         let mut chain: Vec<&Segment> = Vec::new();
@@ -159,8 +165,8 @@ impl JournalFiles {
     }
 }
 
-/// Returns `true` if a segment begins where another one ends, or would end if a crash had not
-/// prevented its last record.
+/// Returns `true` if `after` begins at the link where `before` ends. If a crash has prevented the
+/// `end` record of `before`, the check assumes this record.
 pub(super) fn follows(before: &Segment, after: &Segment) -> bool {
     if before.is_closed() {
         return before.end == End::Whole && before.after == after.before;
@@ -168,8 +174,8 @@ pub(super) fn follows(before: &Segment, after: &Segment) -> bool {
     after.records.is_empty() && closing(&before.after, before.number).1 == after.before
 }
 
-/// Creates the line that closes a segment and names its successor. Also returns the link after this
-/// line.
+/// Creates the line of the `end` record, which closes a segment and names the next one. Also
+/// returns the link after this line.
 pub(super) fn closing(at: &Link, segment: u64) -> (String, Link) {
     at.line("end", &[Value::from(segment + 1)])
 }
@@ -213,7 +219,8 @@ fn segment(bytes: &[u8], number: u64) -> Result<Segment, String> {
     Ok(segment)
 }
 
-/// Length of the record in a line without line break.
+/// Returns the length in bytes of the record in a line that has no line break, but may have another
+/// character in its place.
 fn after_length(line: &[u8], at: &Link) -> usize {
     if at.read(line).is_some() { line.len() } else { line.len() - 1 }
 }
@@ -234,12 +241,12 @@ fn check_opening(record: &Record, number: u64) -> Result<(), String> {
     }
 }
 
-/// Message about a segment of an older version.
+/// Fault of a segment that has an older file format.
 pub(super) const OLD_FORMAT: &str = "is of the format `metaplan-journal/2` or older, which this version does not read; let the version that \
                                      wrote it bring its mission to an end, or begin the mission anew with a journal in another \
                                      directory";
 
-/// Reason why a file whose first line is not a header is not a segment.
+/// Describes the fault of a file whose first line is not a segment header.
 fn no_journal(first: &[u8]) -> String {
     let text = String::from_utf8_lossy(first);
     let old = text.contains("metaplan-journal/1");
@@ -270,6 +277,8 @@ fn read_private(path: &Path) -> io::Result<Vec<u8>> {
     std::fs::read(path)
 }
 
+/// Checks that a path is a regular file or does not exist.
+///
 /// # Errors
 /// The name belongs to something that is not a regular file.
 pub(super) fn require_file(path: &Path) -> io::Result<()> {

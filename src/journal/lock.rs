@@ -1,5 +1,5 @@
-//! Lock of a journal: one process at a time uses it. The file also stores the number of records, so
-//! that missing records are detected.
+//! Lock file of a journal: only one process at a time uses the journal. The file also stores the
+//! number of records, by which missing records are detected.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read as _, Seek as _, SeekFrom, Write as _};
@@ -11,26 +11,26 @@ use fs4::{FileExt, TryLockError};
 use super::directory::{broken, open_private};
 use crate::message::Message;
 
-/// Number of attempts to lock: a killed process may not be gone yet.
+/// Number of attempts to lock; a killed process may still hold the lock for a short time.
 const LOCK_RETRIES: u32 = 10;
-/// Time between two attempts.
+/// Time between two attempts to lock the journal.
 const RETRY_INTERVAL: Duration = Duration::from_millis(20);
-/// Number of characters of the process number, in the first line of the file.
+/// Width in characters of the process number, which is in the first line of the lock file.
 const OWNER_CHARACTERS: usize = 10;
-/// Number of characters of the record count, in the second line.
+/// Width in characters of the record count, which is in the second line of the lock file.
 const COUNT_CHARACTERS: usize = 20;
 
 /// Exclusive access to a journal until the lock is dropped.
 #[derive(Debug)]
 pub(super) struct Lock {
     file: File,
-    /// Number of records after the last write, if known.
+    /// Number of records of the journal after the last write; 0 if unknown.
     pub(super) records: u64,
 }
 
 impl Lock {
-    /// Locks a journal, and stores the number of this process in the file for the messages of other
-    /// processes.
+    /// Locks the journal in a directory. Stores this process's number in the lock file, so that
+    /// other processes can name it in their error message.
     ///
     /// # Errors
     /// M322 if another process has locked the journal.
@@ -72,7 +72,7 @@ impl Lock {
         }
     }
 
-    /// Stores the number of records.
+    /// Writes the number of records, and this process's number, to the lock file.
     pub(super) fn store_count(&mut self, records: u64) -> io::Result<()> {
         let owner = std::process::id();
         self.file.seek(SeekFrom::Start(0))?;

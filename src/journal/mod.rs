@@ -1,24 +1,24 @@
 //! Write-ahead journal: every observation and every decision of a loop is on disk before its
 //! answers leave the program.
 //!
-//! A directory contains segments `journal-N` and, except for the first, the snapshot `snapshot-N`
-//! from which each segment begins; two generations are kept. Records are numbered and chained, see
-//! `record`. An observation is written before it is handled, and the decision before any of its
-//! answers leaves the program \[1\]. Opening restores the loop from the newest sound snapshot and
-//! replays the later observations with the plans of that time. The answers must equal the recorded
-//! ones, except for explanations; otherwise the journal is rejected.
+//! A directory contains segments `journal-N` and snapshots `snapshot-N`. Each segment except the
+//! first begins at the snapshot with its number. Two generations are kept. Records are numbered and
+//! chained by hashes, see `record`. An observation is written before it is handled, and the
+//! decision before any of its answers leaves the program \[1\]. Opening restores the loop from the
+//! newest sound snapshot and replays the later observations with the recorded plans. The answers
+//! must equal the recorded ones, except for explanations; otherwise the journal is rejected.
 //!
-//! A crash may leave the last record incomplete. It is cut off, kept in a separate file, and
-//! reported. A complete record is never cut off: any other fault in a needed file is an error, and
-//! a fault in a file that is not needed is a warning.
+//! A crash may leave the last record incomplete. This record is cut off, kept in a separate file,
+//! and reported. A complete record is never cut off: any other fault in a needed file is an error,
+//! and a fault in a file that is not needed is a warning.
 //!
-//! A new segment is created before the old one ends with a record of its successor, and this record
-//! is written before the snapshot. So a missing segment is detected, and a crash in between is not
-//! mistaken for one.
+//! A checkpoint creates the new segment first, then writes the `end` record of the old segment,
+//! then the snapshot. So a missing segment is detected, and a crash during a checkpoint is not
+//! mistaken for a missing segment.
 //!
-//! One process at a time uses the journal: it holds a lock on the file `lock`, which the operating
-//! system releases when the process ends. The file also stores the number of records, so that
-//! missing records are detected.
+//! Only one process at a time uses a journal. It holds a lock on the file `lock`, which the
+//! operating system releases when the process ends. The file also stores the number of records, by
+//! which missing records are detected.
 //!
 //! If a write fails, no answer leaves the program. With [`Unrecorded::Continue`], the segment is then
 //! renamed, so that the journal cannot be resumed, and the loop continues without it.
@@ -50,20 +50,20 @@ use recover::{Replay, Unfinished, settle, usable};
 
 pub use report::{Entry, JournalReport};
 
-/// Policy for flushing writes to the disk. A killed program loses nothing with any policy; a
-/// machine that loses power may lose data that was not flushed.
+/// Policy for flushing the journal to the disk. If the program is killed, no policy loses data; if
+/// the machine loses power, data that was not flushed may be lost.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Sync {
-    /// Flushes after every observation, before its answers leave the program.
+    /// Flushes after every observation and its decision, before the answers leave the program.
     Always,
-    /// Flushes before effects leave the program.
+    /// Flushes only if the answers contain an effect, before they leave the program.
     #[default]
     Effects,
-    /// The operating system decides when to flush.
+    /// Never flushes; the operating system decides when data reaches the disk.
     Never,
 }
 
-/// Settings of a journal.
+/// Settings for writing a journal.
 #[derive(Debug, Clone, Copy)]
 pub struct Policy {
     /// Policy for flushing writes to the disk.
@@ -78,7 +78,7 @@ impl Default for Policy {
     }
 }
 
-/// An open journal.
+/// A journal that is open for writing, at its end.
 #[derive(Debug)]
 pub struct Journal {
     directory: PathBuf,
@@ -88,23 +88,24 @@ pub struct Journal {
     link: Link,
     /// Lock of the journal while it is open.
     lock: Lock,
-    /// Number of observations since the snapshot.
+    /// Number of observations in the current segment, i.e. since its snapshot.
     observations: u64,
-    /// Work that was begun and not decided when the program ended.
+    /// Work that the previous process began and did not finish, until [`Journal::begin`] completes
+    /// it.
     unfinished: Option<Unfinished>,
     digest: String,
-    /// Reaction to a failed write.
+    /// Reaction of the loop to a failed write: stop, or continue without the journal.
     unrecorded: Unrecorded,
-    /// `true` after a failed write if the loop continues.
+    /// `true` after a failed write with which the loop continues; nothing more is written.
     is_incomplete: bool,
-    /// Message about the failed write, until it is answered.
+    /// Message about the failed write, until it is added to the next answers.
     notice: Option<String>,
 }
 
 impl Journal {
-    /// Opens the journal in a directory for a loop that has not begun, and creates the directory if
-    /// it does not exist. The loop is then in its state after the last recorded decision.
-    /// [`Journal::begin`] has to follow.
+    /// Opens the journal in a directory and restores `control`, a loop that has not begun, to its
+    /// state after the last recorded decision. Creates the directory and the journal if they do not
+    /// exist. [`Journal::begin`] or [`Journal::begin_reacting`] has to be called next.
     ///
     /// # Errors
     /// The directory cannot be used, or another process uses it; or the journal is damaged or
@@ -165,7 +166,8 @@ impl Journal {
         Ok((journal, recovery))
     }
 
-    /// Restores a loop that has not begun as [`Journal::open`] does, without changing the disk.
+    /// Restores a loop that has not begun, as [`Journal::open`] does, but without changing files
+    /// and without a lock.
     ///
     /// # Errors
     /// The journal cannot be resumed: it is damaged, or belongs to another mission, or the mission
@@ -178,9 +180,9 @@ impl Journal {
         Ok(recovery)
     }
 
-    /// Decides the unfinished work, which may require planning. Returns the answers that may not
-    /// have left the program: first those to the unfinished work, then effects that were not
-    /// acknowledged.
+    /// Completes the work that the previous process left unfinished, which may require planning.
+    /// Returns the answers that may not have left the program: first the answers to the unfinished
+    /// work, then effects that were not acknowledged.
     ///
     /// # Errors
     /// The journal cannot be written; the answers must not leave the program.
@@ -203,8 +205,8 @@ impl Journal {
         self.again(control, answers)
     }
 
-    /// Begins as [`Journal::begin`], without planning: the loop reacts to the unfinished work, and the
-    /// deliberation remains.
+    /// Starts the loop as [`Journal::begin`] does, but without planning: the loop only reacts to an
+    /// unfinished observation, and its deliberation remains pending.
     ///
     /// # Errors
     /// The journal cannot be written; the answers must not leave the program.
@@ -218,7 +220,8 @@ impl Journal {
         self.again(control, answers)
     }
 
-    /// Returns answers and effects that were not acknowledged, for repeated output.
+    /// Returns `answers` and all earlier effects that were not acknowledged, which have to be
+    /// output again.
     fn again<C: Recoverable>(
         &mut self,
         control: &C,
@@ -237,7 +240,7 @@ impl Journal {
         Ok(answers)
     }
 
-    /// Writes an observation, handles it by the loop, and writes the decision. The returned answers
+    /// Writes an observation, passes it to the loop, and writes the decision. The returned answers
     /// may leave the program.
     ///
     /// # Errors
@@ -254,8 +257,9 @@ impl Journal {
         Ok(answers)
     }
 
-    /// Writes an observation, and lets the loop react to it. The answers may leave the program
-    /// after [`Journal::reacted`], or with those of the deliberation after [`Journal::decided`].
+    /// Writes an observation, and passes it to the loop, which reacts without planning. The
+    /// returned answers may leave the program only after [`Journal::reacted`], or together with the
+    /// answers of the deliberation after [`Journal::decided`].
     ///
     /// # Errors
     /// The journal cannot be written; the answers must not leave the program.
@@ -273,7 +277,8 @@ impl Journal {
         Ok(answers)
     }
 
-    /// Writes the answers of [`Journal::observe`]. Adds an answer if the loop continues without the journal.
+    /// Writes the answers that [`Journal::observe`] returned as a reaction. If the loop continues
+    /// without the journal after a failed write, adds an answer with this message.
     ///
     /// # Errors
     /// The journal cannot be written; the answers must not leave the program.
@@ -291,8 +296,9 @@ impl Journal {
         Ok(())
     }
 
-    /// Writes the answers of a deliberation, after the answers to the previous observation if these
-    /// were not written. Adds an answer if the loop continues without the journal.
+    /// Writes `answers` as a decision: the answers of a deliberation, preceded by those of
+    /// [`Journal::observe`] if they were not written. If the loop continues without the journal
+    /// after a failed write, adds an answer with this message.
     ///
     /// # Errors
     /// The journal cannot be written; the answers must not leave the program.
@@ -315,8 +321,8 @@ impl Journal {
         Ok(())
     }
 
-    /// Performs a write, unless the loop continues without the journal. If the write fails and the loop
-    /// may continue, the journal is marked as incomplete.
+    /// Performs a write, or nothing if the journal is already incomplete. If the write fails and
+    /// the loop may continue, marks the journal as incomplete and returns `Ok`.
     fn write(&mut self, write: impl FnOnce(&mut Self) -> io::Result<()>) -> io::Result<()> {
         if self.is_incomplete {
             return Ok(());
@@ -337,21 +343,22 @@ impl Journal {
         Ok(())
     }
 
-    /// Renames the last segment, which needs no disk space.
+    /// Renames the last segment, so that the journal cannot be resumed. Renaming needs no disk
+    /// space.
     fn mark_incomplete(&self) -> io::Result<()> {
         let from = path(&self.directory, "journal", self.segment);
         std::fs::rename(from, path(&self.directory, INCOMPLETE, self.segment))?;
         sync_directory(&self.directory)
     }
 
-    /// Adds the answer about a failed write, once.
+    /// Inserts the message about a failed write at the front of the answers, once.
     fn give_notice<C: Recoverable>(&mut self, answers: &mut Vec<C::Answer>) {
         if let Some(message) = self.notice.take() {
             answers.insert(0, Answer::Unrecorded { message }.into());
         }
     }
 
-    /// Flushes answers to the disk according to the policy.
+    /// Flushes the file as far as the policy requires before these answers leave the program.
     fn keep<C: Recoverable>(&mut self, answers: &[C::Answer]) -> io::Result<()> {
         // `Effects` is sufficient, because only effects change the world.
         let must = match self.policy.sync {
@@ -376,8 +383,8 @@ impl Journal {
         Ok(())
     }
 
-    /// Begins a new segment, ends the current one and writes a snapshot, in this order. Older
-    /// generations are removed.
+    /// Creates the next segment, writes the `end` record of the current one, and writes a snapshot,
+    /// in this order. Removes segments and snapshots before the current one.
     fn checkpoint<C: Recoverable>(&mut self, control: &mut C) -> io::Result<()> {
         let next = self.segment + 1;
         let (end, at) = closing(&self.link, self.segment);
@@ -403,18 +410,19 @@ impl Journal {
     }
 }
 
-/// A restored loop, and its position in the journal.
+/// Result of [`resume`]: position of a restored loop in its journal.
 struct Resumed<'c> {
-    /// Number of the snapshot, or 0.
+    /// Number of the snapshot from which the loop was restored, or 0 without a snapshot.
     from: u64,
     segments: Vec<&'c Segment>,
     observations: u64,
     unfinished: Option<Unfinished>,
-    /// Missing snapshots, by number, which are written again.
+    /// Numbers and lines of missing snapshots, which have to be written again.
     missing_snapshots: Vec<(u64, String)>,
 }
 
-/// Restores a loop from the newest sound snapshot and the later observations.
+/// Restores a loop from the newest sound snapshot, and replays the later observations. Changes no
+/// files.
 fn resume<'c, C: Recoverable>(
     directory: &Path,
     contents: &'c JournalFiles,
@@ -452,7 +460,8 @@ fn resume<'c, C: Recoverable>(
     Ok(Resumed { from, segments, observations, unfinished, missing_snapshots })
 }
 
-/// Creates a segment with only its header, atomically.
+/// Atomically creates a segment file that contains only its header. Returns the file and the link
+/// after the header.
 fn create_segment(directory: &Path, after: &Link, digest: &str, number: u64) -> io::Result<(File, Link)> {
     let (line, link) = header(after, digest, number);
     let mut file = tempfile::NamedTempFile::new_in(directory)?;
@@ -463,7 +472,8 @@ fn create_segment(directory: &Path, after: &Link, digest: &str, number: u64) -> 
     Ok((file, link))
 }
 
-/// Writes a snapshot. An existing snapshot that was not usable is kept under another name.
+/// Atomically writes a snapshot. An existing snapshot with this number is damaged, and is kept
+/// under another name.
 fn write_snapshot(directory: &Path, number: u64, line: &str) -> io::Result<()> {
     let name = path(directory, "snapshot", number);
     let mut file = tempfile::NamedTempFile::new_in(directory)?;

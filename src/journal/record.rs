@@ -1,20 +1,21 @@
 //! Records of a journal as lines of text, linked by a hash chain.
 //!
 //! A line is sixteen hexadecimal digits, a space and a JSON array that begins with the record's
-//! number. The digits are the first half of a SHA-256 of the digits of the line before and of the
-//! array, so that a line that is changed, missing, doubled or moved does not fit. The chain detects
-//! damage; it does not protect against a writer with access to the directory.
+//! number. The digits are the first half of the SHA-256 of the previous line's digits and this
+//! line's array. So a changed, missing, repeated or moved line is detected. The chain detects
+//! damage; it does not protect against an attacker with write access to the directory.
 
 use serde_json::{Value, json};
 use sha2::{Digest as _, Sha256};
 
-/// Version of the file format.
+/// Name and version of the journal's file format.
 pub(super) const FORMAT: &str = "metaplan-journal/3";
 
-/// Number of hexadecimal digits before a record.
+/// Number of hexadecimal digits of the hash in front of each record.
 const DIGITS: usize = 16;
 
-/// A position between two records: the number of the next record, and the digits of the last one.
+/// A position between two records: the number of the next record, and the chain digits of the
+/// previous one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Link {
     pub(super) next: u64,
@@ -22,12 +23,13 @@ pub(super) struct Link {
 }
 
 impl Link {
-    /// Link before the first record.
+    /// Returns the link before the first record of a journal.
     pub(super) fn first() -> Self {
         Self { next: 0, digits: "0".repeat(DIGITS) }
     }
 
-    /// Returns the line of the next record, and the link after it.
+    /// Formats the next record as a line with its line break. Also returns the link after this
+    /// line.
     pub(super) fn line(&self, kind: &str, fields: &[Value]) -> (String, Self) {
         let mut array = vec![json!(self.next), json!(kind)];
         array.extend_from_slice(fields);
@@ -37,7 +39,7 @@ impl Link {
     }
 
     /// Parses a line without its line break. Returns the record and the link after it, or `None` if
-    /// the line does not fit here.
+    /// number or digits of the line do not continue the chain at this position.
     pub(super) fn read(&self, line: &[u8]) -> Option<(Record, Self)> {
         let (record, digits) = parse(line)?;
         let text = line.get(DIGITS + 1..)?;
@@ -46,12 +48,12 @@ impl Link {
     }
 }
 
-/// A record.
+/// A parsed record of a journal.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Record {
     pub(super) number: u64,
     pub(super) kind: String,
-    /// Fields after number and kind.
+    /// Fields of the JSON array after number and kind.
     pub(super) fields: Vec<Value>,
 }
 
@@ -69,21 +71,22 @@ impl Record {
     }
 }
 
-/// Returns the first line of a segment, which contains the link to its predecessor, and the link
-/// after it.
+/// Returns the first line of a segment, and the link after this line. The line repeats the link to
+/// the previous segment.
 pub(super) fn header(after: &Link, digest: &str, segment: u64) -> (String, Link) {
     after.line("segment", &[json!(FORMAT), json!(digest), json!(segment), json!(after.digits)])
 }
 
-/// Returns the only line of a snapshot that follows `after`.
+/// Returns the only line of a snapshot file for the position `after` of the record chain.
 pub(super) fn snapshot(after: &Link, digest: &str, segment: u64, data: &Value) -> String {
     after
         .line("snapshot", &[json!(FORMAT), json!(digest), json!(segment), json!(after.digits), data.clone()])
         .0
 }
 
-/// Parses a line that contains its own predecessor: a header or a snapshot. Returns the links
-/// before and after it.
+/// Parses the first line of a file, a header or a snapshot, which contains the digits of its
+/// predecessor. Returns the record, the link before it and the link after it; `None` if it has
+/// another kind or is damaged.
 pub(super) fn opening(line: &[u8], kind: &str) -> Option<(Record, Link, Link)> {
     let (record, _) = parse(line)?;
     let before = Link { next: record.number, digits: record.text(3)?.to_owned() };
@@ -91,7 +94,7 @@ pub(super) fn opening(line: &[u8], kind: &str) -> Option<(Record, Link, Link)> {
     (record.kind == kind).then_some((record, before, after))
 }
 
-/// Parses a line without checking its link.
+/// Parses a line into its record and its digits, without checking the digits.
 fn parse(line: &[u8]) -> Option<(Record, String)> {
     let (digits, text) = line.split_at_checked(DIGITS)?;
     let digits = std::str::from_utf8(digits).ok()?.to_owned();

@@ -12,19 +12,23 @@ use super::recovery::Recovery;
 use crate::mapek::{Observation, Recoverable};
 use crate::message::Message;
 
-/// Unfinished work that is decided first.
+/// Work that a crash has interrupted and that the loop completes when the journal is opened.
 #[derive(Debug)]
 pub(super) enum Unfinished {
-    /// The loop has reacted to an observation, or is about to begin, and has not deliberated.
+    /// The loop has a pending deliberation: it has reacted to an observation, or has just been
+    /// created.
     Agenda,
-    /// An observation, and its time in microseconds.
+    /// An observation without a recorded reaction or decision: its line, and its time in
+    /// microseconds.
     Observation(String, u64),
 }
 
-/// Returns the segments to replay, and the number of the first: from the newest usable snapshot.
+/// Returns the segments to replay, and the number of the first of them. Replay starts at the newest
+/// sound snapshot whose later segments are also sound. Faults in older files are added to
+/// `warnings`.
 ///
 /// # Errors
-/// All faults of the needed files.
+/// Descriptions of all faults, if no snapshot can be used together with all later segments.
 pub(super) fn usable<'a>(
     contents: &'a JournalFiles,
     warnings: &mut Vec<Message>,
@@ -62,18 +66,18 @@ pub(super) fn usable<'a>(
     Err(format!("{}; {way_out}", problems.join(", ")))
 }
 
-/// Replays records on a loop.
+/// Replays recorded observations on a loop, and compares the answers with the recorded ones.
 pub(super) struct Replay<'a, C> {
     pub(super) directory: &'a Path,
     pub(super) control: &'a mut C,
     pub(super) recovery: &'a mut Recovery,
-    /// Number of observations in the last segment.
+    /// Number of observations in the segment that was replayed last.
     pub(super) observations: u64,
     pub(super) unfinished: Option<Unfinished>,
 }
 
 impl<C: Recoverable> Replay<'_, C> {
-    /// Replays a segment.
+    /// Replays all records of one segment.
     pub(super) fn segment(&mut self, segment: &Segment) -> Result<(), Message> {
         self.observations = 0;
         // The end record only links segments.
@@ -112,8 +116,8 @@ impl<C: Recoverable> Replay<'_, C> {
         Ok(())
     }
 
-    /// Replays an observation, and compares the answers with those in the record that follows it,
-    /// if there is one.
+    /// Replays an observation. Compares the answers with those of `next`, the reaction or decision
+    /// that follows it; without `next`, the observation is unfinished.
     fn event(&mut self, line: &str, now: u64, next: Option<&Record>) -> Result<(), Message> {
         self.recovery.replayed = self.recovery.replayed.map(|count| count + 1);
         let Some(next) = next else {
@@ -131,7 +135,7 @@ impl<C: Recoverable> Replay<'_, C> {
         self.compare(next, &answers)
     }
 
-    /// Compares answers with the recorded ones.
+    /// Returns an error if the answers of the replay differ from the recorded ones.
     fn compare(&mut self, written: &Record, answers: &[C::Answer]) -> Result<(), Message> {
         if self.control.decision(answers).agrees(&written.list(0)) {
             return Ok(());
@@ -142,7 +146,8 @@ impl<C: Recoverable> Replay<'_, C> {
     }
 }
 
-/// Completes the last segments after a crash, and opens the last one for appending.
+/// Repairs the ends of segments after a crash, and opens the last segment for appending. Returns
+/// its file and the link at its end.
 pub(super) fn settle(
     directory: &Path,
     segments: &[&Segment],
@@ -177,7 +182,8 @@ pub(super) fn settle(
     Err(io::Error::other("nothing is in it"))
 }
 
-/// Copies the bytes that will be cut off a file to another file.
+/// Copies the incomplete record at the end of a file, i.e. all bytes from `sound` on, to a new file
+/// `NAME.cutN`.
 fn keep_cut(name: &Path, sound: u64) -> io::Result<()> {
     let bytes = std::fs::read(name)?;
     let remaining = bytes.get(sound as usize..).unwrap_or_default();

@@ -5,9 +5,9 @@ use crate::message::Message;
 /// Result of opening a journal.
 #[derive(Debug, Clone, Default)]
 pub struct Recovery {
-    /// Number of replayed observations. `None` for a new journal.
+    /// Number of observations replayed when the journal was opened. `None` for a new journal.
     pub replayed: Option<u64>,
-    /// Number of bytes of an incomplete record that were cut off.
+    /// Number of bytes of an incomplete last record that were cut off.
     pub cut: u64,
     /// Faults of the journal that did not affect the recovery.
     pub warnings: Vec<Message>,

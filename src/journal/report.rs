@@ -1,4 +1,5 @@
-//! Reports the contents of a journal without its mission, and without changing it.
+//! Reads the contents of a journal for a report, without loading its mission and without changing a
+//! file.
 
 use std::path::Path;
 
@@ -8,7 +9,7 @@ use super::directory::{End, JournalFiles, Segment, broken, name};
 use super::recover::usable;
 use crate::message::Message;
 
-/// Contents of a journal.
+/// Contents and faults of a journal.
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct JournalReport {
@@ -16,11 +17,11 @@ pub struct JournalReport {
     pub parts: Vec<String>,
     /// Faults: an error if the journal cannot be used, a warning otherwise.
     pub messages: Vec<Message>,
-    /// All sound records in order.
+    /// All sound records of all segments, in order.
     pub entries: Vec<Entry>,
 }
 
-/// A record.
+/// A record of a journal.
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct Entry {

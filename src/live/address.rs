@@ -1,13 +1,13 @@
-//! Address of the web page, and the check of the `Host` header.
+//! Address at which the web page is served, and the check of the `Host` header.
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, ToSocketAddrs as _};
 
 use crate::message::Message;
 
-/// Default port.
+/// Default port of the web page.
 pub const DEFAULT_PORT: u16 = 8420;
 
-/// A listening address.
+/// An address and port at which the server listens.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Address(pub(super) SocketAddr);
 
@@ -54,8 +54,9 @@ fn wrong(text: &str, why: &str) -> Message {
     )
 }
 
-/// Returns `true` if a `Host` header names this machine by a loopback address. This prevents DNS
-/// rebinding: a page of another site whose name resolves to this machine sends that name.
+/// Returns `true` if a `Host` header names this machine by a loopback address. This check prevents
+/// DNS rebinding: a page of another site whose name resolves to this machine would send that site's
+/// name.
 pub(super) fn is_local_host(host: &str) -> bool {
     let without_port = |host: &str| host.rsplit_once(':').map_or(host, |(name, _)| name).to_owned();
     let name = match host.strip_prefix('[').and_then(|rest| rest.split_once(']')) {

@@ -1,4 +1,4 @@
-//! The picture of the current plan, drawn lazily on the first request.
+//! The picture of the current plan, drawn when it is first requested.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -6,7 +6,7 @@ use crate::mapek::Outlook;
 use crate::report::Painter;
 use crate::visible::visible;
 
-/// The last plan, and its picture once requested.
+/// The current plan, and its picture after the first request.
 #[derive(Debug, Default)]
 pub(super) struct Canvas {
     painter: Option<Painter>,
@@ -24,13 +24,13 @@ impl Canvas {
         Self { painter, shown: Mutex::default() }
     }
 
-    /// Replaces the plan, or removes it. A concurrent drawing does not block this call.
+    /// Replaces the current plan, or removes it. Does not wait for a drawing in progress.
     pub(super) fn take(&self, outlook: Option<Outlook>) {
         *self.lock() = Shown { outlook: outlook.map(Arc::new), drawn: None };
     }
 
-    /// Returns the picture of the last plan, with the request number of its first step. Empty
-    /// without a plan.
+    /// Returns the picture of the current plan as HTML; its attribute `data-first` is the request
+    /// number of the plan's first step. Empty without a plan.
     pub(super) fn picture(&self) -> Arc<str> {
         let (outlook, drawn) = {
             let state = self.lock();

@@ -1,4 +1,5 @@
-//! Broadcast of a run's lines to clients: the last lines, and the current state by key.
+//! Distributes the lines of a run to clients. It retains the last lines, and the line that defines
+//! the current state of each key.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
@@ -11,23 +12,24 @@ use serde_json::{Value, json};
 use crate::live::keep::{design_key, keys};
 use crate::mapek::DesignChange;
 
-/// Maximum number of lines in the queue; further lines are dropped and counted.
+/// Maximum number of lines in the queue from the loop; further lines are dropped and counted.
 const MAX_QUEUED_LINES: usize = 4096;
 const MAX_QUEUED_BYTES: usize = 16 << 20;
 
-/// Maximum number of retained lines.
+/// Maximum number of retained lines for clients.
 const MAX_LINES: usize = 2000;
 
-/// Maximum number of bytes of retained lines, unless a single line has more.
+/// Maximum total size of the retained lines in bytes. A single line may be longer.
 const MAX_RETAINED_BYTES: usize = 4 << 20;
 
-/// Maximum number of keys with a retained state; the oldest are dropped first.
+/// Maximum number of keys whose current state is retained. Above it, the keys that changed longest
+/// ago are dropped.
 const MAX_KEYS: usize = 10_000;
 
-/// Maximum number of lines in a batch.
+/// Maximum number of lines that a client receives at once.
 const MAX_BATCH: usize = 100;
 
-/// The retained lines, and the condition variable for new ones.
+/// The retained lines of a run, and the condition variable that is signalled for new lines.
 #[derive(Debug, Default)]
 pub(super) struct Hub {
     retained: Mutex<RetainedLines>,
@@ -40,26 +42,27 @@ struct RetainedLines {
     bytes: usize,
     /// Number of the first retained line.
     first: u64,
-    /// Line that defines the current state of each key, with its number.
+    /// For each key, the line that defines its current state, and the number of this line.
     words: BTreeMap<String, (u64, Arc<str>)>,
     ended: bool,
 }
 
-/// News for a client that has read up to a line.
+/// Result of waiting for new lines.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum News {
-    /// The next lines.
+    /// The next lines in order.
     Lines(Vec<Arc<str>>),
-    /// No news yet.
+    /// No new lines within the waiting time.
     Nothing,
-    /// Unread lines were dropped.
+    /// Lines that the client has not read were dropped.
     Missed,
-    /// The run has ended.
+    /// The run has ended and all lines were read.
     Ended,
 }
 
 impl Hub {
-    /// Returns the current state, as lines in order, and the number of the next line.
+    /// Returns the lines that define the current state and are no longer retained otherwise, in
+    /// order. Also returns the number of the first retained line.
     pub(super) fn state(&self) -> (Vec<Arc<str>>, u64) {
         let state = self.lock();
         let mut visited = BTreeSet::new();
@@ -70,7 +73,7 @@ impl Hub {
         (words.into_iter().map(|(_, line)| line).collect(), state.first)
     }
 
-    /// Returns the lines from a number on, after waiting up to `wait` for the first.
+    /// Returns the retained lines from number `from` on. If there are none yet, waits up to `wait`.
     pub(super) fn news(&self, from: u64, wait: Duration) -> News {
         let is_waiting = |state: &mut RetainedLines| !state.ended && from == state.end();
         let state = self.more.wait_timeout_while(self.lock(), wait, is_waiting);
@@ -87,7 +90,7 @@ impl Hub {
         }
     }
 
-    /// Appends a line, and retains it as the current state of `keys`.
+    /// Appends a line, and stores it as the current state of `keys`.
     fn take(&self, line: Arc<str>, keys: Vec<String>) {
         let mut state = self.lock();
         let number = state.end();
@@ -122,13 +125,14 @@ impl Hub {
 }
 
 impl RetainedLines {
-    /// Returns the number of the next line.
+    /// Returns the number that the next appended line will have.
     fn end(&self) -> u64 {
         self.first + self.lines.len() as u64
     }
 }
 
-/// Sender of the loop's messages to a hub. Sending never blocks. Copies share the hub.
+/// Sends events and answers of the loop to a hub, through a queue. Only [`HubSender::end`] blocks.
+/// Clones share the hub.
 #[derive(Debug, Clone)]
 pub(super) struct HubSender {
     queue: SyncSender<Option<(f64, Entry)>>,
@@ -136,7 +140,7 @@ pub(super) struct HubSender {
     start: Instant,
 }
 
-/// Size of the queue, and number of dropped lines.
+/// Size of the queue in bytes, and number of lines that were dropped.
 #[derive(Debug, Default)]
 struct Backlog {
     dropped: AtomicU64,
@@ -152,7 +156,7 @@ enum Entry {
 }
 
 impl Entry {
-    /// Number of bytes of text.
+    /// Returns the number of bytes of text that count towards the limit of the queue.
     fn bytes(&self) -> usize {
         match self {
             Self::Event(_, text) | Self::Answer(text) => text.len(),
@@ -162,7 +166,7 @@ impl Entry {
 }
 
 impl HubSender {
-    /// Starts a receiving thread for a hub, and returns the sender.
+    /// Starts the thread that moves messages from the queue to `hub`, and returns the sender.
     pub(super) fn of(hub: Arc<Hub>) -> Self {
         let (queue, receiver) = sync_channel(MAX_QUEUED_LINES);
         let backlog = Arc::new(Backlog::default());
@@ -171,27 +175,27 @@ impl HubSender {
         Self { queue, backlog, start: Instant::now() }
     }
 
-    /// Sends a line of events, with its number.
+    /// Sends an input line of the loop, with its number.
     pub(super) fn send_event(&self, number: u64, text: &str) {
         self.enqueue(Entry::Event(number, text.to_owned()));
     }
 
-    /// Sends an answer, a JSON object of the format.
+    /// Sends an answer, given as the text of a JSON object.
     pub(super) fn send_answer(&self, answer: &str) {
         self.enqueue(Entry::Answer(answer.to_owned()));
     }
 
-    /// Sends the state of designs.
+    /// Sends the availability of designs.
     pub(super) fn send_designs(&self, designs: Vec<DesignChange>) {
         self.enqueue(Entry::Designs(designs));
     }
 
-    /// Sends the existence of a plan, and the number of the running action.
+    /// Sends whether a plan exists, and the request number of its running action, if there is one.
     pub(super) fn send_plan(&self, exists: bool, under_way: Option<u64>) {
         self.enqueue(Entry::Planned { exists, under_way });
     }
 
-    /// Sends the end of the run, and waits until all earlier messages are processed.
+    /// Sends the end of the run. Blocks while the queue is full.
     pub(super) fn end(&self) {
         let _ = self.queue.send(None);
     }

@@ -1,10 +1,11 @@
-//! Determines the lines that describe the current state until a later line replaces them.
+//! Assigns answers to keys of the current state. The last line of each key is kept for clients that
+//! connect later.
 
 use std::borrow::Cow;
 
 use serde::Deserialize;
 
-/// Fields of an answer that identify its subject.
+/// The fields of an answer that determine its keys.
 #[derive(Deserialize)]
 struct About<'a> {
     #[serde(borrow, default)]
@@ -27,19 +28,20 @@ struct Objective {
     objective: String,
 }
 
-/// Key of a design's state.
+/// Returns the key for the availability of a design.
 pub(super) fn design_key(design: &str) -> String {
     format!("design {design}")
 }
 
-/// Returns the keys whose current state an answer defines.
+/// Returns the keys of the state that an answer defines. Empty for answers that are not part of the
+/// state.
 pub(super) fn keys(answer: &str) -> Vec<String> {
     let Ok(about) = serde_json::from_str::<About>(answer) else { return Vec::new() };
     match about.answer.as_ref() {
         "request_action" | "goal_reached" => vec!["action".to_owned()],
         "suspend_action" | "resume_action" | "cancel_action" => vec!["suspension".to_owned()],
-        // A plan that is found, lost or kept: lines of all three kinds are repeated in their order,
-        // since the cost of a kept plan is in the first.
+        // These three kinds have separate keys, because all three lines are needed in their order:
+        // the cost of a kept plan is in the line of the plan that was found.
         kind @ ("plan_found" | "plan_none" | "plan_kept" | "ready" | "contradicted" | "unconcluded"
         | "unrecorded") => {
             vec![kind.to_owned()]

@@ -1,16 +1,16 @@
-//! Parses HTTP requests: the path and the relevant headers.
+//! Parses HTTP requests: the path and the two headers that are needed.
 
 use std::io::{self, Read};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-/// Maximum number of bytes of a request's head.
+/// Maximum number of bytes of a request before its body.
 const MAX_HEAD_BYTES: usize = 16 << 10;
 
-/// Maximum number of headers.
+/// Maximum number of headers of a request.
 const MAX_HEADERS: usize = 64;
 
-/// A parsed request.
+/// The needed parts of a GET request.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Request {
     pub(super) path: String,
@@ -22,7 +22,8 @@ pub(super) struct Request {
 pub(super) type Refused = (u16, &'static str);
 
 impl Request {
-    /// Reads a request, which has to be complete within `patience`.
+    /// Reads a request from a connection. Returns status 408 if the request is not complete within
+    /// `patience`.
     pub(super) fn read(stream: &mut TcpStream, patience: Duration) -> io::Result<Result<Self, Refused>> {
         let begun = Instant::now();
         let mut bytes = Vec::new();
@@ -47,7 +48,7 @@ impl Request {
         }
     }
 
-    /// Parses a request. `None` while it is incomplete.
+    /// Parses the bytes of a request. Returns `None` while the request is incomplete.
     fn parse(bytes: &[u8]) -> Option<Result<Self, Refused>> {
         let mut headers = [httparse::EMPTY_HEADER; MAX_HEADERS];
         let mut parsed = httparse::Request::new(&mut headers);

@@ -1,4 +1,4 @@
-//! HTTP server: answers connections with the page, or with the event stream.
+//! HTTP server: answers requests with the page or with the event stream.
 
 use std::io::{self, Write as _};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
@@ -24,15 +24,15 @@ const KEEPALIVE_INTERVAL: Duration = Duration::from_secs(10);
 /// Maximum number of concurrent connections.
 const MAX_CONNECTIONS: usize = 16;
 
-/// Time at the end of a run for clients to receive the last lines.
+/// Maximum time that the program waits at the end of a run, so that clients receive the last lines.
 const SHUTDOWN_GRACE: Duration = Duration::from_millis(500);
 
 const PAGE: &str = include_str!("page/index.html");
-/// Style sheet of this page, in addition to the common one.
+/// Style sheet of this page, in addition to [`picture::STYLE`].
 const STYLE: &str = include_str!("page/live.css");
 const SCRIPT: &str = include_str!("page/live.js");
 
-/// Server of a run's page; copies share the run.
+/// Server of the web page for one run. Clones share the server.
 #[derive(Debug, Clone)]
 pub struct Live {
     sender: HubSender,
@@ -50,8 +50,8 @@ struct SharedState {
 }
 
 impl Live {
-    /// Starts the server. A token is required unless the address is a loopback address. Without a
-    /// painter no plan is drawn.
+    /// Starts the server. A token is required unless the address is a loopback address. Without
+    /// `painter`, plans are not drawn.
     ///
     /// # Errors
     /// The token is missing, or the address cannot be served.
@@ -89,7 +89,7 @@ impl Live {
         self.address
     }
 
-    /// Publishes a line of events, with its number. Never blocks.
+    /// Publishes an input line of the loop, with its number. Never blocks.
     pub fn heard(&self, number: u64, text: &str) {
         self.sender.send_event(number, text);
     }
@@ -99,12 +99,14 @@ impl Live {
         self.sender.send_answer(answer);
     }
 
-    /// Publishes the initial state of the designs, before the first answer. Never blocks.
+    /// Publishes the availability of the designs at the start, before the first answer. Never
+    /// blocks.
     pub fn known(&self, designs: Vec<DesignChange>) {
         self.sender.send_designs(designs);
     }
 
-    /// Replaces the plan, or removes it. Never blocks; the plan is drawn on the next request.
+    /// Replaces the current plan, or removes it. Never blocks; the plan is drawn on the next
+    /// request.
     pub fn planned(&self, outlook: Option<Outlook>) {
         let under_way = outlook.as_ref().filter(|plan| plan.is_under_way).map(|plan| plan.first);
         let exists = outlook.is_some();
@@ -112,7 +114,8 @@ impl Live {
         self.sender.send_plan(exists, under_way);
     }
 
-    /// Ends the run for all clients, and waits a moment until they have received the end.
+    /// Reports the end of the run to all clients, and waits a short time until they have received
+    /// it.
     pub fn end(&self) {
         self.sender.end();
         let begun = Instant::now();
@@ -122,7 +125,7 @@ impl Live {
     }
 }
 
-/// Counts a connection as open until it is dropped.
+/// Decrements the number of open connections when dropped.
 struct ConnectionGuard(Arc<SharedState>);
 
 impl Drop for ConnectionGuard {
@@ -131,7 +134,7 @@ impl Drop for ConnectionGuard {
     }
 }
 
-/// Starts a thread for a connection, unless there are too many.
+/// Answers a connection on a new thread, with status 503 if there are too many connections.
 fn receive(shared: &Arc<SharedState>, mut stream: TcpStream) {
     let connections = shared.open_connections.fetch_add(1, Ordering::AcqRel);
     let guard = ConnectionGuard(Arc::clone(shared));
@@ -150,7 +153,7 @@ fn receive(shared: &Arc<SharedState>, mut stream: TcpStream) {
     drop(answered);
 }
 
-/// Answers one request.
+/// Reads the request of a connection and answers it.
 fn answer(shared: &SharedState, stream: &mut TcpStream) -> io::Result<()> {
     stream.set_nodelay(true)?;
     let request = match Request::read(stream, CLIENT_TIMEOUT)? {
@@ -170,7 +173,7 @@ fn answer(shared: &SharedState, stream: &mut TcpStream) -> io::Result<()> {
     }
 }
 
-/// Checks that a request is authorised.
+/// Checks the token of a request or, without a token, the `Host` header.
 fn authorize(shared: &SharedState, request: &Request) -> Result<(), Refused> {
     if let Some(token) = &shared.token {
         let fits = request.authorization.as_deref().is_some_and(|given| token.fits(given));
@@ -209,7 +212,8 @@ fn refuse(stream: &mut TcpStream, (status, words): Refused) -> io::Result<()> {
     send(stream, &(head + &text))
 }
 
-/// Sends the current state and then the new lines, until the run ends or the client is too slow.
+/// Sends the lines of the current state and then all new lines, until the run ends or the client is
+/// too slow.
 fn events(shared: &SharedState, stream: &mut TcpStream) -> io::Result<()> {
     send(
         stream,
@@ -240,7 +244,7 @@ fn stanzas(lines: &[Arc<str>]) -> String {
     lines.iter().flat_map(|line| ["data: ", line, "\n\n"]).collect()
 }
 
-/// Writes a text; fails if the client does not read it within the timeout.
+/// Sends a text. Fails if the client has not read the text within the timeout.
 fn send(stream: &mut TcpStream, text: &str) -> io::Result<()> {
     let begun = Instant::now();
     let mut remaining = text.as_bytes();

@@ -1,4 +1,4 @@
-//! Access token, compared in constant time and never printed.
+//! Access token for the web page. It is compared in constant time and never printed.
 
 use std::path::Path;
 
@@ -9,13 +9,13 @@ use subtle::ConstantTimeEq as _;
 
 use crate::message::Message;
 
-/// Minimum length; shorter tokens can be guessed.
+/// Minimum length of a token in characters; shorter tokens can be guessed.
 const MIN_LENGTH: usize = 16;
 
-/// Maximum length; a longer text is probably another file.
+/// Maximum length of a token in characters; a longer text is probably not a token.
 const MAX_LENGTH: usize = 1024;
 
-/// A token, stored as its digest only.
+/// An access token, of which only the SHA-256 digest is stored.
 #[derive(Clone)]
 pub struct Token([u8; 32]);
 
@@ -29,7 +29,7 @@ impl Token {
     /// Reads a token from a file: one word of 16 to 1,024 visible ASCII characters.
     ///
     /// # Errors
-    /// The file cannot be read, or has other contents. The message never quotes them.
+    /// The file cannot be read or does not contain a token. The message never quotes its contents.
     pub fn read(path: &Path) -> Result<Self, Message> {
         let name = path.display().to_string();
         let wrong = |text: String| Message::at("M332", &name, None, text);

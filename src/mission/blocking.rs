@@ -1,10 +1,10 @@
 //! Explains an unsolvable mission by a minimal set of unavailable designs.
 //!
-//! The mission with all unavailable designs has no plan. The designs are made available one by one,
-//! and a design stays available if there is still no plan. The remaining set is minimal: with any
-//! one of its designs there would be a plan. This is the deletion-based search for a minimal
-//! unsatisfiable core [1]. The planner replaces the SAT solver; its proofs hold for plans of every
-//! length.
+//! The explanation is sought if the mission has no plan, but would have one with all designs
+//! available. Designs are made available one by one, and a design stays available if there is still
+//! no plan. The remaining set of unavailable designs is minimal: with any one of them available,
+//! there would be a plan. This is the deletion-based search for a minimal unsatisfiable core [1],
+//! with the planner in place of the SAT solver; its proofs hold for plans of every length.
 //!
 //! [1] J. Marques-Silva, I. Lynce: On improving MUS extraction algorithms, SAT 2011.
 
@@ -17,18 +17,18 @@ use ::mission::Mission;
 
 use crate::mission::planning::ground_with;
 
-/// Reason for the unsolvability of a mission.
+/// Reason why a mission is unsolvable.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Blocking {
     /// Minimal set of unavailable designs, sorted by local name. The mission has no plan while all
-    /// of them are unavailable, even if every other design is available. With any one of them, and
-    /// all others, it has a plan.
+    /// of them are unavailable, even if every other design is available. If any one of them becomes
+    /// available, in addition to all other designs, it has a plan.
     Designs(Vec<String>),
-    /// The mission has no plan even if every design is available.
+    /// Designs are not the reason: the mission has no plan even if every design is available.
     Other,
 }
 
-/// Formats the reason as a clause.
+/// Writes the reason as a clause that continues a sentence.
 impl fmt::Display for Blocking {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -45,8 +45,8 @@ impl fmt::Display for Blocking {
     }
 }
 
-/// Explains why a problem that [`Mission::filled`] has made, and that is proved unsolvable, has no
-/// plan. `None` if the mission has no knowledge base, or if a limit was reached.
+/// Explains why an unsolvable problem has no plan. The problem was returned by [`Mission::filled`].
+/// Returns `None` if the mission has no knowledge base, or if a limit is reached.
 pub fn blocking(mission: &Mission, problem: &Problem, config: &Config) -> Option<Blocking> {
     let mut config = config.clone();
     // A limit on the number of steps would hide longer plans.
@@ -71,8 +71,8 @@ pub fn blocking(mission: &Mission, problem: &Problem, config: &Config) -> Option
     Some(Blocking::Other)
 }
 
-/// Returns `true` if there is a plan with `available` as further designs. `None` if a limit was
-/// reached.
+/// Returns `true` if there is a plan when the designs in `available` are available in addition to
+/// the present ones. `None` if a limit is reached.
 fn solvable_with(
     mission: &Mission,
     problem: &Problem,

@@ -14,9 +14,9 @@ use planner::{Plan, Step};
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, Event};
 
-/// Name of the node that changes the design of a function.
+/// Type of the behaviour-tree node that changes the design of a function.
 const CHANGE_NODE: &str = "ChangeMode";
-/// Attributes that BehaviorTree.CPP reserves.
+/// Attribute names that BehaviorTree.CPP reserves, so that ports cannot have them.
 const RESERVED: [&str; 2] = ["name", "ID"];
 
 /// A node of the tree: its type, its instance name, and the values of its ports.
@@ -26,7 +26,8 @@ struct Node {
     ports: Vec<(String, String)>,
 }
 
-/// Returns the XML of a sequential plan. Its arguments have the form of the domain's file.
+/// Returns the XML of a behaviour tree for a sequential plan. The plan's arguments must be as in
+/// the domain's file.
 pub fn btcpp_text(mission: &Mission, plan: &Plan) -> String {
     let mut text = Vec::new();
     // Writing to memory does not fail.
@@ -34,7 +35,8 @@ pub fn btcpp_text(mission: &Mission, plan: &Plan) -> String {
     String::from_utf8(text).unwrap_or_default() + "\n"
 }
 
-/// Returns the nodes of the sequence.
+/// Returns the nodes of the sequence: the actions of the plan, each after the changes of designs
+/// that it needs.
 fn nodes(mission: &Mission, plan: &Plan) -> Vec<Node> {
     let mut nodes = Vec::new();
     let mut at_work: BTreeMap<&str, &str> = BTreeMap::new();
@@ -58,7 +60,8 @@ fn nodes(mission: &Mission, plan: &Plan) -> Vec<Node> {
     nodes
 }
 
-/// Returns the parameters of the schema with the objects of a step.
+/// Returns the ports of an action's node: parameter names of the schema with the objects of the
+/// step.
 fn ports(mission: &Mission, step: &Step) -> Vec<(String, String)> {
     let named = |action: &&pddl::ast::Action| {
         action.identifier.name.as_str().eq_ignore_ascii_case(&step.action)
@@ -70,7 +73,7 @@ fn ports(mission: &Mission, step: &Step) -> Vec<(String, String)> {
     names.zip(step.arguments.iter().cloned()).collect()
 }
 
-/// Name of a port for a parameter: it begins with a letter and is not reserved.
+/// Returns the name of the port for a parameter. It begins with a letter and is not reserved.
 fn port(parameter: &str) -> String {
     let is_taken = RESERVED.iter().any(|reserved| reserved.eq_ignore_ascii_case(parameter));
     let begins = parameter.starts_with(|first: char| first.is_ascii_alphabetic());
@@ -103,7 +106,7 @@ fn write<W: io::Write>(writer: &mut Writer<W>, mission: &str, nodes: &[Node]) ->
     Ok(())
 }
 
-/// Declares each kind of node with all ports that a node of that kind has.
+/// Declares each kind of node, with the ports of all its nodes.
 fn declare<W: io::Write>(writer: &mut Writer<W>, nodes: &[Node]) -> io::Result<()> {
     let mut kinds: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
     for node in nodes {

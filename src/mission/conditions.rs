@@ -7,10 +7,10 @@ use ::mission::Mission;
 
 use crate::message::{Errors, Message};
 
-/// A fault in a text, with its place.
+/// A fault in the text of a condition or function, with its position.
 #[derive(Debug, Clone)]
 pub struct Fault {
-    /// Byte offset of the fault, if known.
+    /// Byte offset of the fault in the text, if known.
     pub offset: Option<usize>,
     /// Message about the fault.
     pub message: Message,
@@ -43,7 +43,8 @@ pub fn condition(mission: &Mission, text: &str) -> Result<Condition, Vec<Fault>>
         .map_err(|errors| faults(errors, text, before.chars().count()))
 }
 
-/// Parses a numeric function with its arguments, such as `(battery)`. The parentheses are optional.
+/// Parses a numeric function with its arguments, such as `(battery)`. The outer parentheses are
+/// optional.
 ///
 /// # Errors
 /// The text is malformed, or names a function or an object that the mission does not have.
@@ -59,8 +60,8 @@ pub fn function(mission: &Mission, text: &str) -> Result<Atom, Vec<Fault>> {
     Err(vec![Fault { offset: None, message: Message::error("M135", text) }])
 }
 
-/// Returns a message about the objects of a setting that [`Mission::set`] has accepted, if they do
-/// not exist or have other types.
+/// Checks a setting that [`Mission::set`] has accepted. Returns a message if the objects in its
+/// name do not exist or have wrong types.
 pub(super) fn setting(mission: &Mission, name: &str, value: &str) -> Option<Message> {
     if mission.knowledge().is_some_and(|knowledge| knowledge.has_attribute(name.trim())) {
         return None;
@@ -83,8 +84,8 @@ pub fn written(atom: &Atom) -> String {
     format!("({})", words.join(" "))
 }
 
-/// Locates the faults of a text that was parsed on a separate line, after a prefix of `before`
-/// characters.
+/// Converts errors to faults with offsets in `text`. The text was parsed on the first line of an
+/// input, after a prefix of `before` characters.
 fn faults(errors: Errors, text: &str, before: usize) -> Vec<Fault> {
     // Faults in the prefix are not about the text. A fault at an added parenthesis gets the place
     // of the text's first character.

@@ -7,30 +7,32 @@ use pddl::ast::{Name, Problem};
 use pddl::validate::{Interrupted, Options, PlanStep, PlanText, Verdict, validate_within};
 use planner::{Limits, Plan};
 
-/// Semantics by which the validator executes a plan.
+/// Semantics with which the validator executes a plan: sequential or overlapping actions.
 #[derive(Debug, Clone)]
 pub struct Reading {
     options: Options,
-    /// `true` if a plan without a metric is measured by its time.
+    /// `true` if the cost of a plan without a metric is its total time, `false` if it is the number
+    /// of steps.
     timed: bool,
 }
 
-/// Reason for not showing a plan.
+/// Reason why the validator did not confirm a plan.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Unconfirmed {
     /// The validator rejects the plan or computes another cost: a fault of the planner.
     Refused(String),
-    /// A limit was reached before the validator had executed it.
+    /// A limit was reached before the validator had executed the plan.
     Interrupted,
 }
 
 impl Reading {
-    /// Semantics of sequential actions.
+    /// Semantics for sequential actions. `timed` is `true` if the domain has durations.
     pub fn sequential(timed: bool) -> Self {
         Self { options: Options::default(), timed }
     }
 
-    /// Overlapping actions, whose interfering happenings are at least `separation` apart.
+    /// Semantics for overlapping actions. Interfering happenings are at least `separation` apart,
+    /// in the domain's time unit.
     pub fn concurrent(separation: &BigRational) -> Self {
         Self {
             options: Options::default().with_concurrent(true).with_tolerance(separation.clone()),
@@ -38,8 +40,8 @@ impl Reading {
         }
     }
 
-    /// Returns the validator's value of the plan by the problem's metric. `None` for an invalid
-    /// plan, or if a limit is reached.
+    /// Executes the plan with the validator and returns its value by the problem's metric. `None`
+    /// if the plan is invalid, or if a limit is reached.
     pub(super) fn value(
         &self,
         mission: &Mission,
@@ -74,8 +76,9 @@ pub(super) fn verdict_of(
     validate_within(mission.domain(), problem, &plan, &reading.options, &|| limits.reached())
 }
 
-/// Lets the independent validator execute a plan for a problem that [`Mission::filled`] has made.
-/// Plans are often found at the time limit, so the validator has the time of [`Limits::extended`].
+/// Checks a plan by executing it with the independent validator. `problem` was returned by
+/// [`Mission::filled`]. Since plans are often found at the time limit, the validator gets the
+/// additional time of [`Limits::extended`].
 ///
 /// # Errors
 /// The plan is invalid, its cost differs, or the time does not suffice.

@@ -1,8 +1,8 @@
-//! Action elimination: removes actions that a plan does not need [1].
+//! Action elimination: removes superfluous actions from a plan [1].
 //!
-//! If the metric is the makespan, a concurrent action may cost nothing, so the planner may keep
-//! superfluous actions. Each action, from the last to the first, is removed if the plan without it
-//! is valid and has the same cost.
+//! If the metric is the makespan, an action that overlaps with another one may cost nothing, so the
+//! planner may keep superfluous actions. Each action of cost 0, from the last to the first, is
+//! removed if the plan without it is valid and has the same cost.
 //!
 //! [1] H. Nakhost, M. Müller: Action elimination and plan neighborhood graph search, ICAPS 2010.
 
@@ -12,11 +12,12 @@ use planner::{Limits, Plan};
 
 use crate::mission::confirm::Reading;
 
-/// Maximum number of actions. Each candidate is validated, so the effort grows with the square of
-/// the length.
+/// Maximum number of actions in a plan that is examined. Each candidate is validated, so the effort
+/// grows with the square of the number of actions.
 const MAX_ACTIONS: usize = 200;
 
-/// Removes actions of cost 0 that the plan does not need, as far as the limits permit.
+/// Removes superfluous actions of cost 0 from a plan. Returns the plan as reduced until a limit is
+/// reached.
 pub fn lean(
     mission: &Mission,
     problem: &Problem,
@@ -53,8 +54,8 @@ mod tests {
     const DOMAIN: &str = "(define (domain d) (:requirements :durative-actions) (:predicates (done ?x))
         (:durative-action work :parameters (?x) :duration (= ?duration 4) :effect (at end (done ?x))))";
 
-    /// Checks which of the simultaneous actions on the objects `work` remain; the goal needs a and
-    /// b.
+    /// Reduces a plan of simultaneous actions, one for each object in `work`. Checks that the
+    /// actions on the objects in `expected` remain. The goal needs actions on a and b.
     fn check(problem: &str, cost: i64, work: &[&str], expected: &[&str]) {
         let (domain, problem) = (Ok(Source::new("d", DOMAIN)), Ok(Source::new("p", problem)));
         let mission = Mission::new("", None, Bindings::default(), domain, problem);

@@ -12,21 +12,22 @@ use ::mission::Mission;
 use crate::message::{Errors, Message};
 use crate::narrow::narrowed;
 
-/// Planning for a mission.
+/// Grounding of a mission for the planner.
 pub trait Planning {
-    /// Returns the domain and the problem that are grounded for a filled problem. They have the
-    /// same plans as the mission's own, and are smaller if its knowledge base completes its domain.
+    /// Returns a domain and a problem with the same plans as the mission's domain and `problem`.
+    /// They are smaller if the knowledge base completes the domain. [`Planning::ground`] uses this
+    /// form.
     fn narrowed<'m>(&'m self, problem: &'m Problem) -> (Cow<'m, Domain>, Cow<'m, Problem>);
 
-    /// Grounds a problem that [`Mission::filled`] has made. Non-empty `objectives` replace its
+    /// Grounds a problem that [`Mission::filled`] returned. Non-empty `objectives` replace its
     /// metric.
     ///
     /// # Errors
     /// All constructs that the planner does not support, or a limit that was reached.
     fn ground(&self, problem: &Problem, objectives: &[Metric], limits: &Limits) -> Result<Task, Errors>;
 
-    /// Grounds a problem as [`Planning::ground`], with exact rationals, so that numbers of any size
-    /// are accepted.
+    /// Grounds a problem as [`Planning::ground`] does, but with exact rationals, so that numbers of
+    /// any size are accepted.
     ///
     /// # Errors
     /// Errors of [`Planning::ground`].
@@ -37,8 +38,8 @@ pub trait Planning {
         limits: &Limits,
     ) -> Result<ExactTask, Errors>;
 
-    /// Grounds a filled problem for plans with overlapping actions. Interfering happenings are at
-    /// least `separation` apart, in the domain's time unit.
+    /// Grounds a problem that [`Mission::filled`] returned, for plans with overlapping actions.
+    /// Interfering happenings are at least `separation` apart, in the domain's time unit.
     ///
     /// # Errors
     /// All constructs that the planner does not support, with their places.
@@ -50,9 +51,9 @@ pub trait Planning {
         limits: &Limits,
     ) -> Result<TemporalTask, Errors>;
 
-    /// Returns the plan with the arguments of the domain's file, without the designs that the
-    /// knowledge base has added to a plain domain. The configuration of each step has these
-    /// designs.
+    /// Returns the plan with the arguments as in the domain's file, i.e. without the designs that
+    /// the knowledge base has added to a plain domain. The configuration of each step contains
+    /// these designs.
     #[must_use]
     fn written(&self, plan: Plan) -> Plan;
 }
@@ -99,7 +100,7 @@ impl Planning for Mission {
     }
 }
 
-/// Grounds a filled problem with a variant of the domain.
+/// Grounds a problem that [`Mission::filled`] returned, with a variant of the mission's domain.
 ///
 /// # Errors
 /// Errors of [`Planning::ground`].
@@ -115,8 +116,8 @@ pub(crate) fn ground_with(
         .map_err(|errors| messages(mission, &errors))
 }
 
-/// Returns a planner for filled problems similar to this one, or `None` if the mission is not
-/// supported.
+/// Returns a planner for problems that differ from `problem` only in their state and availability
+/// of designs. Returns `None` if the mission does not support this.
 pub(crate) fn replanner(mission: &Mission, problem: &Problem, limits: &Limits) -> Option<Replanner> {
     // Narrowing depends on the facts of a problem, so each problem would need another domain.
     if mission.completed_predicates().is_some() {
@@ -159,7 +160,8 @@ mod tests {
 
     use super::{GroundConfig, Name};
 
-    /// The checker does not link the planner, so the names are defined in both.
+    /// The checker does not link the planner, so the default names are defined in both and must be
+    /// equal.
     #[test]
     fn default_names_equal_those_of_the_planner() {
         let sorted = |mut names: Vec<Name>| {

@@ -1,9 +1,9 @@
-//! Conversion of plans to PlanSys2's format: actions with start and duration in seconds, as POPF
-//! writes them.
+//! Converts plans to the format of PlanSys2: actions with start and duration in seconds, as the
+//! planner POPF writes them.
 //!
-//! PlanSys2 orders actions by their times alone. So an action begins strictly after the end of its
-//! predecessor, and no action has the duration 0. As in POPF, the smallest difference is a
-//! thousandth.
+//! PlanSys2 orders actions only by their times. So an action has to begin strictly after the end of
+//! its predecessor, and no action may have the duration 0. As in POPF, the smallest difference
+//! between two times is a thousandth.
 
 use std::fmt::Write as _;
 
@@ -14,7 +14,7 @@ use planner::{Exact, Limits, Plan, Step};
 
 use crate::mission::confirm::{Reading, verdict_of};
 
-/// An action of a plan for PlanSys2.
+/// A line of a plan for PlanSys2: one action with its times.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PlanLine {
     /// Start of the action, in the domain's time unit.
@@ -25,8 +25,8 @@ pub struct PlanLine {
     pub duration: Exact,
 }
 
-/// Delays actions so that a thousandth lies between the end of an action and each start that
-/// follows it. Returns the given plan if the delayed plan is invalid, or if a limit is reached.
+/// Delays actions so that the end of an action and each later start are at least a thousandth
+/// apart. Returns the given plan if the delayed plan is invalid, or if a limit is reached.
 #[must_use]
 pub fn spaced(mission: &Mission, problem: &Problem, plan: Plan, reading: &Reading, limits: &Limits) -> Plan {
     let mut later = plan.clone();
@@ -52,7 +52,7 @@ pub fn spaced(mission: &Mission, problem: &Problem, plan: Plan, reading: &Readin
     if verdict.is_ok_and(|verdict| verdict.violation.is_none()) { later } else { plan }
 }
 
-/// Converts a plan to lines. Its arguments have the form of the domain's file.
+/// Converts a plan to lines for PlanSys2. The plan's arguments must be as in the domain's file.
 pub fn plan_lines(plan: &Plan) -> Vec<PlanLine> {
     let line = |step: &Step| {
         let (start, duration) = step.times();
@@ -62,7 +62,7 @@ pub fn plan_lines(plan: &Plan) -> Vec<PlanLine> {
     plan.steps.iter().map(line).collect()
 }
 
-/// Duration of an action in PlanSys2, in the domain's time unit.
+/// Returns the duration of an action in PlanSys2, in the domain's time unit; at least a thousandth.
 fn lasting(step: &Step) -> BigRational {
     if step.duration.is_zero() { instant() } else { step.duration.to_rational() }
 }
@@ -72,7 +72,7 @@ pub fn instant() -> BigRational {
     BigRational::new(1.into(), 1000.into())
 }
 
-/// Formats the lines as POPF does, which PlanSys2's POPF plugin parses.
+/// Formats lines in the output format of POPF, which PlanSys2's POPF plugin parses.
 pub fn popf_text(lines: &[PlanLine]) -> String {
     let mut text = "Solution Found\n".to_owned();
     for line in lines {
@@ -92,7 +92,8 @@ mod tests {
         BigRational::new(BigInt::from(numerator), BigInt::from(denominator)).into()
     }
 
-    /// Lines of steps `(name, start, duration)`, in thousandths, for a problem with this in `:init`.
+    /// Returns the output for PlanSys2 of a plan with the steps `(name, start, duration)`, whose
+    /// times are in thousandths. `init` is the text of the problem's `:init`.
     fn lines(init: &str, concurrent: bool, steps: &[(&str, i64, i64)]) -> String {
         let domain = "(define (domain d) (:predicates (p) (q) (r))
             (:durative-action aside :parameters () :duration (= ?duration 5) :condition () :effect (at end (r)))
@@ -136,7 +137,8 @@ mod tests {
         check("", true, &twice, spaced);
     }
 
-    /// A fact that is true only from 5 to 7 fixes the times, so that no gap fits.
+    /// A fact that is true only from time 5 to time 7 fixes the times of both actions, so that no
+    /// gap fits between them.
     #[test]
     fn plans_without_room_for_gaps_are_unchanged() {
         let steps = [("now", 5000, 0), ("short", 5000, 2000)];

@@ -1,4 +1,5 @@
-//! The mission's sections of a manifest: `knowledge`, `planning`, `bindings` and `scenarios`.
+//! The sections of a manifest about the mission: `knowledge`, `planning`, `bindings` and
+//! `scenarios`.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -39,7 +40,7 @@ fn shipped_rules() -> Vec<String> {
 }
 
 impl KnowledgeSection {
-    /// Returns the files of the section.
+    /// Returns the files of the section, with paths resolved relative to the manifest.
     pub fn sources(&self, origin: &ManifestPath) -> Sources {
         let resolve = |paths: &[PathBuf]| paths.iter().map(|path| origin.path(path)).collect();
         let rule = |name: &String| match name.as_str() {
@@ -87,7 +88,7 @@ pub enum TimeUnit {
 }
 
 impl TimeUnit {
-    /// Number of seconds in this unit.
+    /// Returns the number of seconds in this unit.
     pub fn seconds(self) -> f64 {
         match self {
             Self::Seconds => 1.0,
@@ -107,17 +108,19 @@ impl fmt::Display for TimeUnit {
     }
 }
 
-/// The section `bindings`.
+/// The section `bindings` of a manifest: queries that define PDDL symbols, and names of
+/// individuals.
 #[derive(Debug, Clone, Default)]
 pub struct BindingsSection {
-    /// PDDL symbol to query, beyond the defaults.
+    /// Query of each bound PDDL symbol, in addition to the default bindings.
     symbols: BTreeMap<String, Spanned<String>>,
-    /// Individuals with their objects; the span of an individual is its place in the manifest.
+    /// Individuals with the names of their objects in PDDL. The span of an individual is its
+    /// position in the manifest.
     names: Vec<(Spanned<String>, String)>,
 }
 
 impl BindingsSection {
-    /// Returns the bindings of the section.
+    /// Parses the queries of the section and returns the bindings.
     ///
     /// # Errors
     /// All malformed queries.
@@ -161,7 +164,7 @@ impl<'de> Deserialize<'de> for BindingsSection {
     }
 }
 
-/// Reads the section: symbols with queries, and the table `names`.
+/// Deserialises the section `bindings`: symbols with queries, and the table `names`.
 struct Section;
 
 impl<'de> Visitor<'de> for Section {
@@ -192,7 +195,7 @@ impl<'de> Visitor<'de> for Section {
     }
 }
 
-/// Value of a key of the section.
+/// Value of a key in the section `bindings`: a query, or the table `names`.
 enum Bound {
     Query(String),
     Names(Vec<(Spanned<String>, String)>),
@@ -247,33 +250,34 @@ pub struct Scenario<S> {
 /// A mistake in a part of a section, with its place.
 #[derive(Debug, Clone)]
 pub struct Mistake {
-    /// Path to the part, relative to the section.
+    /// Keys that lead to the mistaken entry, relative to the section.
     pub path: Vec<Key>,
-    /// The part of the entry at the end of the path.
+    /// Mistaken part of the entry at the end of the path: its key, its value, or a position inside.
     pub part: Part,
     /// Message about the mistake.
     pub message: Message,
 }
 
 impl Mistake {
-    /// Returns `true` if PDDL analysis found the mistake, which presupposes that the mission's own
-    /// files are correct.
+    /// Returns `true` if the PDDL checker found the mistake. This is reliable only if the mission's
+    /// own files are correct.
     pub fn is_of_pddl(&self) -> bool {
         self.message.code.starts_with('P')
     }
 }
 
 impl<S> Scenario<S> {
-    /// Applies the situation, as far as it fits the mission.
+    /// Applies the settings of the scenario to a mission. Settings that do not fit the mission are
+    /// omitted.
     ///
     /// # Errors
-    /// All settings that do not fit.
+    /// All settings that do not fit the mission.
     pub fn apply(&self, mission: &mut Mission) -> Result<(), Errors> {
         Errors::unless_empty(self.mistakes(mission).into_iter().map(|mistake| mistake.message))
     }
 
-    /// Applies the situation as [`Scenario::apply`] does. Returns all settings that do not fit,
-    /// with their places.
+    /// Applies the scenario as [`Scenario::apply`] does. Returns a mistake, with its position, for
+    /// each setting that does not fit the mission.
     pub fn mistakes(&self, mission: &mut Mission) -> Vec<Mistake> {
         let mut mistakes = Vec::new();
         // If the mission's own files are faulty, errors of PDDL may not be caused by the settings.
@@ -299,7 +303,8 @@ impl<S> Scenario<S> {
     }
 }
 
-/// Sets a value. Returns the fault of the setting, if any.
+/// Sets a value of a mission by name. Returns the mistake in the setting, if any; `path` gives its
+/// keys in the manifest.
 pub fn setting(
     mission: &mut Mission,
     name: &str,

@@ -1,4 +1,4 @@
-//! Reads plans that other programs have written.
+//! Reads plans from files, which other programs may have written.
 
 use num_rational::BigRational;
 use num_traits::Num as _;
@@ -28,15 +28,16 @@ pub fn read_plan(source: &Source, mission: &Mission) -> Result<PlanText, Errors>
     PlanText::parse(source).map_err(|diagnostics| Message::from_pddl(&diagnostics, &[source]).into())
 }
 
-/// Returns the line, from 1, at which a table of `metaplan plan` begins, if the text has one.
+/// Returns the number, from 1, of the line with the heading of a table printed by `metaplan plan`,
+/// if the text has one.
 fn table_heading(text: &str) -> Option<usize> {
     let heading = ["step", "start", "duration", "action"];
     let is_heading = |line: &str| line.split_whitespace().take(heading.len()).eq(heading);
     text.lines().position(is_heading).map(|index| index + 1)
 }
 
-/// Reads the steps of a `metaplan-plan/1` document. Designs that the knowledge base adds to an
-/// action of a plain domain are in the configuration of the step, not in its arguments.
+/// Reads the steps of a `metaplan-plan/1` document. For an action of a plain domain, the designs in
+/// the step's configuration are appended to its arguments.
 fn json_plan(source: &Source, mission: &Mission) -> Result<PlanText, Errors> {
     let bad = |place, text: &str| {
         Message::at("M111", source.name(), place, text.to_owned()).with_source(source.text())

@@ -1,5 +1,5 @@
-//! Converts derived predicates of a knowledge base to clauses: a head, and a conjunction of atoms
-//! and (in)equalities.
+//! Converts derived predicates of a domain to clauses: a head, and a conjunction of atoms,
+//! equalities and inequalities.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,7 +8,8 @@ use pddl::ast::{Condition, Derived, Name, Term, TypedName};
 /// A ground fact: predicate and arguments.
 pub(super) type Fact = (Name, Vec<Name>);
 
-/// A Horn clause `head(arguments) ← body`, possibly with inequalities; all its variables are local.
+/// A Horn clause `head(arguments) ← body`, possibly with inequalities in the body. Its variables
+/// are local to the clause.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Clause {
     pub head: Name,
@@ -16,16 +17,16 @@ pub(super) struct Clause {
     pub body: Vec<Literal>,
 }
 
-/// A conjunct.
+/// A conjunct in the body of a clause.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Literal {
-    /// An atom.
+    /// An atom: predicate and arguments. Type tests are unary atoms, see [`of_type`].
     Holds(Name, Vec<Operand>),
-    /// An equality (`true`) or inequality (`false`) of two terms.
+    /// An equality (`true`) or inequality (`false`) of two operands.
     Equal(bool, Operand, Operand),
 }
 
-/// An argument.
+/// An argument of an atom: a variable or an object.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Operand {
     Variable(Name),
@@ -33,7 +34,7 @@ pub(super) enum Operand {
 }
 
 impl Literal {
-    /// The predicate of an atom.
+    /// Returns the predicate of an atom, or `None` for an equality or inequality.
     pub fn name(&self) -> Option<&Name> {
         match self {
             Self::Holds(name, _) => Some(name),
@@ -41,7 +42,7 @@ impl Literal {
         }
     }
 
-    /// Returns `true` if the literal is a type test.
+    /// Returns `true` if the literal is a type test, i.e. its predicate is the relation of a type.
     pub fn is_type(&self) -> bool {
         matches!(self, Self::Holds(name, _) if name.as_str().contains(' '))
     }
@@ -54,15 +55,15 @@ impl Literal {
     }
 }
 
-/// Name of the relation that contains the objects of a type. It contains a blank, so it differs
-/// from all predicates.
+/// Returns the name of the relation that contains the objects of a type. The name contains a blank,
+/// so it differs from all predicates.
 pub(super) fn of_type(r#type: &Name) -> Name {
     Name::new(&format!("type {type}"))
 }
 
-/// Returns the clauses of a derived predicate, without equalities. `None` if its condition has
-/// another form than disjunctions and existential quantifiers over atoms, equalities and negated
-/// equalities, with distinct variable names.
+/// Converts a derived predicate to clauses without equalities. Returns `None` unless its condition
+/// consists of conjunctions, disjunctions and existential quantifiers over atoms, equalities and
+/// negated equalities, with distinct variable names.
 pub(super) fn clauses(derived: &Derived) -> Option<Vec<Clause>> {
     let head = &derived.head;
     let mut variables: BTreeSet<Name> = BTreeSet::new();
@@ -78,7 +79,8 @@ pub(super) fn clauses(derived: &Derived) -> Option<Vec<Clause>> {
     Some(disjuncts(&derived.condition, &mut variables)?.into_iter().filter_map(clause).collect())
 }
 
-/// Returns the type tests of variables. `None` if a variable name occurs twice.
+/// Returns a type test for each typed variable, and adds the variables to `names`. Returns `None`
+/// if a variable name occurs twice or a variable has several alternative types.
 fn typed(variables: &[TypedName], names: &mut BTreeSet<Name>) -> Option<Vec<Literal>> {
     let mut types = Vec::new();
     for variable in variables {
@@ -97,7 +99,8 @@ fn typed(variables: &[TypedName], names: &mut BTreeSet<Name>) -> Option<Vec<Lite
     Some(types)
 }
 
-/// Converts a condition to disjunctive normal form.
+/// Converts a condition to disjunctive normal form, as a list of conjunctions. Returns `None` for
+/// unsupported conditions.
 fn disjuncts(condition: &Condition, variables: &mut BTreeSet<Name>) -> Option<Vec<Vec<Literal>>> {
     let single = |literal| Some(vec![vec![literal]]);
     match condition {
@@ -144,8 +147,8 @@ pub(super) fn operand(term: &Term) -> Operand {
 }
 
 impl Clause {
-    /// Returns `true` if atoms other than type tests bind all variables. The extension is then
-    /// small, independent of the number of objects.
+    /// Returns `true` if each variable of the clause occurs in an atom that is not a type test. The
+    /// extension is then small, independent of the number of objects.
     pub fn is_bound(&self) -> bool {
         let atoms = self.body.iter().filter(|part| matches!(part, Literal::Holds(..)) && !part.is_type());
         let bound: BTreeSet<&Operand> = atoms.flat_map(Literal::operands).collect();
@@ -153,7 +156,8 @@ impl Clause {
         operands.into_iter().all(|operand| matches!(operand, Operand::Constant(_)) || bound.contains(operand))
     }
 
-    /// Eliminates equalities and repeated atoms. `None` if the body is never true.
+    /// Eliminates equalities by substitution, and removes repeated conjuncts. Returns `None` if the
+    /// body is unsatisfiable.
     fn resolved(mut self) -> Option<Self> {
         while let Some(at) = self.body.iter().position(|part| matches!(part, Literal::Equal(true, ..))) {
             let Literal::Equal(_, left, right) = self.body.remove(at) else { continue };
@@ -182,7 +186,7 @@ impl Clause {
         Some(self)
     }
 
-    /// Substitutes the variables in the map.
+    /// Replaces the variables that are keys of `map`.
     fn with(self, map: &BTreeMap<Name, Operand>) -> Self {
         let substitute = |operand: Operand| match &operand {
             Operand::Variable(name) => map.get(name).cloned().unwrap_or(operand),
@@ -202,8 +206,9 @@ impl Clause {
         }
     }
 
-    /// Resolves the conjunct at `at` with a clause that concludes it, whose variables are renamed
-    /// by `depth`. `None` if the two do not unify.
+    /// Replaces the conjunct at position `at` by the body of the clause `by`, whose head unifies
+    /// with it. The variables of `by` are renamed with the suffix `depth`. Returns `None` if the
+    /// two do not unify.
     pub fn unfolded(&self, at: usize, by: &Self, depth: usize) -> Option<Self> {
         let Literal::Holds(_, operands_of_atom) = &self.body[at] else { return None };
         let operands = by.body.iter().flat_map(Literal::operands).chain(&by.arguments);

@@ -1,8 +1,9 @@
-//! Partial evaluation of derived predicates: those that no action can change become initial facts.
+//! Partial evaluation of derived predicates: predicates that no action can change become initial
+//! facts.
 //!
-//! The clauses of settled predicates (`settle`) have no negated atoms, so their extension is the
-//! least fixpoint over the stated facts, the same set in every state. It is computed by naive
-//! evaluation, in which each clause matches its most restrictive atoms first.
+//! The clauses of settled predicates, which no action can change (`settle`), have no negated atoms.
+//! So their extension is the least fixpoint over the stated facts, the same set in every state. It
+//! is computed by naive evaluation; each clause matches its most restrictive atoms first.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
@@ -12,7 +13,8 @@ use super::clause::{self, Clause, Fact, Literal, Operand};
 use super::possible::Possible;
 use super::settle::{Guards, settle};
 
-/// The settled derived predicates, and their clauses.
+/// Result of partial evaluation: settled predicates, which no action can change, with their
+/// clauses, and bounds for the other derived predicates.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Folded {
     settled: BTreeMap<Name, Vec<Clause>>,
@@ -20,9 +22,10 @@ pub(super) struct Folded {
 }
 
 impl Folded {
-    /// Settles predicates in `vocabulary_of_base`, and predicates whose axioms mention no others, as far as
-    /// possible. Actions and timed initial literals change the predicates in `changed`; of these,
-    /// timed initial literals change those in `timed`.
+    /// Settles as many predicates as possible. Candidates are the predicates in
+    /// `vocabulary_of_base`, and predicates whose axioms mention only candidates and bind all their
+    /// variables. `changed` contains the predicates that actions or timed initial literals change,
+    /// `timed` those that timed initial literals change.
     pub fn new(
         domain: &Domain,
         (changed, timed): (&BTreeSet<Name>, &BTreeSet<Name>),
@@ -44,14 +47,16 @@ impl Folded {
         Self { settled, possible }
     }
 
-    /// Removes the axioms of settled predicates from a domain.
+    /// Removes the axioms of settled predicates from a domain, and restricts the other derived
+    /// predicates by their bounds.
     pub fn shorten(&self, domain: &mut Domain) {
         domain.derived.retain(|axiom| !self.settled.contains_key(&axiom.head.identifier.name));
         self.possible.restrict(domain);
     }
 
-    /// Returns the facts of settled predicates and the bounds of the open ones, given the stated
-    /// facts and the types of objects.
+    /// Returns the facts of settled predicates, and the bounds of the other derived predicates as
+    /// facts. `stated` are the initial facts; `is_of(object, type)` returns `true` if an object has
+    /// a type.
     pub fn facts(
         &self,
         stated: &BTreeSet<Fact>,
@@ -68,8 +73,8 @@ impl Folded {
     }
 }
 
-/// Adds to `vocabulary` the predicates whose axioms mention only predicates in it. Other axioms, for
-/// example about maps, may have very large extensions.
+/// Adds to `vocabulary` the predicates whose axioms mention only predicates of the vocabulary and
+/// bind all their variables. Other axioms, for example about maps, may have very large extensions.
 fn with_small(axioms: &[(&Name, Option<Vec<Clause>>)], mut vocabulary: HashSet<Name>) -> HashSet<Name> {
     let is_small = |clauses: &[Clause], vocabulary: &HashSet<Name>| {
         let is_known = |part: &Literal| match part {
@@ -94,7 +99,8 @@ fn with_small(axioms: &[(&Name, Option<Vec<Clause>>)], mut vocabulary: HashSet<N
     }
 }
 
-/// Computes the least fixpoint of clauses over the stated facts.
+/// Computes the least fixpoint of clauses over the stated facts. Returns the derived facts that are
+/// not stated.
 fn fixpoint(
     clauses: &[&Clause],
     stated: &BTreeSet<Fact>,
@@ -151,13 +157,13 @@ fn add(clauses_by_head: &mut BTreeMap<Name, Option<Vec<Clause>>>, head: &Name, c
     }
 }
 
-/// Variable bindings.
+/// Binding of variables to objects.
 type Bindings<'k> = BTreeMap<&'k Name, &'k Name>;
 
-/// The arguments for which a predicate holds, in the order of their discovery and as a set.
+/// Argument tuples for which a predicate holds, in the order of their discovery and as a set.
 type Rows = (Vec<Vec<Name>>, HashSet<Vec<Name>>);
 
-/// Derived facts, by predicate.
+/// Extensions of predicates (stated and derived facts), and all objects.
 struct Relations<'o> {
     relations: HashMap<Name, Rows>,
     objects: &'o BTreeSet<Name>,
@@ -177,8 +183,9 @@ impl Relations<'_> {
         self.relations.get(predicate).map_or(&[], |(rows, _)| rows)
     }
 
-    /// Orders the conjuncts: atoms that share variables with earlier ones first, small relations
-    /// first; types and inequalities as soon as their variables are bound.
+    /// Orders the conjuncts of a body for matching: atoms that share variables with earlier atoms
+    /// and have few rows come first, type tests and inequalities as soon as their variables are
+    /// bound.
     fn order<'b>(&self, body: &'b [Literal]) -> Vec<&'b Literal> {
         // Greedy join ordering: each step takes the cheapest remaining conjunct.
         let (mut remaining, mut order): (Vec<&Literal>, Vec<&Literal>) = (body.iter().collect(), Vec::new());
@@ -247,7 +254,8 @@ impl Relations<'_> {
         }
     }
 
-    /// Adds the instances of a head. Arguments that the body does not bind range over all objects.
+    /// Appends to `new` the instances of the clause's head for the bindings. Arguments that the
+    /// body does not bind range over all objects.
     fn heads(&self, clause: &Clause, bindings: &Bindings<'_>, new: &mut Vec<Fact>) {
         let mut rows: Vec<(Vec<Name>, Bindings<'_>)> = vec![(Vec::new(), bindings.clone())];
         for argument in &clause.arguments {

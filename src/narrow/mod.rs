@@ -1,9 +1,10 @@
-//! Narrowing: computes an equivalent and smaller task for the planner.
+//! Narrowing: computes a smaller task with the same plans, for the planner.
 //!
-//! A domain in PLANTA's form is completed with hundreds of axioms, and actions change few of their
-//! conclusions. Derived predicates that no action can change become initial facts (`settle`,
-//! `fold`). The others get an upper bound, a static predicate that is true wherever they can be
-//! true (`possible`), so that grounding enumerates few objects.
+//! The knowledge base completes a domain in PLANTA's form with hundreds of axioms, but actions
+//! change few of their conclusions. Derived predicates that no action can change become initial
+//! facts (`settle`, `fold`). Each other derived predicate gets an upper bound: a static predicate
+//! that is true wherever the derived predicate can be true (`possible`), so that grounding
+//! enumerates few objects.
 //!
 //! Only the planner uses narrowing. Messages, exports and certificates are about the task before
 //! narrowing, with which the checker compares the ground task.
@@ -24,10 +25,10 @@ use clause::Fact;
 use fold::Folded;
 use settle::Guards;
 
-/// Returns a domain and a problem with the same plans as those of a mission. They are smaller if
-/// its knowledge base completes its domain.
+/// Returns a domain and a problem with the same plans as the given ones. They are smaller if the
+/// mission's knowledge base has completed the domain, otherwise unchanged.
 ///
-/// `domain` and `problem` may be variants of the mission's own, with another state or goal.
+/// `domain` and `problem` may be variants of the mission's own files, with another state or goal.
 pub(crate) fn narrowed<'t>(
     mission: &Mission,
     domain: &'t Domain,
@@ -42,8 +43,9 @@ pub(crate) fn narrowed<'t>(
     }
 }
 
-/// Narrows the predicates in `completed` and their consequences. Other predicates are of maps and tasks
-/// and may have large extensions, so grounding handles them.
+/// Narrows the predicates in `completed`, which come from the knowledge base, and predicates
+/// derived from them. Other predicates, e.g. of maps and tasks, may have large extensions, so they
+/// remain derived and grounding handles them.
 fn narrow(domain: &Domain, problem: &Problem, completed: &HashSet<Name>) -> (Domain, Problem) {
     let mentioned = Mentioned::by_domain(domain).and_problem(problem);
     let facts: BTreeSet<Fact> = problem
@@ -86,7 +88,8 @@ fn narrow(domain: &Domain, problem: &Problem, completed: &HashSet<Name>) -> (Dom
     (domain, problem)
 }
 
-/// Removes the derived predicates on which no action, goal, metric or other predicate depends.
+/// Removes the axioms and declarations of derived predicates on which no action, goal, metric or
+/// remaining predicate depends.
 fn drop_unused(domain: &mut Domain, problem: &Problem) {
     let derived = std::mem::take(&mut domain.derived);
     let mut used = Mentioned::by_domain(domain).and_problem(problem).predicates;

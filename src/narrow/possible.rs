@@ -1,10 +1,11 @@
 //! Computes upper bounds on the extensions of derived predicates in all reachable states.
 //!
-//! An open predicate stays derived. Its parameters have no types, but only facts that actions add
-//! can extend it, which often leaves few candidates. So each such predicate gets a companion,
-//! `possible-…`, which no action changes and which is true wherever the predicate can be true. An
-//! atom is equivalent to its conjunction with the companion in every state. Grounding and the
-//! certificate checker then enumerate few objects for each variable.
+//! An open predicate, which actions can change, stays derived. Its parameters have no types, but
+//! only facts that actions add can extend it, which often leaves few candidates. So each such
+//! predicate gets a companion `possible-…`, a static predicate that is true wherever the open
+//! predicate can be true. In every state, an atom of the predicate is equivalent to its conjunction
+//! with the companion's atom. With this conjunction, grounding and the certificate checker
+//! enumerate few objects for each variable.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,32 +16,35 @@ use pddl::ast::{
 use super::clause::{Clause, Fact, Literal};
 use super::settle::{Additions, additions, are_equal};
 
-/// A fact that an action may add.
+/// A schema of facts that an action may add.
 #[derive(Debug, Clone)]
 struct Addition {
     predicate: Name,
     arguments: Vec<Argument>,
 }
 
-/// Possible values of an argument: one object, or the common members of some classes.
+/// Possible values of an argument: one object, or the objects that are members of all given
+/// classes.
 #[derive(Debug, Clone)]
 enum Argument {
     Object(Name),
     Of(Vec<Name>),
 }
 
-/// The bounded predicates, and the data of their bounds.
+/// The predicates with an upper bound, and the data from which the bounds are computed.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Possible {
     bounded: BTreeSet<Name>,
+    /// Facts that actions may add.
     additions: Vec<Addition>,
-    /// The clauses of those predicates.
+    /// Clauses of the bounded predicates.
     clauses: Vec<Clause>,
 }
 
 impl Possible {
-    /// Determines the open predicates that have a bound: those that depend only on changed
-    /// predicates whose arguments must be members of classes of the knowledge base.
+    /// Determines which open predicates get a bound. A predicate has no bound if it depends on a
+    /// changed predicate with an unrestricted argument, i.e. an argument that actions do not
+    /// require to be a member of a class of the knowledge base.
     pub fn new(
         domain: &Domain,
         open: &BTreeMap<Name, Option<Vec<Clause>>>,
@@ -49,8 +53,8 @@ impl Possible {
     ) -> Self {
         let mut free = timed.clone();
         free.extend(open.iter().filter(|(_, clauses)| clauses.is_none()).map(|(name, _)| name.clone()));
-        // The extensions of settled predicates are computed before the bounds; those of open
-        // predicates may be larger in other states.
+        // Members of a class have to be known before the bounds are computed, so open predicates do
+        // not count as classes: their extensions may be larger in other states.
         let varying: BTreeSet<Name> = changed.iter().chain(open.keys()).cloned().collect();
         let mut additions_of_actions = Vec::new();
         for action in &domain.actions {
@@ -98,8 +102,8 @@ impl Possible {
         self.clauses.iter()
     }
 
-    /// Returns the facts that actions may add, given the facts that are true in every state: stated
-    /// facts, and facts of settled predicates.
+    /// Returns all facts that actions may add. `fixed` are the facts that are true in every state:
+    /// stated facts that no action changes, and facts of settled predicates.
     pub fn added(&self, fixed: &BTreeSet<Fact>) -> BTreeSet<Fact> {
         let members = |class: &Name| -> BTreeSet<Name> {
             let unary = fixed.iter().filter(|(name, row)| name == class && row.len() == 1);
@@ -127,14 +131,15 @@ impl Possible {
         facts
     }
 
-    /// Returns the companion facts of the bounded predicates among the derived facts.
+    /// Returns the facts of the companion predicates: one for each derived fact of a bounded
+    /// predicate.
     pub fn bounds(&self, derived: BTreeSet<Fact>) -> impl Iterator<Item = Fact> {
         let bounded = derived.into_iter().filter(|(name, _)| self.bounded.contains(name));
         bounded.map(|(name, row)| (possible(&name), row))
     }
 
-    /// Conjoins each atom of a bounded predicate in conditions, and each of their axioms, with the
-    /// companion.
+    /// Replaces each atom of a bounded predicate in conditions and axioms by its conjunction with
+    /// the companion's atom, and adds the companion to each axiom of a bounded predicate.
     pub fn restrict(&self, domain: &mut Domain) {
         let declared: Vec<Declaration> = domain
             .predicates
@@ -193,7 +198,7 @@ impl Possible {
     }
 }
 
-/// Name of the companion of a predicate.
+/// Returns the name of the companion of a predicate.
 pub(super) fn possible(name: &Name) -> Name {
     Name::new(&format!("possible-{name}"))
 }

@@ -1,15 +1,15 @@
-//! Determines the derived predicates of a knowledge base that no action and no event can change,
-//! and their clauses.
+//! Determines the derived predicates of a domain that no action and no timed initial literal can
+//! change, and their clauses.
 //!
-//! A predicate is *open* if an action or an event changes it, if it has an axiom that is not a
-//! clause, or if one of its clauses has an open atom in the body. Axioms about domains and ranges
-//! make nearly every predicate open: the arguments of `(functionGrounding ?f ?fd)` are concluded to
-//! be a function and a function design. Such a conclusion is redundant if each action that adds the
-//! fact requires its arguments to be stated members of that class (a *guard*), and if the initial
-//! state complies. So clauses of an open predicate are unfolded \[1\]. Clauses whose head occurs in
-//! their body are dropped, and so are those with a fact that guards the conclusion. If no open atom
-//! remains, the predicate is *settled*. Each step preserves the least fixpoint in every reachable
-//! state.
+//! A predicate is *open* if an action or a timed initial literal changes it, if it has an axiom
+//! that is not a clause, or if one of its clauses has an open atom in the body. Axioms about
+//! domains and ranges of properties make nearly every predicate open: for example,
+//! `(functionGrounding ?f ?fd)` implies that its arguments are a function and a function design.
+//! Such a conclusion is redundant if each action that adds the fact requires its arguments to be
+//! stated members of the class (a *guard*), and if the initial state complies. So clauses of an
+//! open predicate are unfolded \[1\]. A clause is dropped if its body contains its head, or an atom
+//! whose guard already implies the head. If no open atom remains, the predicate is *settled*. Each
+//! step preserves the least fixpoint in every reachable state.
 //!
 //! \[1\] H. Tamaki, T. Sato: Unfold/fold transformation of logic programs, ICLP 1984.
 
@@ -19,18 +19,19 @@ use pddl::ast::{Action, ActionBody, Atom, Condition, Domain, Effect, Name, Term}
 
 use super::clause::{Clause, Fact, Literal, Operand};
 
-/// Maximum depth of unfolding.
+/// Maximum depth of unfolding a clause.
 const MAX_DEPTH: usize = 8;
 /// Maximum number of clauses that are examined while one predicate is unfolded.
 const MAX_CLAUSES: usize = 1000;
 
-/// Guards: the arguments at a position of facts that actions add are members of a class. A guard is
-/// a predicate, a position and a class.
+/// Guards. A guard is a predicate, an argument position and a class: in every fact of the predicate
+/// that an action adds, the argument at this position is a stated member of the class.
 pub(super) type Guards = BTreeSet<(Name, usize, Name)>;
 
-/// Returns the classes that all actions of a domain require of the arguments of the facts that they
-/// add. Only the initial state may decide the members of a guard's class, so `varying` contains the
-/// predicates that actions or events change, and derived predicates.
+/// Returns the guards of a domain: the classes that all actions require of the arguments of facts
+/// that they add. `varying` contains the predicates that actions or timed initial literals change
+/// and the derived predicates; they do not count as classes, because members of a class must be
+/// fixed by the initial state. Predicates in `timed` have no guards.
 pub(super) fn guards(domain: &Domain, varying: &BTreeSet<Name>, timed: &BTreeSet<Name>) -> Guards {
     let mut guards: BTreeMap<(Name, usize), BTreeSet<Name>> = BTreeMap::new();
     for action in &domain.actions {
@@ -55,15 +56,16 @@ pub(super) fn guards(domain: &Domain, varying: &BTreeSet<Name>, timed: &BTreeSet
     .collect()
 }
 
-/// The facts that an action adds, and the classes that it requires of objects.
+/// The facts that an action adds, and the classes that its conditions require of its arguments.
 pub(super) struct Additions<'a> {
-    /// Classes with the argument that has to be a member.
+    /// Required classes, each with the term that has to be a member.
     pub classes: Vec<(Name, &'a Term)>,
-    /// Added atoms, each with the variables that quantifiers within the effect bind.
+    /// Added atoms, each with the variables that are bound by quantifiers within the effect.
     pub atoms: Vec<(&'a Atom, Vec<&'a Name>)>,
 }
 
-/// Returns the additions of an action. Predicates in `varying` do not count as classes.
+/// Returns the additions of an action. Unary predicates count as classes unless they are in
+/// `varying`.
 pub(super) fn additions<'a>(action: &'a Action, varying: &BTreeSet<Name>) -> Additions<'a> {
     let (conditions, effects): (Vec<&Condition>, Vec<&Effect>) = match &action.body {
         ActionBody::Instantaneous { precondition, effect } => (vec![precondition], vec![effect]),
@@ -81,8 +83,8 @@ pub(super) fn additions<'a>(action: &'a Action, varying: &BTreeSet<Name>) -> Add
     Additions { classes: classes(&conditions, varying), atoms }
 }
 
-/// Returns the unary atoms that a condition requires, except for `varying` predicates, whose
-/// members differ between states.
+/// Returns the unary atoms that the conditions require, as pairs of predicate and argument. Omits
+/// `varying` predicates, whose members differ between states.
 fn classes<'c>(conditions: &[&'c Condition], varying: &BTreeSet<Name>) -> Vec<(Name, &'c Term)> {
     let (mut parts, mut found_classes) = (conditions.to_vec(), Vec::new());
     while let Some(part) = parts.pop() {
@@ -100,7 +102,8 @@ fn classes<'c>(conditions: &[&'c Condition], varying: &BTreeSet<Name>) -> Vec<(N
     found_classes
 }
 
-/// The atoms that an effect adds, each with the variables that quantifiers within the effect bind.
+/// Collects the atoms that an effect adds, each with the variables that are bound by quantifiers
+/// within the effect.
 fn added<'e>(effect: &'e Effect, bound: &[&'e Name], atoms: &mut Vec<(&'e Atom, Vec<&'e Name>)>) {
     match effect {
         Effect::And(parts) => {
@@ -132,11 +135,13 @@ fn is_bound(term: &Term, bound: &[&Name]) -> bool {
     matches!(term, Term::Variable(variable) if bound.contains(&&variable.name))
 }
 
-/// The clauses of settled predicates, and those of open predicates.
+/// Clauses of the settled predicates, and clauses of the open predicates (`None` if an axiom is not
+/// a clause).
 pub(super) type Parted = (BTreeMap<Name, Vec<Clause>>, BTreeMap<Name, Option<Vec<Clause>>>);
 
-/// Unfolds clauses until no further predicate becomes settled. Returns the settled clauses, in
-/// which no open predicate occurs, and the open ones.
+/// Unfolds clauses until no further predicate becomes settled, i.e. free of atoms that actions or
+/// events can change. Returns the clauses of settled predicates and those of the other, open
+/// predicates.
 pub(super) fn settle(
     mut clauses_by_head: BTreeMap<Name, Option<Vec<Clause>>>,
     changed: &BTreeSet<Name>,
@@ -161,7 +166,7 @@ pub(super) fn settle(
     }
 }
 
-/// Returns the predicates that may differ between states.
+/// Returns the predicates whose extension may differ between states.
 fn open(clauses_by_head: &BTreeMap<Name, Option<Vec<Clause>>>, changed: &BTreeSet<Name>) -> BTreeSet<Name> {
     let mut open = changed.clone();
     loop {
@@ -183,7 +188,7 @@ fn first_open(clause: &Clause, open: &BTreeSet<Name>) -> Option<usize> {
     clause.body.iter().position(|part| matches!(part, Literal::Holds(name, _) if open.contains(name)))
 }
 
-/// Unfolding of one predicate's clauses.
+/// Unfolds the clauses of the predicate `head`.
 struct Unfold<'a> {
     clauses_by_head: &'a BTreeMap<Name, Option<Vec<Clause>>>,
     open: &'a BTreeSet<Name>,
@@ -192,7 +197,8 @@ struct Unfold<'a> {
 }
 
 impl Unfold<'_> {
-    /// Returns clauses without open atoms, or `None` if open atoms remain.
+    /// Returns equivalent clauses of the predicate without open atoms, or `None` if open atoms
+    /// remain or a limit is exceeded.
     fn clauses(&self) -> Option<Vec<Clause>> {
         let mut agenda: Vec<(Clause, usize)> =
             self.clauses_by_head[self.head].as_ref()?.iter().map(|clause| (clause.clone(), 0)).collect();
@@ -224,8 +230,8 @@ impl Unfold<'_> {
         Some(done.into_iter().collect())
     }
 
-    /// Returns `true` if the clause is redundant: its body contains its head, or a fact that guards
-    /// its head.
+    /// Returns `true` if the clause is redundant: its body contains its head, or an atom whose
+    /// guard already implies the head.
     fn says_nothing(&self, clause: &Clause) -> bool {
         clause.body.iter().any(|part| {
             let Literal::Holds(name, operands) = part else { return false };
@@ -239,7 +245,7 @@ impl Unfold<'_> {
         })
     }
 
-    /// Returns `true` if a clause concludes the predicate for all members of a class.
+    /// Returns `true` if a clause derives the predicate `head` for all members of a class.
     fn holds_of_all(&self, class: &Name) -> bool {
         let is_inclusion = |clause: &Clause| match (&clause.body[..], &clause.arguments[..]) {
             ([Literal::Holds(name, operands)], [Operand::Variable(_)]) => {
@@ -251,7 +257,8 @@ impl Unfold<'_> {
     }
 }
 
-/// Returns `true` if a fact complies with a guard, given the stated facts.
+/// Returns `true` if the fact complies with the guard: it has another predicate, or its argument is
+/// a stated member of the guard's class.
 pub(super) fn keeps(
     (predicate, arguments): &Fact,
     (guarded, position, class): &(Name, usize, Name),

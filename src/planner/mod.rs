@@ -1,7 +1,7 @@
-//! Plans a mission: grounds it, optimizes it, and lets the validator execute each plan. Nothing is
-//! printed.
+//! Plans a mission: grounds it, optimises it, and executes each resulting plan with the validator.
+//! Prints nothing.
 //!
-//! `metaplan plan` is this module between the arguments and the output.
+//! The command `metaplan plan` parses arguments, calls this module, and writes the output.
 
 mod objectives;
 mod planned;
@@ -28,13 +28,13 @@ pub use ::planner::{
     Statistics, Status, Step, Strategy, alternatives, optimize, optimize_concurrent, optimize_exact,
 };
 
-/// Callback that receives a short description of the work after the best plan is proved.
+/// Callback with a short description of the work that follows the proof of the best plan.
 type Stage<'a> = dyn FnMut(&str) + 'a;
 
-/// Callback for a better plan or a better bound.
+/// Callback for each better plan or better lower bound. `Break` ends planning.
 type Report<'a> = dyn FnMut(&Improvement) -> ControlFlow<()> + 'a;
 
-/// Plans for a mission in its present situation.
+/// Plans a mission in its present situation.
 ///
 /// ```
 /// use std::path::Path;
@@ -66,11 +66,11 @@ pub struct Planner<'m, 'r> {
 }
 
 impl<'m, 'r> Planner<'m, 'r> {
-    /// Fills the problem with the contributions of the mission's knowledge base. The planner has no
-    /// limits and reports no improvements by default.
+    /// Creates a planner for the mission's problem, filled with facts and values from the knowledge
+    /// base. By default, the planner has no limits and reports no improvements.
     ///
     /// # Errors
-    /// Contributions of the knowledge base that do not fit the domain; or M110 if the knowledge is
+    /// Facts or values from the knowledge base do not fit the domain; M110 if the knowledge is
     /// inconsistent.
     pub fn new(mission: &'m Mission) -> Result<Self, Errors> {
         consistent(mission.knowledge())?;
@@ -88,8 +88,8 @@ impl<'m, 'r> Planner<'m, 'r> {
         })
     }
 
-    /// Returns the warnings about the filled problem. [`Mission::warnings`] has the warnings about
-    /// its files.
+    /// Returns the warnings about the facts and values from the knowledge base.
+    /// [`Mission::warnings`] returns the warnings about the mission's files.
     pub fn warnings(&self) -> &[Message] {
         &self.warnings
     }
@@ -101,48 +101,48 @@ impl<'m, 'r> Planner<'m, 'r> {
         self
     }
 
-    /// Sets the limits. A limit ends planning with the best plan found. [`Limits::interrupt`] is a
-    /// flag that another thread can set.
+    /// Sets limits of time and memory. At a limit, planning ends with the best plan found.
+    /// [`Limits::interrupt`] is a flag by which another thread can end planning.
     #[must_use]
     pub fn limits(mut self, limits: Limits) -> Self {
         self.config.limits = limits;
         self
     }
 
-    /// Sets a time limit from now, grounding included. At the limit, planning ends with the best
-    /// plan found.
+    /// Sets a time limit that starts now and includes grounding. At the limit, planning ends with
+    /// the best plan found.
     #[must_use]
     pub fn time_limit(self, time: Duration) -> Self {
         let limits = self.config.limits.clone().with_time(time);
         self.limits(limits)
     }
 
-    /// Replaces the metric of the problem by objectives, the most important first: expressions as
-    /// in a metric, or names of functions.
+    /// Replaces the metric of the problem by objectives, the most important first. An objective is
+    /// an expression as in a metric, or the name of a numeric function.
     #[must_use]
     pub fn minimize(mut self, objectives: impl IntoIterator<Item = impl Into<String>>) -> Self {
         self.minimize = objectives.into_iter().map(Into::into).collect();
         self
     }
 
-    /// Allows actions to overlap as in PDDL 2.1. Interfering happenings are at least `separation`
-    /// apart, in the domain's time unit.
+    /// Sets the least time between interfering happenings, in the domain's time unit, and allows
+    /// actions to overlap as in PDDL 2.1. `None` keeps actions sequential.
     #[must_use]
     pub fn concurrent(mut self, separation: impl Into<Option<BigRational>>) -> Self {
         self.separation = separation.into();
         self
     }
 
-    /// Requests up to `most` further plans of the optimal cost. Requires sequential plans and a
-    /// single objective.
+    /// Requests up to `most` further plans of the optimal cost, or none if `most` is `None`.
+    /// Requires sequential plans and a single objective.
     #[must_use]
     pub fn alternatives(mut self, most: impl Into<Option<usize>>) -> Self {
         self.alternatives = most.into();
         self
     }
 
-    /// Sets the callback for every better plan and better bound. Planning ends with the best plan
-    /// found if it returns `Break`.
+    /// Sets the callback for every better plan and better bound. If the callback returns `Break`,
+    /// planning ends with the best plan found.
     #[must_use]
     pub fn on_improvement(mut self, report: impl FnMut(&Improvement) -> ControlFlow<()> + 'r) -> Self {
         self.report = Box::new(report);
@@ -156,13 +156,13 @@ impl<'m, 'r> Planner<'m, 'r> {
         self
     }
 
-    /// Computes the best plan and lets the validator execute it.
+    /// Computes the best plan and executes it with the validator.
     ///
     /// # Errors
-    /// All constructs that the planner does not support, with their places; faults of the
-    /// objectives; M107 if the options exclude each other; a limit that was reached before the task
-    /// was ground; or M170, a fault of the planner. A missing plan, or one that is not proved
-    /// optimal, is not an error: see [`Solution::status`].
+    /// Constructs that the planner does not support, with their places; faults of the objectives;
+    /// M107 if the options exclude each other; a limit that was reached before the task was ground;
+    /// or M170, a fault of the planner. It is not an error if no plan is found or optimality is not
+    /// proved: see [`Solution::status`].
     pub fn plan(self) -> Result<Planned<'m>, Errors> {
         let objectives = Objectives::read(self.mission, &self.problem, &self.minimize)?;
         let several = objectives.metrics.len() > 1;
@@ -179,8 +179,8 @@ impl<'m, 'r> Planner<'m, 'r> {
         }
     }
 
-    /// Computes the Pareto front of two objectives: one plan for each pair of values, executed by
-    /// the validator. Replaces the objectives of [`Planner::minimize`].
+    /// Computes the Pareto front of two objectives: one plan for each pair of values. The validator
+    /// executes each plan. Objectives set by [`Planner::minimize`] are ignored.
     ///
     /// # Errors
     /// Errors of [`Planner::plan`].
@@ -256,7 +256,8 @@ impl<'m, 'r> Planner<'m, 'r> {
         Ok(planned)
     }
 
-    /// Plans by search alone, in exact rationals.
+    /// Plans by search alone, in exact rationals. `refused` has the messages about numbers that are
+    /// too large for integers.
     fn exact(self, objectives: Objectives, refused: Errors) -> Result<Planned<'m>, Errors> {
         // The search in rationals supports a single objective.
         if objectives.metrics.len() > 1 {
@@ -272,7 +273,8 @@ impl<'m, 'r> Planner<'m, 'r> {
         Ok(planned)
     }
 
-    /// Computes further plans; the validator executes each of them.
+    /// Computes further optimal plans, and executes each of them with the validator. Returns `None`
+    /// if the solution has no proved optimal plan.
     fn further_plans(
         &self,
         task: &Task,
@@ -300,7 +302,8 @@ impl<'m, 'r> Planner<'m, 'r> {
         Ok(Some(found))
     }
 
-    /// Builds the result after the validator has executed the plan.
+    /// Executes the plan of `point` with the validator, and builds the result. `ground` is the time
+    /// of grounding.
     fn planned(
         self,
         point: Point,
@@ -332,8 +335,8 @@ impl<'m, 'r> Planner<'m, 'r> {
         })
     }
 
-    /// Returns a callback that forwards improvements to the listener, and sets the interruption
-    /// flag if the listener returns `Break`.
+    /// Returns a callback that forwards improvements to the caller's callback, and sets the
+    /// interruption flag if that returns `Break`.
     fn improvement_listener(&mut self) -> impl FnMut(Improvement) {
         let flag = self.config.limits.interrupt();
         let report = &mut self.report;
@@ -357,7 +360,7 @@ impl fmt::Debug for Planner<'_, '_> {
     }
 }
 
-/// Rejects inconsistent knowledge, from which anything follows.
+/// Checks that the knowledge base is consistent. Anything follows from an inconsistent one.
 ///
 /// # Errors
 /// M110 for each contradiction.
@@ -373,18 +376,20 @@ pub fn consistent(knowledge: Option<&Knowledge>) -> Result<(), Errors> {
     }))
 }
 
-/// Returns `true` if numbers that are too large (E304) are the only faults of a task.
+/// Returns `true` if all messages are about numbers that are too large for integers (E304), and
+/// there is at least one.
 fn is_too_large(messages: &[Message]) -> bool {
     !messages.is_empty() && messages.iter().all(|message| message.code == "E304")
 }
 
-/// Point of a front for the solution of a single objective.
+/// Converts the solution of a single objective to a point with its cost as the only value; without
+/// a value if no objective replaces the metric.
 fn valued(solution: Solution, objectives: &Objectives) -> Point {
     let cost = solution.plan.as_ref().map(|plan| plan.cost.clone());
     Point { values: cost.into_iter().filter(|_| !objectives.metrics.is_empty()).collect(), solution }
 }
 
-/// Error M107 for options that exclude each other.
+/// Creates the error M107 for options that exclude each other.
 fn apart(text: &str) -> Errors {
     Message::error("M107", text).into()
 }

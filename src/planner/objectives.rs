@@ -1,4 +1,4 @@
-//! The objectives of a plan, and the validator's check of their values.
+//! The objectives of a plan, and the check of their values by the validator.
 
 use pddl::ast::{Metric, Problem};
 use planner::{Limits, Point};
@@ -6,17 +6,21 @@ use planner::{Limits, Point};
 use crate::message::{Errors, Message};
 use crate::mission::{Mission, Reading, Unconfirmed, confirm};
 
-/// The objectives in order. Empty for the problem's metric.
+/// Objectives that replace the problem's metric, the most important first. Empty if the problem's
+/// metric is kept.
 #[derive(Debug, Clone)]
 pub(super) struct Objectives {
     /// The objectives as the user wrote them.
     pub(super) texts: Vec<String>,
+    /// The parsed objectives, in the order of `texts`.
     pub(super) metrics: Vec<Metric>,
 }
 
 impl Objectives {
+    /// Parses objectives, which are expressions or names of numeric functions.
+    ///
     /// # Errors
-    /// All faults of each objective.
+    /// All faults of all objectives.
     pub(super) fn read(mission: &Mission, problem: &Problem, texts: &[String]) -> Result<Self, Errors> {
         let mut metrics = Vec::new();
         let mut messages = Vec::new();
@@ -30,7 +34,8 @@ impl Objectives {
         Ok(Self { texts: texts.to_vec(), metrics })
     }
 
-    /// Lets the validator execute the plan and check its value by every objective.
+    /// Executes the plan of `point` with the validator, and compares the value of each objective
+    /// with the planner's value.
     ///
     /// # Errors
     /// M170 if the validator rejects the plan or computes another value; M130 if the time limit is
@@ -57,7 +62,7 @@ impl Objectives {
     }
 }
 
-/// Error for a plan that the validator did not confirm.
+/// Creates the error for a plan that the validator rejected or could not execute within the limits.
 pub(super) fn unconfirmed(reason: Unconfirmed) -> Message {
     match reason {
         Unconfirmed::Refused(reason) => fault(&reason),
@@ -68,7 +73,7 @@ pub(super) fn unconfirmed(reason: Unconfirmed) -> Message {
     }
 }
 
-/// Message about an internal fault of the planner (M170).
+/// Creates the error M170 for an internal fault of the planner.
 pub(super) fn fault(reason: &str) -> Message {
     let text = format!("this is a fault of metaplan, not of your input; please report it: {reason}");
     Message::error("M170", text)

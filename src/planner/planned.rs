@@ -13,14 +13,15 @@ use crate::mission::{Blocking, Mission, Planning as _, Reading, spaced};
 use crate::planner::objectives::Objectives;
 use crate::report::{Positions, Seen, front_sheet, plan_picture};
 
-/// Ground task of a mission, by the kind of its plans.
+/// Ground task of a mission by the kind of its plans. Tasks of sequential plans are retained for
+/// certificates.
 #[derive(Debug)]
 pub(super) enum Ground {
-    /// Sequential steps, with integers.
+    /// Sequential steps, with integer costs and values.
     Integers(Task),
-    /// Sequential steps, with rationals of any size.
+    /// Sequential steps, with costs and values that are rationals of any size.
     Exact(ExactTask),
-    /// Overlapping steps.
+    /// Overlapping actions; the task is not retained.
     Concurrent,
 }
 
@@ -28,22 +29,25 @@ pub(super) enum Ground {
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct Planned<'m> {
-    /// The plan and its proved properties. Actions have all arguments of the mission's domain,
-    /// including those that the knowledge base has added to a plain domain; [`Planned::written`]
-    /// omits these.
+    /// The plan and its proved properties. Steps have all arguments, including designs that the
+    /// knowledge base has added as parameters to a plain domain; [`Planned::written`] omits these
+    /// arguments.
     pub solution: Solution,
-    /// Value of the plan by each objective. Empty if there is no plan, or if the problem's own
+    /// Value of each objective for the plan. Empty if there is no plan, or if the problem's own
     /// metric is minimised.
     pub values: Vec<Exact>,
     /// Further optimal plans, if requested and if the plan is proved optimal.
     pub alternatives: Option<Alternatives>,
-    /// Unavailable designs that prevent a plan, if the mission is proved unsolvable.
+    /// If the mission is proved unsolvable: unavailable designs that prevent a plan, or the
+    /// information that designs are not the reason.
     pub blocking: Option<Blocking>,
-    /// Numeric functions without a value that actions need, if the mission is proved unsolvable.
+    /// If the mission is proved unsolvable: numeric functions that actions need and that have no
+    /// value.
     pub missing_values: Vec<MissingValue>,
-    /// Reasons for planning by search alone, in exact rationals. Empty if integers suffice.
+    /// Messages about numbers that are too large for integers. If there are any, planning used only
+    /// search in exact rationals.
     pub too_large: Vec<Message>,
-    /// Times of the stages before the search. The caller adds the time of reading.
+    /// Running times of the stages before the search. The caller adds the time for reading files.
     pub preparation: Preparation,
     pub(super) mission: &'m Mission,
     pub(super) problem: Problem,
@@ -53,14 +57,14 @@ pub struct Planned<'m> {
     pub(super) limits: Limits,
 }
 
-/// A front of two objectives for a mission.
+/// Pareto front of two objectives for a mission.
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct PlannedFront<'m> {
-    /// The plans with all arguments of the mission's domain, from the best by the first objective
-    /// to the best by the second.
+    /// The front. Its plans have all arguments of the mission's domain, and are sorted from the
+    /// best by the first objective to the best by the second.
     pub front: Front,
-    /// Times of the stages before the search. The caller adds the time of reading.
+    /// Running times of the stages before the search. The caller adds the time for reading files.
     pub preparation: Preparation,
     pub(super) mission: &'m Mission,
     pub(super) problem: Problem,
@@ -68,13 +72,13 @@ pub struct PlannedFront<'m> {
 }
 
 impl Planned<'_> {
-    /// Returns the objectives in order, as the caller wrote them. Empty for the problem's own
-    /// metric.
+    /// Returns the objectives as the caller wrote them, the most important first. Empty if the
+    /// problem's own metric is minimised.
     pub fn objectives(&self) -> &[String] {
         &self.objectives.texts
     }
 
-    /// Returns the planned problem, including the contributions of the knowledge base.
+    /// Returns the planned problem, including the facts and values from the knowledge base.
     pub fn problem(&self) -> &Problem {
         &self.problem
     }
@@ -85,19 +89,19 @@ impl Planned<'_> {
         self.limits.reached()
     }
 
-    /// Returns `true` if actions of the plan may overlap.
+    /// Returns `true` if the mission was planned with overlapping actions.
     pub fn overlaps(&self) -> bool {
         matches!(self.task, Ground::Concurrent)
     }
 
-    /// Returns the plan, with the arguments of each step as in the domain's file: without the designs
-    /// that the knowledge base has added as arguments.
+    /// Returns the plan with the arguments as in the domain's file, i.e. without the designs that
+    /// the knowledge base has added as arguments.
     pub fn written(&self) -> Option<Plan> {
         self.solution.plan.clone().map(|plan| self.mission.written(plan))
     }
 
-    /// Returns the plan with the gaps between actions that PlanSys2 needs, in the form of
-    /// [`Planned::written`].
+    /// Returns the plan with the gaps between actions that PlanSys2 needs. Its arguments are as in
+    /// the domain's file, see [`Planned::written`].
     pub fn spaced(&self) -> Option<Plan> {
         let plan = self.solution.plan.clone()?;
         let limits = self.limits.extended();
@@ -117,7 +121,8 @@ impl Planned<'_> {
             .with_missing_values(&self.missing_values)
     }
 
-    /// Writes a certificate of the answer to a new directory. `metaplan verify` checks it.
+    /// Writes a certificate of the status and the plan to a new directory. `metaplan verify` checks
+    /// it.
     ///
     /// # Errors
     /// The answer has no certificate, actions overlap, or the directory cannot be written.
@@ -152,8 +157,8 @@ impl PlannedFront<'_> {
         &self.objectives
     }
 
-    /// Returns the front, with the arguments of each step as in the domain's file: without the designs
-    /// that the knowledge base has added as arguments.
+    /// Returns the front with the arguments of each step as in the domain's file, i.e. without the
+    /// designs that the knowledge base has added as arguments.
     pub fn written(&self) -> Front {
         let mut front = self.front.clone();
         for point in &mut front.points {
@@ -167,7 +172,7 @@ impl PlannedFront<'_> {
         ParetoAnswer::new(&self.mission.name, &self.objectives, &self.written(), &self.preparation)
     }
 
-    /// Returns an HTML page about the front.
+    /// Returns the data of a page about the front, with its plans.
     pub fn sheet(&self, positions: &Positions) -> picture::Sheet {
         let context = Seen { mission: self.mission, problem: &self.problem, positions };
         front_sheet(context, &self.objectives, &self.front)

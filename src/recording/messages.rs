@@ -1,7 +1,7 @@
-//! ROS 2 messages of recordings: their definitions, and their encoding in CDR \[1\].
+//! ROS 2 messages in recordings: their definitions, and their encoding in CDR \[1\].
 //!
-//! - \[1\] OMG: DDS Interoperability Wire Protocol 2.5, 2022, section 10: octets 0 and 1 identify
-//!   the representation.
+//! - \[1\] OMG: DDS Interoperability Wire Protocol 2.5, 2022, section 10. The octets 0 and 1
+//!   identify the representation.
 
 use byteorder::{BigEndian, LittleEndian};
 use serde::de::DeserializeOwned;
@@ -9,16 +9,16 @@ use serde::{Deserialize, Serialize};
 
 use crate::mapek::{Event, Observation};
 
-/// Type name of diagnostics.
+/// Name of the message type for diagnostics.
 pub(super) const DIAGNOSTICS: &str = "diagnostic_msgs/msg/DiagnosticArray";
 
-/// Type name of a text.
+/// Name of the message type for a text.
 pub(super) const TEXT: &str = "std_msgs/msg/String";
 
-/// The definition of [`Text`].
+/// The definition of [`Text`], in the format `ros2msg`.
 pub(super) const TEXT_DEFINITION: &str = "string data\n";
 
-/// The definition of [`DiagnosticArray`] and its parts, in the format `ros2msg`.
+/// The definition of [`DiagnosticArray`] and the types of its parts, in the format `ros2msg`.
 pub(super) const DIAGNOSTICS_DEFINITION: &str = "\
 std_msgs/Header header
 DiagnosticStatus[] status
@@ -47,34 +47,34 @@ string key
 string value
 ";
 
-/// `std_msgs/msg/String`.
+/// The ROS 2 message `std_msgs/msg/String`.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Text {
     pub(super) data: String,
 }
 
-/// `builtin_interfaces/msg/Time`.
+/// The ROS 2 message `builtin_interfaces/msg/Time`.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Time {
     pub(super) sec: i32,
     pub(super) nanosec: u32,
 }
 
-/// `std_msgs/msg/Header`.
+/// The ROS 2 message `std_msgs/msg/Header`.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Header {
     pub(super) stamp: Time,
     pub(super) frame_id: String,
 }
 
-/// `diagnostic_msgs/msg/KeyValue`.
+/// The ROS 2 message `diagnostic_msgs/msg/KeyValue`.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct KeyValue {
     pub(super) key: String,
     pub(super) value: String,
 }
 
-/// `diagnostic_msgs/msg/DiagnosticStatus`.
+/// The ROS 2 message `diagnostic_msgs/msg/DiagnosticStatus`.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct DiagnosticStatus {
     pub(super) level: u8,
@@ -84,20 +84,21 @@ pub(super) struct DiagnosticStatus {
     pub(super) values: Vec<KeyValue>,
 }
 
-/// `diagnostic_msgs/msg/DiagnosticArray`. As JSON it is a line of events.
+/// `diagnostic_msgs/msg/DiagnosticArray`. Serialised as JSON, it is an event line that the loop
+/// accepts.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct DiagnosticArray {
     pub(super) header: Header,
     pub(super) status: Vec<DiagnosticStatus>,
 }
 
-/// The levels of a status.
+/// Value of the field `level` of a status without an error.
 const OK: u8 = 0;
 const ERROR: u8 = 2;
 
 impl DiagnosticArray {
-    /// Converts an observation of attributes or components to a message in the form of MROS's
-    /// monitors. `None` for any other observation. The time is in nanoseconds of the system's
+    /// Converts an observation of measurements or component states to a message as MROS's monitors
+    /// send it. Returns `None` for any other observation. `time` is in nanoseconds of the system's
     /// clock.
     pub(super) fn of(observation: &Observation, time: u64) -> Option<Self> {
         let status: Vec<_> = observation.events.iter().flatten().filter_map(DiagnosticStatus::of).collect();
@@ -125,7 +126,7 @@ impl DiagnosticStatus {
     }
 }
 
-/// Encodes a message in plain CDR, little-endian.
+/// Encodes a message in plain CDR, little-endian, with the encapsulation header.
 pub(super) fn to_cdr(message: &impl Serialize) -> Vec<u8> {
     let mut bytes = vec![0, 1, 0, 0];
     // Encoding cannot fail for numbers, texts and lists of them.
@@ -133,8 +134,8 @@ pub(super) fn to_cdr(message: &impl Serialize) -> Vec<u8> {
     bytes
 }
 
-/// Decodes CDR with either byte order, the inverse of [`to_cdr`]. Returns a description of the
-/// fault if the bytes do not have the type.
+/// Decodes a message from plain CDR with either byte order. Returns a description of the fault if
+/// the bytes do not encode the type.
 pub(super) fn from_cdr<M: DeserializeOwned>(bytes: &[u8]) -> Result<M, String> {
     let read = match bytes {
         [0, 0, _, _, content @ ..] => cdr_encoding::from_bytes::<M, BigEndian>(content),

@@ -1,19 +1,19 @@
 //! Recording of runs as MCAP files \[1\], which Foxglove, `PlotJuggler` and `ros2 bag` also read,
 //! and extraction of events from MCAP files.
 //!
-//! | topic | schema | has |
-//! |---|---|---|
-//! | `/diagnostics` | `diagnostic_msgs/msg/DiagnosticArray`, in CDR | measurements and states of
-//! components, in the form of MROS's monitors |
-//! | `/metaplan/events` | `metaplan.Event` | each line of events, unchanged, with its number and
-//! time |
-//! | `/metaplan/inferences`, `/metaplan/plans`, `/metaplan/effects`, `/metaplan/loop` |
-//! `metaplan.Answer` | the written answers, each on the topic of its kind |
+//! A recording has these topics:
 //!
-//! Times start with the system's clock when the file is created, and never decrease. A chunk is
-//! written to the file as a whole, at most [`INTERVAL`] after its first message. So a killed
-//! program leaves a file of complete chunks, and perhaps a part of one, and all readers of MCAP can
-//! read the complete chunks.
+//! - `/diagnostics`, schema `diagnostic_msgs/msg/DiagnosticArray` in CDR: measurements and states of
+//!   components, in the form of MROS's monitors.
+//! - `/metaplan/events`, schema `metaplan.Event`: each input line, unchanged, with its number and
+//!   time.
+//! - `/metaplan/inferences`, `/metaplan/plans`, `/metaplan/effects` and `/metaplan/loop`, schema
+//!   `metaplan.Answer`: the written answers, each on the topic of its kind.
+//!
+//! Times begin with the system's clock when the file is created, and never decrease. A chunk is
+//! written to the file as a whole, at most [`INTERVAL`] after its first message. So if the program
+//! is killed, the file consists of complete chunks and perhaps an incomplete one. All readers of
+//! MCAP can read the complete chunks.
 //!
 //! - \[1\] Foxglove: MCAP file format specification, <https://mcap.dev/spec>.
 
@@ -29,5 +29,5 @@ pub use replay::{Replay, Replayed};
 pub use schema::answer_schema;
 pub use write::{Form, Recording};
 
-/// First byte of an MCAP file, with which no line of text begins.
+/// First byte of every MCAP file. No line of text begins with it.
 pub const FIRST_BYTE: u8 = mcap::MAGIC[0];

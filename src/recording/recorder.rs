@@ -10,19 +10,20 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use crate::recording::write::{Form, Recording};
 
-/// Maximum delay before a message is in the file.
+/// Maximum time between a message and its flush to the file.
 pub const INTERVAL: Duration = Duration::from_secs(1);
 
-/// Capacity of the queue. Senders block while it is full.
+/// Capacity of the queue between loop and writer thread, in entries. Senders block while the queue
+/// is full.
 const QUEUE_CAPACITY: usize = 1024;
 
-/// A recording that a separate thread writes; copies share the file.
+/// A recording that a separate thread writes. Clones share the file.
 #[derive(Debug, Clone)]
 pub struct Recorder {
     entries: SyncSender<Entry>,
     thread: Arc<Mutex<Option<JoinHandle<io::Result<()>>>>>,
-    /// Reference for times: the system's clock in nanoseconds, and the monotonic clock at the same
-    /// moment.
+    /// Start of the recording as nanoseconds of the system's clock, and as a moment of the
+    /// monotonic clock.
     begun: (u64, Instant),
 }
 
@@ -34,7 +35,8 @@ enum Entry {
 }
 
 impl Recorder {
-    /// Creates the file, which must not exist, so that no recording is overwritten.
+    /// Creates the file of a recording. The file must not exist, so that no recording is
+    /// overwritten.
     ///
     /// # Errors
     /// The file exists, or cannot be written.
@@ -48,25 +50,25 @@ impl Recorder {
         Ok(Self { entries, thread: Arc::new(Mutex::new(Some(thread))), begun })
     }
 
-    /// Records a line before the loop handles it, with its number and the time since the start of
-    /// the mission.
+    /// Records an input line before the loop handles it. `line` is the number of the line, `now`
+    /// the time since the start of the mission.
     pub fn event(&self, line: u64, now: Duration, text: &str) {
         self.send(Entry::Event { time: self.time(), line, now, text: text.to_owned() });
     }
 
-    /// Records an answer, a JSON object of the format.
+    /// Records an answer of the loop, given as the text of a JSON object.
     pub fn answer(&self, text: &str) {
         self.send(Entry::Answer { time: self.time(), text: text.to_owned() });
     }
 
-    /// Returns `true` if writing has failed, so that recording has ended; [`Recorder::finish`]
+    /// Returns `true` if the writer thread has ended, usually after an error. [`Recorder::finish`]
     /// returns the error.
     pub fn has_failed(&self) -> bool {
         let thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner);
         thread.as_ref().is_some_and(JoinHandle::is_finished)
     }
 
-    /// Ends the file with its index. Later messages are not recorded.
+    /// Ends the file with its index. Messages that are sent later are not recorded.
     ///
     /// # Errors
     /// Writing has failed, now or before.
@@ -80,8 +82,8 @@ impl Recorder {
         }
     }
 
-    /// Sends an entry. After an error the channel is closed; [`Recorder::finish`] returns the
-    /// error.
+    /// Sends an entry to the writer thread. After an error the channel is closed and the entry is
+    /// lost.
     fn send(&self, entry: Entry) {
         let _ = self.entries.send(entry);
     }
@@ -92,9 +94,10 @@ impl Recorder {
     }
 }
 
-/// Writes entries until the end is requested, or until all senders are dropped.
+/// Writes entries to the file until an end entry arrives or all senders are dropped. Flushes at
+/// most [`INTERVAL`] after an entry.
 fn write(mut recording: Recording<File>, entries: &Receiver<Entry>) -> io::Result<()> {
-    // Deadline for flushing the last entry to the file.
+    // Time at which the entries that are not flushed have to be flushed.
     let mut due: Option<Instant> = None;
     loop {
         let entry = match due {

@@ -1,7 +1,7 @@
 //! Extracts the lines of events from an MCAP file, in the order of the file.
 //!
-//! For a recording of Metaplan these are the lines that the loop received, at their original times.
-//! For any other file, for example of `ros2 bag record`, they are its diagnostics, at times
+//! For a recording of Metaplan these are the input lines of the loop, at their original times. For
+//! any other file, for example of `ros2 bag record`, they are its diagnostics messages, at times
 //! relative to the first of them. An unfinished file, for example after a crash, is read up to its
 //! end.
 
@@ -18,23 +18,24 @@ use crate::recording::schema;
 use crate::recording::unpack::{LARGEST, records};
 use crate::recording::write::EventMessage;
 
-/// A line of an MCAP file.
+/// An event line from an MCAP file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Replayed {
-    /// The line.
+    /// Text of the line, for a loop.
     pub text: String,
-    /// The time since the start of the mission.
+    /// Time of the line since the start of the mission.
     pub now: Duration,
 }
 
-/// An MCAP file that is being read.
+/// Reader that extracts event lines from an MCAP file.
 pub struct Replay<R> {
     source: R,
     reader: LinearReader,
     schemas: BTreeMap<u16, String>,
     channels: BTreeMap<u16, Kind>,
     lines: VecDeque<Replayed>,
-    /// Time of the first diagnostics message.
+    /// Time of the first diagnostics message, in nanoseconds; the times of later ones are relative
+    /// to it.
     first: Option<u64>,
     state: State,
 }
@@ -45,29 +46,29 @@ impl<R> std::fmt::Debug for Replay<R> {
     }
 }
 
-/// State of the reader.
+/// State of a [`Replay`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum State {
     Reading,
     /// The file was read to its end.
     Finished,
-    /// The file is truncated and was read up to that point.
+    /// The file is truncated and was read up to its end.
     Unfinished,
 }
 
-/// Contents of a channel.
+/// Kind of the messages of a channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
-    /// Events of a loop, as JSON.
+    /// Event lines of a recorded loop, as JSON.
     Events,
-    /// Events of a loop, as JSON text in CDR.
+    /// Event lines of a recorded loop, as JSON text in CDR.
     EventTexts,
-    /// Diagnostics of ROS 2.
+    /// Diagnostics messages of ROS 2.
     Diagnostics,
 }
 
 impl<R: Read> Replay<R> {
-    /// Reads from a source.
+    /// Creates a reader for an MCAP file.
     pub fn new(source: R) -> Self {
         let options = LinearReaderOptions::default()
             .with_skip_end_magic(true)
@@ -84,10 +85,11 @@ impl<R: Read> Replay<R> {
         }
     }
 
-    /// Returns the next line, or `None` at the end.
+    /// Returns the next event line, or `None` at the end of the file.
     ///
     /// # Errors
-    /// The source cannot be read, is not an MCAP file, is damaged, or contains nothing for a loop.
+    /// The source cannot be read, is not an MCAP file, is damaged, or contains no event lines and
+    /// no diagnostics.
     pub fn next_line(&mut self) -> io::Result<Option<Replayed>> {
         loop {
             if let Some(line) = self.lines.pop_front() {
@@ -100,13 +102,13 @@ impl<R: Read> Replay<R> {
         }
     }
 
-    /// Returns `true` if the file is truncated, for example by a crash. Known once the end is
-    /// reached.
+    /// Returns `true` if the file is truncated, for example by a crash. The answer is valid only
+    /// after the end is reached.
     pub fn is_unfinished(&self) -> bool {
         self.state == State::Unfinished
     }
 
-    /// Reads the next record.
+    /// Reads the next part of the file.
     fn read(&mut self) -> io::Result<()> {
         let record = match self.reader.next_event() {
             Some(Ok(LinearReadEvent::ReadRequest(need))) => {
@@ -140,7 +142,8 @@ impl<R: Read> Replay<R> {
         Ok(())
     }
 
-    /// Handles a record that is not a chunk.
+    /// Handles a record that is not a chunk: registers schemas and channels, and queues the lines
+    /// of messages.
     fn take(&mut self, record: Record<'static>) -> io::Result<()> {
         match record {
             Record::Schema { header, .. } => {
@@ -207,7 +210,7 @@ impl<R: Read> Replay<R> {
     }
 }
 
-/// Converts an error of the library to an I/O error.
+/// Converts an error of the crate `mcap` to an I/O error.
 fn damaged(error: McapError) -> io::Error {
     match error {
         McapError::Io(error) => error,

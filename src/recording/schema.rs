@@ -1,21 +1,22 @@
-//! JSON schemas of a recording's topics, and the assignment of answers to topics.
+//! JSON Schemas of a recording's topics, and the assignment of answers to topics by kind.
 
 use schemars::Schema;
 use serde_json::{Value, json};
 
-/// The topic of diagnostics.
+/// Topic of the diagnostics messages.
 pub(super) const DIAGNOSTICS: &str = "/diagnostics";
 
-/// Topic of the lines of events.
+/// Topic of the loop's input lines.
 pub(super) const EVENTS: &str = "/metaplan/events";
 
-/// The name of the schema of [`EVENTS`].
+/// Name of the schema of the topic [`EVENTS`].
 pub(super) const EVENT: &str = "metaplan.Event";
 
-/// The name of the schema of the topics of [`ANSWERS`].
+/// Name of the schema of the topics in [`ANSWERS`].
 pub(super) const ANSWER: &str = "metaplan.Answer";
 
-/// Topics of answers with their kinds. Kinds that are not listed belong to the last topic.
+/// Topics of answers, each with the kinds of its answers. Kinds that are not listed belong to the
+/// last topic.
 pub(super) const ANSWERS: [(&str, &[&str]); 4] = [
     ("/metaplan/inferences", &["inferred", "contradicted", "unconcluded", "filtered", "silent"]),
     ("/metaplan/plans", &["plan_requested", "planning", "plan_found", "plan_kept", "plan_none"]),
@@ -33,12 +34,12 @@ pub(super) const ANSWERS: [(&str, &[&str]); 4] = [
     ("/metaplan/loop", &[]),
 ];
 
-/// Returns the topic of answers of a kind, as an index of [`ANSWERS`].
+/// Returns the index in [`ANSWERS`] of the topic for answers of a kind.
 pub(super) fn topic(kind: &str) -> usize {
     ANSWERS.iter().position(|(_, kinds)| kinds.contains(&kind)).unwrap_or(ANSWERS.len() - 1)
 }
 
-/// Returns the schema of events.
+/// Returns the JSON Schema of recorded input lines.
 pub(super) fn event() -> Value {
     json!({
         "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -63,12 +64,12 @@ pub(super) fn event() -> Value {
     })
 }
 
-/// The schema of answers.
+/// Returns the JSON Schema of the loop's answers.
 pub fn answer_schema() -> Schema {
     Schema::try_from(answer()).unwrap_or_default()
 }
 
-/// Returns the schema of answers, in the recorded form.
+/// Returns the JSON Schema of the loop's answers, in their recorded form.
 pub(super) fn answer() -> Value {
     let texts = json!({"type": "array", "items": {"type": "string"}});
     let step = json!({

@@ -1,4 +1,4 @@
-//! Writes the events and answers of a loop to an MCAP file.
+//! Writes the input lines and answers of a loop to an MCAP file.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -15,13 +15,13 @@ use crate::mapek::Observation;
 use crate::recording::messages::{self, DiagnosticArray, Text, to_cdr};
 use crate::recording::schema;
 
-/// Version of the format.
+/// Name and version of the recording format, in the file's metadata.
 const FORMAT: &str = "metaplan-recording/1";
 
-/// Encoding of events and answers.
+/// Encoding of event lines and answers in a recording.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Form {
-    /// JSON with a schema, so that viewers can display the fields.
+    /// JSON with a JSON Schema, so that viewers can display the fields.
     #[default]
     Json,
     /// The JSON text as `std_msgs/msg/String` in CDR. `ros2 bag play` needs files with a single
@@ -29,8 +29,8 @@ pub enum Form {
     Text,
 }
 
-/// An MCAP file that is being written. Each method has a parameter for the time in nanoseconds of
-/// the system's clock, which must not decrease.
+/// An MCAP file that is open for writing. The parameter `time` of its methods is in nanoseconds of
+/// the system's clock, and must not decrease.
 #[derive(Debug)]
 pub struct Recording<W: Write + Seek> {
     writer: Out<W>,
@@ -40,7 +40,7 @@ pub struct Recording<W: Write + Seek> {
     answers: Vec<Topic>,
 }
 
-/// Writer of the library, with an opaque `Debug` output.
+/// Wrapper that gives the MCAP writer a `Debug` implementation.
 struct Out<W: Write + Seek>(Writer<W>);
 
 impl<W: Write + Seek> std::fmt::Debug for Out<W> {
@@ -49,14 +49,15 @@ impl<W: Write + Seek> std::fmt::Debug for Out<W> {
     }
 }
 
-/// A channel, and its number of messages.
+/// A channel of the file, and the number of messages written to it.
 #[derive(Debug)]
 struct Topic {
     channel: u16,
     messages: u32,
 }
 
-/// Message for a line of events.
+/// JSON message for an input line. `event` has the line if it is a JSON object, otherwise `text`
+/// has it.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct EventMessage<'a> {
     pub(super) line: u64,
@@ -67,7 +68,7 @@ pub(super) struct EventMessage<'a> {
     pub(super) text: Option<Cow<'a, str>>,
 }
 
-/// Fields that determine the kind of an answer.
+/// The field that gives the kind of an answer.
 #[derive(Deserialize)]
 struct Kind<'a> {
     #[serde(borrow, default)]
@@ -75,7 +76,7 @@ struct Kind<'a> {
 }
 
 impl<W: Write + Seek> Recording<W> {
-    /// Creates a file, with all topics.
+    /// Creates a recording in `sink`, with all topics.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -117,8 +118,8 @@ impl<W: Write + Seek> Recording<W> {
         Ok(Self { writer: Out(writer), form, diagnostics, events, answers })
     }
 
-    /// Writes a line of events with its number and the time since the start of the mission, and its
-    /// attributes and components as diagnostics.
+    /// Writes an input line with its number and the time since the start of the mission. If the
+    /// line reports measurements or component states, also writes them as diagnostics.
     ///
     /// # Errors
     /// The file cannot be written, or an earlier write has failed.
@@ -136,7 +137,7 @@ impl<W: Write + Seek> Recording<W> {
         }
     }
 
-    /// Writes an answer, a JSON object of the format.
+    /// Writes an answer, given as the text of a JSON object, to the topic of its kind.
     ///
     /// # Errors
     /// The file cannot be written, or an earlier write has failed.
@@ -179,7 +180,7 @@ impl<W: Write + Seek> Out<W> {
     }
 }
 
-/// Encodes JSON in the given form.
+/// Encodes a JSON text in the given form.
 fn bytes(form: Form, json: String) -> Vec<u8> {
     match form {
         Form::Json => json.into_bytes(),
@@ -187,7 +188,7 @@ fn bytes(form: Form, json: String) -> Vec<u8> {
     }
 }
 
-/// Converts an error of the library to an I/O error.
+/// Converts an error of the crate `mcap` to an I/O error.
 fn failed(error: McapError) -> io::Error {
     match error {
         McapError::Io(error) => error,

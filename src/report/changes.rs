@@ -1,4 +1,5 @@
-//! Differences between a mission as its files define it and in a situation, with their causes.
+//! Differences between two situations of a mission (as its files define it, and now), with their
+//! causes.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,13 +10,13 @@ use crate::mission::Mission;
 use crate::number::decimal;
 use crate::report::designs::because;
 
-/// Name of an unknown state of a component or an attribute.
+/// Text in place of an unknown status of a component or an unknown value of an attribute.
 const UNKNOWN: &str = "not said";
 
-/// The cost of a plan, or the reason for the lack of a plan.
+/// The cost of a plan, or the reason why there is no cost.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Cost {
-    /// The metric, as text.
+    /// The value of the metric, as text.
     Of(String),
     /// The mission is proved to have no plan.
     NoPlan,
@@ -23,7 +24,8 @@ pub enum Cost {
     NotFound,
 }
 
-/// Returns the differences from causes to effects: reports, task, availability of designs, and
+/// Returns the differences between two situations of a mission, each with its plan. The order is
+/// from causes to effects: components and measurements, the task, availability of designs, and
 /// costs of the plans.
 pub fn changes(before: (&Mission, &Plan), after: (&Mission, &Plan), costs: &[Cost; 2]) -> Vec<Change> {
     let mut changes = Vec::new();
@@ -37,7 +39,8 @@ pub fn changes(before: (&Mission, &Plan), after: (&Mission, &Plan), costs: &[Cos
     changes
 }
 
-/// Formats the values that differ: `name: old before, new now`.
+/// Returns a sentence `name: old before, new now` for each name whose values differ. A name without
+/// a value has the value `missing`.
 fn differences(
     before: &BTreeMap<String, String>,
     after: &BTreeMap<String, String>,
@@ -74,7 +77,7 @@ fn measured(mission: &Mission) -> BTreeMap<String, String> {
     value.collect()
 }
 
-/// Returns the differences of the problems.
+/// Returns at most one sentence, about the initial facts and values in which the problems differ.
 fn task(before: &Mission, after: &Mission) -> Vec<String> {
     let (old, new) = (stated(before), stated(after));
     let only = |facts: &BTreeSet<String>, other_facts: &BTreeSet<String>| {
@@ -110,7 +113,7 @@ fn shown(atom: &Atom) -> String {
     format!("({})", words.join(" "))
 }
 
-/// Returns the designs that are lost or gained, with the reasons.
+/// Returns the designs that became available or unavailable, with the reasons.
 fn designs(before: &Mission, after: &Mission) -> Vec<Change> {
     let available = |mission: &Mission| -> BTreeMap<String, bool> {
         let designs = mission.knowledge().into_iter().flat_map(|knowledge| knowledge.catalogue().designs());
@@ -126,7 +129,7 @@ fn designs(before: &Mission, after: &Mission) -> Vec<Change> {
     changes.collect()
 }
 
-/// Returns the differences of the plans.
+/// Returns sentences about the differences between two plans and their costs.
 fn plans(before: &Plan, after: &Plan, costs: &[Cost; 2]) -> Vec<String> {
     let text = match costs {
         [Cost::Of(old), Cost::Of(new)] => return cost_and_design_differences(before, after, [old, new]),
@@ -142,7 +145,8 @@ fn plans(before: &Plan, after: &Plan, costs: &[Cost; 2]) -> Vec<String> {
     vec![text]
 }
 
-/// Sentences about the differences between two plans with these costs.
+/// Returns sentences about the differences between the costs, the used designs and the actions of
+/// two plans.
 fn cost_and_design_differences(before: &Plan, after: &Plan, [old_cost, new_cost]: [&str; 2]) -> Vec<String> {
     let mut texts = Vec::new();
     if old_cost == new_cost {
@@ -165,8 +169,8 @@ fn cost_and_design_differences(before: &Plan, after: &Plan, [old_cost, new_cost]
     texts
 }
 
-/// Sentence with the number of actions that both plans have. An action counts as often as it is in
-/// both plans. Its designs do not matter.
+/// Returns a sentence with the number of actions that are in both plans. An action that occurs
+/// several times is counted as often as it occurs in both. Designs are ignored.
 fn shared(before: &Plan, after: &Plan) -> String {
     let mut old: Vec<&str> = before.steps.iter().map(|step| step.label.as_str()).collect();
     let in_both = after.steps.iter().filter(|step| {

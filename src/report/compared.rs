@@ -9,8 +9,9 @@ use crate::answers::{MEASURES, Pair, Row};
 use crate::comparison::Comparison;
 use crate::simulate::{Run, Sample, Strategy};
 
-/// Returns the picture of comparisons. `rows` are the rows of the table, including added ones.
-/// Computation times are not drawn.
+/// Returns the picture of comparisons, each with its pair of start and goal if there are several.
+/// `rows` are the rows of the table, including rows that the user has added. Computation times are
+/// omitted.
 pub fn comparison_sheet(mission: &str, comparisons: &[(Option<Pair>, Comparison)], rows: &[Row]) -> Sheet {
     let mut parts = Vec::new();
     for (pair, comparison) in comparisons {
@@ -30,8 +31,8 @@ pub fn comparison_sheet(mission: &str, comparisons: &[(Option<Pair>, Comparison)
     }
 }
 
-/// Labels rows or points by their kind, with a number if the kind occurs several times: `a1`, `a2`,
-/// `b`.
+/// Returns a label for each row or point: its kind, with a number if the kind occurs several times
+/// for a pair of start and goal (`a1`, `a2`, `b`).
 fn labels<'k>(kinds: &[(&'k Option<Pair>, &'k str)]) -> Vec<String> {
     let mut counts: BTreeMap<&(&Option<Pair>, &str), usize> = BTreeMap::new();
     let label = |kind| {
@@ -43,8 +44,9 @@ fn labels<'k>(kinds: &[(&'k Option<Pair>, &'k str)]) -> Vec<String> {
     kinds.iter().map(label).collect()
 }
 
-/// Points for time and the probability of a success without collision: the front, and each
-/// candidate with a finite time. A point has the label of its row in the table.
+/// Returns the diagram of expected time against the probability of success without collision: the
+/// Pareto front as a line, and each candidate with a finite time as a point. A point has the label
+/// of its row in the table.
 fn front(comparison: &Comparison) -> Points {
     let kinds: Vec<String> =
         comparison.candidates.iter().map(|candidate| candidate.kind.to_string()).collect();
@@ -63,7 +65,8 @@ fn front(comparison: &Comparison) -> Points {
     }
 }
 
-/// Costs of deviating from the best policy, with the reasons.
+/// Returns sentences about the costs of deviating from the best policy, with the compared values as
+/// reasons.
 fn prices(comparison: &Comparison) -> Vec<Change> {
     let leaf = |text: String| Reason { text, supports: Vec::new() };
     let price = |name: &str, value: Option<f64>, because: Vec<Reason>| Change {
@@ -119,8 +122,8 @@ fn table(rows: &[Row]) -> Part {
     Part::Table("measures".to_owned(), header.collect(), rows.iter().zip(labels(&kinds)).map(line).collect())
 }
 
-/// Returns the picture of simulated missions: the distributions of costs, reactions and
-/// reconfigurations over the seeds.
+/// Returns the picture of simulated missions: distributions of costs, reaction times and
+/// reconfigurations over the seeds, for each strategy.
 pub fn simulation_sheet(mission: &str, scenario: &str, strategies: &[Strategy], runs: &[Run]) -> Sheet {
     let cost = |run: &Run| run.accomplished.then_some(run.cost);
     let changes = |run: &Run| Some(run.reconfigurations as f64);
@@ -148,7 +151,7 @@ pub fn simulation_sheet(mission: &str, scenario: &str, strategies: &[Strategy], 
     }
 }
 
-/// Sentence with the number of missions that reached their goal.
+/// Returns a sentence with the number of missions that reached their goal.
 fn accomplished(done: usize, all: usize) -> String {
     match (done, all) {
         (0, 1) => "The mission was not accomplished.".to_owned(),
@@ -160,8 +163,8 @@ fn accomplished(done: usize, all: usize) -> String {
     }
 }
 
-/// Text for a strategy that has no costs, since none of its missions was accomplished. It is short
-/// enough for a telephone.
+/// Text for a strategy without costs, because none of its missions was accomplished. It is short
+/// enough for a small screen.
 fn none_accomplished(missions: usize) -> String {
     format!("0 of {missions} accomplished")
 }
@@ -210,7 +213,8 @@ fn figures(strategies: &[Strategy], runs: &[Run]) -> Part {
     Part::Table("figures".to_owned(), header, strategies.iter().map(line).collect())
 }
 
-/// Formats a mean, with half the width of its interval if there are several values.
+/// Formats a mean, followed by half the width of its confidence interval if there are several
+/// values.
 fn mean(sample: &Sample) -> String {
     match sample.count {
         1 => rounded(sample.mean),
@@ -218,7 +222,7 @@ fn mean(sample: &Sample) -> String {
     }
 }
 
-/// Formats a simulated figure with two decimals, since it is random.
+/// Formats a simulated value with at most two decimals; more digits would only be noise.
 fn rounded(value: f64) -> String {
     hundredths(value).to_string()
 }

@@ -13,7 +13,8 @@ use crate::mapek::{fact_text, unavailable};
 use crate::mission::Mission;
 use crate::number::decimal;
 
-/// Returns all designs, with the steps that use them.
+/// Returns all designs of the mission's knowledge base, each with the numbers of the steps that use
+/// it.
 pub fn designs(mission: &Mission, steps: &[Step]) -> Vec<Design> {
     let Some(knowledge) = mission.knowledge() else { return Vec::new() };
     let (components, measurements) = (knowledge.view().components(), knowledge.view().measurements());
@@ -67,8 +68,8 @@ fn required(requirement: &Requirement, measurements: &[Measurement]) -> String {
     }
 }
 
-/// Returns all reasons for the availability of a design: if it is not available, every cause that
-/// rules it out.
+/// Returns the reasons for the availability of a design. For an unavailable design, these are all
+/// causes that rule it out, with derivations.
 pub(super) fn because(knowledge: &Knowledge, design: &str, available: bool) -> Vec<Reason> {
     if available {
         let text = "nothing says that it is not realisable, and nothing that it is not available".to_owned();
@@ -104,7 +105,8 @@ pub(super) fn because(knowledge: &Knowledge, design: &str, available: bool) -> V
     introduction.into_iter().chain(trees).collect()
 }
 
-/// Converts a derivation to a tree. A fact that was explained before is only named.
+/// Converts the step `at` of a derivation to a tree of reasons. A fact that is already in
+/// `explained` is named without its reasons.
 fn tree(derivation: &Derivation, at: usize, symbols: &Symbols, explained: &mut BTreeSet<usize>) -> Reason {
     let step = &derivation.steps[at];
     let fact = fact_text(&step.fact, symbols);

@@ -1,11 +1,11 @@
-//! Converts a journal to a picture.
+//! Converts a journal of a loop to a picture.
 
 use picture::{Happening, Kind, Log, Reason};
 use serde_json::Value;
 
 use crate::journal::JournalReport;
 
-/// Returns the picture of a journal called `name`.
+/// Returns the picture of a journal; `name` is its title.
 pub fn log_picture(name: &str, journal: &JournalReport) -> Log {
     let mut happenings = Vec::new();
     let mut time = 0.0;
@@ -37,7 +37,7 @@ pub fn log_picture(name: &str, journal: &JournalReport) -> Log {
     }
 }
 
-/// Converts an answer of the loop to its kind, a sentence, and details.
+/// Converts an answer of the loop to its kind, a sentence, and details for the picture.
 fn happening(answer: &Value) -> (Kind, String, Vec<Reason>) {
     let word = |field: &str| plain(&answer[field]);
     match answer["answer"].as_str().unwrap_or_default() {
@@ -87,7 +87,8 @@ fn happening(answer: &Value) -> (Kind, String, Vec<Reason>) {
     }
 }
 
-/// Converts changed designs and objectives, with the reasons.
+/// Converts an `inferred` answer: the designs and objectives whose status has changed, with the
+/// reasons.
 fn inferred(answer: &Value) -> (Kind, String, Vec<Reason>) {
     let designs = list(&answer["designs"]).iter().map(|design| {
         let is = if design["available"] == Value::Bool(true) { "is available" } else { "is not available" };
@@ -106,7 +107,8 @@ fn inferred(answer: &Value) -> (Kind, String, Vec<Reason>) {
     (Kind::Inference, text.join("; "), reasons)
 }
 
-/// Formats an action with its arguments and designs; `name` is the field with the action's name.
+/// Formats an action with its arguments and designs. `name` is the field of `step` that contains
+/// the action's name.
 fn action(step: &Value, name: &str) -> String {
     let arguments = list(&step["arguments"]).iter().map(plain);
     let words: Vec<String> = std::iter::once(plain(&step[name])).chain(arguments).collect();
@@ -120,7 +122,7 @@ fn list(value: &Value) -> &[Value] {
     value.as_array().map(Vec::as_slice).unwrap_or_default()
 }
 
-/// Converts a list of sentences, or a single one.
+/// Converts a list of sentences, or a single sentence, to reasons without supports.
 fn lines(value: &Value) -> Vec<Reason> {
     match value {
         Value::Array(all) => all.iter().map(|entry| leaf(plain(entry))).collect(),

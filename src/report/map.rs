@@ -1,8 +1,9 @@
 //! Infers the places of a mission, their neighbours, and the route of a plan.
 //!
-//! PDDL does not mark places. Here something moves if an action deletes `(p … a)` and adds `(p …
-//! b)` with parameters `a` and `b` of one type. The objects of that type are places. Two places are
-//! neighbours if they are the only places of a fact or a value of the problem.
+//! PDDL does not mark places. This module assumes that something moves if an action deletes `(p …
+//! a)` and adds `(p … b)` with parameters `a` and `b` of one type. The objects of this type are
+//! places. Two places are neighbours if a fact or value of the problem has exactly these two places
+//! among its arguments.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,16 +16,17 @@ use planner::Plan;
 
 use crate::report::seen::Scene;
 
-/// Movement by an action.
+/// A movement: an action that replaces the last argument of an atom.
 struct Movement<'d> {
     action: &'d Name,
     predicate: &'d Name,
-    /// Positions of the parameters for origin and destination.
+    /// Positions of the action's parameters for origin and destination.
     parameters: (usize, usize),
     r#type: &'d TypeExpression,
 }
 
-/// Returns the map, if the mission has places, and adds its route to each step of the plan.
+/// Returns the map of a mission that has places, otherwise `None`. Sets the origin and destination
+/// of each step that is a movement.
 pub(super) fn map(scene: Scene<'_>, plan: &Plan, steps: &mut [Step]) -> Option<Map> {
     let movements: Vec<Movement<'_>> = scene.domain.actions.iter().flat_map(moves).collect();
     let moving = places_of_most(scene, plan, &movements)?;
@@ -55,14 +57,14 @@ pub(super) fn map(scene: Scene<'_>, plan: &Plan, steps: &mut [Step]) -> Option<M
     Some(Map { places: places.iter().map(place).collect(), ways: ways(scene.problem, &number, &predicates) })
 }
 
-/// Movements between the places that a plan uses most.
+/// The movements of a plan, and the places between which they lead.
 struct Moving<'d> {
     movements: Vec<&'d Movement<'d>>,
     places: Vec<Name>,
 }
 
-/// Selects the kind of places with most moves of the plan, then the one with most actions. Designs
-/// are not places.
+/// Selects the places between which the plan moves most often; of equal candidates, those with more
+/// movements in the domain. Types with designs are excluded.
 fn places_of_most<'d>(scene: Scene<'_>, plan: &Plan, movements: &'d [Movement<'d>]) -> Option<Moving<'d>> {
     let designs: BTreeSet<Name> = scene.designs.keys().map(|design| Name::new(design)).collect();
     let mut kinds: BTreeMap<Vec<Name>, Vec<&'d Movement<'d>>> = BTreeMap::new();
@@ -81,7 +83,7 @@ fn places_of_most<'d>(scene: Scene<'_>, plan: &Plan, movements: &'d [Movement<'d
     most_used.map(|(places, movements)| Moving { movements, places })
 }
 
-/// Returns the movements by an action.
+/// Returns all movements that an action describes.
 fn moves(action: &Action) -> Vec<Movement<'_>> {
     let (mut added, mut deleted) = (Vec::new(), Vec::new());
     let mut parts: Vec<&Effect> = match &action.body {
@@ -160,7 +162,8 @@ fn objects(domain: &Domain, problem: &Problem, r#type: &TypeExpression) -> Vec<N
     entries.map(|entry| entry.identifier.name.clone()).filter(|name| visited.insert(name.clone())).collect()
 }
 
-/// Returns the last arguments of facts with these predicates.
+/// Returns the last arguments of the atoms with these predicates, i.e. the places where something
+/// is.
 fn ends<'p>(atoms: impl Iterator<Item = &'p Atom>, predicates: &BTreeSet<&Name>) -> BTreeSet<Name> {
     let matching = atoms.filter(|atom| predicates.contains(&atom.predicate.name));
     matching.filter_map(|atom| atom.arguments.last()).map(|term| name_of(term).clone()).collect()
@@ -180,7 +183,8 @@ fn goals(goal: &Condition) -> impl Iterator<Item = &Atom> {
     })
 }
 
-/// Returns pairs of neighbours: by facts, or without such facts, by values.
+/// Returns pairs of neighbouring places by number. Neighbours are given by facts or, if there are
+/// no such facts, by numeric values. Facts of `moving` predicates are ignored.
 fn ways(problem: &Problem, number: &BTreeMap<&Name, usize>, moving: &BTreeSet<&Name>) -> Vec<(usize, usize)> {
     let (mut facts, mut values) = (BTreeSet::new(), BTreeSet::new());
     for element in &problem.init {

@@ -1,7 +1,7 @@
 //! Pictures of answers: a plan with its configuration, its numbers, its route on the map, and the
 //! reasons.
 //!
-//! Pictures are made from the contents of the JSON answers. Only `picture` draws them.
+//! Pictures contain the same data as the JSON answers. The crate `picture` draws them.
 
 mod changes;
 mod compared;

@@ -1,5 +1,5 @@
-//! Curves of the numbers that a plan changes, of the limits that its conditions impose, and of its
-//! cost.
+//! Curves for a plan's picture: the cost, the numbers that the plan changes, and the limits that
+//! its conditions impose.
 
 use std::collections::BTreeMap;
 
@@ -12,8 +12,8 @@ use planner::Plan;
 use crate::number;
 use crate::report::seen::Scene;
 
-/// Returns a curve for the cost, and one for each number that the plan changes or a condition
-/// limits.
+/// Returns a curve for the cost of a plan, and a curve for each number that the plan changes or a
+/// condition limits.
 pub(super) fn curves(scene: Scene<'_>, plan: &Plan, steps: &[Step], axis: Axis) -> Vec<Curve> {
     if steps.is_empty() {
         return Vec::new();
@@ -26,16 +26,16 @@ pub(super) fn curves(scene: Scene<'_>, plan: &Plan, steps: &[Step], axis: Axis) 
         line: 0,
     });
     let text = PlanText { steps: text.collect() };
-    // The validator has executed the plan before, so its course exists.
+    // The validator has executed the plan before, so executing it again does not fail.
     let course = course(scene.domain, scene.problem, &text).unwrap_or_default();
     let points = metric(scene, plan, &course, axis).unwrap_or_else(|| spent(plan, steps, axis));
     let cost = Curve { name: "cost".to_owned(), points, bounds: Vec::new() };
     std::iter::once(cost).chain(numbers(&course, steps, axis)).collect()
 }
 
-/// Values of the problem's metric if the plan ended after each start and end of an action. `None`
-/// if a value is undefined, or if the last value is not the cost of the plan. For example, the cost
-/// of the remainder of a mission does not include earlier costs.
+/// Returns the value of the problem's metric after each start and end of an action, as if the plan
+/// ended there. `None` if a value is undefined, or if the last value is not the cost of the plan.
+/// For example, the cost of a plan's remainder does not include costs of earlier actions.
 fn metric(scene: Scene<'_>, plan: &Plan, course: &Course, axis: Axis) -> Option<Vec<(f64, f64)>> {
     let first = metric_after(scene.domain, scene.problem, &BigRational::default())?;
     let mut points = vec![(0.0, number::to_f64(&first))];
@@ -46,9 +46,9 @@ fn metric(scene: Scene<'_>, plan: &Plan, course: &Course, axis: Axis) -> Option<
     ((last - cost).abs() <= 1e-6 * cost.abs().max(1.0)).then_some(points)
 }
 
-/// Cost of the plan after each step. If actions overlap, costs that belong to no step are spread
-/// evenly over time, since the makespan is not a sum over steps. Otherwise they are added before
-/// the first step.
+/// Returns the cost of the plan after each step. The part of the cost that belongs to no step is
+/// added before the first step. If actions overlap, this part is the makespan, so it is spread
+/// evenly over time instead.
 fn spent(plan: &Plan, steps: &[Step], axis: Axis) -> Vec<(f64, f64)> {
     let costs = plan.steps.iter().map(|step| step.cost.to_f64());
     let remainder = plan.cost.to_f64() - costs.clone().sum::<f64>();
@@ -65,7 +65,8 @@ fn spent(plan: &Plan, steps: &[Step], axis: Axis) -> Vec<(f64, f64)> {
     points
 }
 
-/// Appends a point, or replaces the value of the last point if that is not before `at`.
+/// Appends the point (`at`, `value`). If the last point is not before `at`, replaces the last
+/// point's value instead.
 fn set(points: &mut Vec<(f64, f64)>, at: f64, value: f64) {
     match points.last_mut() {
         Some(last) if last.0 >= at => last.1 = value,
@@ -109,7 +110,8 @@ fn add<'c>(curves: &mut BTreeMap<&'c str, Curve>, bound: &'c NumberBound, (from,
     curve.bounds.push(Bound { from, to, value: number::to_f64(&bound.bound), text });
 }
 
-/// Position of a moment on the axis.
+/// Returns the position of a moment on the axis: its time, or the number of the step's start or
+/// end.
 fn place(moment: &CourseMoment, axis: Axis) -> f64 {
     match axis {
         Axis::Time => number::to_f64(&moment.time),

@@ -1,4 +1,4 @@
-//! Draws the remaining plan of a loop as a part of a page.
+//! Draws the remaining plan of a running loop as HTML for a part of a page.
 
 use num_rational::BigRational;
 use pddl::ast::Condition;
@@ -10,10 +10,11 @@ use crate::report::plan::drawn;
 use crate::report::positions::Positions;
 use crate::report::seen::{Designs, Scene, known_designs};
 
-/// Maximum number of drawn steps. Later steps are drawn as the plan advances.
+/// Maximum number of drawn steps of a plan. Later steps appear as the plan advances.
 const MAX_STEPS: usize = 500;
 
-/// Draws the remaining plan of a loop.
+/// Draws remaining plans of a loop. The designs of the mission and the coordinates of places do not
+/// change.
 #[derive(Debug, Clone)]
 pub struct Painter {
     designs: Designs,
@@ -21,13 +22,13 @@ pub struct Painter {
 }
 
 impl Painter {
-    /// Creates the painter for a mission.
+    /// Creates the painter for plans of a mission.
     pub fn new(mission: &Mission, positions: Positions) -> Self {
         Self { designs: known_designs(mission), positions }
     }
 
-    /// Formats the remaining plan as HTML: timeline, numbers and map, in the style
-    /// [`picture::STYLE`].
+    /// Returns HTML for the remaining plan: timeline, curves and map. The page needs the style
+    /// sheet [`picture::STYLE`].
     pub fn part(&self, outlook: &Outlook) -> String {
         let later = outlook.steps.len().saturating_sub(MAX_STEPS);
         let mut problem = outlook.problem.clone();
@@ -49,7 +50,7 @@ impl Painter {
     }
 }
 
-/// Sequential plan of the remaining steps.
+/// Builds a sequential plan from the remaining steps; its cost is the sum of their costs.
 fn plan(steps: &[PlannedStep]) -> Plan {
     let mut now = BigRational::default();
     let mut timed = |step: &PlannedStep| {

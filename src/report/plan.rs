@@ -1,4 +1,4 @@
-//! Converts a solution to a picture.
+//! Converts the solution of a mission to a picture.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,8 @@ use crate::report::map::map;
 use crate::report::numbers::curves;
 use crate::report::seen::{Designs, Scene, Seen, known_designs};
 
-/// Returns the picture of a solution whose steps have all arguments of the mission's domain.
+/// Returns the picture of a solution. The steps of its plan must have all arguments of the
+/// mission's domain.
 pub fn plan_picture(seen: Seen<'_>, solution: &Solution) -> picture::Plan {
     let functions_of_designs = known_designs(seen.mission);
     let mut picture =
@@ -21,7 +22,7 @@ pub fn plan_picture(seen: Seen<'_>, solution: &Solution) -> picture::Plan {
     picture
 }
 
-/// Returns the picture of a plan: steps, numbers, and route on the map.
+/// Returns the picture of a plan: its steps, curves, and route on the map.
 pub(super) fn drawn(scene: Scene<'_>, plan: &Plan) -> picture::Plan {
     let axis = axis(plan);
     let mut steps = steps(scene.designs, plan, axis);
@@ -30,7 +31,8 @@ pub(super) fn drawn(scene: Scene<'_>, plan: &Plan) -> picture::Plan {
     picture::Plan { steps, axis, map, curves, ..picture::Plan::default() }
 }
 
-/// Returns a picture with only the verdict, the steps and the search of a solution.
+/// Returns a picture of a solution without map and curves: the verdict, the steps and the progress
+/// of the search.
 pub fn timeline_picture(mission: &Mission, solution: &Solution) -> picture::Plan {
     let axis = solution.plan.as_ref().map(axis).unwrap_or_default();
     let functions_of_designs = known_designs(mission);
@@ -40,7 +42,7 @@ pub fn timeline_picture(mission: &Mission, solution: &Solution) -> picture::Plan
     picture::Plan { verdict, steps, axis, search, ..picture::Plan::default() }
 }
 
-/// Formats the cost and its proof.
+/// Returns a sentence with the cost, the lower bound and the proof status.
 fn sentence(solution: &Solution) -> String {
     let cost = solution.plan.as_ref().map(|plan| format!("Cost {}", plan.cost));
     let bound = solution.lower_bound.as_ref().filter(|_| solution.status != Status::Optimal);
@@ -53,7 +55,8 @@ fn sentence(solution: &Solution) -> String {
     format!("{}{rest}.", first.to_uppercase())
 }
 
-/// Returns the time axis, unless actions of duration 0 follow each other.
+/// Returns the axis of the picture: time, or step numbers if the plan is sequential and has actions
+/// of duration 0.
 fn axis(plan: &Plan) -> Axis {
     let ends = plan.steps.iter().map(|step| step.start.to_rational() + step.duration.to_rational());
     let is_sequence = plan.steps.iter().skip(1).zip(ends).all(|(next, end)| end <= next.start.to_rational());
@@ -93,8 +96,9 @@ fn steps(functions_of_designs: &Designs, plan: &Plan, axis: Axis) -> Vec<picture
     drawn
 }
 
-/// Returns the configuration of a step. If the domain does not relate a design to a function, the
-/// knowledge base does. Of several designs of one function the last counts.
+/// Returns the designs of a step by function. If the domain does not assign designs to functions,
+/// the arguments that are designs are assigned by the knowledge base. Of several designs for one
+/// function, the last one is used.
 fn configuration(step: &Step, functions_of_designs: &Designs) -> Vec<(String, String)> {
     if !step.configuration.is_empty() {
         return step.configuration.clone();
@@ -106,14 +110,15 @@ fn configuration(step: &Step, functions_of_designs: &Designs) -> Vec<(String, St
     of_arguments.collect::<BTreeMap<String, String>>().into_iter().collect()
 }
 
-/// Label of an action: its name and arguments, without functions and designs.
+/// Returns the label of a step: its action and arguments, without functions and designs.
 fn label(step: &Step, configuration: &[(String, String)]) -> String {
     let configured = |word: &&String| configuration.iter().any(|(f, design)| f == *word || design == *word);
     let words = step.arguments.iter().filter(|word| !configured(word)).map(String::as_str);
     std::iter::once(step.action.as_str()).chain(words).collect::<Vec<_>>().join(" ")
 }
 
-/// Returns the progress of the search. Times are omitted, because they differ between runs.
+/// Returns the costs and lower bounds during the search. Times are omitted, because they differ
+/// between runs.
 fn search(solution: &Solution) -> Vec<picture::Progress> {
     let moments = solution.statistics.history.iter().map(|moment| {
         let cost =

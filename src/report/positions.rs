@@ -1,4 +1,4 @@
-//! Coordinates of places: the section `report` of a manifest.
+//! Coordinates of places for the map, from the section `report` of a manifest.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -38,7 +38,8 @@ pub enum Positions {
     /// No coordinates are given.
     #[default]
     Unknown,
-    /// Two functions of the problem: the x and the y coordinate.
+    /// Names of two numeric functions of the problem, which give the x and the y coordinate of a
+    /// place.
     Functions([String; 2]),
     /// Coordinates of each place by name: x to the right, y upwards.
     Known(BTreeMap<Name, (f64, f64)>),
@@ -59,7 +60,7 @@ impl ReportSection {
 }
 
 impl Positions {
-    /// Returns the coordinates of the places, or `None` unless all are known.
+    /// Returns the coordinates of `places` by name, or `None` if a coordinate is unknown.
     pub(super) fn of(&self, problem: &Problem, places: &[Name]) -> Option<BTreeMap<Name, (f64, f64)>> {
         let coordinates = match self {
             Self::Unknown => return None,
@@ -73,7 +74,7 @@ impl Positions {
     }
 }
 
-/// Returns the values of a unary function by object.
+/// Returns the initial values of a numeric function with one argument, by object.
 fn values(problem: &Problem, function: &str) -> BTreeMap<Name, f64> {
     let function = Name::new(function);
     let value = |element: &InitialElement| match element {
@@ -87,7 +88,8 @@ fn values(problem: &Problem, function: &str) -> BTreeMap<Name, f64> {
     problem.init.iter().filter_map(value).collect()
 }
 
-/// Reads lines `place,x,y`; a first line without numbers is a heading.
+/// Reads the coordinates of places from a CSV file with lines `place,x,y`. A first line without
+/// numbers is a heading.
 fn read(file: &Path) -> Result<BTreeMap<Name, (f64, f64)>, Errors> {
     let source = source(file)?;
     let mut reader = csv::ReaderBuilder::new()

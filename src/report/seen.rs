@@ -1,4 +1,4 @@
-//! Context of a plan's picture: domain, problem, coordinates of places, and designs.
+//! Input of the drawing functions for a plan: domain, problem, coordinates of places, and designs.
 
 use std::collections::BTreeMap;
 
@@ -7,22 +7,22 @@ use pddl::ast::{Domain, Problem};
 use crate::mission::Mission;
 use crate::report::positions::Positions;
 
-/// Context of a plan's picture, as the caller supplies it.
+/// Mission, problem and coordinates for the picture of a plan.
 #[derive(Debug, Clone, Copy)]
 pub struct Seen<'a> {
     /// The mission.
     pub mission: &'a Mission,
-    /// The mission's problem, as [`Mission::filled`] has made it.
+    /// The planned problem, with facts and values from the knowledge base (see
+    /// [`Mission::filled`]).
     pub problem: &'a Problem,
     /// Coordinates of the mission's places.
     pub positions: &'a Positions,
 }
 
-/// Designs of a knowledge base, with the first function that each of them solves.
+/// Maps each design of a knowledge base to the first function that it solves.
 pub(super) type Designs = BTreeMap<String, String>;
 
-/// Context of a plan's picture, as the drawing functions need it: the domain and the problem, the
-/// coordinates of places, and the designs.
+/// Input of the drawing functions for a plan: domain, problem, coordinates of places, and designs.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Scene<'a> {
     pub(super) domain: &'a Domain,
@@ -38,7 +38,7 @@ impl<'a> Seen<'a> {
     }
 }
 
-/// Returns the designs of a mission's knowledge base.
+/// Maps each design of the mission's knowledge base to the first function that it solves.
 pub(super) fn known_designs(mission: &Mission) -> Designs {
     let designs = mission.knowledge().into_iter().flat_map(|knowledge| knowledge.catalogue().designs());
     let solved = designs.filter_map(|design| {

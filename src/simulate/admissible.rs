@@ -13,7 +13,7 @@ use pddl::visit::Node;
 
 use crate::mapek::{PlannedStep, resume};
 
-/// The conditions of an action that can be checked before all its designs are chosen.
+/// The conditions of an action that can be checked although some of its designs are not chosen yet.
 pub(super) struct Admission<'p> {
     domain: Domain,
     problem: &'p Problem,
@@ -21,7 +21,8 @@ pub(super) struct Admission<'p> {
 
 impl<'p> Admission<'p> {
     /// Collects the conditions of a step. `done` is the completed share of the step, if it is
-    /// running. Conditions that mention the designs of the functions in `undecided` are omitted.
+    /// running. The functions in `undecided` have no chosen design yet, so conditions that mention
+    /// their designs are omitted.
     pub(super) fn new(
         domain: &Domain,
         problem: &'p Problem,
@@ -46,13 +47,13 @@ impl<'p> Admission<'p> {
         Self { domain, problem }
     }
 
-    /// Returns `true` if the step is possible with its designs, as far as they are chosen.
+    /// Returns `true` if the collected conditions hold for the step with its current designs.
     pub(super) fn admits(&self, step: &PlannedStep) -> bool {
         advance(&self.domain, self.problem, &step.to_plan_step(), false).is_ok()
     }
 }
 
-/// Removes the conditions that mention certain parameters.
+/// Removes the conditions that mention a parameter in `open`.
 fn leave_open(action: &mut Action, open: &[Name]) {
     match &mut action.body {
         ActionBody::Instantaneous { precondition, .. } => drop_open(precondition, open),

@@ -1,21 +1,22 @@
-//! Baseline strategies for comparison with the adaptation loop. Each lacks one capability of the
-//! loop.
+//! Baseline strategies for comparison with the adaptation loop. Each baseline lacks one capability
+//! of the loop.
 //!
 //! All strategies receive the same observations as the loop, request actions in the same way, and
 //! use the same planner. They differ in when they plan and in how they choose designs:
 //!
-//! - *none* follows its first plan, and stops when an action fails;
-//! - *failure* plans jointly again when an action has failed, as PLANTA does \[1\];
-//! - *greedy* chooses for each function separately the admissible design with the lowest cost of
-//!   the next action, at each request and when a design is lost. MROS chooses similarly: the design
-//!   of greatest utility among those that fulfil the requirements \[2\]. The task is planned again
-//!   when an action has failed;
-//! - *random* chooses any admissible design instead.
+//! - *none* executes its first plan, and stops when an action fails;
+//! - *failure* plans actions and designs together again after an action has failed, as PLANTA does
+//!   \[1\];
+//! - *greedy* chooses the design of each function separately: the admissible design with the lowest
+//!   cost of the next action. It chooses at each request of an action, and when a running action
+//!   loses a design. MROS chooses similarly: the design of greatest utility among those that fulfil
+//!   the requirements \[2\]. The task is planned again when an action has failed;
+//! - *random* works as *greedy*, but chooses a random admissible design.
 //!
-//! [`Admission`] defines which designs are admissible. If no design is, the action keeps the design
-//! of its plan if that is available, and otherwise gets an available one; the action may become
-//! possible later. If the action is not possible with the chosen designs, but with those of its
-//! plan, it gets the designs of its plan.
+//! [`Admission`] defines which designs are admissible. If a function has no admissible design, the
+//! action keeps the planned design if that is available, and otherwise gets an available one; the
+//! action may become possible later. If the action is impossible with the chosen designs but
+//! possible with the designs of its plan, the planned designs are used.
 //!
 //! \[1\] Rezende Silva et al., PLANTA, 2025. \[2\] Bozhinoski et al., MROS, Advanced Robotics 36,
 //! 2022.
@@ -31,18 +32,19 @@ use crate::mapek::{Answer, Event, Loop, Observation, PlannedStep};
 use crate::mission::Mission;
 use crate::simulate::admissible::Admission;
 
-/// A control strategy.
+/// A control strategy of a simulated robot: the adaptation loop or a baseline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Strategy {
     /// The adaptation loop.
     Joint,
-    /// Executes the first plan without any change.
+    /// Executes its first plan, and stops when an action fails.
     None,
-    /// Chooses for each function a random design with which the action is possible.
+    /// Chooses for each function a random design with which the next action is possible.
     Random,
-    /// Chooses for each function separately the cheapest design with which the action is possible.
+    /// Chooses for each function separately the cheapest design with which the next action is
+    /// possible.
     Greedy,
-    /// Plans jointly again when an action has failed.
+    /// Plans actions and designs together again when an action has failed.
     Failure,
 }
 
@@ -66,7 +68,8 @@ impl Strategy {
     }
 }
 
-/// A running strategy. A loop that never deliberates maintains its knowledge.
+/// A running strategy. All strategies use a [`Loop`] for their knowledge about the robot; only
+/// `joint` lets the loop plan.
 #[derive(Debug)]
 pub(super) struct Controller {
     strategy: Strategy,
@@ -74,9 +77,9 @@ pub(super) struct Controller {
     plan: VecDeque<PlannedStep>,
     random: fastrand::Rng,
     gave_up: bool,
-    /// The designs that were available at the last planning.
+    /// Local names of the designs that were available at the last planning.
     planned_with: BTreeSet<String>,
-    /// Number of plans that were computed.
+    /// Number of plans that were computed until now.
     pub(super) plans: usize,
 }
 
@@ -144,7 +147,8 @@ impl Controller {
         self.plan = self.control.plan_anew().unwrap_or_default().into();
     }
 
-    /// Requests the next action if no action is running.
+    /// Requests the next action of the plan if no action is running. If the plan is empty and the
+    /// available designs have changed, plans again first.
     fn go_on(&mut self, answers: &mut Vec<Answer>) {
         if self.gave_up || self.control.beliefs().running().is_some() {
             return;
@@ -167,8 +171,8 @@ impl Controller {
         }
     }
 
-    /// Returns the action with the designs that the strategy chooses for the functions in
-    /// `concerns`. `done` is the completed share of the action, if it is running.
+    /// Returns `step` with designs chosen by the strategy for those functions for which `concerns`
+    /// returns `true`. `done` is the completed share of the step, if it is running.
     fn choose(
         &mut self,
         step: &PlannedStep,
@@ -215,7 +219,8 @@ impl Controller {
         if !whole.admits(&chosen) && whole.admits(step) { step.clone() } else { chosen }
     }
 
-    /// Chooses designs again if the running action has lost a design.
+    /// Chooses a new design for each function of the running action whose design is no longer
+    /// available.
     fn replace_lost(&mut self, answers: &mut Vec<Answer>) {
         let beliefs = self.control.beliefs();
         let Some((_, step)) = beliefs.running() else { return };
@@ -230,8 +235,8 @@ impl Controller {
     }
 }
 
-/// Returns the design with the lowest cost of the action by itself, whether or not the action is
-/// possible. Ties are broken by order.
+/// Returns the design with which the action alone has the lowest cost, even if the action is not
+/// possible with it. Of equal designs, returns the first.
 fn cheapest(
     mission: &Mission,
     problem: &Problem,

@@ -1,4 +1,4 @@
-//! Checks the section `simulation` of a scenario against its mission: every name and every number.
+//! Checks the names and numbers in the section `simulation` of a scenario against its mission.
 
 use pddl::ast::Condition;
 
@@ -8,32 +8,33 @@ use crate::message::{Message, did_you_mean};
 use crate::mission::conditions::{self, Fault, written};
 use crate::mission::{Mission, Mistake, setting};
 
-/// Parsed conditions and functions of a simulation.
+/// Parsed conditions and numeric functions of a simulation's settings.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Watched {
-    /// The condition of each event, in their order. `None` for an event with a time.
+    /// Condition of each event, in the order of the events. `None` for an event with a time.
     pub(super) events: Vec<Option<Condition>>,
-    /// The function that ends the mission, as the validator writes it.
+    /// Numeric function that ends the mission when it reaches 0, in the validator's notation.
     pub(super) lifeline: Option<String>,
-    /// The condition under which the pipeline is found.
+    /// Condition that holds once the pipeline is found.
     pub(super) found: Option<Condition>,
-    /// The function for the length of the pipeline, without parentheses.
+    /// Numeric function with the length of the pipeline, without parentheses.
     pub(super) length: Option<String>,
 }
 
-/// Collector of mistakes.
+/// Collects the mistakes in a section `simulation`.
 struct Checker<'m> {
     mission: &'m Mission,
     mistakes: Vec<Mistake>,
 }
 
 impl Simulation {
-    /// Returns all mistakes in the section, for a mission in the scenario's situation.
+    /// Returns all mistakes in this section, checked against a mission in the scenario's situation.
     pub fn mistakes(&self, mission: &Mission) -> Vec<Mistake> {
         self.watched(mission).1
     }
 
-    /// Conditions and functions of the simulation, and all mistakes in it.
+    /// Parses the conditions and functions of the simulation. Also returns all mistakes in the
+    /// section.
     pub(super) fn watched(&self, mission: &Mission) -> (Watched, Vec<Mistake>) {
         let mut checker = Checker { mission, mistakes: Vec::new() };
         checker.numbers(self);
@@ -105,7 +106,7 @@ impl Checker<'_> {
         }
     }
 
-    /// Checks an event; returns its condition.
+    /// Checks an event of the simulation. Returns its parsed condition, if it has a valid one.
     fn event(&mut self, index: usize, event: &Disturbance, simulation: &Simulation) -> Option<Condition> {
         let path = |rest: &[&str]| -> Vec<Key> {
             let begin = ["events".into(), index.into()];
@@ -160,7 +161,8 @@ impl Checker<'_> {
         }
     }
 
-    /// Checks the name of a numeric function; returns the function as the validator writes it.
+    /// Checks the name of a numeric function. Returns the function in the validator's notation, or
+    /// `None` after adding the mistakes.
     fn function(&mut self, path: &[Key], text: &str) -> Option<String> {
         match conditions::function(self.mission, text) {
             Ok(atom) => Some(written(&atom)),
@@ -218,7 +220,7 @@ impl Checker<'_> {
     }
 }
 
-/// The last key of a path, as it is quoted.
+/// Returns the last key of a path in quotes, for use in a message.
 fn last(path: &[Key]) -> String {
     match path.last() {
         Some(Key::Name(name)) => format!("`{name}`"),

@@ -1,8 +1,9 @@
 //! Simulates missions with a robot model, to compare control strategies in the same world.
 //!
-//! An [`Experiment`] runs one mission until the goal is reached, the robot is lost, or the time is
-//! over. The figures are those of the mission (accomplished, its metric), those that SUAVE reports
-//! \[1\], and the stability of the control (reconfigurations, distinct configurations).
+//! An [`Experiment`] runs one mission until the goal is reached, the robot is lost, the strategy
+//! gives up, or the time budget is used up. The results are those of the mission (success, its
+//! metric), those that SUAVE reports \[1\], and the stability of the control (reconfigurations,
+//! distinct configurations).
 //!
 //! - \[1\] Rezende Silva et al., SUAVE: an exemplar for self-adaptive underwater vehicles, SEAMS
 //!   2023.
@@ -33,7 +34,7 @@ use baseline::Controller;
 use check::Watched;
 use world::World;
 
-/// A mission with the environment of a simulated robot. It can be run repeatedly.
+/// A mission with the simulated environment of its robot. It can be run repeatedly.
 ///
 /// ```
 /// use std::path::Path;
@@ -56,12 +57,12 @@ pub struct Experiment {
 }
 
 impl Experiment {
-    /// Prepares a mission in the situation of a scenario, controlled by a loop with the settings
-    /// `control`. `time_unit` is the unit of the domain's times; the clock of the loop is in
-    /// seconds.
+    /// Prepares a mission for simulation. `mission` is in the situation of a scenario, `control`
+    /// has the settings of the loop, `simulation` the settings of the environment. `time_unit` is
+    /// the unit of the domain's times; the clock of the loop is in seconds.
     ///
     /// # Errors
-    /// All mistakes in the simulation.
+    /// All mistakes in the settings of the simulation.
     pub fn new(
         mission: Mission,
         control: Settings,
@@ -78,19 +79,19 @@ impl Experiment {
         &self.mission
     }
 
-    /// Adds warnings about probable mistakes in the mission's situation.
+    /// Adds warnings about probable mistakes in the numbers of the mission, such as missing values.
     pub fn note_doubts(&mut self) {
         numbers::note_doubts(&mut self.mission);
     }
 
-    /// Returns the unit of all times except those of the log.
+    /// Returns the unit of all times of a [`Run`]. Times in the log are in seconds.
     pub fn time_unit(&self) -> TimeUnit {
         self.time_unit
     }
 
-    /// Runs the mission once. `log` is called with every observation and its answers, with times in
-    /// seconds. Returns `None` if a limit was reached before the end, since a part of a mission is
-    /// not a result.
+    /// Runs the mission once with a strategy. `log` is called with every observation and the
+    /// answers to it, with times in seconds. Returns `None` if a limit of `limits` was reached
+    /// before the end of the mission.
     ///
     /// # Errors
     /// The mission cannot be planned for.
@@ -119,22 +120,24 @@ impl Experiment {
     }
 }
 
-/// A world, its controller, and the records of both.
+/// State of one simulated run: the world, its controller, and the results so far.
 struct Stage {
     world: World,
     controller: Controller,
-    /// Number of seconds in a unit of the domain's time.
+    /// Length of the domain's time unit in seconds.
     second: f64,
     time_budget: f64,
     configuration: BTreeMap<String, String>,
     configurations: BTreeSet<BTreeMap<String, String>>,
-    /// Time since which the running action has stalled without a reaction.
+    /// Time at which the running action stalled, if the controller has not reacted since. Times are
+    /// in the domain's unit.
     stalled_since: Option<f64>,
     run: Run,
 }
 
 impl Stage {
-    /// Runs to the end of the mission. Returns `None` if a limit is reached first.
+    /// Runs until the mission ends, and returns the reason for its end. Returns `None` if a limit
+    /// is reached first.
     fn play(
         &mut self,
         limits: &Limits,
@@ -197,14 +200,15 @@ impl Stage {
         }
     }
 
-    /// Records the time at which the running action stalls.
+    /// Records the current time if the running action stalls and no earlier stall is pending.
     fn record_stall(&mut self) {
         if self.stalled_since.is_none() && !self.world.goes_on() {
             self.stalled_since = Some(self.world.time);
         }
     }
 
-    /// Executes the controller's decisions.
+    /// Executes the effects in the controller's answers, and appends the resulting events to the
+    /// queue.
     fn take(&mut self, answers: &[Answer], queue: &mut VecDeque<Event>) {
         for effect in answers.iter().filter_map(Answer::effect) {
             if let Command::Reconfigure { function, from, to } = &effect.command {

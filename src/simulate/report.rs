@@ -1,11 +1,11 @@
-//! The figures of one simulated mission, including the columns of SUAVE.
+//! The results of one simulated mission, including the columns of SUAVE's reports.
 
 use std::fmt;
 
 use crate::mission::TimeUnit;
 use crate::simulate::baseline::Strategy;
 
-/// The columns that SUAVE writes, as it names them, in seconds.
+/// Columns of the reports of SUAVE, with SUAVE's names; times are in seconds.
 pub const SUAVE_COLUMNS: [&str; 4] =
     ["pipeline found", "time searching pipeline (s)", "distance inspected (m)", "mean reaction time (s)"];
 
@@ -16,13 +16,13 @@ pub enum Ending {
     Goal,
     /// The time budget was used up.
     Time,
-    /// The lifeline reached 0.
+    /// The robot was lost because its lifeline, such as the battery, reached 0.
     Lost,
-    /// The strategy gave up.
+    /// The strategy will make no further request.
     GaveUp,
 }
 
-/// Short text about several missions with this ending.
+/// Writes a phrase for several missions with this ending, such as "lost the robot".
 impl fmt::Display for Ending {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
@@ -37,17 +37,17 @@ impl fmt::Display for Ending {
 /// Result of a simulated mission. Times are in the domain's time unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {
-    /// The control strategy.
+    /// The control strategy of the run.
     pub strategy: Strategy,
-    /// Seed of everything random.
+    /// Seed of all random numbers.
     pub seed: u64,
     /// `true` if the goal was reached.
     pub accomplished: bool,
-    /// `true` if the robot was lost.
+    /// `true` if the lifeline, such as the battery, reached 0.
     pub lost: bool,
     /// Reason for the end of the mission.
     pub ending: Ending,
-    /// Unit of the times.
+    /// Unit of the times of this result.
     pub time_unit: TimeUnit,
     /// The mission's metric at the end.
     pub cost: f64,
@@ -59,16 +59,16 @@ pub struct Run {
     pub failed: usize,
     /// Number of actions that were cancelled.
     pub cancelled: usize,
-    /// Number of planning queries.
+    /// Number of plans that were requested or computed.
     pub plans: usize,
     /// Number of changes of a function's design.
     pub reconfigurations: usize,
-    /// Number of distinct configurations in the requests of actions.
+    /// Number of distinct configurations with which actions were requested.
     pub distinct: usize,
-    /// Reaction times: for each time that the running action stalled, the time until the controller
-    /// acted.
+    /// Reaction times: for each stall of the running action, the time until the next effect of the
+    /// controller.
     pub reactions: Vec<f64>,
-    /// Time at which the pipeline was found.
+    /// Time at which the pipeline was found. `None` if it was not found.
     pub found: Option<f64>,
     /// Inspected length of the pipeline. `None` if the mission does not inspect.
     pub distance: Option<f64>,
@@ -99,16 +99,15 @@ impl Default for Run {
 }
 
 impl Run {
-    /// Returns the mean reaction time. `None` without any event, which differs from a reaction at
-    /// once.
+    /// Returns the mean reaction time. `None` if no action stalled; an immediate reaction gives 0.
     pub fn mean_reaction(&self) -> Option<f64> {
         let count = self.reactions.len();
         (count > 0).then(|| self.reactions.iter().sum::<f64>() / count as f64)
     }
 
-    /// Returns the values of [`SUAVE_COLUMNS`]. Empty if the mission does not have them, and `no
-    /// event` if no reaction was needed. As in SUAVE, the search time of a pipeline that was not
-    /// found is the duration of the mission.
+    /// Returns the texts for [`SUAVE_COLUMNS`]. The first three are empty if the mission does not
+    /// inspect a pipeline; the last is `no event` if no reaction was needed. As in SUAVE, the
+    /// search time of a pipeline that was not found is the duration of the mission.
     pub fn suave(&self) -> [String; 4] {
         let Some(distance) = self.distance else {
             return [String::new(), String::new(), String::new(), self.reaction()];
@@ -129,7 +128,8 @@ impl Run {
         short(time * self.time_unit.seconds())
     }
 
-    /// Returns `true` if this outcome is better: accomplished missions first, then the lower cost.
+    /// Returns `true` if this run is better than `other`: it alone reached the goal, or both did
+    /// and its cost is lower.
     pub fn is_better_than(&self, other: &Self) -> bool {
         match (self.accomplished, other.accomplished) {
             (true, true) => self.cost < other.cost - 1e-6,

@@ -1,17 +1,18 @@
 //! Mean, deviation and confidence interval of a sample.
 //!
-//! The interval is Student's, two-sided, at 95 percent \[1\].
+//! The interval is two-sided, at 95 percent, by Student's distribution \[1\].
 //!
 //! - \[1\] Student: The probable error of a mean, Biometrika 6, 1908.
 
-/// Statistics of a sample.
+/// Statistics of a sample of values.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
     /// Number of values.
     pub count: usize,
     /// Mean of the values.
     pub mean: f64,
-    /// Standard deviation, with one degree of freedom less than values; 0 for fewer than two.
+    /// Standard deviation, with the number of values minus one as denominator; 0 for fewer than two
+    /// values.
     pub deviation: f64,
     /// Half the width of the 95 percent confidence interval of the mean; 0 for fewer than two
     /// values.
@@ -25,7 +26,7 @@ const QUANTILES: [f64; 30] = [
 ];
 
 impl Sample {
-    /// Computes the statistics of a sample. `None` if it is empty.
+    /// Computes the statistics of values. Returns `None` if there are no values.
     pub fn of(values: &[f64]) -> Option<Self> {
         let count = values.len();
         if count == 0 {

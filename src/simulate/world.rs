@@ -1,4 +1,5 @@
-//! The simulated robot: its state, which changes by time, disturbances and the running action.
+//! The simulated robot: its true state, which changes with time, by disturbances and by the running
+//! action.
 //!
 //! Conditions, durations and effects of actions follow the mission's own domain, with a seeded
 //! deviation of the duration. An action stalls if its designs are not available, or if its
@@ -22,20 +23,20 @@ use crate::simulate::settings::{Disturbance, Simulation};
 /// Times and shares are rounded to multiples of 1 / `GRAIN`.
 const GRAIN: f64 = 1e6;
 
-/// The running action.
+/// The running action of the simulated robot.
 #[derive(Debug, Clone)]
 struct Job {
     action: u64,
     step: PlannedStep,
     /// Completed share of the action, from 0 to 1.
     progress: f64,
-    /// Time for which the action has stalled.
+    /// Duration for which the action has stalled without interruption.
     waited: f64,
     /// `true` if the controller has suspended the action.
     suspended: bool,
 }
 
-/// A scheduled failure or recovery.
+/// A scheduled change of a component's status.
 #[derive(Debug, Clone)]
 struct ComponentChange {
     time: f64,
@@ -43,11 +44,12 @@ struct ComponentChange {
     status: Status,
 }
 
-/// The true state of the robot and its environment.
+/// The true state of the robot and its environment in a simulation.
 #[derive(Debug, Clone)]
 pub struct World {
     truth: Mission,
-    /// The problem with the contributions of the knowledge base, filled on first use.
+    /// The problem with the facts and values from the knowledge base; computed on first use after a
+    /// change.
     filled: OnceCell<Problem>,
     settings: Simulation,
     watched: Watched,
@@ -57,13 +59,14 @@ pub struct World {
     job: Option<Job>,
     phases: Vec<f64>,
     component_changes: Vec<ComponentChange>,
-    /// Time of each disturbance, once determined; infinite after the disturbance has happened.
+    /// Time of each disturbance. `None` if its condition has not held yet; infinite after the
+    /// disturbance has happened.
     times: Vec<Option<f64>>,
-    /// `true` if the robot is lost.
+    /// `true` after the lifeline, a numeric function such as `battery`, has reached 0.
     pub lost: bool,
-    /// Greatest completed share of the inspection until now.
+    /// Greatest completed share of the action that inspects the pipeline, from 0 to 1.
     pub inspected: f64,
-    /// Time at which the pipeline was found.
+    /// Time at which the condition "pipeline found" first held.
     pub found: Option<f64>,
 }
 
@@ -138,13 +141,14 @@ impl World {
         })
     }
 
-    /// Returns the true state for modification.
+    /// Returns the mission with the true state for modification, and invalidates the filled
+    /// problem.
     fn change(&mut self) -> &mut Mission {
         self.filled.take();
         &mut self.truth
     }
 
-    /// Executes an effect of the controller. Returns the immediate events.
+    /// Executes a command of the controller. Returns the events that the robot reports immediately.
     pub fn obey(&mut self, effect: &Effect) -> Vec<Event> {
         match &effect.command {
             Command::Request { step } => {
@@ -176,7 +180,8 @@ impl World {
         self.job.as_ref().is_none_or(|job| self.remaining_time(job).is_some())
     }
 
-    /// Returns the time that the remaining part of an action takes, if it can proceed.
+    /// Returns the time that the remaining part of an action takes, or `None` if the action is
+    /// suspended or its conditions do not hold.
     fn remaining_time(&self, job: &Job) -> Option<f64> {
         if job.suspended {
             return None;
@@ -186,8 +191,8 @@ impl World {
         Some(number::to_f64(&advance.duration) * self.slowness(&job.step))
     }
 
-    /// Factor by which an action takes longer than expected in this world, independent of its
-    /// designs.
+    /// Returns the ratio of the real to the expected duration of an action in this world. The ratio
+    /// depends on the seed and on the action without its designs.
     fn slowness(&self, step: &PlannedStep) -> f64 {
         let mut text = step.action.clone();
         for word in step.context().into_iter().flatten() {
@@ -199,10 +204,11 @@ impl World {
         1.0 + self.settings.noise * (2.0 * fastrand::Rng::with_seed(seed).f64() - 1.0)
     }
 
-    /// Advances time by at most one step, and reports events.
+    /// Advances time by one step of the simulation, or to the end of the running action if this is
+    /// sooner. Returns the events that happen until then.
     ///
     /// # Errors
-    /// A disturbance or a signal that does not fit the mission.
+    /// A disturbance or a signal does not fit the mission.
     pub fn pass(&mut self) -> Result<Vec<Event>, Message> {
         let mut events = Vec::new();
         let remaining = self.job.as_ref().and_then(|job| self.remaining_time(job));
@@ -251,7 +257,8 @@ impl World {
         self.watch();
     }
 
-    /// Applies the changes of a share of an action and, if `whole`, all its effects at the end.
+    /// Applies the effects of a share of an action: numeric increases and decreases in proportion
+    /// to the share, and, if `whole`, also assignments and changes of facts.
     fn use_up(&mut self, step: &PlannedStep, share: f64, whole: bool, events: &mut Vec<Event>) {
         let Ok(mut advance) = advance(self.truth.domain(), self.filled(), &step.to_plan_step(), true) else {
             return;
@@ -280,8 +287,8 @@ impl World {
         }
     }
 
-    /// Records the time at which the pipeline is found, and schedules events whose conditions hold
-    /// for the first time.
+    /// Records the time at which the pipeline is found. Schedules the disturbances whose conditions
+    /// now hold for the first time.
     fn watch(&mut self) {
         if self.found.is_none() && self.watched.found.as_ref().is_some_and(|found| self.holds(found)) {
             self.found = Some(self.time);
@@ -298,7 +305,7 @@ impl World {
         }
     }
 
-    /// Returns `true` if a condition holds in the current state.
+    /// Returns `true` if a condition holds in the current true state.
     fn holds(&self, condition: &Condition) -> bool {
         let goal = condition.clone();
         is_valid(self.truth.domain(), &Problem { goal, constraints: Vec::new(), ..self.filled().clone() })
@@ -337,7 +344,8 @@ impl World {
         Ok(())
     }
 
-    /// Returns the initial values of the signals.
+    /// Returns the events of time 0: disturbances at this time, and the initial values of the
+    /// signals.
     ///
     /// # Errors
     /// Errors of [`World::pass`].
@@ -364,26 +372,28 @@ impl World {
         Ok(())
     }
 
-    /// Returns `true` if the goal holds.
+    /// Returns `true` if the goal holds in the true state.
     pub fn reached(&self) -> bool {
         is_valid(self.truth.domain(), self.filled())
     }
 
-    /// Returns the value of the mission's metric until now, or the time if it has no metric.
+    /// Returns the value of the mission's metric in the current state, or the elapsed time if the
+    /// mission has no metric.
     pub fn cost(&self) -> f64 {
         let metric = metric_after(self.truth.domain(), self.filled(), &exact(self.time));
         metric.map_or(self.time, |metric| number::to_f64(&metric))
     }
 
-    /// Returns the inspected length, in the unit of the length. `None` if the mission does not
-    /// inspect.
+    /// Returns the inspected length of the pipeline, in the unit of the mission's function for the
+    /// length. `None` if the simulation has no such function.
     pub fn distance(&self) -> Option<f64> {
         let length = self.truth.value(self.watched.length.as_ref()?)?;
         Some(number::to_f64(&length) * self.inspected)
     }
 }
 
-/// Returns `true` if the empty plan solves the problem.
+/// Returns `true` if the initial state of the problem satisfies its goal, i.e. the empty plan is
+/// valid.
 fn is_valid(domain: &Domain, problem: &Problem) -> bool {
     validate(domain, problem, &PlanText::default(), &Options::default()).valid
 }

@@ -70,7 +70,8 @@ impl GroupPart {
 }
 
 impl SweepAnswer {
-    /// Answer about the runs with the requested numbers.
+    /// Creates the answer from the lines of completed runs, the numbers of all requested runs, and
+    /// the groups of a merged table.
     pub fn new(lines: &[Line], requested: impl Iterator<Item = usize>, groups: &[Group]) -> Self {
         let done: std::collections::BTreeSet<usize> = lines.iter().map(|line| line.run).collect();
         let requested: Vec<usize> = requested.collect();
@@ -87,18 +88,18 @@ impl SweepAnswer {
         }
     }
 
-    /// Adds the reasons for ending before all runs were done.
+    /// Adds the reasons why the command ended before all runs were done.
     #[must_use]
     pub fn because(self, messages: Vec<Message>) -> Self {
         Self { messages, ..self }
     }
 
-    /// Returns `true` if all runs are done, each with an answer.
+    /// Returns `true` if all requested runs are done, each with an answer.
     pub fn is_complete(&self) -> bool {
         self.done == self.runs && self.failed == 0
     }
 
-    /// Formats the answer as a sentence.
+    /// Formats the numbers of runs as a phrase, such as "3 of 4 runs done".
     pub fn sentence(&self) -> String {
         let done = format!("{} of {} runs done", self.done, self.runs);
         match (self.failed, self.timed_out) {

@@ -1,10 +1,10 @@
-//! Parameter studies: one command with every combination of varied values, in shards, on any number
-//! of machines.
+//! Parameter studies: one command is run with every combination of varied values. Runs are divided
+//! into shards, which any number of machines can execute.
 //!
-//! A [`Study`] is the product of its variations. Its runs are numbered, and a [`Shard`] is every
-//! N-th of them. Each run is a separate process, so a failed run affects no other, and writes one
-//! line to the shard's file. A resumed study repeats the runs without a complete line. [`Table`]
-//! joins the lines of all shards.
+//! A [`Study`] is the Cartesian product of its variations. Its runs are numbered, and a [`Shard`]
+//! is every N-th of them. Each run is a separate process, so a failed run affects no other run. The
+//! result of a run is one line in the shard's file. A resumed study repeats the runs without a
+//! complete line. [`Table`] joins the lines of all shards.
 
 mod answer;
 mod process;

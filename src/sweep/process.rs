@@ -1,4 +1,4 @@
-//! Executes a run as a process.
+//! Executes a run of a parameter study as a process.
 
 use std::io::Read;
 use std::path::Path;
@@ -12,14 +12,14 @@ use super::results::Line;
 use super::study::{Planned, Study};
 use crate::message::Message;
 
-/// Polling interval for the end of a process.
+/// Time between two checks whether a process has ended.
 const POLL_INTERVAL: Duration = Duration::from_millis(5);
 
-/// Number of characters of standard error that are kept.
+/// Maximum number of characters of a run's standard error output that are stored.
 const MAX_MESSAGE_CHARACTERS: usize = 2000;
 
-/// Executes a run with a program, and waits for its end. Returns `None` if a limit is reached
-/// first; the run is killed in this case.
+/// Executes a run of a study with `program`, and waits for its end. Returns `None` if a limit is
+/// reached first; the run is killed in this case.
 ///
 /// # Errors
 /// The program, or the generator of its files, cannot be executed.
@@ -77,21 +77,22 @@ pub fn perform(
     Ok(Some(Line { run: run.number, vary: run.vary.clone(), status, timed_out, seconds, answer, message }))
 }
 
-/// Reads a pipe to its end on a separate thread: reading two pipes alternately on one thread may
+/// Reads a pipe to its end on a separate thread. Reading two pipes alternately on one thread may
 /// deadlock.
 fn reader(pipe: Option<impl Read + Send + 'static>) -> std::thread::JoinHandle<String> {
     std::thread::spawn(move || {
         let mut bytes = Vec::new();
         if let Some(mut pipe) = pipe {
-            // The part that was read before an error counts.
+            // On an error, the part that was read until then is returned.
             let _ = pipe.read_to_end(&mut bytes);
         }
         String::from_utf8_lossy(&bytes).into_owned()
     })
 }
 
-/// Waits for the end of a process. Its own time limit ends the process, which is its result. Any
-/// other limit ends it, and `None` is returned.
+/// Waits for the end of a process. Returns its exit status, and `true` if it was killed because of
+/// `limit`, the time limit of a run. If a limit of `limits` is reached, kills the process and
+/// returns `None`.
 fn wait(
     child: &mut Child,
     limit: Option<Duration>,

@@ -1,4 +1,4 @@
-//! Result files of a study (JSON Lines).
+//! Result files of a parameter study, in JSON Lines format: one file per shard, one line per run.
 
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
@@ -12,24 +12,24 @@ use serde_json::{Map, Value};
 use super::study::{Shard, Study};
 use crate::message::{Errors, Message};
 
-/// Version of the file format.
+/// Name and version of the format of result files.
 pub(super) const FORMAT: &str = "metaplan-sweep/1";
 
-/// Reason for rejecting the file of another study.
+/// Message about a file that belongs to another study.
 const OTHER_STUDY: &str = "it belongs to another study, or the study or its files have changed";
 
-/// The first line of a file.
+/// The first line of a shard's file. It identifies the study.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 struct Header {
     format: String,
-    /// Checksum of the study.
+    /// Checksum of the study, by which files of other studies are rejected.
     study: String,
     /// Number of runs of the study.
     runs: usize,
     shard: String,
 }
 
-/// Result of a finished run.
+/// Result of a finished run, a line of the file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Line {
     /// Number of the run in the study, from 0.
@@ -49,22 +49,23 @@ pub struct Line {
     pub message: String,
 }
 
-/// The file of a shard, locked against other processes.
+/// The file of a shard, open for appending and locked against other processes.
 #[derive(Debug)]
 pub struct Results {
     file: File,
     /// Path of the file.
     pub path: PathBuf,
-    /// Results of finished runs, by number.
+    /// Results of finished runs, by the number of the run.
     pub done: BTreeMap<usize, Line>,
 }
 
 impl Results {
-    /// Opens the file of a shard in a directory, which is created if it does not exist.
+    /// Opens the file of a shard in a directory. Creates directory and file if they do not exist,
+    /// and removes an incomplete last line.
     ///
     /// # Errors
-    /// The file exists and is not to be resumed, another process writes it, it belongs to another
-    /// study, or it is damaged before its last line.
+    /// The file exists and `resume` is `false`, another process writes it, it belongs to another
+    /// study, or a line before the last one is damaged.
     pub fn open(directory: &Path, study: &Study, shard: Shard, resume: bool) -> Result<Self, Message> {
         let path = directory.join(format!("shard-{:04}-of-{:04}.jsonl", shard.index, shard.of));
         let failed = |error: io::Error| wrong(&path, &error.to_string());
@@ -110,7 +111,7 @@ impl Results {
         Ok(results)
     }
 
-    /// Appends the line of a run and flushes it to the disk.
+    /// Appends the result of a run and flushes the file to the disk.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -145,7 +146,7 @@ fn parse(path: &Path, text: &str) -> Result<(Header, Vec<Line>), Message> {
     Ok((header, parsed.collect::<Result<_, _>>()?))
 }
 
-/// Reads the lines of all shards in a directory, sorted by run, without duplicates.
+/// Reads the results in all shard files of a directory, sorted by run, without duplicates.
 ///
 /// # Errors
 /// All faults: files that cannot be read or belong to another study, and runs with differing
@@ -192,8 +193,8 @@ pub fn read_lines(directory: &Path, study: &Study) -> Result<Vec<Line>, Errors> 
     if mistakes.is_empty() { Ok(all.into_values().collect()) } else { Err(mistakes.into()) }
 }
 
-/// Returns an answer without the fields that differ between repeated runs: times, memory and the
-/// course of a search.
+/// Returns an answer without the fields that differ between repetitions of a run: times, memory and
+/// the course of a search.
 pub(super) fn essence(answer: &Value) -> Value {
     match answer {
         Value::Object(fields) => {
@@ -205,7 +206,7 @@ pub(super) fn essence(answer: &Value) -> Value {
     }
 }
 
-/// Returns `true` if a field is measured on a machine.
+/// Returns `true` if the field with this name depends on the machine and not only on the input.
 fn is_measured(name: &str) -> bool {
     ["statistics", "costs", "milliseconds", "seconds", "elapsed"].contains(&name)
 }

@@ -1,4 +1,4 @@
-//! Reads the file of a study, and enumerates its runs.
+//! Reads the file of a parameter study, and enumerates its runs.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -15,7 +15,7 @@ use crate::manifest::{self, Key, ManifestPath, Part};
 use crate::message::{Errors, Message, did_you_mean};
 use crate::setup::Setup;
 
-/// Maximum number of runs; more are considered a mistake.
+/// Maximum number of runs of a study; a larger number is considered a mistake.
 const MAX_RUNS: usize = 10_000_000;
 
 /// The command of a study, and its varied parameters.
@@ -114,20 +114,20 @@ struct Generate {
     run: Vec<String>,
 }
 
-/// The JSON Schema of a study's file.
+/// Returns the JSON Schema of a study's file.
 pub fn schema() -> Schema {
     schema_for!(Sections)
 }
 
-/// A study: its file and its runs.
+/// A parameter study: the contents of its file, and the values of all keys.
 #[derive(Debug, Clone)]
 pub struct Study {
     sections: Sections,
-    /// Working directory of the processes: relative paths are relative to the study's file.
+    /// Directory of the study's file, which is the working directory of the runs.
     pub directory: PathBuf,
-    /// Checksum of the file, of the files that its command names, and of the program's version.
+    /// Checksum of the study, of the files that its command names, and of the program's version.
     pub digest: String,
-    /// Keys with their values, the last one varies fastest.
+    /// Varied keys with their values. The value of the last key changes from each run to the next.
     keys: Vec<(String, Vec<Value>)>,
     origin: ManifestPath,
 }
@@ -135,18 +135,18 @@ pub struct Study {
 /// One run of a study.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Planned {
-    /// Number of the run, from 0.
+    /// Number of the run in the study, from 0.
     pub number: usize,
-    /// Varied keys with their values.
+    /// Varied keys with their values in this run.
     pub vary: Map<String, Value>,
 }
 
-/// A shard: each N-th run, from the I-th on.
+/// A shard I/N of a study: every N-th run, beginning with the I-th.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shard {
     /// Index of the shard, from 1 to `of`.
     pub index: usize,
-    /// Number of shards.
+    /// Number of shards into which the study is divided.
     pub of: usize,
 }
 
@@ -176,11 +176,11 @@ impl FromStr for Shard {
 }
 
 impl Study {
-    /// Reads a study's file.
+    /// Reads the file of a study.
     ///
     /// # Errors
-    /// The file cannot be read or is not a study, varies a key that cannot be varied, or its pairs
-    /// have no places.
+    /// The file cannot be read or is not a study, a key has invalid values, or its mission has no
+    /// places for `pairs`.
     pub fn read(file: &Path) -> Result<Self, Errors> {
         let (sections, place): (Sections, ManifestPath) = manifest::read(file)?;
         let wrong_at = |path: &[Key], part: Part, text: String| {
@@ -265,16 +265,17 @@ impl Study {
         Ok(Self { sections, directory, digest, keys, origin: place })
     }
 
-    /// Message about a mistake in the study's file. `path` contains the keys that lead to the mistaken
-    /// value.
+    /// Creates a message about a mistake in the study's file. `path` contains the keys that lead to
+    /// the mistaken value.
     pub fn mistake(&self, path: &[Key], text: &str) -> Message {
         let place = self.origin.place_of(path, Part::Value);
         self.origin.quote([Message::at("M150", self.origin.file(), place, text)]).swap_remove(0)
     }
 
-    /// The first run, and for each value of each key a run that differs from the first one in this
-    /// value only, with the path to that value. Ranges of numbers and pairs contribute their last
-    /// value only.
+    /// Returns a sample of the runs for checking the study. The sample contains the first run and,
+    /// for each value of each key, a run that differs from the first run only in this value. Number
+    /// ranges and pairs contribute only their last value. Each run has the path of keys to its
+    /// value in the file.
     pub fn samples(&self) -> Vec<(Vec<Key>, Planned)> {
         if self.is_empty() {
             return Vec::new();
@@ -291,8 +292,8 @@ impl Study {
         samples
     }
 
-    /// Returns `true` if a program generates files for each run, so that they do not exist in
-    /// advance.
+    /// Returns `true` if a program generates files for each run, so that these files do not exist
+    /// in advance.
     pub fn generates(&self) -> bool {
         self.sections.generate.is_some()
     }
@@ -307,7 +308,7 @@ impl Study {
         self.len() == 0
     }
 
-    /// Returns the runs of a shard, in order.
+    /// Returns the runs of a shard in ascending order.
     pub fn runs(&self, shard: Shard) -> impl Iterator<Item = Planned> + '_ {
         (shard.index - 1..self.len()).step_by(shard.of).map(|number| self.planned(number))
     }
@@ -323,7 +324,7 @@ impl Study {
         Planned { number, vary: vary.into_iter().rev().collect() }
     }
 
-    /// Returns the JSON pointer to the rows of an answer.
+    /// Returns the JSON pointer to the part of an answer from which table rows are built.
     pub fn rows(&self) -> &str {
         &self.sections.rows
     }
@@ -333,7 +334,7 @@ impl Study {
         &self.sections.description
     }
 
-    /// Returns the keys in order, each with `true` if it is a repetition.
+    /// Returns the varied keys in order, each with `true` if it only repeats runs, like a seed.
     pub fn keys(&self) -> Vec<(String, bool)> {
         let is_repetition = |key: &String| self.sections.repetitions.contains(key);
         self.keys.iter().map(|(key, _)| (key.clone(), is_repetition(key))).collect()
@@ -344,7 +345,8 @@ impl Study {
         self.sections.time_limit
     }
 
-    /// Returns the arguments of a run's command, after the program's name.
+    /// Returns the arguments of a run's command, without the program's name. `directory` replaces
+    /// `{dir}`.
     pub fn words(&self, run: &Planned, directory: &Path) -> Vec<String> {
         let mut words: Vec<String> =
             self.sections.command.iter().map(|word| filled(word, &run.vary, directory)).collect();
@@ -369,14 +371,15 @@ impl Study {
         words
     }
 
-    /// Returns the command line of the program that writes a run's files, if there is one.
+    /// Returns the command line of the program that writes the files of a run, if the study has
+    /// such a program.
     pub fn generator(&self, run: &Planned, directory: &Path) -> Option<Vec<String>> {
         let generate = self.sections.generate.as_ref()?;
         Some(generate.run.iter().map(|word| filled(word, &run.vary, directory)).collect())
     }
 }
 
-/// Returns the names in braces.
+/// Returns the names in braces, e.g. `key` for `{key}`, in a word of a command.
 fn placeholders(word: &str) -> impl Iterator<Item = &str> {
     word.split('{').skip(1).filter_map(|rest| rest.split_once('}').map(|(name, _)| name))
 }
@@ -422,7 +425,8 @@ fn values(variation: &Variation) -> Result<Vec<Value>, String> {
     if values.is_empty() { Err("has no value".to_owned()) } else { Ok(values) }
 }
 
-/// Ordered pairs of a mission's places.
+/// Returns ordered pairs of a mission's places, as texts `start,goal`. If there are more than
+/// `most`, selects `most` pairs, evenly spread.
 fn places(mission: &Path, most: Option<usize>) -> Result<Vec<Value>, Errors> {
     let Setup { mission, roles, .. } = Setup::read(mission)?;
     let (problem, _) = mission.filled()?;

@@ -1,4 +1,4 @@
-//! Table of a study's lines, and means over its repetitions.
+//! Table of the results of a parameter study, and means over its repetitions.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,49 +7,51 @@ use serde_json::{Map, Value};
 use super::results::{Line, essence};
 use crate::simulate::Sample;
 
-/// Column of exit statuses, which have no mean.
+/// Name of the column with the exit statuses, of which no mean is computed.
 const STATUS: &str = "status";
 
-/// Contents of a cell. `None` if the row has no such value.
+/// Value in a cell. `None` if the row has no value for the column.
 pub type Cell = Option<Value>;
 
-/// A row of the table: the varied keys of a run, its status, and one JSON value of its answer.
+/// A row of the table: the varied keys of a run, its status, and the fields of one JSON value of
+/// its answer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
-    /// Number of the run.
+    /// Number of the run to which the row belongs.
     pub run: usize,
     /// Cells in the order of the columns.
     pub cells: Vec<Cell>,
 }
 
-/// All rows, with the union of their columns.
+/// All rows of a study's table. The columns are the union of the fields of all rows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
     /// Column names, sorted: first the varied keys, then the fields of answers.
     pub columns: Vec<String>,
-    /// Number of columns that are varied keys.
+    /// Number of columns that are varied keys; they come first.
     pub keys: usize,
-    /// Rows by run, in the order of the answer.
+    /// Rows sorted by run; the rows of a run are in the order of its answer.
     pub rows: Vec<Row>,
 }
 
-/// Columns with the common values of rows.
+/// Pairs of a column's name and the value that all rows of a group have in it.
 type Common = Vec<(String, Value)>;
 
-/// Rows that differ only in repetitions.
+/// Rows that differ only in repetitions, i.e. in the seed or another key that only repeats a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Group {
-    /// Common values of the group: keys and words, with their columns.
+    /// Values that all rows of the group have: varied keys and texts.
     pub common: Common,
-    /// Number of rows.
+    /// Number of rows in the group.
     pub count: usize,
-    /// Statistics of the numeric columns.
+    /// Statistics of each numeric column over the rows.
     pub samples: Vec<(String, Sample)>,
 }
 
 impl Table {
-    /// Collects the rows at a JSON pointer in each answer. `measured` includes the fields that are
-    /// measured on a machine.
+    /// Builds the table. `rows` is the JSON pointer to an object, or a list of objects, in each
+    /// answer; each object becomes a row. With `measured`, includes the fields that depend on the
+    /// machine, such as times.
     pub fn new(lines: &[Line], rows: &str, measured: bool) -> Self {
         let mut rows_of_lines: Vec<(&Line, Map<String, Value>)> = Vec::new();
         for line in lines {
@@ -102,8 +104,8 @@ impl Table {
         String::from_utf8(writer.into_inner().unwrap_or_default()).unwrap_or_default()
     }
 
-    /// Groups the rows that have the same words and the same values of keys except for
-    /// `repetitions`. The mean of truth values is the share of true ones.
+    /// Groups the rows that have equal texts and equal values of all keys except those in
+    /// `repetitions`. The mean of truth values is the proportion of true ones.
     pub fn groups(&self, repetitions: &[String]) -> Vec<Group> {
         let is_number = |column: usize| {
             self.rows.iter().filter_map(|row| row.cells[column].as_ref()).all(|value| figure(value).is_some())
@@ -141,12 +143,12 @@ impl Table {
     }
 }
 
-/// Returns a number, or a truth value as 0 or 1.
+/// Returns a number as it is, a truth value as 0 or 1, and `None` for other values.
 fn figure(value: &Value) -> Option<f64> {
     value.as_bool().map(|truth| f64::from(u8::from(truth))).or_else(|| value.as_f64())
 }
 
-/// Joins the values of a repeated option to one cell.
+/// Joins the values of an option that is given several times to one text.
 fn joined(value: Value) -> Value {
     match value {
         Value::Array(values) => {
@@ -160,7 +162,8 @@ fn joined(value: Value) -> Value {
     }
 }
 
-/// Flattens an object to cells by path; lists are omitted.
+/// Adds the scalar fields of an object, and of objects within it, to `cells`. Names are paths such
+/// as `a.b`. Lists are omitted.
 fn flatten(path: &str, value: &Value, cells: &mut Map<String, Value>) {
     match value {
         Value::Object(fields) => {

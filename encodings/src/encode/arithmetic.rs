@@ -1,14 +1,15 @@
-//! Binary arithmetic in clauses: two's complement, ripple-carry addition, constant folding.
+//! Binary arithmetic as clauses: two's complement, ripple-carry addition, constant folding.
 
 use task::number::{Int, dense};
 
 use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::sat::Lit;
 
-/// Bits of a number, lowest first; the last one is the sign.
+/// Bits of a number in two's complement, lowest first; the last bit is the sign.
 pub type Bits = Vec<Lit>;
 
-/// Number of bits for a range, including the sign.
+/// Returns the number of bits, including the sign, that every number from `low` to `high` fits
+/// into.
 #[expect(clippy::arithmetic_side_effects, reason = "a number has at most 128 leading zeros")]
 pub fn width(low: Int, high: Int) -> usize {
     let bits = |number: Int| {
@@ -17,7 +18,7 @@ pub fn width(low: Int, high: Int) -> usize {
     bits(low).max(bits(high))
 }
 
-/// Builds arithmetic circuits for one family of clauses.
+/// Adds arithmetic circuits to a formula, as clauses of one family.
 pub struct Arithmetic<'f> {
     pub(crate) formula: &'f mut Formula,
     pub(crate) family: Family,
@@ -36,13 +37,13 @@ impl Arithmetic<'_> {
         (0..width).map(bit).collect()
     }
 
-    /// Sign-extends a number to more bits.
+    /// Sign-extends a number to at least `width` bits.
     pub(crate) fn extend(bits: &Bits, width: usize) -> Bits {
         let sign = bits.last().copied().unwrap_or(!Formula::truth());
         bits.iter().copied().chain(std::iter::repeat(sign)).take(width.max(bits.len())).collect()
     }
 
-    /// Conjunction of two literals.
+    /// Returns a literal that is equivalent to the conjunction of two literals.
     pub(crate) fn and(&mut self, a: Lit, b: Lit) -> Lit {
         let (truth, falsum) = (Formula::truth(), !Formula::truth());
         match (a, b) {
@@ -108,7 +109,7 @@ impl Arithmetic<'_> {
         majority
     }
 
-    /// Sum of two numbers at the given width, which must hold it.
+    /// Returns the sum of two numbers with `width` bits. The sum must fit into this width.
     pub(crate) fn add(&mut self, a: &Bits, b: &Bits, width: usize) -> Bits {
         let (a, b) = (Self::extend(a, width), Self::extend(b, width));
         let mut carry = !Formula::truth();
@@ -121,7 +122,7 @@ impl Arithmetic<'_> {
         sum
     }
 
-    /// Multiple of a number, by shifts and additions.
+    /// Returns the product of a number and a constant with `width` bits, by shifts and additions.
     pub(crate) fn multiple(&mut self, bits: &Bits, factor: Int, width: usize) -> Bits {
         if factor == 1 {
             return Self::extend(bits, width);
@@ -141,8 +142,9 @@ impl Arithmetic<'_> {
         sum
     }
 
-    /// Number that has the given value under each premise (a conjunction), and is 0 if `active` is
-    /// false. At most one premise must hold at a time, and one must hold if `active` does.
+    /// Returns a number that has the given value if its premise, a conjunction, is true, and is 0
+    /// if `active` is false. At most one premise may be true at a time, and one must be true if
+    /// `active` is.
     pub(crate) fn choose(&mut self, premises: &[(Vec<Lit>, Int)], active: Lit) -> Bits {
         let low = premises.iter().map(|(_, value)| *value).fold(0, Int::min);
         let high = premises.iter().map(|(_, value)| *value).fold(0, Int::max);
@@ -163,7 +165,7 @@ impl Arithmetic<'_> {
             .collect()
     }
 
-    /// Adds clauses that make two numbers equal under the premise.
+    /// Adds clauses by which two numbers are equal if the premise is true.
     pub(crate) fn equal_if(&mut self, premise: Lit, a: &Bits, b: &Bits) {
         let width = a.len().max(b.len());
         for (a, b) in Self::extend(a, width).into_iter().zip(Self::extend(b, width)) {
@@ -172,13 +174,14 @@ impl Arithmetic<'_> {
         }
     }
 
-    /// Adds clauses that bound a number from above by a constant.
+    /// Adds clauses by which a number is at most `limit`.
     #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     pub(crate) fn at_most(&mut self, bits: &Bits, limit: Int) {
         let width = bits.len().max(width(limit, limit));
         let bits = Self::extend(bits, width);
         let Some((sign, magnitude)) = bits.split_last() else { return };
-        // Order of two's complement: compare magnitudes, with the inverted sign as the highest bit.
+        // In two's complement, numbers are ordered like unsigned numbers whose highest bit is the
+        // inverted sign.
         let order: Vec<(Lit, bool)> = magnitude
             .iter()
             .enumerate()
@@ -201,7 +204,7 @@ mod tests {
     use crate::sat::{Answer, Backend};
     use task::limits::Limits;
 
-    /// Returns `true` if the formula has an assignment in which the bits have this value.
+    /// Returns `true` if the formula has a satisfying assignment in which the bits have this value.
     fn can_be(formula: &Formula, bits: &Bits, value: Int) -> bool {
         let mut solver = Backend::default().start(&Limits::none(), u64::MAX);
         formula.clauses().for_each(|(_, clause)| solver.add_clause(clause));

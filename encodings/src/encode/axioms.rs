@@ -1,10 +1,11 @@
-//! Derived variables: the least fixpoint of their rules, by completion and levels.
+//! Clauses for derived variables: the least fixpoint of their rules, by completion and level
+//! constraints.
 //!
-//! - body: `b@t ↔ ⋀ l@t` for each rule;
-//! - completion: `h@t ↔ ⋁ b@t` over the rules with head h \[1\];
-//! - levels: in a layer of n variables that depend on each other, `h@t` needs a rule whose own
-//!   variables of the layer follow in fewer rounds: `h@t → ⋁ s@t`, `s@t → b@t`,
-//!   `s@t ∧ r(h) ≤ k → r(a) ≤ k−1` with r in order encoding \[2\].
+//! - body: `b@t ↔ ⋀ l@t` for the body b of each rule;
+//! - completion: `h@t ↔ ⋁ b@t` over the bodies b of the rules with head h \[1\];
+//! - levels: in a layer of n variables that depend on each other, a true `h@t` needs a supporting
+//!   rule whose body variables from this layer are derived in an earlier round: `h@t → ⋁ s@t`, `s@t
+//!   → b@t`, `s@t ∧ r(h) ≤ k → r(a) ≤ k−1` with the round r in order encoding \[2\].
 //!
 //! \[1\] K. Clark: Negation as failure, Logic and Data Bases, 1978.
 //! \[2\] T. Janhunen: Representing normal programs with clauses, ECAI 2004.
@@ -20,8 +21,8 @@ use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::encode::numeric::is_at_least_zero;
 use crate::sat::Lit;
 
-/// Adds the clauses of derived variables before a step, with the numeric variables `numbers`.
-/// Returns `None` if numbers overflow.
+/// Adds the clauses for derived variables before a step. `numbers` has the bits of the numeric
+/// variables. Returns `None` if numbers can exceed the available bits.
 pub(super) fn axioms(builder: &mut Builder<'_>, step: usize, numbers: &[Bits]) -> Option<()> {
     let task = builder.task;
     for (layer, index) in task.axioms.iter().zip(0..) {
@@ -58,7 +59,8 @@ pub(super) fn axioms(builder: &mut Builder<'_>, step: usize, numbers: &[Bits]) -
     Some(())
 }
 
-/// Adds level constraints, which exclude variables that support only each other.
+/// Adds level constraints for a recursive layer: each true variable is derived in a round after the
+/// variables that support it. So variables that support only each other are false.
 #[expect(clippy::arithmetic_side_effects, reason = "rounds count from 1")]
 fn levels(
     builder: &mut Builder<'_>,
@@ -67,8 +69,8 @@ fn levels(
     bodies: &BTreeMap<VariableId, Vec<(Lit, Vec<VariableId>)>>,
 ) {
     let rounds = dense(bodies.len());
-    // `later[v][k]`: variable v follows in more than k + 1 rounds. Every true variable follows in
-    // at most `rounds`.
+    // `later[v][k]` is true if variable v is derived in round k + 2 or later. Every true variable
+    // is derived in at most `rounds` rounds.
     let mut later: BTreeMap<VariableId, Vec<Lit>> = BTreeMap::new();
     for variable in bodies.keys() {
         let literals: Vec<_> = (1..rounds)
@@ -85,8 +87,8 @@ fn levels(
         }
         later.insert(*variable, literals);
     }
-    // Each true variable needs a supporting rule whose own variables were derived in earlier
-    // rounds.
+    // Each true variable needs a supporting rule whose body variables from this layer were derived
+    // in earlier rounds.
     debug_assert!(layer.recursive);
     for (variable, bodies) in bodies {
         let head = builder.variables.values[step][variable.index()][0];

@@ -1,8 +1,8 @@
-//! Formula under construction, shared by the families of clauses.
+//! Formula under construction, to which the families of clauses are added.
 //!
-//! A group of operators has one variable that is true if the operator at the step is a member:
-//! `o@t → g@t` for each member, and `g@t → ⋁ o@t`. Groups make clauses about designs, costs and
-//! consumptions independent of the number of operators that share them.
+//! A group of operators has one variable, which is true at a step if one of its members is
+//! executed: `o@t → g@t` for each member, and `g@t → ⋁ o@t`. With groups, clauses about designs,
+//! costs and consumption do not have to be repeated for each operator.
 
 use std::collections::BTreeMap;
 
@@ -16,20 +16,20 @@ use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::encode::variables::Variables;
 use crate::sat::Lit;
 
-/// A task with its limits, its unfinished formula, and the variables of the formula.
+/// A task with limits, an unfinished formula, and the meaning of the formula's variables.
 pub(super) struct Builder<'a> {
     pub(super) task: &'a Task,
     pub(super) limits: &'a Limits,
     pub(super) formula: Formula,
     pub(super) variables: Variables,
-    /// Maximum number of clauses.
+    /// Maximum number of clauses of the formula.
     most: usize,
     groups: FxHashMap<(usize, Vec<OperatorId>), Lit>,
 }
 
 impl<'a> Builder<'a> {
-    /// Creates a formula without clauses, for plans with the operators that are allowed at each
-    /// step.
+    /// Creates a formula without clauses. `allowed[step][operator]` is `true` if the operator may
+    /// occur at the step.
     pub(super) fn new(
         context: Context<'a>,
         allowed: &[Vec<bool>],
@@ -41,13 +41,13 @@ impl<'a> Builder<'a> {
         Ok(Self { task, limits, formula, variables, most: max_clauses, groups: FxHashMap::default() })
     }
 
-    /// Fails if a limit is reached or there are too many clauses.
+    /// Returns an error if a limit is reached or there are too many clauses.
     pub(super) fn check(&self) -> Result<(), Interrupted> {
         if self.formula.clause_count() > self.most { Err(Interrupted) } else { self.limits.check() }
     }
 
-    /// Variable of a group of operators at a step. Members that are impossible at the step are
-    /// ignored.
+    /// Returns the literal of a group of operators at a step, and adds its defining clauses to
+    /// `family` if it is new. Members that are impossible at the step are ignored.
     pub(super) fn group(&mut self, step: usize, members: &[OperatorId], family: Family) -> Lit {
         let present: Vec<_> = {
             let candidates = &self.variables.operators[step];
@@ -74,7 +74,8 @@ impl<'a> Builder<'a> {
         group
     }
 
-    /// Groups the operators at a step by the values of a property.
+    /// Groups the operators at a step by the values that `property` returns. An operator with
+    /// several values is in several groups.
     pub(super) fn partition<K: Ord>(
         &self,
         step: usize,

@@ -1,8 +1,8 @@
-//! Conditional effects.
+//! Clauses for conditional effects.
 //!
-//! - `f@t ↔ o@t ∧ ⋀ l@t` for an effect of operator o whose condition is the literals l;
-//! - `f@t → e@t+1` for each fact that it sets, unless a later effect sets the variable to another
-//!   value.
+//! - `f@t ↔ o@t ∧ ⋀ l@t` for a conditional effect f of operator o with the literals l as condition;
+//! - `f@t → e@t+1` for each fact e that the effect sets, unless a later effect of the operator sets
+//!   the same variable to another value.
 
 use task::number::dense;
 use task::task::{Fact, OperatorId};
@@ -11,21 +11,21 @@ use crate::encode::builder::Builder;
 use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::sat::Lit;
 
-/// A conditional effect at a step, with its variable.
+/// A conditional effect of an operator at a step, with its SAT variable.
 pub(super) struct ConditionalEffectVar<'a> {
     operator: OperatorId,
     position: usize,
-    /// Literal that is true if the effect takes place.
+    /// Literal that is true if the effect takes place at the step.
     pub(super) literal: Lit,
     pub(super) effects: &'a [Fact],
 }
 
-/// Conditional effects of the operators at a step.
+/// Conditional effects of all operators at a step.
 pub(super) struct FiredEffects<'a>(Vec<ConditionalEffectVar<'a>>);
 
 impl<'a> FiredEffects<'a> {
-    /// Creates the variables of the conditional effects at a step, and adds clauses for their
-    /// effects.
+    /// Creates the variables of the conditional effects at a step, and adds the clauses for their
+    /// conditions and effects.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "steps are fewer than the horizon, whose formula is in memory"
@@ -68,8 +68,8 @@ impl<'a> FiredEffects<'a> {
         self.0.iter()
     }
 
-    /// Conditional effects of an operator, from an index on, that set the variable of a fact to
-    /// another value.
+    /// Returns the literals of the operator's conditional effects, from index `from` on, that set
+    /// the variable of `fact` to another value.
     pub(super) fn prevailing(
         &self,
         operator: OperatorId,

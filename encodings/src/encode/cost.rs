@@ -1,14 +1,14 @@
-//! The accumulated cost, and the limit on it.
+//! Clauses for the accumulated cost, and for the limit on the cost.
 //!
-//! Costs are *reduced* by a potential: with the goal distance h in a projection, an operator from
-//! abstract state α to β costs c + h(β) − h(α) ≥ 0. The sum over a plan is its cost minus
-//! h(initial), because h is 0 in goal states. So only the gap between the limit and the lower bound
-//! has to be counted, and an operator on a cheapest path costs nothing. Tables of designs
-//! contribute the difference from their cheapest entry.
+//! Costs are *reduced* by a potential: with the goal distance h in a projection, an operator of
+//! cost c from abstract state α to β has the reduced cost c + h(β) − h(α) ≥ 0. The sum over a plan
+//! is its cost minus h(initial), because h is 0 in goal states. So only the gap between the limit
+//! and the lower bound has to be counted, and an operator on a cheapest path has the reduced cost
+//! 0. The entries of design tables count as differences from the cheapest entry.
 //!
-//! The sum has an order encoding: one variable for each possible amount, in one direction only. A
-//! variable states that *at least* this amount has been spent. If too many amounts are possible,
-//! binary addition is used instead.
+//! The sum has an order encoding: one variable for each possible amount, which is implied if *at
+//! least* this amount has been spent. The converse is not encoded. If too many amounts are
+//! possible, binary addition is used instead.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -23,56 +23,61 @@ use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::encode::interference::Interference;
 use crate::sat::Lit;
 
-/// Maximum number of distinct accumulated amounts in the order encoding. Beyond it, the sum is
-/// encoded with binary addition.
+/// Maximum number of different accumulated amounts in the order encoding. Beyond it, the sum is
+/// encoded by binary addition.
 const AMOUNT_LIMIT: usize = 1_000;
 
-/// Cost limit of an encoding: only plans with cost at most `limit` are admitted; `bounds` provides
-/// the heuristics.
+/// Cost limit of an encoding: only plans with a cost of at most `limit` are admitted. `bounds`
+/// provides projections of the task, whose lower bounds reduce the costs that are summed.
 pub struct CostLimit<'a> {
     pub limit: Int,
     pub bounds: &'a Bounds,
     pub counting: CostEncoding,
 }
 
-/// Treatment of the costs of steps in an encoding.
+/// Encoding of the costs of all steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CostEncoding {
-    /// Sum of the costs, bounded by the limit.
+    /// The sum of the costs, bounded by the limit.
     Sum,
-    /// Weighted literals for core-guided search. Only single amounts above the limit are excluded.
+    /// Weighted literals for core-guided search. Clauses exclude only single amounts above the gap
+    /// between limit and lower bound.
     Apart,
 }
 
-/// Contributions of one source to the cost of a step: each amount is added if its premise (a
-/// conjunction) holds.
+/// Possible contributions of a source to the cost of a step: each amount is added if its premise, a
+/// conjunction, holds.
 type Increments = Vec<(Vec<Lit>, Int)>;
 
-/// Source of cost at a step: the operators themselves, or the tables of some slots.
+/// Source of cost at a step, which contributes at most one amount: operators that exclude each
+/// other, or the design tables of a set of slots.
 struct Source {
     step: u32,
-    /// Index of the source within the step.
+    /// Index of this source of cost within its step.
     stage: u32,
     increments: Increments,
 }
 
-/// Final cost, minus its lower bound.
+/// Encoded cost of the whole plan, minus a lower bound.
 pub(super) struct Cost {
+    /// Lower bound on the cost of every plan.
     lower: Int,
     spent: Spent,
 }
 
 enum Spent {
-    /// Literal "at least this amount" for every positive amount that can occur.
+    /// Literal that is implied by "at least this amount is spent", for every positive amount that
+    /// can occur.
     Order(BTreeMap<Int, Lit>),
     Binary(Bits),
-    /// Weighted literals.
+    /// Weighted literals; the cost beyond the lower bound is the sum of the weights of true
+    /// literals.
     Apart(Vec<(Lit, Int)>),
 }
 
 impl Cost {
-    /// Sums up and bounds the costs of all steps. Without interference there is one operator per
-    /// step. Returns `None` if a limit of the run is reached.
+    /// Encodes and bounds the sum of the costs of all steps. Without `interference` there is one
+    /// operator per step. Returns `None` if a limit is reached.
     pub(super) fn new(
         builder: &mut Builder<'_>,
         cost: &CostLimit<'_>,
@@ -104,7 +109,8 @@ impl Cost {
         Some(Self { lower, spent })
     }
 
-    /// Lower bound on the cost of every plan, and weighted literals for the costs beyond it.
+    /// Returns a lower bound on the cost of every plan, and weighted literals for the cost beyond
+    /// it.
     pub(super) fn payments(&self) -> (Int, &[(Lit, Int)]) {
         match &self.spent {
             Spent::Apart(literals) => (self.lower, literals),
@@ -112,7 +118,8 @@ impl Cost {
         }
     }
 
-    /// Adds clauses that admit only plans with cost at most `limit`.
+    /// Adds clauses that admit only plans with a cost of at most `limit`. Has no effect on weighted
+    /// literals.
     pub(super) fn at_most(&self, formula: &mut Formula, limit: Int) {
         // The gap is negative if no plan can have this cost.
         let gap = limit.saturating_sub(self.lower);
@@ -132,17 +139,17 @@ impl Cost {
     }
 }
 
-/// The cost sum under construction.
+/// State of the encoding of a cost sum.
 struct Sum<'s, 'a> {
     builder: &'s mut Builder<'a>,
     cost: &'s CostLimit<'s>,
     interference: Option<&'s Interference>,
-    /// Amount that may be spent beyond the lower bound.
+    /// Cost that a plan may have beyond the lower bound.
     gap: Int,
 }
 
 impl Sum<'_, '_> {
-    /// All sources in the order of steps. Returns `None` if a limit of the run is reached.
+    /// Returns all sources of cost in the order of steps, or `None` if a limit is reached.
     fn sources(&mut self) -> Option<Vec<Source>> {
         let mut sources = Vec::new();
         for step in 0..self.builder.variables.horizon() {
@@ -157,10 +164,11 @@ impl Sum<'_, '_> {
         Some(sources)
     }
 
-    /// Contributions of a step by source: the operators, and the tables of designs.
+    /// Returns the possible contributions to the cost of a step, grouped by source: operators, and
+    /// design tables.
     fn increments(&mut self, step: usize) -> Vec<Increments> {
-        // Each source contributes at most one amount, so operators that can be executed together
-        // are separate sources.
+        // Each source contributes at most one amount. So operators that can be executed at the same
+        // step are separate sources.
         let mut by_source: BTreeMap<(Option<usize>, Option<OperatorId>), Increments> = BTreeMap::new();
         for index in 0..self.builder.variables.operators[step].len() {
             let (id, literal) = self.builder.variables.operators[step][index];
@@ -190,9 +198,9 @@ impl Sum<'_, '_> {
         increments_by_source
     }
 
-    /// Adds the reduced cost of an operator with its cheapest designs to `out`: a single amount, or
-    /// an amount for each abstract transition if the amounts differ. Also forbids the operator in
-    /// transitions from or to a dead end of the abstraction.
+    /// Appends to `out` the reduced cost of an operator with its cheapest designs. This is a single
+    /// amount, or an amount for each abstract transition if the amounts differ. Also forbids the
+    /// operator in transitions from or to a dead end of the abstraction.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "costs to go and the cost of an operator are at most GROWTH_LIMIT; steps are in memory"
@@ -221,7 +229,8 @@ impl Sum<'_, '_> {
                 })
                 .collect();
             if !operator.conditional.is_empty() {
-                // With conditional effects the target is open, so it is read from the next state.
+                // With conditional effects the operator does not determine the target, so the
+                // premise includes the next state.
                 let after = potential.pattern.iter().zip(potential.values(transition.target));
                 here.extend(after.map(|(variable, value)| {
                     self.builder.variables.values[step + 1][variable.index()][value as usize]
@@ -256,7 +265,8 @@ impl Sum<'_, '_> {
         Some(spent)
     }
 
-    /// `spent ≥ v ∧ increment ≥ w → spent' ≥ v + w`; sums above the gap are conflicts.
+    /// Adds the amounts of a source to the order encoding: `spent ≥ v ∧ increment ≥ w → spent' ≥ v
+    /// + w`. Sums above the gap are conflicts.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "amounts are at most the gap, which is at most GROWTH_LIMIT; steps are in memory"
@@ -292,8 +302,8 @@ impl Sum<'_, '_> {
         after
     }
 
-    /// Literals for the positive amounts of a source, each implied by its premise. Amounts above
-    /// the gap are conflicts.
+    /// Returns a literal for each positive amount of a source, implied by the premises of this
+    /// amount. Amounts above the gap are conflicts.
     fn amounts(&mut self, source: &Source) -> BTreeMap<Int, Lit> {
         let mut increments: BTreeMap<Int, Lit> = BTreeMap::new();
         for (premise, amount) in source.increments.iter().filter(|(_, amount)| *amount > 0) {
@@ -312,8 +322,8 @@ impl Sum<'_, '_> {
         increments
     }
 
-    /// Amounts of a source as weighted literals: each literal implies the next smaller one and
-    /// carries the difference.
+    /// Returns the amounts of a source as weighted literals. Each literal implies the literal of
+    /// the next smaller amount, and its weight is the difference from this amount.
     #[expect(clippy::arithmetic_side_effects, reason = "amounts come in ascending order")]
     fn apart(&mut self, source: &Source) -> Vec<(Lit, Int)> {
         let mut weighted: Vec<(Lit, Int)> = Vec::new();
@@ -341,7 +351,8 @@ impl Sum<'_, '_> {
             let active = self.builder.variables.busy[*step as usize];
             let mut arithmetic = Arithmetic { formula: &mut self.builder.formula, family: Family::Cost };
             let increment = arithmetic.choose(&possible, active);
-            // Neither summand exceeds the gap, so the sum fits; then the limit is enforced again.
+            // Neither summand exceeds the gap, so the sum fits into the width. Then the sum is
+            // bounded by the gap again.
             spent = arithmetic.add(&spent, &increment, width);
             arithmetic.at_most(&spent, gap);
         }
@@ -349,8 +360,8 @@ impl Sum<'_, '_> {
     }
 }
 
-/// Tables of an operator in the numbering of the task: combinations of (slot, design), and the
-/// difference of each from the cheapest.
+/// Returns the cost tables of an operator: combinations of (slot, design) in the numbering of the
+/// task, and the difference of each entry from the cheapest entry.
 #[allow(clippy::type_complexity)]
 #[expect(
     clippy::arithmetic_side_effects,
@@ -367,7 +378,7 @@ fn residual_tables(operator: &Operator) -> Vec<(Vec<Vec<(usize, usize)>>, Vec<In
         .collect()
 }
 
-/// Amounts that are possible after one more source.
+/// Returns the accumulated amounts that are possible after one more source, up to the gap.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "amounts are at most the gap, which is at most GROWTH_LIMIT"
@@ -381,7 +392,8 @@ fn next_amounts(spent: &BTreeSet<Int>, increments: impl Iterator<Item = Int>, ga
     amounts
 }
 
-/// Returns `true` if few enough amounts are possible for the order encoding.
+/// Returns `true` if the number of possible accumulated amounts is small enough for the order
+/// encoding.
 fn amounts_fit(sources: &[Source], gap: Int) -> bool {
     let mut spent = BTreeSet::new();
     for source in sources {

@@ -1,16 +1,17 @@
-//! Designs of operators in the numbering of the task.
+//! Converts designs from the numbering of an operator to the numbering of the task.
 
 use task::number::dense;
 use task::task::{Operator, SlotUse};
 
-/// Slot and design in the numbering of the task, from indices within an operator.
+/// Returns slot and design in the numbering of the task. `slot` and `design` are indices within an
+/// operator with the slots `slots`.
 pub(super) fn task_slot(slots: &[SlotUse], slot: u32, design: u32) -> (usize, usize) {
     let usage = &slots[slot as usize];
     (usage.slot.index(), usage.designs[design as usize] as usize)
 }
 
-/// All combinations of designs of some slots, in the order of `Table::values` and the numbering of
-/// the task.
+/// Returns all combinations of designs for some slots of an operator, in the order of
+/// `Table::values`. Each combination lists pairs (slot, design) in the numbering of the task.
 pub(super) fn combinations(operator: &Operator, slots: &[u32]) -> Vec<Vec<(usize, usize)>> {
     let mut combinations = vec![Vec::new()];
     for slot in slots {

@@ -1,4 +1,4 @@
-//! Assembles the families of clauses into a formula, and decodes assignments into plans.
+//! Assembles all families of clauses into a formula, and decodes satisfying assignments into plans.
 
 use std::cell::OnceCell;
 
@@ -24,19 +24,20 @@ use crate::encode::symmetry::Symmetry;
 use crate::encode::variables::Variables;
 use crate::sat::{Lit, Solver};
 
-/// The plans that a formula admits.
+/// The set of plans that a formula admits.
 pub struct PlanConstraints<'a> {
-    /// Per step: whether each operator may occur. The number of steps is the horizon.
+    /// `allowed[step][operator]` is `true` if the operator may occur at the step. The number of
+    /// steps is the horizon.
     pub allowed: &'a [Vec<bool>],
-    /// Cost limit, if any.
+    /// Limit on the cost of the plans; `None` for plans of any cost.
     pub cost: Option<CostLimit<'a>>,
-    /// Number and order of operators within a step.
+    /// Number and order of the operators within a step.
     pub semantics: StepSemantics,
-    /// Clause limit: encoding stops with `None` beyond it.
+    /// Maximum number of clauses; beyond it, no encoding is created.
     pub max_clauses: usize,
 }
 
-/// A formula and the meaning of its variables.
+/// The formula for plans of a task, with the meaning of its variables.
 pub struct Encoding<'a> {
     pub(super) task: &'a Task,
     pub formula: Formula,
@@ -45,10 +46,10 @@ pub struct Encoding<'a> {
 }
 
 impl<'a> Encoding<'a> {
-    /// Encodes plans with symmetry breaking: among plans that differ by exchanging interchangeable
-    /// designs or objects, only some are admitted. The symmetries are computed once per task and
-    /// cached in `symmetry`. Returns `None` if a limit is reached, there are too many clauses, or
-    /// numbers are too large.
+    /// Encodes plans with symmetry breaking: of plans that differ only by exchanging
+    /// interchangeable designs or objects, not all are admitted. `symmetry` caches the symmetries
+    /// of the task. Returns `None` if a limit is reached, there are too many clauses, or numbers
+    /// are too large.
     pub fn new(
         context: Context<'a>,
         plans: PlanConstraints<'_>,
@@ -64,7 +65,7 @@ impl<'a> Encoding<'a> {
         Some(Self::of(builder, cost))
     }
 
-    /// As [`Encoding::new`], without symmetry breaking.
+    /// Encodes plans as [`Encoding::new`] does, but without symmetry breaking.
     pub fn with_equals(context: Context<'a>, plans: PlanConstraints<'_>) -> Option<Self> {
         let (builder, cost) = build(context, plans)?;
         Some(Self::of(builder, cost))
@@ -75,25 +76,28 @@ impl<'a> Encoding<'a> {
         Self { task, formula, variables, cost }
     }
 
-    /// Lowers the cost limit, which must not exceed the limit of the encoding.
+    /// Adds clauses for a lower cost limit. The new limit must not exceed the limit of the
+    /// encoding.
     pub fn tighten(&mut self, limit: Int) {
         if let Some(cost) = &self.cost {
             cost.at_most(&mut self.formula, limit);
         }
     }
 
-    /// Number of steps.
+    /// Returns the maximum number of steps.
     pub fn horizon(&self) -> usize {
         self.variables.horizon()
     }
 
-    /// Lower bound on the cost of every plan, and weighted literals whose weights are added if they
-    /// are true.
+    /// Returns the cost as a sum for core-guided search: a lower bound on the cost of every plan,
+    /// and literals whose weights are added to it if the literals are true. Without weighted
+    /// literals, the slice is empty.
     pub fn payments(&self) -> (Int, &[(Lit, Int)]) {
         self.cost.as_ref().map_or((0, &[]), Cost::payments)
     }
 
-    /// Variable of the operator of a plan at a step, or of the design of one of its slots.
+    /// Returns the literal for a choice of a plan at the step `at`: the operator, or the design of
+    /// one of its slots.
     pub fn choice(&self, plan: &[GroundStep], (at, slot): (usize, Option<u32>)) -> Lit {
         let step = &plan[at];
         match slot {
@@ -106,9 +110,9 @@ impl<'a> Encoding<'a> {
         }
     }
 
-    /// Clause that excludes exactly one plan.
+    /// Returns a clause that excludes exactly this plan.
     pub fn blocking_clause(&self, plan: &[GroundStep]) -> Vec<Lit> {
-        // A longer plan with this prefix is a different plan, so it stays admitted.
+        // A longer plan that begins with this plan is a different plan, so it stays admitted.
         let longer = self.variables.busy.get(plan.len()).copied();
         let choices = plan.iter().enumerate().flat_map(|(at, step)| {
             let slots = (0..dense(step.choice.len())).map(Some);
@@ -117,7 +121,7 @@ impl<'a> Encoding<'a> {
         choices.chain(longer).collect()
     }
 
-    /// Decodes the last assignment of a solver into a plan.
+    /// Decodes the last satisfying assignment of a solver into a plan.
     pub fn decode(&self, solver: &dyn Solver) -> Vec<GroundStep> {
         let holds = |literal: Lit| {
             literal == Formula::truth() || solver.value(literal.variable()) == literal.is_positive()
@@ -139,8 +143,8 @@ impl<'a> Encoding<'a> {
     }
 }
 
-/// Adds all families except symmetry breaking. Returns `None` if a limit is reached or numbers
-/// overflow.
+/// Adds all families of clauses except symmetry breaking. Returns `None` if a limit is reached or
+/// numbers are too large.
 fn build<'a>(context: Context<'a>, plans: PlanConstraints<'_>) -> Option<(Builder<'a>, Option<Cost>)> {
     let PlanConstraints { allowed, cost, semantics, max_clauses: max_clause_count } = plans;
     let potential = cost.as_ref().and_then(|cost| cost.bounds.projections.first());

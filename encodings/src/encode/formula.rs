@@ -1,4 +1,4 @@
-//! Clauses under construction, with their families and the meanings of variables.
+//! Formula under construction: its clauses with their families, and the meanings of its variables.
 
 use std::fmt;
 
@@ -6,36 +6,38 @@ use task::number::{Int, dense};
 
 use crate::sat::Lit;
 
-/// Purpose of a clause. The file that writes a family documents it.
+/// Family of a clause, i.e. the purpose for which it is added. The file that adds a family
+/// documents its clauses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Family {
-    /// State variables have exactly one value.
+    /// Clauses by which each state variable has exactly one value at each step.
     Domain,
-    /// At most one operator per step, and none after the last one.
+    /// Clauses for the sequence of operators: at most one per step in sequential semantics, and
+    /// none after an idle step.
     Sequence,
-    /// Operators at the same step do not interfere.
+    /// Clauses by which operators at the same step do not interfere.
     Interference,
-    /// Operators require their conditions.
+    /// Clauses by which an executed operator requires its conditions.
     Condition,
-    /// Operators have their effects.
+    /// Clauses by which an executed operator has its effects.
     Effect,
-    /// Conditional effects take place if their conditions hold.
+    /// Clauses by which conditional effects take place if their conditions hold.
     Conditional,
-    /// A value changes only if an operator sets it.
+    /// Frame axioms: a value changes only if an operator sets another value.
     Frame,
-    /// Derived variables are the least fixpoint of their rules.
+    /// Clauses by which the derived variables are the least fixpoint of their rules.
     Axiom,
-    /// Each function in use has exactly one suitable design.
+    /// Clauses by which each function in use has exactly one suitable design.
     Selection,
-    /// Interchangeable designs and objects are used in a fixed order.
+    /// Symmetry breaking: interchangeable designs and objects are used in a fixed order.
     Symmetry,
-    /// Exact integer arithmetic for numeric variables.
+    /// Clauses for exact integer arithmetic on numeric variables.
     Numeric,
-    /// The accumulated cost.
+    /// Clauses that sum the cost of the plan.
     Cost,
-    /// The last state satisfies the goal.
+    /// Clauses by which the last state satisfies the goal.
     Goal,
-    /// The plan is cheaper than the incumbent.
+    /// Clauses for the cost limit; usually the plan has to be cheaper than the incumbent.
     Bound,
 }
 
@@ -57,7 +59,7 @@ impl Family {
         Self::Bound,
     ];
 
-    /// Name in statistics.
+    /// Returns the name of the family in statistics.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Domain => "domain",
@@ -89,27 +91,28 @@ pub enum VariableMeaning {
     Busy { step: u32 },
     /// The finite-domain variable has the value before the step.
     Value { variable: u32, value: u32, step: u32 },
-    /// The slot is filled with its design at the step.
+    /// The slot (a parameter for a function design) is filled with the design at the step.
     Design { slot: u32, design: u32, step: u32 },
-    /// The operator at the step is one of a group.
+    /// An operator of the group is executed at the step.
     Group { group: u32, step: u32 },
     /// The accumulated cost before the step, minus its lower bound, is at least the amount.
     CostAtLeast { amount: Int, step: u32, stage: u32 },
-    /// The step adds at least the amount.
+    /// A source of cost at the step adds this amount. It is implied by the choices that cause the
+    /// amount.
     Increment { amount: Int, step: u32, stage: u32 },
     /// The conditional effect with this index of the operator takes place at the step.
     Fires { operator: u32, effect: u32, step: u32 },
     /// The body of the rule with this index in a layer of derived variables holds before the step.
     Body { layer: u32, rule: u32, step: u32 },
-    /// The derived variable follows in more than `rounds` rounds of its layer.
+    /// The derived variable is derived in a later round of its layer than round `rounds`.
     Later { variable: u32, rounds: u32, step: u32 },
-    /// A bit of a number.
+    /// A bit of a number, or of an intermediate result.
     Bit { bit: u32 },
-    /// Known plans are excluded.
+    /// Selector that excludes known plans while it is assumed.
     Others,
-    /// A counted number of literals of a core is true.
+    /// A count of true literals in a core of the core-guided search.
     Paid,
-    /// Auxiliary variable, for example of an at-most-one constraint.
+    /// Auxiliary variable without a meaning in the task, for example of an at-most-one constraint.
     Ladder,
 }
 
@@ -118,14 +121,15 @@ pub enum VariableMeaning {
 pub struct Formula {
     meanings: Vec<VariableMeaning>,
     literals: Vec<Lit>,
-    /// End of each clause in `literals`, and its family.
+    /// For each clause: its end in `literals`, and its family.
     clauses: Vec<(u32, Family)>,
-    /// Per literal: number (plus 1) of the last clause that contains it.
+    /// For each literal: the number, from 1, of the last clause that contains it; 0 if no clause
+    /// does.
     last: Vec<u32>,
 }
 
 impl Formula {
-    /// An empty formula with the constant true.
+    /// Creates a formula that contains only the constant true.
     pub(crate) fn new() -> Self {
         let mut formula = Self::default();
         let truth = formula.fresh(VariableMeaning::True);
@@ -134,7 +138,7 @@ impl Formula {
         formula
     }
 
-    /// The literal that is always true.
+    /// Returns the literal that is always true.
     pub(crate) const fn truth() -> Lit {
         Lit::TRUE
     }
@@ -146,12 +150,12 @@ impl Formula {
         literal
     }
 
-    /// Adds a clause. Clauses with a true constant or complementary literals are dropped; false
-    /// constants and duplicates are omitted.
+    /// Adds a clause. The clause is dropped if it contains the constant true or complementary
+    /// literals. The constant false and duplicate literals are omitted from it.
     #[expect(clippy::arithmetic_side_effects, reason = "clauses are held in memory")]
     pub fn add(&mut self, family: Family, clause: impl IntoIterator<Item = Lit>) {
         let start = self.literals.len();
-        // Marks carry the number of the clause, so they need no reset between clauses.
+        // Marks in `last` carry the number of the clause, so they need no reset between clauses.
         let number = dense(self.clauses.len() + 1);
         for literal in clause {
             if literal == Self::truth() || self.last[(!literal).index()] == number {
@@ -166,15 +170,16 @@ impl Formula {
         self.clauses.push((dense(self.literals.len()), family));
     }
 
-    /// Drops the literals of an incomplete clause, so that the next clause can reuse its number.
+    /// Removes the literals from `start` on, which belong to an incomplete clause, and their marks.
     fn forget(&mut self, start: usize) {
         for literal in self.literals.drain(start..) {
             self.last[literal.index()] = 0;
         }
     }
 
-    /// Literal that is implied by each of the given ones (one direction only). Returns the literal
-    /// itself if there is only one.
+    /// Returns a literal that is implied by each of the given literals; the converse is not
+    /// encoded. Returns the given literal itself if there is only one, and the constant false for
+    /// an empty list.
     pub(crate) fn any(&mut self, family: Family, meaning: VariableMeaning, literals: &[Lit]) -> Lit {
         match literals {
             [] => !Self::truth(),
@@ -189,7 +194,7 @@ impl Formula {
         }
     }
 
-    /// Literal that is equivalent to the conjunction of the premises.
+    /// Returns a literal that is equivalent to the conjunction of the premises.
     pub(crate) fn equivalent(&mut self, meaning: VariableMeaning, premises: &[Lit], family: Family) -> Lit {
         let premises: Vec<_> = premises.iter().copied().filter(|l| *l != Self::truth()).collect();
         match premises[..] {
@@ -206,13 +211,13 @@ impl Formula {
         }
     }
 
-    /// At-most-one constraint: pairwise for up to five literals, otherwise Sinz's sequential
-    /// counter \[1\].
+    /// Adds an at-most-one constraint: pairwise clauses for up to five literals, otherwise Sinz's
+    /// sequential counter \[1\].
     ///
     /// \[1\] C. Sinz: Towards an optimal CNF encoding of Boolean cardinality constraints, CP 2005.
     #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     pub(crate) fn at_most_one(&mut self, family: Family, literals: &[Lit]) {
-        // For few literals pairwise clauses are fewer than those of the counter and need no
+        // For few literals, pairwise clauses are fewer than the clauses of the counter and need no
         // variables.
         if literals.len() <= 5 {
             for (position, a) in literals.iter().enumerate() {
@@ -243,12 +248,12 @@ impl Formula {
         self.clauses.len()
     }
 
-    /// All clauses in the order of insertion.
+    /// Returns all clauses with their families, in the order of insertion.
     pub fn clauses(&self) -> impl Iterator<Item = (Family, &[Lit])> {
         self.clauses_from(0)
     }
 
-    /// Clauses from index `start` on.
+    /// Returns the clauses from index `start` on, with their families.
     #[expect(clippy::arithmetic_side_effects, reason = "the first clause is told apart")]
     pub fn clauses_from(&self, start: usize) -> impl Iterator<Item = (Family, &[Lit])> {
         (start..self.clauses.len()).map(|index| {
@@ -258,7 +263,7 @@ impl Formula {
         })
     }
 
-    /// Number of clauses per family.
+    /// Returns the number of clauses of each family, by the name of the family.
     pub fn counts(&self) -> Vec<(&'static str, usize)> {
         let count =
             |family| self.clauses.iter().filter(|(_, clause_family)| *clause_family == family).count();

@@ -1,12 +1,12 @@
-//! The goal: constraints on the last state. Idle steps at the end preserve it.
+//! Clauses for the goal: conditions on the last state. Idle steps at the end preserve this state.
 
 use crate::encode::arithmetic::Bits;
 use crate::encode::builder::Builder;
 use crate::encode::formula::Family;
 use crate::encode::numeric::is_at_least_zero;
 
-/// Adds the goal for the last state with the numeric variables `numbers`. Returns `None` if numbers
-/// overflow.
+/// Adds the goal conditions on the last state. `numbers` has the bits of the numeric variables in
+/// this state. Returns `None` if numbers can exceed the available bits.
 pub(super) fn goal(builder: &mut Builder<'_>, numbers: &[Bits]) -> Option<()> {
     let task = builder.task;
     let last = builder.variables.horizon();

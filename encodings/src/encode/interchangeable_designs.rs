@@ -1,8 +1,8 @@
-//! Detects interchangeable designs of a slot by hashing.
+//! Detects interchangeable designs of a slot (a parameter for a function design) by hashing.
 //!
-//! Each design has a signature: a hash of its entries in all tables and exclusions of the task.
-//! Only designs with the same signature are compared. The time is linear in the size of the tables,
-//! independent of the number of designs.
+//! Each design has a signature: a hash of its entries in all tables and forbidden combinations of
+//! the task. Only designs with the same signature are compared. The running time is linear in the
+//! size of the tables, independent of the number of designs.
 
 use std::hash::{BuildHasher, Hash};
 
@@ -14,26 +14,26 @@ use task::number::Int;
 use task::task::quantity::{Quantity, SlotSet};
 use task::task::{Operator, SlotId};
 
-/// Part of a task that may distinguish designs of a slot: it refers to the designs that one
-/// operator admits, in order.
+/// Part of a task that may distinguish the designs of a slot. It has an entry for each design that
+/// one operator admits.
 struct Witness<'t> {
-    /// Indices into the slot's designs, ascending.
+    /// The admitted designs, as indices into the slot's designs, ascending.
     designs: &'t [u32],
     says: WitnessKind<'t>,
 }
 
 enum WitnessKind<'t> {
-    /// The operator admits the designs.
+    /// The operator admits these designs and no others.
     Admitted,
-    /// Entries of a table in rows of length `stride`; every `designs.len()`-th row belongs to the
-    /// same design.
+    /// A table with rows of length `stride`. Every `designs.len()`-th row belongs to the same
+    /// design.
     Table { values: &'t [Int], stride: usize },
-    /// Per design: combinations that are forbidden with it, sorted.
+    /// For each design: the combinations of other designs that are forbidden with it, sorted.
     Forbidden(Vec<Vec<SlotSet>>),
 }
 
 impl Witness<'_> {
-    /// Rows of a table that belong to the design at an index.
+    /// Returns the rows of a table that belong to the design at a position.
     fn rows<'v>(&self, values: &'v [Int], stride: usize, position: usize) -> impl Iterator<Item = &'v [Int]> {
         values.chunks(stride).skip(position).step_by(self.designs.len())
     }
@@ -67,7 +67,8 @@ fn hash<T: Hash>(value: &T) -> u64 {
     FxBuildHasher.hash_one(value)
 }
 
-/// Designs of a slot that are interchangeable with an earlier one, ascending.
+/// Returns the designs of a slot that are interchangeable with an earlier design of the slot,
+/// ascending.
 pub(super) fn equal_designs(context: Context<'_>, slot: SlotId) -> Result<Vec<u32>, Interrupted> {
     let Context { task, limits } = context;
     let witnesses = witnesses(context, slot)?;
@@ -90,8 +91,8 @@ pub(super) fn equal_designs(context: Context<'_>, slot: SlotId) -> Result<Vec<u3
     Ok(equal)
 }
 
-/// All parts of the task that refer to designs of a slot. Parts that operators share are listed
-/// once.
+/// Returns all parts of the task that refer to designs of a slot. A part that operators share
+/// occurs once.
 #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
 fn witnesses(context: Context<'_>, slot: SlotId) -> Result<Vec<Witness<'_>>, Interrupted> {
     let Context { task, limits } = context;
@@ -141,7 +142,8 @@ fn witnesses(context: Context<'_>, slot: SlotId) -> Result<Vec<Witness<'_>>, Int
     Ok(witnesses)
 }
 
-/// Quantities that affect plans.
+/// Returns the numeric expressions of an operator that may depend on designs: effects, conditions
+/// and cost.
 fn quantities(operator: &Operator) -> impl Iterator<Item = &Quantity<Int>> {
     let effects = operator.numeric_effects.iter().map(|effect| &effect.value.quantity);
     let comparisons = operator.condition.comparisons.iter().map(|comparison| &comparison.quantity);

@@ -1,19 +1,21 @@
-//! Interference of operators in parallel steps.
+//! Clauses that exclude interference between operators of the same step.
 //!
 //! In ∀-step semantics \[1\] the operators of a step can be executed in any order with the same
-//! result. In ∃-step semantics \[2\] they can be executed in at least one order, here the order of
-//! the ground task. In both, all conditions hold before the step and all effects after it. Let E be
-//! the operators that change a fact (or a variable that is read other than by a plain condition),
-//! and R those that need it:
+//! result. In ∃-step semantics \[2\] they can be executed in at least one order; here this is the
+//! order of the ground task. In both semantics, all conditions hold before the step and all effects
+//! hold after the step. For each fact, let E be the operators that change the fact, and R the
+//! operators that need the fact. For a variable that is read in another way than by a plain
+//! condition, E contains all its writers:
 //!
 //! - ∃-step: `¬o@t ∨ ¬p@t` for o ∈ E before p ∈ R in the order, by a ladder: `o@t → a@t`,
 //!   `a@t → a'@t`, `a@t → ¬p@t`;
 //! - ∀-step: the same, and again in the reverse order;
 //! - exclusion: at most one of the operators that share a slot, a numeric variable, or a transition
-//!   of the cost potential. So numbers, designs and costs are encoded as in sequential semantics.
+//!   of the cost potential (the projection that reduces costs). So numbers, designs and costs are
+//!   encoded as in sequential semantics.
 //!
-//! Every sequential plan is a plan in these semantics, so bounds on the length of sequential plans
-//! remain valid.
+//! Every sequential plan is also a plan in these semantics, so bounds on the length of sequential
+//! plans remain valid.
 //!
 //! \[1\] H. Kautz, B. Selman: Pushing the envelope: planning, propositional logic and stochastic
 //! search, AAAI 1996.
@@ -31,15 +33,15 @@ use crate::encode::builder::Builder;
 use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::sat::Lit;
 
-/// Number and order of operators at one step.
+/// Number of operators at one step, and the order in which they must be executable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum StepSemantics {
-    /// One operator.
+    /// At most one operator per step.
     Sequential,
-    /// Several operators that can be executed in any order.
+    /// Several operators per step, which can be executed in any order with the same result.
     ForAllStep,
-    /// Several operators that can be executed in the order of the ground task.
+    /// Several operators per step, which can be executed in the order of the ground task.
     ExistsStep,
 }
 
@@ -47,37 +49,38 @@ words! {
     StepSemantics, "semantics": Sequential = "sequential", ForAllStep = "for-all-step", ExistsStep = "exists-step"
 }
 
-/// Interference relation of a task, the same for all steps.
+/// Interference relation between the operators of a task, the same for all steps.
 pub(super) struct Interference {
-    /// Whether conflicts apply in the reverse order as well.
+    /// `true` if conflicts apply in the reverse order as well (∀-step semantics).
     both_orders: bool,
-    /// Groups with at most one operator per step.
+    /// Groups of operators of which at most one may occur at a step.
     exclusions: Vec<Vec<OperatorId>>,
     conflicts: Vec<Conflict>,
-    /// Per operator: the first exclusion group that contains it.
+    /// For each operator: index of the first exclusion group that contains it.
     classes: Vec<Option<usize>>,
 }
 
-/// Operators that change something, and operators that need it unchanged, both ascending.
+/// Operators that change a fact or variable, and operators that need it unchanged, both in
+/// ascending order.
 struct Conflict {
     erase: Vec<OperatorId>,
     need: Vec<OperatorId>,
 }
 
-/// Reads and writes of a variable by operators.
+/// Operators that read and write a state variable.
 #[derive(Default)]
 struct Uses {
-    /// Readers by plain conditions, by required value.
+    /// Operators with a plain condition on the variable, by required value.
     require: BTreeMap<u32, Vec<OperatorId>>,
-    /// Other readers.
+    /// Operators that read the variable in another way.
     read: Vec<OperatorId>,
-    /// Writers, with the value that they set.
+    /// Operators that set the variable, each with the new value.
     write: Vec<(OperatorId, u32)>,
 }
 
 impl Interference {
-    /// Interference relation of a task. Returns `None` in sequential semantics. `potential` is the
-    /// projection that reduces costs.
+    /// Computes the interference relation of a task. Returns `None` in sequential semantics.
+    /// `potential` is the projection by which costs are reduced.
     pub(super) fn new(
         context: Context<'_>,
         semantics: StepSemantics,
@@ -142,13 +145,13 @@ impl Interference {
         Ok(Some(Self { both_orders: semantics == StepSemantics::ForAllStep, exclusions, conflicts, classes }))
     }
 
-    /// Exclusion class of an operator. Operators of the same class never share a step; those
-    /// without a class may share it with any operator.
+    /// Returns the exclusion group of an operator. Operators with the same group never share a
+    /// step; operators without a group may share a step with any operator.
     pub(super) fn class(&self, operator: OperatorId) -> Option<usize> {
         self.classes[operator.index()]
     }
 
-    /// Adds clauses that exclude interference at a step.
+    /// Adds the clauses that exclude interference at a step.
     pub(super) fn add(&self, builder: &mut Builder<'_>, step: usize) -> Result<(), Interrupted> {
         for group in &self.exclusions {
             let literals: Vec<_> =
@@ -191,8 +194,8 @@ impl Uses {
         }
         for item in limits.watch(&self.require) {
             let (value, need) = item?;
-            // Operators that require another value of the variable are excluded at this step
-            // already.
+            // Operators that require another value of the variable cannot occur at the same step
+            // anyway.
             let possible = [None, Some(*value)].into_iter().filter_map(|required| writers.get(&required));
             let erase = possible.flatten().filter(|(_, set)| set != value);
             let mut erase: Vec<_> = erase.map(|(id, _)| *id).collect();
@@ -209,10 +212,11 @@ impl Uses {
     }
 }
 
-/// Basic and numeric variables that derived variables depend on, transitively.
+/// Basic and numeric variables on which derived variables depend, directly or through other derived
+/// variables.
 struct Support {
     basic: usize,
-    /// Per derived variable: basic variables and numeric variables.
+    /// For each derived variable: basic variables and numeric variables on which it depends.
     of: Vec<(Vec<usize>, Vec<usize>)>,
 }
 
@@ -249,14 +253,14 @@ impl Support {
         facts.chain(literals).filter_map(|variable| self.of.get(variable.index().checked_sub(self.basic)?))
     }
 
-    /// Basic variables that a condition depends on, other than by its facts.
+    /// Returns the basic variables on which a condition depends other than by its plain facts.
     fn read_by(&self, condition: &Condition) -> Vec<usize> {
         let literals = condition.clauses.iter().flatten();
         let direct = literals.filter_map(|literal| self.if_basic(literal.fact.variable));
         direct.chain(self.derived(condition).flat_map(|(variables, _)| variables.iter().copied())).collect()
     }
 
-    /// Numeric variables that a condition depends on.
+    /// Returns the numeric variables on which a condition depends.
     fn numbers_of(&self, condition: &Condition) -> Vec<usize> {
         let direct = condition.comparisons.iter().flat_map(|linear| &linear.coefficients);
         let direct = direct.map(|(variable, _)| variable.index());
@@ -270,7 +274,8 @@ fn sorted(numbers: &mut Vec<usize>) -> &[usize] {
     numbers
 }
 
-/// Adds clauses that no operator that needs a fact follows one that erases it.
+/// Adds clauses by which no operator that needs a fact follows an operator that erases it. `chain`
+/// has the operators in order, each with two flags: it erases the fact, it needs the fact.
 fn ladder(formula: &mut Formula, chain: &[(Lit, (bool, bool))]) {
     let last = chain.iter().rposition(|(_, (_, needs))| *needs);
     let mut erased = !Formula::truth();

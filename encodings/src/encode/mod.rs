@@ -1,10 +1,11 @@
-//! Encoding of ground tasks: is there a plan of at most `horizon` steps that costs at most `limit`?
+//! Encoding of ground tasks: the formula is satisfiable if there is a plan of at most `horizon`
+//! steps with a cost of at most `limit`.
 //!
-//! An encoding over finite-domain variables with explanatory frame axioms \[1\], with one or
-//! several operators per step. Unused steps are idle and come at the end. The designs of an
-//! operator's slots have variables of their own, separate from the operator's variable, so the
-//! formula grows with the sum of the numbers of designs, not with their product. Each family of
-//! clauses has a file.
+//! The encoding has finite-domain variables and explanatory frame axioms \[1\], with one or several
+//! operators per step. Unused steps are idle and come at the end. The designs of an operator's
+//! slots (its parameters for function designs) have variables separate from the operator's
+//! variable. So the formula grows with the sum of the numbers of designs, not with their product.
+//! Each family of clauses has a file.
 //!
 //! \[1\] H. Kautz, B. Selman: Pushing the envelope: planning, propositional logic and stochastic
 //! search, AAAI 1996.

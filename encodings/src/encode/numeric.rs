@@ -1,10 +1,11 @@
-//! Exact numeric variables in binary arithmetic.
+//! Clauses for exact numeric variables in binary arithmetic.
 //!
-//! At every step an effect `x := Σ f·y + q` of the operator at the step determines the next value,
-//! where q is a constant plus tables of designs. Numbers that no operator changes keep their
-//! values. A condition `Σ f·y + q ≥ 0` requires the sign bit of the sum to be 0 if its operator is
-//! executed. If a condition equals the value that an effect of the same operator assigns (a battery
-//! that must not fall below 0), the sign bit of the next value is used instead.
+//! At every step, an effect `x := Σ f·y + q` of the operator at the step determines the next value.
+//! Here q is a constant plus entries of tables, which are selected by designs. Numbers that no
+//! operator changes keep their values. A condition `Σ f·y + q ≥ 0` requires the sign bit of the sum
+//! to be 0 if its operator is executed. If a condition has the same expression as an effect of the
+//! same operator (a battery that must not fall below 0), the sign bit of the next value is used
+//! instead.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -19,24 +20,25 @@ use crate::encode::designs::combinations;
 use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::sat::Lit;
 
-/// Conjunctions, each with the number that it selects.
+/// Conjunctions of literals, each with the number that is selected if the conjunction is true.
 type Premises = Vec<(Vec<Lit>, Int)>;
 
-/// Coefficients of numeric variables.
+/// Linear combination: numeric variables with their coefficients.
 type Shape = Vec<(NumericId, Int)>;
 
-/// Combinations of a table in the numbering of the task, and its values.
+/// Identity of a table: combinations of (slot, design) in the numbering of the task, and the value
+/// of each.
 type TableKey = (Vec<Vec<(usize, usize)>>, Arc<[Int]>);
 
-/// Range of values of a number.
+/// Interval that contains all possible values of a number.
 #[derive(Debug, Clone, Copy)]
 struct Range {
     low: Int,
     high: Int,
 }
 
-/// Encodes all numeric variables. Returns their values before each step and after the last one, or
-/// `None` if a limit is reached or a number can exceed the available bits.
+/// Encodes all numeric variables. Returns their bits before each step and after the last step.
+/// Returns `None` if a limit is reached or a number can exceed the available bits.
 pub(super) fn numeric(builder: &mut Builder<'_>) -> Option<Vec<Vec<Bits>>> {
     let initial = &builder.task.initial.numbers;
     let mut ranges: Vec<Range> = initial.iter().map(|n| Range { low: *n, high: *n }).collect();
@@ -52,18 +54,19 @@ pub(super) fn numeric(builder: &mut Builder<'_>) -> Option<Vec<Vec<Bits>>> {
     Some(numbers_by_step)
 }
 
-/// The update of numbers at a step.
+/// The update of all numbers at one step.
 struct Transition<'s, 'a> {
     builder: &'s mut Builder<'a>,
     step: usize,
-    /// Numbers before the step.
+    /// Bits of the numbers before the step.
     numbers: &'s [Bits],
-    /// Ranges of the numbers before the step.
+    /// Intervals of the numbers before the step.
     ranges: &'s [Range],
 }
 
 impl Transition<'_, '_> {
-    /// Numbers after the step, and their ranges. Returns `None` if a number can grow too large.
+    /// Returns the bits of the numbers after the step, and their intervals. Returns `None` if a
+    /// number can grow too large.
     fn encode(&mut self) -> Option<(Vec<Bits>, Vec<Range>)> {
         let ranges = self.next_ranges()?;
         let mut next = Vec::with_capacity(self.numbers.len());
@@ -74,7 +77,8 @@ impl Transition<'_, '_> {
         Some((next, ranges))
     }
 
-    /// Ranges after the step. Returns `None` if a number can exceed the available bits.
+    /// Returns the intervals of the numbers after the step, or `None` if a number can exceed the
+    /// available bits.
     fn next_ranges(&self) -> Option<Vec<Range>> {
         let mut next = self.ranges.to_vec();
         for (id, _) in &self.builder.variables.operators[self.step] {
@@ -113,8 +117,9 @@ impl Transition<'_, '_> {
         Some(self.plus_quantities(base, &members, &quantity, active, width))
     }
 
-    /// Part of the next value that depends on present values, selected by the coefficients of the
-    /// effect at the step.
+    /// Returns the part of the next value that depends on present values: the linear combination of
+    /// the effect at the step, or `current` if no operator changes the number. `shapes` groups the
+    /// operators by their linear combinations.
     fn base(&mut self, shapes: &BTreeMap<Shape, Vec<OperatorId>>, current: &Bits) -> Option<Bits> {
         let mut options = Vec::new();
         let mut length = current.len();
@@ -144,8 +149,8 @@ impl Transition<'_, '_> {
         Some(base)
     }
 
-    /// Adds the quantities of the operators: one summand for their constants, and one per set of
-    /// slots for their tables.
+    /// Adds the constants and table entries of the operators `members` to `base`: one summand for
+    /// the constants, and one summand for the tables of each set of slots.
     fn plus_quantities(
         &mut self,
         base: Bits,
@@ -209,7 +214,8 @@ impl Transition<'_, '_> {
         arithmetic.add(&base, &summand, width)
     }
 
-    /// Adds the numeric conditions of the operators at a step.
+    /// Adds clauses for the numeric conditions of the operators at the step. `next` has the bits of
+    /// the numbers after the step.
     #[expect(clippy::arithmetic_side_effects, reason = "widths of numbers of 128 bits")]
     fn comparisons(&mut self, next: &[Bits]) -> Option<()> {
         for index in 0..self.builder.variables.operators[self.step].len() {
@@ -263,7 +269,8 @@ impl Transition<'_, '_> {
     }
 }
 
-/// Linear combination of numbers.
+/// Returns the bits of a linear combination of numbers, or `None` if it can exceed the available
+/// bits.
 #[expect(clippy::arithmetic_side_effects, reason = "widths of numbers of 128 bits")]
 fn weighted(formula: &mut Formula, shape: &Shape, numbers: &[Bits], ranges: &[Range]) -> Option<Bits> {
     let linear = Linear { coefficients: shape.clone(), quantity: Quantity::constant(0) };
@@ -281,7 +288,8 @@ fn weighted(formula: &mut Formula, shape: &Shape, numbers: &[Bits], ranges: &[Ra
     Some(sum.unwrap_or_else(|| Arithmetic::constant(0, 1)))
 }
 
-/// Literal that an expression without designs is at least 0. Returns `None` if numbers overflow.
+/// Returns a literal that is true if a linear expression without tables is at least 0. Returns
+/// `None` if numbers can exceed the available bits.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "widths of numbers of 128 bits; a number has a bit at least"
@@ -295,8 +303,8 @@ pub(super) fn is_at_least_zero(
     let ranges: Vec<Range> = numbers
         .iter()
         .map(|bits| {
-            // A number with this many bits has at most this magnitude, and `next_ranges` admits no
-            // larger ones.
+            // A number with this many bits has at most this absolute value, and `next_ranges`
+            // admits no larger ones.
             let limit: Int = 1 << bits.len().saturating_sub(1).min(126);
             Range { low: -limit, high: limit }
         })
@@ -309,7 +317,7 @@ pub(super) fn is_at_least_zero(
     Some(sum.last().map_or(Formula::truth(), |sign| !*sign))
 }
 
-/// Range of a linear expression. Returns `None` if it exceeds the available bits.
+/// Returns the interval of a linear expression, or `None` if it exceeds the available bits.
 fn linear_range(linear: &Linear<Int>, ranges: &[Range]) -> Option<Range> {
     let (mut low, mut high) = (linear.quantity.minimum(), linear.quantity.maximum());
     for (variable, factor) in &linear.coefficients {

@@ -11,8 +11,8 @@ use crate::encode::builder::Builder;
 use crate::encode::conditional::FiredEffects;
 use crate::encode::formula::{Family, Formula, VariableMeaning};
 
-/// Adds the sequence clauses: at most one operator per step if `is_alone`, and none after an idle
-/// step.
+/// Adds the sequence clauses of a step: no operator after an idle step and, if `is_alone`, at most
+/// one operator.
 pub(super) fn sequence(builder: &mut Builder<'_>, step: usize, is_alone: bool) {
     let literals: Vec<_> = builder.variables.operators[step].iter().map(|(_, literal)| *literal).collect();
     let busy = match literals[..] {
@@ -36,7 +36,8 @@ pub(super) fn sequence(builder: &mut Builder<'_>, step: usize, is_alone: bool) {
     builder.variables.busy.push(busy);
 }
 
-/// Adds the conditions of operators, except those on numbers and designs.
+/// Adds clauses for the conditions of the operators at a step, except conditions on numbers and
+/// designs.
 pub(super) fn conditions(builder: &mut Builder<'_>, step: usize) {
     for index in 0..builder.variables.operators[step].len() {
         let (id, literal) = builder.variables.operators[step][index];
@@ -52,7 +53,8 @@ pub(super) fn conditions(builder: &mut Builder<'_>, step: usize) {
     }
 }
 
-/// Adds the effects of operators, except those on numbers.
+/// Adds clauses for the effects of the operators at a step, except effects on numbers. `fires`
+/// contains the conditional effects, which prevail over unconditional ones.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "steps are fewer than the horizon, whose formula is in memory"

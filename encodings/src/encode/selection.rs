@@ -1,9 +1,9 @@
-//! Selection of function designs, factored.
+//! Clauses for the selection of function designs, factored by slots.
 //!
-//! With `g@t` for the operators that admit the same designs D of a slot:
-//! `g@t → ⋁_{d ∈ D} slot=d@t`, at most one design of a slot, and `slot=d@t → ⋁ {g@t : d ∈ D}`, so
-//! an unused slot stays empty. Unsuitable combinations are forbidden one by one:
-//! `¬g@t ∨ ¬slot=d@t ∨ ¬slot'=d'@t`.
+//! Let `g@t` be the group of the operators that admit the same designs D of a slot. Then `g@t →
+//! ⋁_{d ∈ D} slot=d@t`, at most one design of a slot is true, and `slot=d@t → ⋁ {g@t : d ∈ D}`, so
+//! an unused slot has no design. Forbidden combinations are excluded one by one: `¬g@t ∨ ¬slot=d@t
+//! ∨ ¬slot'=d'@t`.
 
 use task::limits::Interrupted;
 
@@ -12,7 +12,8 @@ use crate::encode::designs::task_slot;
 use crate::encode::formula::{Family, Formula};
 use crate::sat::Lit;
 
-/// Adds clauses that give each function in use exactly one suitable design.
+/// Adds clauses by which each slot that an operator uses at the step has exactly one admitted
+/// design.
 pub(super) fn selection(builder: &mut Builder<'_>, step: usize) -> Result<(), Interrupted> {
     for slot in 0..builder.task.slots.len() {
         let uses = builder.partition(step, |operator| {

@@ -1,4 +1,4 @@
-//! State variables: their domains at every step, and the frame axioms.
+//! Clauses for state variables: their domains at every step, and the frame axioms.
 //!
 //! - domain: `⋁_d v=d@t`, and at most one of them;
 //! - frame (explanatory, after Haas \[1\]): `v=d@t+1 → v=d@t ∨ ⋁ {o@t : o sets v to d}`. With the domain
@@ -14,7 +14,7 @@ use crate::encode::conditional::FiredEffects;
 use crate::encode::formula::{Family, Formula};
 use crate::sat::Lit;
 
-/// Adds clauses that give every variable exactly one value before the step.
+/// Adds clauses by which every state variable has exactly one value before the step.
 pub(super) fn domain(builder: &mut Builder<'_>, step: usize) {
     for variable in 0..builder.task.variables.len() {
         let falsum = !Formula::truth();
@@ -27,8 +27,8 @@ pub(super) fn domain(builder: &mut Builder<'_>, step: usize) {
     }
 }
 
-/// Adds frame axioms: a value that holds after the step held before it, or an operator at the step
-/// sets it.
+/// Adds the frame axioms of a step: a value that holds after the step held before the step, or an
+/// operator at the step sets it.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "steps are fewer than the horizon, whose formula is in memory"

@@ -1,15 +1,16 @@
-//! Symmetry breaking for interchangeable designs and objects: one representative of symmetric plans
-//! is enough.
+//! Symmetry breaking for interchangeable designs and objects: of symmetric plans, at least one
+//! stays admitted.
 //!
-//! - designs: of interchangeable designs of a slot, only the first is used: `¬slot=d@t`. Designs
-//!   are chosen independently at every step, so each step is symmetric on its own;
+//! - designs: of interchangeable designs of a slot, only the first is used: `¬slot=d@t` for all
+//!   others. Designs are chosen independently at every step, so each step has its own symmetry;
 //! - objects: objects x₁ < x₂ < …, any two of which can be exchanged without changing the task
 //!   \[1\], are first used in this order: `o@t → s_i@t` for each operator o with x_{i+1} but not
 //!   `x_i` among its arguments. Here `s_i@t → s_i@t−1 ∨ u_i@t` states that `x_i` has been used, and
 //!   `u_i@t ↔ ⋁ o@t` that it is used now. Renaming the objects of a plan in the order of their
 //!   first use yields a plan that satisfies this at the same cost.
 //!
-//! Objects with different numeric variables, and tasks with derived variables, are not reduced.
+//! Objects are not considered interchangeable if they have different numeric variables, or if the
+//! task has derived variables.
 //!
 //! \[1\] J. Rintanen: Symmetry reduction for SAT representations of transition systems, ICAPS 2003.
 
@@ -24,12 +25,12 @@ use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::encode::interchangeable_designs::equal_designs;
 use crate::sat::Lit;
 
-/// Symmetries of a task: interchangeable designs and objects.
+/// Interchangeable designs and objects of a task.
 pub struct Symmetry {
-    /// Designs that are interchangeable with an earlier design of the slot.
+    /// Designs that are interchangeable with an earlier design of the same slot.
     designs: Vec<(SlotId, u32)>,
-    /// Per pair of interchangeable objects: operators that use the first, and operators that use
-    /// only the second.
+    /// For each pair of neighbouring interchangeable objects: operators that use the first, and
+    /// operators that use only the second.
     objects: Pairs,
 }
 
@@ -43,7 +44,7 @@ impl Symmetry {
         Ok(Self { designs, objects: equal_objects(context)? })
     }
 
-    /// Adds the symmetry-breaking clauses.
+    /// Adds the symmetry-breaking clauses for all steps.
     pub(super) fn add(&self, builder: &mut Builder<'_>) -> Result<(), Interrupted> {
         let horizon = builder.variables.horizon();
         for step in 0..horizon {
@@ -72,10 +73,11 @@ impl Symmetry {
     }
 }
 
-/// For each pair of objects two lists of operators.
+/// For each pair of objects: operators that use the first, and operators that use only the second.
 type Pairs = Vec<(Vec<OperatorId>, Vec<OperatorId>)>;
 
-/// Neighbouring objects in classes of interchangeable objects.
+/// Returns the pairs of neighbouring objects in each class of interchangeable objects, as lists of
+/// operators that use them.
 fn equal_objects(context: Context<'_>) -> Result<Pairs, Interrupted> {
     let task = context.task;
     let pairs = symmetry_generators(context, true)?.into_iter().map(
@@ -89,7 +91,7 @@ fn equal_objects(context: Context<'_>) -> Result<Pairs, Interrupted> {
     Ok(pairs.collect())
 }
 
-/// Operators with an object among their arguments, ascending.
+/// Returns the operators with an object among their arguments, ascending.
 fn uses_of(task: &Task, object: ObjectId) -> Vec<OperatorId> {
     let operators = task.operators.iter().zip(OperatorId::all(task.operators.len()));
     let users = operators.filter(|(operator, _)| operator.arguments.contains(&Argument::Object(object)));

@@ -1,4 +1,4 @@
-//! Snapshots of the clauses of a small task: symbolic and sorted, by family.
+//! Snapshot tests for the clauses of a small task: symbolic and sorted, by family.
 
 use std::cell::OnceCell;
 use std::fmt::Write as _;
@@ -113,8 +113,8 @@ fn check(family: Family) -> String {
     clauses(&task, &encoding.formula, family)
 }
 
-/// Two interchangeable lamps that need power, and a switch that cuts it. The switch is declared
-/// between two actions that need power.
+/// Task with two interchangeable lamps that need power, and a switch that cuts the power. The
+/// action of the switch is declared between two actions that need power.
 const LAMPS: (&str, &str) = (
     "(define (domain d)
       (:predicates (on ?x) (red ?x) (power))
@@ -196,7 +196,7 @@ fn goal() {
     assert_snapshot!(check(Family::Goal));
 }
 
-/// Clauses that a family writes on its own for both steps of the task.
+/// Returns the clauses that `write` adds for both steps of the task, without the other families.
 fn alone(family: Family, write: impl Fn(&mut Builder<'_>, usize)) -> String {
     let (task, limits) = (task(), Limits::none());
     let allowed = vec![vec![true; task.operators.len()]; 2];

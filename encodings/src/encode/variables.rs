@@ -1,6 +1,6 @@
-//! Variables of a formula by step: operators, values of state variables, and designs.
+//! Variables of a formula for each step: operators, values of state variables, and designs.
 //!
-//! A value that is unreachable by a step gets no variable there.
+//! A value that is unreachable at a step has no variable at this step.
 
 use task::context::Context;
 use task::limits::Interrupted;
@@ -10,21 +10,24 @@ use task::task::{Fact, Literal, OperatorId, Task};
 use crate::encode::formula::{Formula, VariableMeaning};
 use crate::sat::Lit;
 
-/// The variables for operators, values and designs.
+/// SAT variables for operators, values of state variables, and designs, by step.
 #[derive(Default)]
 pub(super) struct Variables {
-    /// Per step: possible operators, ascending, with their variables.
+    /// For each step: the possible operators in ascending order, each with its variable.
     pub(super) operators: Vec<Vec<(OperatorId, Lit)>>,
-    /// Per step: whether any operator is executed.
+    /// For each step: literal that is true if any operator is executed.
     pub(super) busy: Vec<Lit>,
-    /// `values[step][variable][value]`: the variable has the value before the step.
+    /// `values[step][variable][value]`: literal that is true if the state variable has the value
+    /// before the step.
     pub(super) values: Vec<Vec<Vec<Lit>>>,
-    /// `designs[step][slot][design]`.
+    /// `designs[step][slot][design]`: literal that is true if the slot is filled with the design at
+    /// the step.
     pub(super) designs: Vec<Vec<Vec<Lit>>>,
 }
 
 impl Variables {
-    /// Creates the variables for operators, values and designs.
+    /// Creates the variables. `allowed[step][operator]` is `true` if the operator may occur at the
+    /// step.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "steps are fewer than the horizon, whose formula is in memory"
@@ -41,7 +44,8 @@ impl Variables {
         for (variable, value) in task.initial.values.iter().enumerate() {
             possible[variable][*value as usize] = true;
         }
-        // Values of derived variables are determined by the other variables at every step.
+        // All values of derived variables are possible, because the other variables determine them
+        // at every step.
         for values in &mut possible[task.basic..] {
             values[1] = true;
         }
@@ -73,30 +77,31 @@ impl Variables {
         Ok(declared)
     }
 
-    /// Number of steps.
+    /// Returns the number of steps.
     pub(super) fn horizon(&self) -> usize {
         self.operators.len()
     }
 
-    /// Variable of a fact before a step.
+    /// Returns the literal of a fact before a step.
     pub(super) fn fact(&self, fact: Fact, step: usize) -> Lit {
         self.values[step][fact.variable.index()][fact.value as usize]
     }
 
-    /// Variable of a fact before a step, or its negation.
+    /// Returns the SAT literal of a literal of the task before a step.
     pub(super) fn literal(&self, literal: Literal, step: usize) -> Lit {
         let fact = self.fact(literal.fact, step);
         if literal.positive { fact } else { !fact }
     }
 
-    /// Variable of an operator at a step, if the operator is possible there.
+    /// Returns the literal of an operator at a step, or `None` if the operator is impossible there.
     pub(super) fn operator(&self, step: usize, id: OperatorId) -> Option<Lit> {
         let candidates = &self.operators[step];
         candidates.binary_search_by_key(&id, |(id, _)| *id).ok().map(|index| candidates[index].1)
     }
 }
 
-/// Creates the variables of values before a step.
+/// Creates the variables for the values of state variables before a step. Impossible values are the
+/// constant false.
 fn values(formula: &mut Formula, possible: &[Vec<bool>], step: usize) -> Vec<Vec<Lit>> {
     let mut literals_by_variable = Vec::with_capacity(possible.len());
     for (variable, values) in possible.iter().enumerate() {
@@ -118,7 +123,8 @@ fn values(formula: &mut Formula, possible: &[Vec<bool>], step: usize) -> Vec<Vec
     literals_by_variable
 }
 
-/// Creates the variables of designs that operators may use at a step.
+/// Creates the variables for the designs that operators may use at a step. Other designs are the
+/// constant false.
 fn designs(task: &Task, formula: &mut Formula, present: &[(OperatorId, Lit)], step: usize) -> Vec<Vec<Lit>> {
     let mut used: Vec<Vec<bool>> = task.slots.iter().map(|slot| vec![false; slot.designs.len()]).collect();
     for slot in present.iter().flat_map(|(id, _)| task.operators[id.index()].slots.iter()) {

@@ -11,7 +11,7 @@ use task::limits::Limits;
 
 use crate::sat::solver::{Answer, Lit, Solver};
 
-/// Number of decisions between two polls of the time limit.
+/// Number of decisions of the solver between two checks of the limits.
 const CLOCK_INTERVAL: u32 = 64;
 
 /// A `BatSat` solver.
@@ -21,7 +21,7 @@ pub(super) struct Batsat {
     core: Vec<Lit>,
 }
 
-/// Counts conflicts and stops the solver at a limit.
+/// Solver callbacks: count conflicts, and stop the solver at a limit or beyond the conflict budget.
 struct Watch {
     limits: Limits,
     budget: u64,
@@ -48,7 +48,7 @@ impl Callbacks for Watch {
 }
 
 impl Batsat {
-    /// Creates a solver that stops at a limit or after `budget` learnt clauses.
+    /// Creates a solver that stops at a limit or after more than `budget` conflicts.
     pub(super) fn new(limits: &Limits, budget: u64) -> Self {
         let watch = Watch {
             limits: limits.clone(),
@@ -61,7 +61,7 @@ impl Batsat {
         Self { solver, buffer: Vec::new(), core: Vec::new() }
     }
 
-    /// Translates literals into the buffer.
+    /// Translates literals to `BatSat`'s type and stores them in `buffer`.
     fn translate(&mut self, literals: &[Lit]) {
         self.buffer.clear();
         for literal in literals {
@@ -85,7 +85,7 @@ impl Solver for Batsat {
         if answer == lbool::TRUE {
             Answer::Satisfiable
         } else if answer == lbool::FALSE {
-            // The core is a clause over the negated assumptions.
+            // The reported core is a clause of negated assumptions.
             let core = self.solver.unsat_core().iter();
             self.core.extend(core.map(|literal| Lit::new(literal.var().idx(), !literal.sign())));
             Answer::Unsatisfiable

@@ -9,14 +9,14 @@ use crate::sat::solver::{Answer, Lit, Solver};
 /// A `CaDiCaL` solver.
 pub(super) struct Cadical {
     solver: cadical::Solver<Watch>,
-    /// Values of the assigned variables.
+    /// Values of all variables in the last satisfying assignment.
     assignment: Vec<bool>,
     variables: u32,
     conflicts: u64,
     core: Vec<Lit>,
 }
 
-/// Counts conflicts and stops the solver at a limit.
+/// Solver callbacks: count conflicts, and stop the solver at a limit or beyond the conflict budget.
 struct Watch {
     limits: Limits,
     budget: u64,
@@ -38,7 +38,7 @@ impl cadical::Callbacks for Watch {
 }
 
 impl Cadical {
-    /// Creates a solver that stops at a limit or after `budget` learnt clauses.
+    /// Creates a solver that stops at a limit or after more than `budget` conflicts.
     pub(super) fn new(limits: &Limits, budget: u64) -> Self {
         let mut solver = cadical::Solver::new();
         solver.set_callbacks(Some(Watch { limits: limits.clone(), budget, conflicts: 0 }));

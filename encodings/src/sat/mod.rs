@@ -1,8 +1,8 @@
 //! SAT solvers behind one trait.
 //!
-//! Each solver has a file, and only that file names its crate. Solvers are incremental: they accept
-//! further clauses after each answer, keep learnt clauses, decide under assumptions, and report
-//! which assumptions fail together.
+//! Each solver has its own file, and only this file names the solver's crate. Solvers are
+//! incremental: they accept further clauses after each answer, keep learnt clauses, solve under
+//! assumptions, and report a core, i.e. assumptions that together are inconsistent.
 
 mod batsat;
 #[cfg(feature = "cadical")]
@@ -35,18 +35,18 @@ pub enum Backend {
     /// An external program with its arguments. It receives the formula in DIMACS on standard input,
     /// and answers on standard output in the format of the SAT competitions or of `MiniSat`.
     Program {
-        /// Path, or name that is looked up as by a shell.
+        /// Path of the program, or a name that is searched in `PATH`.
         command: String,
-        /// Arguments, passed unchanged.
+        /// Arguments of the program, passed unchanged.
         arguments: Vec<String>,
     },
 }
 
-/// Error in the solver that a user names.
+/// Error in a solver that the user has chosen by name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BackendError {
-    /// The name is blank.
+    /// The given name of the solver is blank.
     #[error("a solver needs a name; built in are: {}", Backend::BUILT_IN.join(", "))]
     Empty,
     /// The program does not behave like a SAT solver.
@@ -54,13 +54,13 @@ pub enum BackendError {
     Unusable {
         /// The program as named by the user.
         command: String,
-        /// Description of the failure.
+        /// Description of the fault.
         reason: String,
     },
 }
 
 impl Backend {
-    /// Solvers that need no external program.
+    /// Returns the solvers that need no external program.
     pub fn built_in() -> impl Iterator<Item = Self> {
         Self::BUILT_IN.iter().filter_map(|name| name.parse().ok())
     }
@@ -73,7 +73,7 @@ impl Backend {
         "cadical",
     ];
 
-    /// Starts a solver that stops at a limit or after `budget` learnt clauses.
+    /// Starts a solver that stops at a limit or after `budget` conflicts.
     pub fn start(&self, limits: &Limits, budget: u64) -> Box<dyn Solver> {
         match self {
             Self::Varisat => Box::new(varisat::Varisat::new(limits, budget)),
@@ -86,18 +86,19 @@ impl Backend {
         }
     }
 
-    /// Checks that the solver is available and decides two formulas with one variable correctly.
+    /// Checks that the solver is available and answers correctly for two formulas with one
+    /// variable. Built-in solvers are not checked.
     ///
     /// # Errors
     ///
-    /// Fails if the program cannot be started or answers wrongly.
+    /// The program cannot be started or answers wrongly.
     pub fn check(&self) -> Result<(), BackendError> {
         let Self::Program { command, .. } = self else { return Ok(()) };
         let variable = Lit::TRUE;
         for (clauses, expected) in
             [(&[variable][..], Answer::Satisfiable), (&[variable, !variable][..], Answer::Unsatisfiable)]
         {
-            // A budget of 0 gives external programs a short time limit.
+            // A budget of 0 limits external programs to a short time.
             let mut solver = self.start(&Limits::none(), 0);
             for literal in clauses {
                 solver.add_clause(&[*literal]);
@@ -116,7 +117,8 @@ impl Backend {
     }
 }
 
-/// Parses the name of a built-in solver, or a program with arguments after blanks.
+/// Parses the name of a built-in solver, or an external program followed by arguments that are
+/// separated by blanks.
 impl FromStr for Backend {
     type Err = BackendError;
 

@@ -1,10 +1,11 @@
-//! External solver programs: DIMACS \[1\] on standard input, the answer on standard output.
+//! External SAT solver programs: DIMACS \[1\] on standard input, the answer on standard output.
 //!
-//! Two answer formats are read: that of the SAT competitions (`s SATISFIABLE`, and the assignment
-//! in lines `v …`), and that of `MiniSat`'s result file (`SAT`, and the assignment on the next
-//! line). The process is killed when a limit is reached. Programs have no portable option for a
-//! conflict budget, so a time limit replaces it. Each call starts a new process that receives the
-//! assumptions as clauses; learnt clauses are lost, and all assumptions count as failed.
+//! Two answer formats are accepted: that of the SAT competitions (`s SATISFIABLE`, and the
+//! assignment in lines `v …`), and that of `MiniSat`'s result file (`SAT`, and the assignment on
+//! the next line). The process is killed when a limit is reached. Programs have no portable option
+//! for a conflict budget, so a time limit replaces the budget. Each call starts a new process that
+//! receives the assumptions as clauses. So learnt clauses are lost, and the core always contains
+//! all assumptions.
 //!
 //! \[1\] DIMACS challenge: Satisfiability, suggested format, 1993.
 
@@ -19,17 +20,17 @@ use task::limits::Limits;
 
 use crate::sat::solver::{Answer, Lit, Solver};
 
-/// Time limit that replaces a conflict budget.
+/// Time limit of a run that replaces a conflict budget.
 const BUDGET_TIME: Duration = Duration::from_secs(2);
-/// Polling interval of the limits while the program runs.
+/// Time between two checks of the limits while the program runs.
 const INTERVAL: Duration = Duration::from_millis(5);
 
-/// A formula for a program, and its last answer.
+/// Formula for an external solver program, and the program's last answer.
 pub(super) struct Program {
     command: Command,
     limits: Limits,
     budget: u64,
-    /// DIMACS literals; each clause ends with 0.
+    /// DIMACS literals of all clauses; each clause ends with 0.
     clauses: Vec<i32>,
     variables: u32,
     assignment: Vec<bool>,
@@ -38,8 +39,8 @@ pub(super) struct Program {
 }
 
 impl Program {
-    /// Prepares a program. A run ends at a limit, or after [`BUDGET_TIME`] if there is a conflict
-    /// budget.
+    /// Prepares a solver without clauses. Each run of the program ends at a limit, or after
+    /// [`BUDGET_TIME`] unless `budget` is `u64::MAX`.
     pub(super) fn new(command: &str, arguments: &[String], limits: &Limits, budget: u64) -> Self {
         let mut process = Command::new(command);
         process.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null());
@@ -66,7 +67,8 @@ impl Program {
         text
     }
 
-    /// Stores the assignment if it satisfies every clause.
+    /// Stores the assignment that makes these DIMACS literals true. Returns an error if the
+    /// assignment does not satisfy every clause.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "literals are not 0, and each clause has its 0 with it"
@@ -88,7 +90,8 @@ impl Program {
         }
     }
 
-    /// Runs the program once and checks its answer.
+    /// Runs the program once on all clauses, and checks its answer. A fault of the program is
+    /// stored, and counts as an interruption.
     fn decide(&mut self) -> Answer {
         let read = match self.run() {
             Ok(None) => return Answer::Interrupted,
@@ -107,7 +110,8 @@ impl Program {
         }
     }
 
-    /// Output of the program. Returns `None` if a limit was reached and it was killed.
+    /// Runs the program and returns its output. Returns `None` if a limit was reached and the
+    /// program was killed.
     fn run(&mut self) -> Result<Option<String>, String> {
         let started = Instant::now();
         let mut child = Process(self.command.spawn().map_err(|error| format!("cannot be started: {error}"))?);
@@ -122,8 +126,8 @@ impl Program {
         }
         if let Some(mut input) = child.0.stdin.take() {
             let text = self.dimacs();
-            // A program that has read enough may close its input; its answer is checked in any
-            // case.
+            // A program that has read enough may close its input, so write errors are ignored; the
+            // answer is checked in any case.
             thread::spawn(move || input.write_all(text.as_bytes()));
         }
         loop {
@@ -146,8 +150,9 @@ impl Program {
     }
 }
 
-/// Waits for a program that has closed its output. Returns `false` if a limit is reached first. A
-/// solver exits with 10, 20 or 0; after any other status the output may be incomplete.
+/// Waits for the end of a program that has closed its output. Returns `false` if a limit is reached
+/// first. A SAT solver exits with status 10, 20 or 0; after any other status the output may be
+/// incomplete, so the result is an error.
 fn has_ended(child: &mut Child, is_over: &dyn Fn() -> bool) -> Result<bool, String> {
     while !is_over() {
         match child.try_wait().map_err(|error| format!("how it ended is not known: {error}"))? {
@@ -170,7 +175,7 @@ impl Drop for Process {
     }
 }
 
-/// Parses the output of a program: answer, and literals of the assignment.
+/// Parses the output of a program. Returns the answer, and the literals of the assignment.
 fn read(output: &str) -> Result<(Answer, Vec<i32>), String> {
     let mut answer = None;
     let mut literals = Vec::new();

@@ -1,11 +1,11 @@
-//! Common part of all solvers: literals, answers, and the trait.
+//! Literals, answers, and the trait that all SAT solvers implement.
 
-/// A literal: a variable, counted from 0, or its negation.
+/// A literal: a variable or its negation. Variables are numbered from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Lit(u32);
 
 impl Lit {
-    /// The first variable, which formulas fix to true.
+    /// The positive literal of variable 0, which every formula fixes to true.
     pub(crate) const TRUE: Self = Self(0);
 
     pub(crate) fn positive(variable: u32) -> Self {
@@ -20,7 +20,8 @@ impl Lit {
         self.0 >> 1
     }
 
-    /// Dense index of the literal, from 0.
+    /// Returns a dense index of the literal, from 0. The two literals of a variable have adjacent
+    /// indices.
     pub(crate) fn index(self) -> usize {
         self.0 as usize
     }
@@ -29,10 +30,10 @@ impl Lit {
         self.0 & 1 == 0
     }
 
-    /// DIMACS literal: variables count from 1, negation is the sign.
+    /// Converts to a DIMACS literal: variables are numbered from 1, and negation is the sign.
     ///
     /// # Panics
-    /// From 2^31 variables.
+    /// The variable has a number of 2^31 − 1 or more.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "fewer than 2^31 - 1 variables are held in memory with their clauses"
@@ -62,19 +63,22 @@ pub enum Answer {
 
 /// An incremental SAT solver.
 pub trait Solver {
-    /// Adds a clause; its variables need no declaration.
+    /// Adds a clause. Variables need no declaration.
     fn add_clause(&mut self, clause: &[Lit]);
-    /// Decides all added clauses together with the assumptions, which hold for this call only.
+    /// Decides whether all added clauses are satisfiable together with the assumptions. The
+    /// assumptions apply to this call only.
     fn solve(&mut self, assumptions: &[Lit]) -> Answer;
-    /// Failed assumptions of the last call, if its answer was `Unsatisfiable`: a subset of the
-    /// assumptions that is inconsistent with the clauses, unordered and not necessarily minimal.
-    /// Empty if the clauses alone are unsatisfiable.
+    /// Returns the failed assumptions of the last call, if its answer was `Unsatisfiable`. They are
+    /// a subset of the assumptions that is inconsistent with the clauses, unordered and not
+    /// necessarily minimal. The subset is empty if the clauses alone are unsatisfiable.
     fn core(&self) -> &[Lit];
-    /// Value of a variable in the last assignment.
+    /// Returns the value of a variable in the last satisfying assignment.
     fn value(&self, variable: u32) -> bool;
-    /// Number of learnt clauses, one per conflict; 0 if the solver does not report it.
+    /// Returns the number of learnt clauses over all calls, one per conflict; 0 if the solver does
+    /// not report them.
     fn conflicts(&self) -> u64;
-    /// Reason of an interruption that was not caused by a limit.
+    /// Returns the reason for an interruption that was not caused by a limit, e.g. a crash of the
+    /// program.
     fn failure(&self) -> Option<&str> {
         None
     }

@@ -1,4 +1,5 @@
-//! Totalizer \[1\] of `RustSAT`: counts true literals, and is extended incrementally \[2\].
+//! Cardinality constraints by the totalizer \[1\] of `RustSAT`, which is extended incrementally
+//! \[2\].
 //!
 //! \[1\] O. Bailleux, Y. Boufkhad: Efficient CNF encoding of Boolean cardinality constraints, CP 2003.
 //! \[2\] R. Martins, S. Joshi, V. Manquinho, I. Lynce: Incremental cardinality constraints for
@@ -10,7 +11,7 @@ use rustsat::types::{Lit as TreeLit, Var};
 
 use crate::sat::solver::Lit;
 
-/// Counts true literals.
+/// Totalizer: defines literals that compare the number of true input literals with constants.
 pub struct Totalizer {
     tree: Tree,
     literals: usize,
@@ -22,9 +23,9 @@ impl Totalizer {
         Self { tree: inputs.collect(), literals: literals.len() }
     }
 
-    /// Literal that is implied if more than `count` of the counted literals are true. Returns
-    /// `None` if there are not that many literals. New variables are taken from `variables` on;
-    /// their defining clauses are passed to `add`.
+    /// Returns a literal that is implied if more than `count` of the input literals are true.
+    /// Returns `None` if there are at most `count` input literals. New variables are numbered from
+    /// `variables` on, which is increased; their defining clauses are passed to `add`.
     pub fn more_than(
         &mut self,
         count: usize,
@@ -36,7 +37,8 @@ impl Totalizer {
         }
         let mut manager = BasicVarManager::from_next_free(Var::new(*variables));
         let mut clauses = Cnf::new();
-        // Memory is bounded by the clause limit of the formula instead.
+        // The clause limit of the formula bounds the memory, so the totalizer's own limit is not
+        // used.
         self.tree.encode_ub_change(count..=count, &mut clauses, &mut manager).ok()?;
         *variables = manager.n_used();
         let translate = |literal: &TreeLit| Lit::new(literal.vidx32(), literal.is_pos());

@@ -1,14 +1,14 @@
 //! Varisat \[1\] back end.
 //!
-//! Varisat cannot be interrupted directly. But it streams its proof, and stops at once if the
-//! stream reports an error. So the proof goes to a sink that counts learnt clauses and fails at a
-//! limit. The proof is in Varisat's own format, because DRAT does not support assumptions and later
-//! clauses.
+//! Varisat has no function for interrupting it. But it streams its proof, and stops if writing the
+//! proof fails. So the proof goes to a sink that counts learnt clauses and fails at a limit. The
+//! sink requests Varisat's own proof format, because DRAT supports neither assumptions nor clauses
+//! that are added later.
 //!
-//! Answers under assumptions are correct. But after the first failure under assumptions, stale
-//! marks inside the solver may put wrong assumptions into the core. So later cores are confirmed by
-//! one more call. If that call finds an assignment, a new solver with the same clauses computes the
-//! core.
+//! Answers under assumptions are correct. But after the first call that failed under assumptions,
+//! stale marks inside the solver may put wrong assumptions into a core. So each later core is
+//! confirmed by one more call. If this call finds an assignment, a new solver with the same clauses
+//! computes the core.
 //!
 //! \[1\] J. Harder: Varisat, <https://jix.github.io/varisat/>.
 
@@ -25,22 +25,24 @@ use crate::sat::solver::{Answer, Lit, Solver};
 /// A Varisat solver.
 pub(super) struct Varisat {
     solver: varisat::Solver<'static>,
-    /// Whether an earlier call failed under assumptions.
+    /// `true` if an earlier call was unsatisfiable because of assumptions; later cores need
+    /// confirmation.
     failed: bool,
-    /// Whether a limit was reached. Varisat panics if it is called again after that.
+    /// `true` if a limit was reached. Varisat must not be called again then, since it would panic.
     interrupted: bool,
     limits: Limits,
     budget: u64,
     conflicts: Rc<Cell<u64>>,
-    /// All clauses, one after another, and the end of each.
+    /// Literals of all clauses, one clause after another.
     literals: Vec<varisat::Lit>,
+    /// End of each clause in `literals`.
     ends: Vec<usize>,
     assignment: Vec<bool>,
     core: Vec<Lit>,
 }
 
 impl Varisat {
-    /// Creates a solver that stops at a limit or after `budget` learnt clauses.
+    /// Creates a solver that stops at a limit or after more than `budget` conflicts.
     pub(super) fn new(limits: &Limits, budget: u64) -> Self {
         let conflicts = Rc::new(Cell::new(0));
         Self {
@@ -57,7 +59,8 @@ impl Varisat {
         }
     }
 
-    /// Decides the clauses under assumptions in a single call.
+    /// Decides the clauses under assumptions by a single call of Varisat, without confirming the
+    /// core.
     #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     fn ask(&mut self, assumptions: &[Lit]) -> Answer {
         if self.interrupted {
@@ -92,7 +95,7 @@ impl Varisat {
         }
     }
 
-    /// Replaces the solver by a new one with the same clauses.
+    /// Replaces the solver by a new one that contains the same clauses.
     fn renew(&mut self) {
         self.solver = start(&self.limits, self.budget, &self.conflicts);
         let mut begin = 0;
@@ -116,8 +119,9 @@ fn translate(literal: Lit) -> varisat::Lit {
     varisat::Lit::from_index(literal.variable() as usize, literal.is_positive())
 }
 
-/// Searches for a DRAT refutation of DIMACS clauses, which is written to `proof`. Also stops if a
-/// model is found.
+/// Decides DIMACS clauses with Varisat, and writes a DRAT proof to `proof`. The proof is a
+/// refutation if the answer is `Unsatisfiable`. Stops at a limit or after more than `budget` added
+/// clauses.
 pub fn refute_with_proof(
     clauses: impl Iterator<Item = impl Iterator<Item = i32>>,
     proof: Box<dyn io::Write>,
@@ -181,22 +185,25 @@ impl Solver for Varisat {
     }
 }
 
-/// Position within a step of Varisat's proof format, which consists of numbers.
+/// Position within a step of Varisat's proof format, in which all data are numbers.
 #[derive(Clone, Copy)]
 enum Part {
-    /// Code of the step.
+    /// The code of a step is next.
     Code,
-    /// Length of a list of items of `each` numbers, and whether another list follows.
+    /// The length of a list is next. Its items have `each` numbers; `and_list` is `true` if another
+    /// list follows.
     Length { each: u64, and_list: bool },
-    /// Number of numbers left in a list, and whether another list follows.
+    /// The numbers of a list are next: `left` of them remain. `and_list` is `true` if another list
+    /// follows.
     Numbers { left: u64, and_list: bool },
 }
 
-/// Streaming parser of Varisat's proof format that detects learnt clauses.
+/// Streaming parser of Varisat's proof format that recognises learnt clauses.
 struct Steps {
     part: Part,
-    /// Partially read number, and number of its bytes already read.
+    /// Partially read number.
     number: u128,
+    /// Number of bytes of `number` that were read.
     bytes: u32,
 }
 
@@ -207,7 +214,8 @@ impl Default for Steps {
 }
 
 impl Steps {
-    /// Reads one byte. Returns `true` if it completes the code of a learnt clause.
+    /// Reads one byte of the proof. Returns `true` if the byte completes the code of a learnt
+    /// clause.
     fn byte(&mut self, byte: u8) -> bool {
         let place = self.bytes.saturating_mul(8);
         self.number |= u128::from(byte).checked_shl(place).unwrap_or(0);
@@ -246,7 +254,7 @@ impl Steps {
     }
 }
 
-/// Proof sink that counts learnt clauses and fails at a limit or beyond the budget.
+/// Proof sink that counts learnt clauses, and fails at a limit or beyond the conflict budget.
 struct BudgetSink {
     limits: Limits,
     budget: u64,
@@ -269,8 +277,8 @@ impl io::Write for BudgetSink {
     }
 }
 
-/// Proof sink that forwards a DRAT proof, counts added clauses, and fails at a limit or beyond the
-/// budget.
+/// Proof sink that forwards a DRAT proof and counts added clauses. It fails at a limit or beyond
+/// the budget.
 struct DratSink {
     limits: Limits,
     budget: u64,

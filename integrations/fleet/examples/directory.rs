@@ -1,5 +1,5 @@
-//! Two robots in a directory, without a server: both enrol, one loses its Kinect, and both receive
-//! their decisions in order.
+//! Example: two robots in a directory, without a server. Both enrol, one loses its Kinect sensor,
+//! and both receive their decisions in order.
 
 #![expect(clippy::print_stdout, reason = "an example prints")]
 

@@ -2,12 +2,13 @@
 //! stateless workers.
 //!
 //! Robots append events to the subject `ev.PARTITION.ROBOT`, and receive decisions on
-//! `dec.PARTITION.ROBOT`. Both are persistent streams, and the stream of events is the journal. A
-//! worker leases partitions and runs the [loops](metaplan::mapek::Loop) of their robots. Every
-//! event leads to exactly one decision, which is appended only if the robot's previous decision is
-//! still the last one (compare-and-set on the last sequence of the subject). A worker that still
-//! relies on an expired lease therefore cannot decide an event twice: leases are for efficiency,
-//! and the chain of decisions guarantees correctness.
+//! `dec.PARTITION.ROBOT`. A partition is a fixed group of robots. Both streams are persistent, and
+//! the stream of events is the journal. A worker leases partitions and runs the
+//! [loops](metaplan::mapek::Loop) of their robots. Every event leads to exactly one decision. A
+//! decision is appended only if the robot's previous decision is still the last one
+//! (compare-and-set on the last sequence of the subject). So a worker that still relies on an
+//! expired lease cannot decide an event twice: leases are for efficiency, and the chain of
+//! decisions guarantees correctness.
 //!
 //! ```
 //! use std::{path::Path, sync::Arc, time::Duration};
@@ -46,9 +47,8 @@
 //! # }
 //! ```
 //!
-//! - [`store`]: the required interface of a log, implemented by NATS JetStream and by a local
-//!   directory.
-//! - [`robot`]: a single robot: an event in, a decision out, without clock and network.
+//! - [`store`]: the interface of a log, which NATS JetStream and a local directory implement.
+//! - [`robot`]: a single robot, which turns events into decisions, without clock and network.
 //! - [`partition`]: the robots of a partition: recovery, order, snapshots.
 //! - [`worker`]: leases and their balance, metrics, shutdown.
 //! - [`robots`](mod@robots): clients: append events, follow decisions, query the fleet.

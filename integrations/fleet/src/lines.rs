@@ -1,4 +1,4 @@
-//! Standard input and output of the program, as lines.
+//! Standard input and output of the program: lines with events and decisions.
 
 use std::collections::BTreeMap;
 use std::io::{self, Write as _};
@@ -19,7 +19,7 @@ use serde_json::{Value, json};
 use tokio::io::{AsyncBufReadExt as _, BufReader, stdin};
 use tokio::sync::{mpsc, watch};
 
-/// Maximum number of unsent lines per robot.
+/// Maximum number of input lines of a robot that are read but not stored.
 const AHEAD: usize = 1024;
 
 fn fault(fault: &Fault) -> Message {
@@ -30,8 +30,8 @@ fn unwritten(error: &io::Error) -> Message {
     Message::error("N313", format!("standard output cannot be written: {error}"))
 }
 
-/// Stores lines `ROBOT EVENT` until the end of input or `stop`. Returns the number of stored
-/// events.
+/// Reads lines `ROBOT EVENT` from standard input and stores the events, until the end of input or
+/// until `stop` becomes true. Returns the number of stored events.
 async fn feed<S: Store>(store: &S, session: &str, mut stop: watch::Receiver<bool>) -> Result<u64, Message> {
     let mut robots: BTreeMap<String, mpsc::Sender<String>> = BTreeMap::new();
     let mut senders = tokio::task::JoinSet::new();
@@ -76,7 +76,7 @@ async fn feed<S: Store>(store: &S, session: &str, mut stop: watch::Receiver<bool
             robots.insert(robot.to_owned(), tell);
         }
         if let Some(tell) = robots.get(robot) {
-            // The receiver lives as long as this sender.
+            // The receiving task ends only after this channel is closed.
             let _ = tell.send(event.to_owned()).await;
         }
     }
@@ -99,13 +99,14 @@ fn say(message: &Message) {
     eprint!("{}", message.text());
 }
 
-/// Stores events from standard input.
+/// Stores the events in lines `ROBOT EVENT` from standard input.
 pub(crate) async fn send<S: Store>(store: S, session: &str) -> Result<(), Message> {
     let (_goes_on, stop) = watch::channel(false);
     feed(&store, session, stop).await.map(|_| ())
 }
 
-/// Formats a decision as a line.
+/// Converts a stored decision to the robot's name and the JSON text for the output line. Returns
+/// `None` for other messages.
 fn line(message: &Stored) -> Option<(String, String)> {
     let address = Address::parse(&message.subject)?;
     let decided = Decided::parse(&message.payload)?;
@@ -119,7 +120,7 @@ fn line(message: &Stored) -> Option<(String, String)> {
     Some((address.robot, line.to_string()))
 }
 
-/// Writes decisions until the output is closed.
+/// Writes decisions of one robot or of all robots to standard output, until the output is closed.
 pub(crate) async fn follow<S: Store>(
     store: S,
     robot: Option<&str>,
@@ -133,7 +134,8 @@ pub(crate) async fn follow<S: Store>(
     write_decisions(&store, robot, &reached).await
 }
 
-/// Returns the sequences after which decisions are written: the given one, or the current ends.
+/// Returns for each partition the sequence number after which decisions are written: `after`, or
+/// the current end of the partition.
 async fn beginning<S: Store>(
     store: &S,
     partitions: Vec<u32>,
@@ -150,7 +152,8 @@ async fn beginning<S: Store>(
     Ok(reached)
 }
 
-/// Writes the decisions after the given sequences until the output is closed.
+/// Writes the decisions after the sequence numbers in `reached`, by partition, until the output is
+/// closed. Updates `reached`.
 async fn write_decisions<S: Store>(
     store: &S,
     robot: Option<&str>,
@@ -166,7 +169,7 @@ async fn write_decisions<S: Store>(
         }
         let mut decisions = select_all(streams);
         while let Some((partition, message)) = decisions.next().await {
-            // An interrupted subscription is resumed.
+            // The subscription was interrupted and is started again.
             let Ok(message) = message else { break };
             if let Some((name, text)) = line(&message)
                 && robot.is_none_or(|robot| robot == name)
@@ -184,7 +187,7 @@ async fn write_decisions<S: Store>(
     }
 }
 
-/// Runs a fleet in a directory, from standard input to standard output.
+/// Runs a fleet in a directory: events from standard input, decisions to standard output.
 pub(crate) async fn up(
     shared: Arc<Shared<Local>>,
     after: Option<u64>,
@@ -206,8 +209,8 @@ pub(crate) async fn up(
     let writing = tokio::spawn(async move { write_decisions(&reader, None, &progress).await });
     let session = format!("{:016x}.", fastrand::u64(..));
     let fed = feed(&store, &session, stop.clone()).await;
-    // All stored events are decided and written before the end, unless the program is stopped or
-    // the output closed.
+    // Waits until all stored events are decided and all decisions written, unless the program is
+    // stopped or the output is closed.
     while !*stop.borrow_and_update() && !writing.is_finished() && !is_done(&shared, &written).await? {
         tokio::select! {
             _ = stop.changed() => {}
@@ -215,7 +218,7 @@ pub(crate) async fn up(
         }
     }
     order.send_replace(true);
-    // A worker has no result.
+    // A worker has no result to check.
     let _ = working.await;
     writing.abort();
     if let Ok(outcome) = writing.await {
@@ -224,7 +227,7 @@ pub(crate) async fn up(
     fed.map(|_| ())
 }
 
-/// Returns `true` if all events are decided or refused, and all decisions are written.
+/// Returns `true` if all stored events are decided or refused, and all decisions are written.
 async fn is_done(shared: &Shared<Local>, written: &Mutex<BTreeMap<u32, u64>>) -> Result<bool, Message> {
     let store = &shared.store;
     for partition in 0..store.partitions() {
@@ -240,7 +243,7 @@ async fn is_done(shared: &Shared<Local>, written: &Mutex<BTreeMap<u32, u64>>) ->
     Ok(true)
 }
 
-/// Writes the status of a fleet.
+/// Writes the status of a fleet to standard output, as JSON or as text.
 pub(crate) fn status(status: &Status, as_json: bool) -> Result<(), Message> {
     let text = if as_json {
         format!("{}\n", serde_json::to_string(status).unwrap_or_default())

@@ -1,7 +1,7 @@
-//! Missions of a worker: the manifests of a directory are read once, each with an initial loop for
-//! its robots.
+//! Missions of a worker. The manifests of a directory are read once; each mission has an initial
+//! loop, which is cloned for every robot.
 //!
-//! Cloned loops share their constant parts: knowledge base, domain and ground task.
+//! Cloned loops share their constant parts, e.g. knowledge base, domain and ground task.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -10,16 +10,16 @@ use metaplan::mapek::Loop;
 use metaplan::message::{Errors, Message};
 use metaplan::setup::Setup;
 
-/// A mission with its initial loop.
+/// A mission with the initial state of its loop.
 #[derive(Debug, Clone)]
 pub struct Template {
-    /// The initial loop.
+    /// The loop before its start.
     pub control: Loop,
-    /// Checksum of files and settings.
+    /// Checksum of the mission's files and settings.
     pub digest: String,
 }
 
-/// Missions by the names of their manifests, without `.toml`.
+/// Missions by name. The name is that of the manifest's file without `.toml`.
 #[derive(Debug, Clone, Default)]
 pub struct Missions(BTreeMap<String, Template>);
 
@@ -27,7 +27,8 @@ impl Missions {
     /// Reads all manifests `*.toml` of a directory.
     ///
     /// # Errors
-    /// The directory cannot be read or has no manifests, or all errors of the manifests.
+    /// The directory cannot be read or has no manifests, or a manifest is faulty; all faults are
+    /// reported.
     pub fn read(directory: &Path) -> Result<Self, Errors> {
         let failed = |error: std::io::Error| {
             Errors::from(vec![Message::error("N300", format!("{}: {error}", directory.display()))])
@@ -63,7 +64,7 @@ impl Missions {
         Ok(Self(missions))
     }
 
-    /// Returns the mission of that name.
+    /// Returns the mission with this name, if it exists.
     pub fn get(&self, name: &str) -> Option<&Template> {
         self.0.get(name)
     }

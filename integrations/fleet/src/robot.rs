@@ -1,5 +1,5 @@
-//! State of a single robot: an event in, a decision out. Without clock, threads and network, so
-//! that equal events at equal times lead to equal decisions.
+//! State of a single robot, which turns an event into a decision. It has no clock, threads or
+//! network, so equal events at equal times lead to equal decisions.
 
 use std::time::Duration;
 
@@ -10,46 +10,46 @@ use crate::missions::Missions;
 use crate::store::Stored;
 use crate::wire::{Decided, FORMAT, Saved};
 
-/// State of a robot, without its pending events.
+/// State of a robot. Events that are not decided yet are not part of it.
 #[derive(Debug, Default)]
 pub struct Robot {
-    /// Mission of the robot; `None` if it is not enrolled.
+    /// Name of the robot's mission; `None` if the robot is not enrolled.
     pub mission: Option<String>,
     /// Time of enrolment in microseconds since 1970.
     pub enrolled: u64,
-    /// Sequence of the last event that the state contains.
+    /// Sequence number of the last event that was decided.
     pub event: u64,
     control: Control,
 }
 
-/// Loop of a robot.
+/// The adaptation loop of a robot.
 #[derive(Debug, Default)]
 enum Control {
     #[default]
     None,
-    /// Loaded and ready.
+    /// Loaded in memory.
     Warm(Box<Loop>),
-    /// Compressed snapshot of a few kilobytes.
+    /// Unloaded: compressed snapshot of a few kilobytes.
     Cold(Vec<u8>),
 }
 
-/// Reason for refusing an event.
+/// Reason for refusing an event, which then changes nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Refused {
-    /// The robot is not enrolled.
+    /// The robot is not enrolled, so it has no mission.
     Unknown,
-    /// The robot is already enrolled.
+    /// The event enrols a robot that is already enrolled.
     Enrolled,
-    /// There is no mission of that name.
+    /// The directory of missions has no mission of this name.
     Mission,
-    /// The message id names another robot.
+    /// The message id contains the name of another robot.
     Forged,
-    /// The subject is not of the robot's partition.
+    /// The subject's partition is not the partition of the robot.
     Misplaced,
 }
 
 impl Refused {
-    /// Name of the reason in metrics.
+    /// Returns the name of the reason in metrics.
     pub fn name(self) -> &'static str {
         match self {
             Self::Unknown => "not_enrolled",
@@ -60,7 +60,7 @@ impl Refused {
         }
     }
 
-    /// Description of the reason for the sender.
+    /// Returns a sentence about the reason for the sender of the event.
     pub fn sentence(self) -> &'static str {
         match self {
             Self::Unknown => {
@@ -76,22 +76,22 @@ impl Refused {
     }
 }
 
-/// Request of an event.
+/// Request that an event makes: enrolment, retirement, or handling by the loop.
 enum Request<'a> {
     Enrol(&'a str),
     Retire,
     Observe,
 }
 
-/// Reason why a robot cannot continue.
+/// Reason why a robot cannot handle events until its mission or data are repaired.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Faulted(pub String);
 
 impl Robot {
-    /// Restores a robot from its saved state.
+    /// Restores a robot from its snapshot.
     ///
     /// # Errors
-    /// The mission has changed since the state was saved.
+    /// The mission does not exist, or has changed since the snapshot.
     pub fn restore(saved: &Saved, missions: &Missions) -> Result<Self, Faulted> {
         let mut robot = Self {
             mission: saved.mission.clone(),
@@ -114,7 +114,7 @@ impl Robot {
         Ok(robot)
     }
 
-    /// Returns the state to save after a decision.
+    /// Returns a snapshot of the robot. `decision` is the sequence number of its last decision.
     pub fn save(&self, missions: &Missions, decision: u64) -> Saved {
         let snapshot = match &self.control {
             Control::None => Value::Null,
@@ -137,18 +137,19 @@ impl Robot {
         matches!(self.control, Control::Warm(_))
     }
 
-    /// Replaces a loaded loop by its compressed snapshot.
+    /// Replaces a loaded loop by its compressed snapshot, to save memory.
     pub fn cool(&mut self) {
         if let Control::Warm(control) = &self.control {
             self.control = Control::Cold(compressed(&control.snapshot().0));
         }
     }
 
-    /// Decides an event. In recovery, `before` is the decision that a former owner has made: its
-    /// plans are used, and the answers must be equal.
+    /// Decides an event. During recovery, `before` is the decision that a former owner has stored:
+    /// its plans are used, and the new answers must be equal. Returns the reason if the event is
+    /// refused.
     ///
     /// # Errors
-    /// The robot cannot continue. Its state is unchanged, or is invalid and must be recovered.
+    /// The robot cannot continue. Its state is unchanged, or is invalid and has to be recovered.
     pub fn decide(
         &mut self,
         event: &Stored,
@@ -240,8 +241,7 @@ fn request(head: &Value) -> Request<'_> {
     }
 }
 
-/// Returns `true` if two decisions are equal except for the wording of explanations, as in a
-/// journal.
+/// Returns `true` if two decisions are equal except for the wording of explanations.
 fn is_same(left: &Decided, right: &Decided) -> bool {
     left.enrolled == right.enrolled && left.retired == right.retired && left.decision().agrees(&right.answers)
 }
@@ -250,7 +250,7 @@ fn compressed(known: &Value) -> Vec<u8> {
     lz4_flex::compress_prepend_size(known.to_string().as_bytes())
 }
 
-/// Inverse of [`compressed`].
+/// Decompresses the output of [`compressed`].
 fn decompressed(bytes: &[u8]) -> Value {
     let text = lz4_flex::decompress_size_prepended(bytes).unwrap_or_default();
     serde_json::from_slice(&text).unwrap_or_default()

@@ -1,4 +1,4 @@
-//! Clients of a fleet: append events, follow decisions, and query the status.
+//! Functions for clients of a fleet: append events and query the status.
 
 use std::collections::BTreeMap;
 
@@ -8,20 +8,21 @@ use crate::partition::pause;
 use crate::store::{Bucket, Entry, Fault, Message, Store, Stream};
 use crate::wire::{Address, Presence, Progress};
 
-/// Appends the events of a robot, one at a time. Each is stored before the next one is sent, which
-/// preserves their order, and none is lost or duplicated.
+/// Appends the events of a robot. Each event is stored before the next one is sent, so events keep
+/// their order, and none is lost or duplicated.
 #[derive(Debug)]
 pub struct Sender<S> {
     store: S,
     address: Address,
-    /// Part of message ids after the robot's name; empty if the robot numbers its events itself.
+    /// Part of a message id between the robot's name and the number. It distinguishes senders;
+    /// empty if the robot numbers its events without gaps.
     session: String,
     number: u64,
 }
 
 impl<S: Store> Sender<S> {
-    /// Creates a sender for a robot. A second sender with the same session repeats the messages of
-    /// the first.
+    /// Creates a sender for a robot. A second sender with the same session creates the same message
+    /// ids, so it stores no event twice.
     pub fn new(store: S, robot: &str, session: &str) -> Self {
         let address = Address::of(robot, store.partitions());
         Self { store, address, session: session.to_owned(), number: 0 }
@@ -32,14 +33,16 @@ impl<S: Store> Sender<S> {
         &self.address
     }
 
-    /// Appends an event, retrying with growing pauses until it is durable. Returns its sequence.
+    /// Appends an event, and retries with growing pauses until it is stored durably. Returns its
+    /// sequence number.
     ///
     /// # Errors
-    /// The event exceeds the server's limit.
+    /// The event is longer than the server accepts.
     pub async fn send(&mut self, event: &str) -> Result<u64, Fault> {
         self.number += 1;
         let subject = self.address.to_string();
-        // Another client may have used our message id. Then a different id is chosen.
+        // Another client may have used this message id for another message. Then a different id is
+        // chosen.
         for spare in 0_u32.. {
             let mut id = format!("{}:{}{}", self.address.robot, self.session, self.number);
             if spare > 0 {
@@ -54,7 +57,8 @@ impl<S: Store> Sender<S> {
         Err(Fault::Conflict)
     }
 
-    /// Returns `true` if the stored message with our id is our own: same subject and payload.
+    /// Returns `true` if the stored message with this sequence number has the subject and payload
+    /// that were sent.
     async fn is_own(&self, subject: &str, sequence: u64, event: &str) -> bool {
         for attempt in 1.. {
             match self.store.at(Stream::Events, sequence).await {
@@ -80,12 +84,12 @@ async fn until_there<S: Store>(store: &S, message: Message<'_>) -> Result<crate:
     Err(Fault::Conflict)
 }
 
-/// Status of a fleet.
+/// Status of a fleet, for display.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Status {
-    /// All partitions.
+    /// Status of each partition, by number.
     pub partitions: Vec<PartitionStatus>,
-    /// Workers by name.
+    /// Status of each worker, by name.
     pub workers: BTreeMap<String, Presence>,
 }
 
@@ -94,11 +98,11 @@ pub struct Status {
 pub struct PartitionStatus {
     /// Number of the partition.
     pub partition: u32,
-    /// Name of the owner, if there is one.
+    /// Name of the worker that leases the partition, if any.
     pub worker: Option<String>,
-    /// Number of ownership changes.
+    /// Number of ownership changes of the partition.
     pub epoch: u64,
-    /// Sequence up to which events are saved.
+    /// Sequence number up to which all events are contained in snapshots.
     pub events: u64,
 }
 

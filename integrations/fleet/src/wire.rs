@@ -1,4 +1,4 @@
-//! Data formats of streams and buckets, and the syntax of subjects.
+//! Data formats of the messages and of the stored values, and the syntax of subjects.
 
 use std::fmt;
 
@@ -6,14 +6,14 @@ use metaplan::mapek::Decision;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// Version of the data format.
+/// Version of the data format, which every decision contains.
 pub const FORMAT: &str = "metaplan-fleet/1";
 
 /// Maximum length of a robot's name in bytes.
 const LONGEST_NAME: usize = 64;
 
-/// Returns `true` if a text is a valid name of a robot: a token of a subject with at most 64
-/// letters, digits, `-` and `_`.
+/// Returns `true` if a text is a valid name of a robot: 1 to 64 letters, digits, `-` and `_`, so
+/// that the name can be part of a subject.
 pub fn is_name(name: &str) -> bool {
     !name.is_empty()
         && name.len() <= LONGEST_NAME
@@ -30,7 +30,7 @@ pub fn partition_of(robot: &str, partitions: u32) -> u32 {
     crc32fast::hash(robot.as_bytes()) % partitions.max(1)
 }
 
-/// Partition and robot, as the end of a subject.
+/// Partition and name of a robot. As text, `PARTITION.ROBOT`, it is the end of a subject.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Address {
     /// Partition number, from 0.
@@ -40,12 +40,13 @@ pub struct Address {
 }
 
 impl Address {
-    /// Returns the address of a robot.
+    /// Returns the address of a robot in a fleet with this number of partitions.
     pub fn of(robot: &str, partitions: u32) -> Self {
         Self { partition: partition_of(robot, partitions), robot: robot.to_owned() }
     }
 
-    /// Parses `PARTITION.ROBOT`.
+    /// Parses `PARTITION.ROBOT`. Returns `None` for any other text, including other spellings of a
+    /// number.
     pub fn parse(text: &str) -> Option<Self> {
         let (partition, robot) = text.split_once('.')?;
         let address = Self { partition: partition.parse().ok()?, robot: robot.to_owned() };
@@ -59,14 +60,14 @@ impl fmt::Display for Address {
     }
 }
 
-/// Decision about an event, as appended to the robot's decisions.
+/// Decision about an event, as stored in the stream of decisions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Decided {
-    /// [`FORMAT`].
+    /// Data format of the message, equal to [`FORMAT`].
     pub format: String,
-    /// Sequence of the event in the stream of events.
+    /// Sequence number of the event in the stream of events.
     pub event: u64,
-    /// Time since enrolment in microseconds.
+    /// Time between enrolment and event in microseconds.
     pub now: u64,
     /// Name of the mission, if this event has enrolled the robot.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -76,12 +77,13 @@ pub struct Decided {
     pub retired: bool,
     /// Answers in the format of `metaplan run`.
     pub answers: Vec<Value>,
-    /// Plans made for the decision, for recovery by another worker.
+    /// Plans that were made for the decision, so that another worker can replay the decision
+    /// without planning.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub plans: Vec<Value>,
-    /// Name of the deciding worker.
+    /// Name of the worker that has decided.
     pub worker: String,
-    /// Counter of lease changes of the partition.
+    /// Number of ownership changes of the partition until the decision.
     pub epoch: u64,
 }
 
@@ -91,63 +93,65 @@ impl Decided {
         Decision { answers: self.answers.clone(), plans: self.plans.clone() }
     }
 
-    /// Parses a message of the stream of decisions.
+    /// Parses a message of the stream of decisions. Returns `None` for other data or another
+    /// version.
     pub fn parse(payload: &[u8]) -> Option<Self> {
         serde_json::from_slice(payload).ok().filter(|decided: &Self| decided.format == FORMAT)
     }
 }
 
-/// Saved position of a partition, from which a new owner starts. Its revision in the bucket fences
-/// former owners.
+/// Stored position of a partition, from which a new owner recovers. Each write requires the
+/// revision of the previous write, which rejects writes of former owners.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Progress {
-    /// Counter of lease changes.
+    /// Number of ownership changes of the partition.
     pub epoch: u64,
-    /// Sequence up to which all events are contained in snapshots.
+    /// Sequence number up to which the effects of all events are contained in snapshots.
     pub events: u64,
-    /// Sequence up to which all decisions are contained in snapshots.
+    /// Sequence number up to which all decisions are contained in snapshots.
     pub decisions: u64,
-    /// Revision of the last snapshot. Readers of snapshots must read at least up to it.
+    /// Revision of the last snapshot. A reader of snapshots has to wait for this revision, because
+    /// it may read from a server that lags behind.
     pub snapshots: u64,
 }
 
-/// Saved state of a robot after an event.
+/// Snapshot of a robot after an event.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Saved {
-    /// Mission of the robot; `None` if it was retired.
+    /// Name of the robot's mission; `None` if the robot was retired.
     pub mission: Option<String>,
     /// Checksum of the mission's files and settings.
     #[serde(default)]
     pub digest: String,
     /// Time of enrolment in microseconds since 1970.
     pub enrolled: u64,
-    /// Sequence of the last event that the state contains.
+    /// Sequence number of the last event whose effect the snapshot contains.
     pub event: u64,
-    /// Sequence of the last decision that the state contains.
+    /// Sequence number of the last decision that the snapshot contains.
     pub decision: u64,
-    /// Snapshot of the loop.
+    /// Snapshot of the robot's loop.
     #[serde(default)]
     pub known: Value,
 }
 
-/// Published status of a worker.
+/// Status that a worker publishes about itself.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Presence {
-    /// Number of owned partitions.
+    /// Number of partitions that the worker owns.
     pub partitions: u32,
-    /// Number of their robots.
+    /// Number of robots in these partitions.
     pub robots: u64,
-    /// Number of robots loaded in memory.
+    /// Number of robots whose loops are loaded in memory.
     pub warm: u64,
     /// Number of events that are read but not decided.
     pub waiting: u64,
-    /// Number of decided events since the start.
+    /// Number of decided events since the worker's start.
     pub decided: u64,
-    /// Number of refused events since the start.
+    /// Number of refused events since the worker's start.
     pub refused: u64,
-    /// Share of the threads' time used by loops in the last seconds, from 0 to 1.
+    /// Proportion of the threads' time that loops used since the last status, from 0 to 1.
     pub load: f64,
-    /// `true` if the worker takes no more partitions.
+    /// `true` if the worker is shutting down and takes no more partitions.
     pub draining: bool,
 }
 

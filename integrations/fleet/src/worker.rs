@@ -1,8 +1,9 @@
-//! Leases of partitions by workers.
+//! A worker: leases partitions and runs their robots.
 //!
-//! A lease is a value that expires unless it is renewed. A worker takes free partitions up to its
-//! share: the number of partitions divided by the number of workers, rounded up. A worker with more
-//! partitions saves and returns some. Leases affect efficiency only, not correctness.
+//! A lease is a stored value that expires unless it is renewed. A worker takes free partitions up
+//! to its share, which is the number of partitions divided by the number of workers, rounded up. A
+//! worker with more partitions saves and returns some. Leases affect only efficiency, not
+//! correctness.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -17,27 +18,27 @@ use crate::partition::{End, Order, Shared, serve};
 use crate::store::{Bucket, Entry, Fault, Store};
 use crate::wire::{Presence, partition_of};
 
-/// A leased partition.
+/// A partition that this worker has leased.
 struct Held {
     revision: u64,
-    /// Time of the last renewal.
+    /// Start of the last successful renewal.
     renewed: Instant,
     orders: watch::Sender<Order>,
     task: JoinHandle<End>,
 }
 
-/// A worker with its leases.
+/// A worker with its leased partitions.
 struct Worker<S> {
     shared: Arc<Shared<S>>,
     lease: Duration,
     held: BTreeMap<u32, Held>,
-    /// Revision of its presence.
+    /// Revision of the status that this worker has published.
     presence: u64,
-    /// Time of the last presence, and the busy time until then.
+    /// Time of the last status, and the total working time of loops until then in microseconds.
     looked: (Instant, u64),
 }
 
-/// Runs a worker until `stop` is true. Its partitions are then saved and returned.
+/// Runs a worker until `stop` becomes true. Then saves and returns its partitions.
 pub async fn run<S: Store>(shared: Arc<Shared<S>>, mut stop: watch::Receiver<bool>) {
     let lease = shared.store.lease();
     let mut worker =
@@ -56,8 +57,8 @@ pub async fn run<S: Store>(shared: Arc<Shared<S>>, mut stop: watch::Receiver<boo
 }
 
 impl<S: Store> Worker<S> {
-    /// Publishes the presence, renews the leases, and takes or returns partitions according to the
-    /// share.
+    /// Publishes the status, renews the leases, and handles partitions that have ended. Unless
+    /// `draining`, then takes or returns partitions according to the worker's share.
     async fn round(&mut self, draining: bool) {
         self.present(draining).await;
         self.renew().await;
@@ -138,7 +139,8 @@ impl<S: Store> Worker<S> {
         }
     }
 
-    /// Handles partitions that have ended.
+    /// Removes partitions whose task has ended. A partition in which another worker has written is
+    /// recovered again if the lease is still held.
     async fn collect(&mut self) {
         let ended: Vec<u32> = self
             .held
@@ -151,8 +153,8 @@ impl<S: Store> Worker<S> {
             let order = *held.orders.borrow();
             let end = held.task.await;
             match (end, order) {
-                // Another worker has written what only the owner writes, although the lease is
-                // ours. The partition is recovered again.
+                // Another worker has written data that only the owner writes, although this worker
+                // has the lease. So the partition is recovered again.
                 (Ok(End::Fenced) | Err(_), Order::Go) => {
                     tracing::warn!(partition, "somebody else has written in it: it is read again");
                     metrics::counter!("metaplan_fleet_fenced_total").increment(1);
@@ -206,7 +208,7 @@ impl<S: Store> Worker<S> {
         Held { revision, renewed, orders, task }
     }
 
-    /// Returns all partitions.
+    /// Saves and returns all partitions, and removes the published status.
     async fn drain(&mut self, mut tick: tokio::time::Interval) {
         for held in self.held.values() {
             held.orders.send_if_modified(|order| {
@@ -232,7 +234,8 @@ fn lose(held: &mut Held) {
     held.orders.send_replace(Order::Abandon);
 }
 
-/// Returns the number of partitions that a worker should have.
+/// Returns the number of partitions that a worker should lease: an equal share of all partitions,
+/// rounded up. Workers that are shutting down do not count.
 fn share(workers: &[Entry], own: &str, partitions: u32) -> usize {
     let takes = |entry: &&Entry| {
         entry.key != own

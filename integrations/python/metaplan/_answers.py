@@ -18,24 +18,24 @@ if TYPE_CHECKING:
     from metaplan._native import Planned
 
 Number = int | Decimal | Fraction
-"""An exact number: ``int`` or ``Decimal``; in a plan with a value that has no finite decimal, such as 1/3, ``int`` or ``Fraction``.
+"""An exact number: ``int`` or ``Decimal``. If a value of a plan has no finite decimal (1/3), all its numbers are ``int`` or ``Fraction``.
 
 So the numbers of one plan can be added and compared with each other.
 """
 
 
 def exact(value: Any) -> Number | None:
-    """A number of a JSON document that was read without loss."""
+    """Converts a number of a JSON document without loss; ``None`` stays ``None``."""
     return value if value is None or isinstance(value, int) else Decimal(value)
 
 
 def _load(text: str) -> dict[str, Any]:
-    """A JSON object with exact numbers."""
+    """Parses a JSON object; numbers with decimals become ``Decimal``."""
     return cast("dict[str, Any]", json.loads(text, parse_float=Decimal))
 
 
 def _frame(rows: list[dict[str, Any]]) -> pandas.DataFrame:
-    """A table, if pandas is installed."""
+    """Returns a table with the given rows; raises ``ImportError`` if pandas is not installed."""
     try:
         import pandas
     except ImportError as error:
@@ -79,7 +79,7 @@ class Step:
     cost: Number
     """Contribution of the step to the metric."""
     reconfigured: tuple[str, ...] = ()
-    """Functions whose design changes."""
+    """Functions whose design changes at this step."""
 
     def __str__(self) -> str:
         return f"({' '.join((self.action, *self.arguments))})"
@@ -92,18 +92,18 @@ class _Numbers:
         self._fractions = any(text is not None and "/" in text for text in texts)
 
     def read(self, text: str) -> Number:
-        """A number from ``3``, ``3.5`` or ``1/3``."""
+        """Parses ``3``, ``3.5`` or ``1/3``."""
         if self._fractions:
             value = Fraction(text)
             return value.numerator if value.denominator == 1 else value
         return Decimal(text) if "." in text else int(text)
 
     def maybe(self, text: str | None) -> Number | None:
-        """A number, or ``None`` for ``None``."""
+        """Parses a number; ``None`` stays ``None``."""
         return None if text is None else self.read(text)
 
     def steps(self, steps: list[dict[str, Any]], numbers: list[list[str]]) -> list[Step]:
-        """The steps of a plan from their JSON objects and their exact start, duration and cost."""
+        """Builds the steps of a plan from their JSON objects and the exact texts of start, duration and cost."""
         return [
             Step(
                 action=step["action"],
@@ -119,7 +119,7 @@ class _Numbers:
 
 
 def _texts(value: Any) -> Iterator[str]:
-    """All strings in lists and dictionaries."""
+    """Yields all strings in nested lists and dictionaries."""
     if isinstance(value, str):
         yield value
     elif isinstance(value, (dict, list)):
@@ -155,11 +155,11 @@ class Plan(Answer):
         }
         """Value of each objective of ``minimize`` or ``pareto``."""
         self.blocking: list[str] = answer.get("blocking") or []
-        """Without a plan: a minimal list of designs of which one has to become available."""
+        """If no plan exists: a minimal list of unavailable designs, at least one of which has to become available."""
         self.statistics: dict[str, Any] = answer["statistics"]
         """Counters and times of the search."""
         self.verdict: str = planned.verdict if planned else self.status
-        """The claim and its proof in a sentence."""
+        """The status and its proof in a sentence."""
         self.text: str | None = planned.text if planned else None
         """The plan with one step on each line, as validators read it; ``None`` without a plan."""
         self.warnings: list[Message] = messages_of(planned.warnings) if planned else []
@@ -245,9 +245,9 @@ class Front(Answer):
         self.points: list[Plan] = [
             Plan(json.dumps(point), own) for point, own in zip(points, exact_numbers["points"], strict=True)
         ]
-        """A plan for each point, from the best one by the first objective on."""
+        """A plan for each point of the front, sorted from the best by the first objective."""
         self.verdict: str = planned.verdict
-        """The status as the program prints it."""
+        """The status in a sentence."""
         self.warnings: list[Message] = messages_of(planned.warnings)
         """Warnings about the mission's files."""
 
@@ -285,7 +285,7 @@ class Comparison(Answer):
 
     @property
     def front(self) -> list[tuple[float, float]]:
-        """Pareto front of the policies: probability of reaching the goal, and expected time."""
+        """Pareto front of the policies: expected time, and probability of reaching the goal without a collision."""
         return [(first, second) for first, second in self.to_dict()["comparisons"][0]["front"]]
 
     def to_df(self) -> pandas.DataFrame:
@@ -317,7 +317,7 @@ class Verdict(Answer):
 
     @property
     def violation(self) -> dict[str, Any] | None:
-        """Cause for which the plan is not valid: ``step``, ``action`` and ``message``."""
+        """First violation, with ``step``, ``action`` and ``message``; ``None`` for a valid plan."""
         return self._fields.get("violation")
 
     def __bool__(self) -> bool:
@@ -343,7 +343,7 @@ class Verification(Answer):
 
     @property
     def parts(self) -> list[dict[str, Any]]:
-        """The result for each part: ``part``, ``verified`` and ``message``."""
+        """The result for each part of the certificate: ``part``, ``verified`` and ``message``."""
         return cast("list[dict[str, Any]]", self._fields["parts"])
 
     def __bool__(self) -> bool:

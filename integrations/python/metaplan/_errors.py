@@ -1,4 +1,4 @@
-"""Errors with all problems of an input, each with its place."""
+"""Errors with all problems of an input, each with its position."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Message:
 
 
 def messages_of(text: str) -> list[Message]:
-    """The messages of an answer in JSON."""
+    """Returns the messages in a JSON answer."""
     fields = ("code", "severity", "message", "file", "line", "column")
     return [
         Message(**{name: own[name] for name in fields if own.get(name) is not None})

@@ -1,4 +1,4 @@
-"""Missions: a knowledge base and a task, joined."""
+"""Missions (a knowledge base joined with a planning task), and the functions of the package."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from metaplan._answers import Answer, Comparison, Front, LoopAnswer, Plan, Verdi
 from metaplan._errors import Message, messages_of
 
 if TYPE_CHECKING:
-    # Of Python 3.11.
+    # Part of `typing` from Python 3.11 on.
     from typing_extensions import Unpack
 
 File = str | os.PathLike[str]
@@ -27,7 +27,7 @@ File = str | os.PathLike[str]
 
 
 class PlanOptions(TypedDict, total=False):
-    """Keywords of :meth:`Mission.plan` but ``pareto``, ``certificate`` and ``on_improvement``."""
+    """Keywords of :meth:`Mission.plan` except ``pareto``, ``certificate`` and ``on_improvement``."""
 
     minimize: str | Iterable[str]
     alternatives: int | None
@@ -50,7 +50,7 @@ def _value(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float):
-        # Neither 1e-07 nor 0.1000000000000000055.
+        # Decimal notation of the shortest representation: neither 1e-07 nor 0.1000000000000000055.
         return format(Decimal(repr(value)), "f")
     return str(value)
 
@@ -60,13 +60,13 @@ def _absolute(path: File) -> str:
 
 
 def _document(path: File) -> str:
-    """A name of shipped rules as it is, and a path as an absolute one."""
+    """Returns the name of shipped rules unchanged, and any other path as an absolute path."""
     name = os.fspath(path)
     return name if name in ("coadaptation", "tomasys") else _absolute(name)
 
 
 def _toml(value: Any) -> str:
-    """A value of a manifest."""
+    """Formats a value for a manifest (TOML)."""
     if isinstance(value, Mapping):
         return "{ " + ", ".join(f"{json.dumps(str(key))} = {_toml(own)}" for key, own in value.items()) + " }"
     if isinstance(value, (list, tuple)):
@@ -364,17 +364,17 @@ class Loop:
         return list(map(_answer, self._native.start()))
 
     def handle(self, event: Mapping[str, Any] | str, now: float | None = None) -> list[LoopAnswer]:
-        """Returns the answers to an event that arrives ``now`` seconds after the start; by default at the present time."""
+        """Returns the answers to an event that arrives ``now`` seconds after the start. Default: the present time."""
         line = event if isinstance(event, str) else json.dumps(dict(event))
         return list(map(_answer, self._native.handle(line, time.monotonic() - self._began if now is None else now)))
 
 
 _Source = tuple[str, tuple[Any, ...]]
-"""Native constructor of a mission and its arguments."""
+"""Name of the native constructor of a mission, and its arguments."""
 
 
 def _portable(maker: str, arguments: tuple[Any, ...]) -> _Source:
-    """A source with absolute paths, for another working directory."""
+    """Returns the source with absolute paths, so that it is valid in any working directory."""
     if maker == "load":
         return maker, (_absolute(arguments[0]),)
     if maker == "parse":
@@ -386,7 +386,7 @@ def _portable(maker: str, arguments: tuple[Any, ...]) -> _Source:
 
 
 def _restored(cls: type[Mission], source: _Source, changes: tuple[tuple[str, ...], ...], digest: str) -> Mission:
-    """A mission that was pickled."""
+    """Recreates a mission that was pickled, and checks that its files have not changed."""
     mission = cls._of(source)
     for change in changes:
         mission._change(*change)

@@ -24,7 +24,7 @@ __all__ = ["Knowledge", "load"]
 class Knowledge:
     """A knowledge base as a document that Metaplan reads.
 
-    Without ``path`` the document is temporary: it is deleted with this object, so a mission of it cannot be pickled for later.
+    Without ``path`` the document is temporary. It is deleted with this object, so a pickled mission that uses it cannot be restored later.
     """
 
     def __init__(self, graph: rdflib.Graph, path: str | os.PathLike[str] | None = None) -> None:
@@ -35,7 +35,7 @@ class Knowledge:
         self.path = Path(path)
         """Path of the document, in N-Triples."""
         text = graph.serialize(format="nt", encoding="utf-8")
-        # Equal graphs must give equal documents.
+        # Sorted lines, so that equal graphs give equal documents.
         self.path.write_bytes(b"".join(sorted(text.splitlines(keepends=True))))
 
     def __fspath__(self) -> str:
@@ -76,7 +76,7 @@ def load(source: Any, path: str | os.PathLike[str] | None = None) -> Knowledge:
 
 
 def _restored(document: str, path: str | None) -> Knowledge:
-    """A knowledge base that was pickled."""
+    """Recreates a knowledge base that was pickled."""
     return Knowledge(rdflib.Graph().parse(data=document, format="nt"), path)
 
 

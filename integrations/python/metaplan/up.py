@@ -94,13 +94,13 @@ _REASONS = {
     "TIMED_EFFECTS": "timed effects (after the end of a plan they count in unified-planning, and in PDDL they do not)",
     "UNDEFINED_INITIAL_SYMBOLIC": "fluents without an initial value (in PDDL they are false)",
 }
-"""Reasons why some features are not supported; the names of the others say enough."""
+"""Explanations for unsupported features whose names do not suffice as an explanation."""
 
 _UNDECLARED = ("DURATION_INEQUALITIES", "FLUENTS_IN_DURATIONS")
-"""Features that are not declared and nevertheless planned for with ``skip_checks``: with a metric, planning may not end by itself."""
+"""Features that are supported only with ``skip_checks``, because planning with a metric may not terminate."""
 
 _UNTIMED = ("TRAJECTORY_CONSTRAINTS", "STATE_INVARIANTS")
-"""Features that are supported in problems without time."""
+"""Features that are supported only in problems without time."""
 
 
 def _kind(features: dict[str, tuple[str, ...]]) -> ProblemKind:
@@ -116,7 +116,7 @@ def _is_timed(kind: ProblemKind) -> bool:
 
 
 def _refusals(kind: ProblemKind, supported: ProblemKind) -> list[str]:
-    """Descriptions of the features of a kind that are not supported."""
+    """Returns descriptions of the features of ``kind`` that are not in ``supported``."""
     own = set(kind.features)
     missing = [_REASONS.get(name, name.lower().replace("_", " ")) for name in sorted(own - set(supported.features))]
     if _is_timed(kind):
@@ -125,21 +125,21 @@ def _refusals(kind: ProblemKind, supported: ProblemKind) -> list[str]:
 
 
 class _Converter(ConverterToPDDLString):
-    """Writes all rational and truth values; that of unified-planning rounds fractions to ten digits, and refuses truth values."""
+    """Writes rational and truth values exactly; the converter of unified-planning rounds fractions to ten digits and rejects truth values."""
 
     def convert_fraction(self, frac: Fraction) -> str:
-        """PDDL of a rational number."""
+        """Returns a rational number as PDDL."""
         if frac.denominator == 1:
             return str(frac.numerator)
         return f"(/ {frac.numerator} {frac.denominator})"
 
     def walk_bool_constant(self, expression: FNode, args: list[str]) -> str:
-        """PDDL of a truth value: an empty conjunction or disjunction."""
+        """Returns a truth value as PDDL: an empty conjunction or disjunction."""
         return "(and)" if expression.is_true() else "(or)"
 
 
 def _exact(method: Any) -> FunctionType:
-    """A method of the writer with :class:`_Converter` in place of its converter, for which it has no parameter."""
+    """Returns a method of the writer that uses :class:`_Converter`; the writer has no parameter for the converter."""
     names = {**method.__globals__, "ConverterToPDDLString": _Converter}
     return FunctionType(method.__code__, names, method.__name__, method.__defaults__, method.__closure__)
 
@@ -160,13 +160,13 @@ class _Writer(PDDLWriter):
             problem.clear_quality_metrics()
             manager = problem.environment.expression_manager
             for goal, gain in metric.goals.items():
-                # A goal with a cost is a goal that should be violated.
+                # A goal with a negative gain is replaced by its negation with a positive gain.
                 goal = manager.auto_promote(goal)[0]
                 self._optional.append((goal, Fraction(gain)) if gain >= 0 else (manager.Not(goal), -Fraction(gain)))
         PDDLWriter.__init__(self, problem, rewrite_bool_assignments=True)
 
     def get_problem(self) -> str:
-        """The problem as PDDL."""
+        """Returns the problem as PDDL."""
         text: str = PDDLWriter.get_problem(self)
         if not self._optional:
             return text
@@ -181,15 +181,15 @@ class _Writer(PDDLWriter):
 
 
 class _Written:
-    """A problem as Metaplan reads it."""
+    """A problem of unified-planning written as PDDL, with the mapping from plans back to its actions."""
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         self.timed = _is_timed(problem.kind)
         self.separation = SEPARATION if problem.epsilon is None else str(problem.epsilon)
         self._back: list[Callable[[ActionInstance], ActionInstance | None]] = []
-        # PDDL has no bounds, so they become conditions. Fluents with objects as values become
-        # predicates.
+        # PDDL has no bounded types, so bounds become conditions. Fluents with objects as values
+        # become predicates.
         if problem.kind.has_object_fluents():
             problem = self._compiled(UsertypeFluentsRemover(), problem, CompilationKind.USERTYPE_FLUENTS_REMOVING)
         if problem.kind.has_bounded_types():
@@ -206,7 +206,7 @@ class _Written:
         return Mission.from_files(self.writer.get_domain(), self.writer.get_problem())
 
     def plan(self, found: Plan) -> up.plans.Plan:
-        """Steps to instances of the problem's own actions."""
+        """Converts a plan of Metaplan to a plan of the original problem."""
         environment = self.problem.environment
         manager = environment.expression_manager
 
@@ -228,7 +228,7 @@ class _Written:
         return TimeTriggeredPlan([timed(step) for step in found], environment)
 
     def steps(self, plan: SequentialPlan) -> str:
-        """A plan of the problem as text."""
+        """Returns a plan of the original problem as text for the validator."""
         if self._back:
             actions = [
                 ActionInstance(self.written.action(own.action.name), own.actual_parameters) for own in plan.actions
@@ -267,7 +267,7 @@ class MetaplanEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin):
 
     @staticmethod
     def supported_kind() -> ProblemKind:
-        """Returns the supported features; trajectory constraints only without time, see :meth:`supports`."""
+        """Returns the supported features. Trajectory constraints are supported only without time, see :meth:`supports`."""
         return _kind(_FEATURES)
 
     @staticmethod
@@ -331,8 +331,8 @@ class MetaplanEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin):
         if self.skip_checks:
             supported = supported.union(_kind({"time": _UNDECLARED[:1], "expression_duration": _UNDECLARED[1:]}))
         if refusals := _refusals(problem.kind, supported):
-            # Other features are rejected even with `skip_checks`, because the PDDL would be a
-            # different problem.
+            # Other features are rejected even with `skip_checks`, because PDDL would give them another
+            # meaning.
             return self._none(PlanGenerationResultStatus.UNSUPPORTED_PROBLEM, f"not supported: {'; '.join(refusals)}")
         options = dict(self._options)
         try:
@@ -391,7 +391,7 @@ class MetaplanValidator(Engine, PlanValidatorMixin):
 
     @staticmethod
     def supported_kind() -> ProblemKind:
-        """Returns the supported features: those of the planner but time."""
+        """Returns the supported features: those of the planner except time."""
         return _kind({**_FEATURES, "time": (), "expression_duration": ()})
 
     @staticmethod

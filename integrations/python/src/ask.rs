@@ -1,4 +1,5 @@
-//! Functions without a mission: verification, knowledge bases, models, error codes.
+//! Functions that need no mission: verification of certificates, queries of knowledge bases, model
+//! checking, explanation of codes.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -22,7 +23,7 @@ fn json(answer: &impl serde::Serialize) -> String {
     serde_json::to_string(answer).unwrap_or_default()
 }
 
-/// Verifies a certificate. Returns JSON and text.
+/// Verifies a certificate. Returns the report as JSON and as text.
 #[pyfunction]
 #[pyo3(signature = (directory, mission=None, time_limit=None))]
 pub(crate) fn verify(
@@ -46,7 +47,7 @@ pub(crate) fn verify(
     stopped.map_or_else(|| Ok((json(&VerificationAnswer::new(&report)), report.to_string())), Err)
 }
 
-/// Queries knowledge bases and rules. Returns JSON.
+/// Queries knowledge bases and rules. Returns the answer as JSON.
 #[pyfunction]
 #[pyo3(signature = (documents, rules, fail, set))]
 pub(crate) fn reason(
@@ -70,7 +71,7 @@ pub(crate) fn reason(
     py.detach(concluded).map_err(|messages| raise(py, &messages))
 }
 
-/// Computes the value of a property of a PRISM model. Returns JSON.
+/// Computes the value of a property of a PRISM model. Returns the answer as JSON.
 #[pyfunction]
 #[pyo3(signature = (name, model, property, constants, exact=None))]
 pub(crate) fn check(
@@ -109,7 +110,7 @@ pub(crate) fn check(
     })
 }
 
-/// Explains an error code. Returns JSON.
+/// Explains an error code. Returns the answer as JSON.
 #[pyfunction]
 pub(crate) fn explain_code(code: &str) -> PyResult<String> {
     codes::find(code)

@@ -1,10 +1,10 @@
-//! Conversion of errors to the exception `metaplan.Error` with all messages.
+//! Converts errors to the Python exception `metaplan.Error`, which contains all messages.
 
 use metaplan::answers::ErrorAnswer;
 use metaplan::message::Message;
 use pyo3::prelude::*;
 
-/// Creates the exception for messages, from the JSON that the command line writes.
+/// Creates the exception for messages, from the same JSON that the command line prints.
 pub(crate) fn raise(py: Python<'_>, messages: &[Message]) -> PyErr {
     let json = serde_json::to_string(&ErrorAnswer::new(messages)).unwrap_or_default();
     let exception = py
@@ -22,7 +22,7 @@ pub(crate) fn raise_one(py: Python<'_>, message: Message) -> PyErr {
     raise(py, &[message])
 }
 
-/// Serialises warnings as a JSON list.
+/// Serialises messages as JSON, in the format of error answers.
 pub(crate) fn listed<'m>(messages: impl IntoIterator<Item = &'m Message>) -> String {
     let messages: Vec<Message> = messages.into_iter().cloned().collect();
     serde_json::to_string(&ErrorAnswer::new(&messages)).unwrap_or_default()

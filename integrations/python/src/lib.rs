@@ -1,8 +1,8 @@
-//! Native part of the Python package: the facade as JSON and text, from which `metaplan/*.py`
-//! creates objects.
+//! Native part of the Python package. It returns answers of the facade as JSON and text, from which
+//! `metaplan/*.py` creates objects.
 //!
 //! This crate makes no decisions. The interpreter lock is released during work. Signals are checked
-//! every 20 ms, and Ctrl-C sets the interrupt flag of the planner.
+//! every 20 ms; Ctrl-C sets the interrupt flag of the planner.
 
 mod ask;
 mod failure;

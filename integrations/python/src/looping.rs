@@ -1,4 +1,4 @@
-//! The adaptation loop: lines of events in, lines of answers out.
+//! The adaptation loop for Python: event lines in, answer lines out.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use crate::failure::raise;
 use crate::mission::{Mission, seconds};
 
-/// The loop of a single robot.
+/// The adaptation loop of a single robot.
 #[pyclass(module = "metaplan._native", frozen)]
 pub(crate) struct Loop {
     control: Mutex<mapek::Loop>,
@@ -20,8 +20,8 @@ fn lines(answers: &[mapek::Answer]) -> Vec<String> {
 
 #[pymethods]
 impl Loop {
-    /// Starts the loop of a mission in its current situation. `time_limit` is the planning time in
-    /// seconds, unless the manifest sets one.
+    /// Creates the loop of a mission in its current situation. `time_limit` is the planning time in
+    /// seconds; `None` keeps the manifest's setting.
     #[new]
     fn new(py: Python<'_>, mission: &Mission, time_limit: Option<f64>) -> PyResult<Self> {
         let setup = mission.read();
@@ -36,12 +36,12 @@ impl Loop {
         Ok(Self { control: Mutex::new(control) })
     }
 
-    /// Returns the answers of the first planning.
+    /// Starts the loop. Returns the answers of the first planning.
     fn start(&self, py: Python<'_>) -> Vec<String> {
         py.detach(|| lines(&self.control.lock().unwrap_or_else(PoisonError::into_inner).start()))
     }
 
-    /// Handles a line of events, received at a time since the start.
+    /// Handles an event line that was received `now` seconds after the start. Returns the answers.
     fn handle(&self, py: Python<'_>, line: &str, now: f64) -> PyResult<Vec<String>> {
         let now = seconds("now", now)?;
         let observation = Observation::parse(line);

@@ -1,4 +1,4 @@
-//! Missions and their plans.
+//! Missions and their plans for Python.
 
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -27,26 +27,26 @@ use serde::Serialize;
 use crate::failure::{listed, raise, raise_one};
 use crate::wait::detached;
 
-/// A mission in its current situation. A running call keeps its situation when another thread
-/// changes the mission.
+/// A mission in its current situation. If a thread changes the mission, calls that are running in
+/// other threads keep the previous situation.
 #[pyclass(module = "metaplan._native", frozen)]
 pub(crate) struct Mission {
     setup: RwLock<Arc<Setup>>,
 }
 
-/// Result of planning.
+/// Result of planning, as JSON and text.
 #[pyclass(module = "metaplan._native", frozen)]
 pub(crate) struct Planned {
     /// The answer in the JSON format of `metaplan plan` or `metaplan plan --pareto`.
     #[pyo3(get)]
     json: String,
-    /// The numbers of the answer as exact texts, in JSON; see [`Numbers`].
+    /// The numbers of the answer as exact texts, in JSON; see `Numbers`.
     #[pyo3(get)]
     exact: String,
-    /// The plan with a step per line. `None` without a plan, or for a Pareto front.
+    /// The plan with one step per line. `None` without a plan, or for a Pareto front.
     #[pyo3(get)]
     text: Option<String>,
-    /// The claim in a sentence.
+    /// The status and its proof in a sentence.
     #[pyo3(get)]
     verdict: String,
     /// Warnings as JSON.
@@ -55,7 +55,7 @@ pub(crate) struct Planned {
     seen: Option<Drawable>,
 }
 
-/// Numbers of a plan as texts: decimals if possible, otherwise fractions. JSON numbers cannot
+/// Exact numbers of a plan as texts: decimals if possible, otherwise fractions. JSON numbers cannot
 /// represent 1/3.
 #[derive(Serialize)]
 struct Numbers {
@@ -67,7 +67,7 @@ struct Numbers {
     alternatives: Vec<Vec<[String; 3]>>,
 }
 
-/// Numbers of the plans of a Pareto front.
+/// Exact numbers of the plans of a Pareto front.
 #[derive(Serialize)]
 struct FrontNumbers {
     points: Vec<Numbers>,
@@ -86,14 +86,14 @@ impl Numbers {
         }
     }
 
-    /// Start, duration and cost of each step.
+    /// Returns start, duration and cost of each step as texts.
     fn steps(plan: &Plan) -> Vec<[String; 3]> {
         let numbers = |step: &Step| [&step.start, &step.duration, &step.cost].map(Exact::to_string);
         plan.steps.iter().map(numbers).collect()
     }
 }
 
-/// Data from which a picture of the plan is drawn on demand.
+/// Data from which a picture of the plan is drawn when it is requested.
 struct Drawable {
     setup: Arc<Setup>,
     problem: metaplan::pddl::ast::Problem,
@@ -110,7 +110,7 @@ impl Planned {
     }
 }
 
-/// Planning parameters.
+/// Planning parameters of a call.
 struct Wanted {
     config: Config,
     minimize: Vec<String>,
@@ -120,17 +120,17 @@ struct Wanted {
     certificate: Option<PathBuf>,
 }
 
-/// Parses a number of a keyword argument.
+/// Parses a number in the keyword argument `name`.
 fn number(name: &str, text: &str) -> PyResult<Exact> {
     text.parse().map_err(|error| PyValueError::new_err(format!("{name}: {error}")))
 }
 
-/// Parses a word of a keyword argument.
+/// Parses a choice, such as a strategy, in the keyword argument `name`.
 fn word<T: std::str::FromStr<Err: std::fmt::Display>>(name: &str, text: &str) -> PyResult<T> {
     text.parse().map_err(|error| PyValueError::new_err(format!("{name}: {error}")))
 }
 
-/// Parses seconds of a keyword argument.
+/// Converts a number of seconds in the keyword argument `name` to a duration.
 pub(crate) fn seconds(name: &str, value: f64) -> PyResult<Duration> {
     Duration::try_from_secs_f64(value)
         .map_err(|_| PyValueError::new_err(format!("{name} must be a number of seconds, not {value}")))
@@ -160,8 +160,8 @@ impl Mission {
         made(py, move || Setup::parse(&name, &text, &directory))
     }
 
-    /// Reads a mission from a domain and a problem, each a path or a name with a text, and optional
-    /// knowledge bases.
+    /// Creates a mission from a domain and a problem, and optional knowledge bases. Domain and
+    /// problem are each a path, or a name with a text.
     #[staticmethod]
     fn join(
         py: Python<'_>,
@@ -180,8 +180,8 @@ impl Mission {
         Self { setup: RwLock::new(self.read()) }
     }
 
-    /// Returns a checksum of all inputs of planning: knowledge, rules, domain, problem and
-    /// settings.
+    /// Returns a checksum of everything that planning depends on: knowledge base, rules, domain,
+    /// problem and settings.
     fn digest(&self, py: Python<'_>) -> PyResult<String> {
         let setup = self.read();
         let control = py.detach(|| Loop::new(setup.mission.clone(), setup.settings.clone()));
@@ -206,13 +206,14 @@ impl Mission {
         self.read().scenarios.keys().cloned().collect()
     }
 
-    /// Warnings as JSON.
+    /// Warnings about the mission's files, as JSON.
     #[getter]
     fn warnings(&self) -> String {
         listed(self.read().mission.warnings())
     }
 
-    /// Returns the domain and the completed problem as PDDL.
+    /// Returns the domain and the problem as PDDL. The problem includes facts and values from the
+    /// knowledge base.
     fn pddl(&self, py: Python<'_>) -> PyResult<(String, String)> {
         let setup = self.read();
         let (problem, _) = setup.mission.filled().map_err(|messages| raise(py, &messages))?;
@@ -235,7 +236,8 @@ impl Mission {
         self.change(|setup| setup.mission.set(name, value)).map_err(|message| raise_one(py, message))
     }
 
-    /// Computes the best plan or a Pareto front.
+    /// Computes the best plan, or the Pareto front of two objectives. After Ctrl-C, returns the
+    /// best plan found until then.
     #[pyo3(signature = (*, minimize, pareto=None, alternatives=None, concurrent=None, horizon=None, engine=None, strategy=None, confirm=false,
         time_limit=None, memory_limit=None, certificate=None, on_improvement=None))]
     #[allow(clippy::too_many_arguments, reason = "keywords")]
@@ -284,7 +286,7 @@ impl Mission {
         }
     }
 
-    /// Compares the plan with the policies of probabilistic model checking. Returns JSON.
+    /// Compares the plan with policies of probabilistic model checking. Returns the answer as JSON.
     fn compare(
         &self,
         py: Python<'_>,
@@ -321,7 +323,7 @@ impl Mission {
         })
     }
 
-    /// Validates a plan. Returns JSON.
+    /// Validates a plan, given as text. Returns the verdict as JSON.
     fn validate(&self, py: Python<'_>, plan: &str, concurrent: bool, tolerance: &str) -> PyResult<String> {
         let tolerance = number("tolerance", tolerance)?.to_rational();
         let setup = self.read();
@@ -336,8 +338,8 @@ impl Mission {
         py.detach(judged).map_err(|messages: Errors| raise(py, &messages))
     }
 
-    /// Explains the availability or choice of a design, or the changes that would alter the plan.
-    /// Returns JSON.
+    /// Explains the availability and choice of a design. Without a design, explains which changes
+    /// would alter the plan. Returns the answer as JSON.
     fn explain(&self, py: Python<'_>, design: Option<String>, time_limit: Option<f64>) -> PyResult<String> {
         let mut limits = Limits::none();
         if let Some(time) = time_limit {
@@ -363,7 +365,7 @@ impl Mission {
     }
 }
 
-/// Reads a mission without the interpreter lock.
+/// Reads a mission with released interpreter lock, and checks that its inputs fit together.
 fn made(py: Python<'_>, read: impl FnOnce() -> Result<Setup, Errors> + Send) -> PyResult<Mission> {
     let checked = move || {
         let setup = read()?;
@@ -399,7 +401,7 @@ fn joined(
     Ok(missions::Mission::new(name, knowledge, bindings, domain, problem)?.into())
 }
 
-/// Reason for a missing answer.
+/// Reason why there is no answer: faults of the inputs, or a Python exception.
 enum Stop {
     Wrong(Errors),
     Raised(PyErr),
@@ -468,7 +470,8 @@ fn answered(
     let answer: PlanAnswer = found.answer();
     let json = serde_json::to_string(&answer).unwrap_or_default();
     let alternatives = found.alternatives.as_ref().map_or(&[][..], |found| &found.plans);
-    // Values of the problem's own metric have no name and are not part of the answer.
+    // Only objectives of the call have names and are part of the answer; values of the problem's
+    // own metric are not.
     let values = &found.values[..found.values.len().min(found.objectives().len())];
     let makespan = found.solution.plan.as_ref().filter(|_| found.overlaps()).map(Plan::makespan);
     let numbers = Numbers {

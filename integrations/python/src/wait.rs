@@ -1,4 +1,4 @@
-//! Runs work without the interpreter lock and with signal handling.
+//! Runs work without the interpreter lock, and handles signals meanwhile.
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -8,14 +8,14 @@ use std::time::Duration;
 
 use pyo3::prelude::*;
 
-/// Interval between checks for signals.
+/// Time between two checks for signals.
 const INTERVAL: Duration = Duration::from_millis(20);
-/// Stack size of working threads, as large as that of a main thread.
+/// Stack size of the working thread in bytes, as large as that of a main thread.
 const STACK: usize = 8 << 20;
 
-/// Runs work while other threads of the interpreter continue. If a signal raises an exception such
-/// as `KeyboardInterrupt`, sets the interrupt flag and waits for the result. The exception is
-/// returned together with the partial result.
+/// Runs `work` on a thread while other threads of the interpreter continue. If a signal raises an
+/// exception such as `KeyboardInterrupt`, sets the interrupt flag and still waits for the result.
+/// Then the exception is returned together with the result, which may be partial.
 pub(crate) fn detached<T: Send>(
     py: Python<'_>,
     interrupt: &AtomicBool,
@@ -36,7 +36,8 @@ pub(crate) fn detached<T: Send>(
                     Ok(Ok(found)) => return (found, stopped),
                     Ok(Err(panic)) => resume_unwind(panic),
                     Err(RecvTimeoutError::Timeout) => {
-                        // A path to the method is not general enough in its lifetime.
+                        // A path to the method does not compile, because it is not general enough
+                        // in its lifetime.
                         #[expect(clippy::redundant_closure_for_method_calls, reason = "see above")]
                         let signal = Python::attach(|py| py.check_signals());
                         if let (None, Err(error)) = (&stopped, signal) {

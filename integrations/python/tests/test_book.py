@@ -1,4 +1,4 @@
-"""The blocks of the book and of the README are run."""
+"""Runs the code blocks of the book and of the README."""
 
 import re
 import runpy

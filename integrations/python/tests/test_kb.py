@@ -1,4 +1,4 @@
-"""Knowledge bases from and to other libraries."""
+"""Exchange of knowledge bases with other libraries."""
 
 import pickle
 from pathlib import Path

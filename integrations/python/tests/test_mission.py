@@ -1,4 +1,4 @@
-"""Missions: what the command line answers is what the package answers."""
+"""Missions: the package must give the same answers as the command line."""
 
 import asyncio
 import copy
@@ -89,7 +89,7 @@ def test_missions_are_pickled_with_their_situation(source, tmp_path, monkeypatch
         mission.set("length a b", Decimal("0.25"))
     else:
         mission.fail("c_kinect").set(robot_at="wp2")
-    # A process of its own in another directory, as of a pool.
+    # A separate process in another directory, like a worker of a process pool.
     Path("elsewhere").mkdir()
     program = "import pickle, sys; plan = pickle.load(sys.stdin.buffer).plan(); pickle.dump(plan, sys.stdout.buffer)"
     out = subprocess.run([sys.executable, "-c", program], input=pickle.dumps(mission), cwd="elsewhere", capture_output=True, check=False)
@@ -227,7 +227,7 @@ def test_the_plan_is_compared_with_policies():
 
 
 def tour(places):
-    """A tour of all places: a plan is found at once, the best one is not."""
+    """Returns a tour of all places: a plan is found immediately, but an optimal plan is not."""
     names = [f"p{index}" for index in range(places)]
     length = {(a, b): 10 + (7 * i * i + 13 * j * j + 5 * i * j) % 83 for i, a in enumerate(names) for j, b in enumerate(names) if a != b}
     facts = " ".join(f"(way {a} {b}) (= (length {a} {b}) {far})" for (a, b), far in length.items())
@@ -266,7 +266,7 @@ plan = metaplan.Mission.from_files(open(sys.argv[1]).read(), open(sys.argv[2]).r
 print(plan.status, len(plan.steps))
 """
     command = [sys.executable, "-c", program, tmp_path / "d.pddl", tmp_path / "p.pddl"]
-    # A background job of a shell ignores the signal, and so would what it starts.
+    # A background job of a shell ignores the signal, and its child processes would inherit this.
     heeds = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)  # noqa: E731
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, preexec_fn=heeds) as process:
         assert process.stdout.readline() == "begun\n"

@@ -1,4 +1,4 @@
-"""The notebooks of the book run from their first cell to the last."""
+"""Runs all cells of the book's notebooks."""
 
 from pathlib import Path
 

@@ -20,7 +20,7 @@ BLOCKS = {
     f"{page.stem.lower()}_{number}": block
     for page in PAGES
     for number, block in enumerate(re.findall(r"^```python\n(.*?)^```", page.read_text(), re.MULTILINE | re.DOTALL))
-    # The client runs the program, and does not use the package.
+    # The client runs the program instead of using the package.
     if "metaplan" in block and "class Loop" not in block
 }
 USES = """
@@ -92,7 +92,7 @@ def test_public_members_are_documented(name):
 
 
 def attributes(body):
-    """The attributes that statements assign, each with whether a string follows."""
+    """Yields the attributes that statements assign, each with ``True`` if a documentation string follows."""
     for own, after in zip(body, [*body[1:], None]):
         targets = own.targets if isinstance(own, ast.Assign) else [own.target] if isinstance(own, ast.AnnAssign) else []
         for target in targets:
@@ -103,7 +103,7 @@ def attributes(body):
 
 @pytest.mark.parametrize("path", sorted((PACKAGE / "metaplan").glob("*.py")), ids=lambda path: path.stem)
 def test_attributes_are_documented(path):
-    """A string follows each public attribute, where help systems for source read it; :func:`inspect.getdoc` does not."""
+    """A string follows each public attribute. Documentation tools read it from the source; :func:`inspect.getdoc` does not."""
     for node in ast.parse(path.read_text()).body:
         if isinstance(node, ast.ClassDef) and node.name[0] != "_" and "TypedDict" not in map(ast.unparse, node.bases):
             made = [own for own in node.body if isinstance(own, ast.FunctionDef) and own.name == "__init__"]

@@ -29,7 +29,7 @@ SOLVED = (Status.SOLVED_SATISFICING, Status.SOLVED_OPTIMALLY)
 
 
 def value(problem, plan):
-    """What a plan comes to by the only metric, as unified-planning has it."""
+    """Returns the value of a plan by the problem's only metric, computed by unified-planning."""
     from unified_planning.engines.plan_validator import SequentialPlanValidator
 
     metric = problem.quality_metrics[0]
@@ -40,7 +40,7 @@ def value(problem, plan):
 
 
 def cases():
-    """All test cases by name. Of those whose PDDL files are not in the distribution there is nothing but the name."""
+    """Yields all test cases as pairs of name and case. Prints the names of those whose files are missing."""
     yield from get_example_problems().items()
     for folder, _, files in sorted(os.walk(CASES)):
         for file in sorted(files):

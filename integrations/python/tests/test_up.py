@@ -26,7 +26,7 @@ SOLVED = (Status.SOLVED_SATISFICING, Status.SOLVED_OPTIMALLY)
 
 
 def is_valid(problem, plan):
-    """What unified-planning's own validator says."""
+    """Returns ``True`` if unified-planning's own validator accepts the plan."""
     own = "sequential_plan_validator" if isinstance(plan, SequentialPlan) else "up_time_triggered_validator"
     with PlanValidator(name=own) as validator:
         return validator.validate(problem, plan).status == ValidationResultStatus.VALID
@@ -56,7 +56,7 @@ def test_what_is_solved_is_declared():
 
 @pytest.mark.parametrize("name", sorted(EXAMPLES.keys() - set(COVERED)))
 def test_what_is_not_supported_is_refused_with_its_name(name):
-    """Neither a plan that is not valid nor an empty message, not even where checks are skipped."""
+    """The engine returns neither an invalid plan nor an empty message, even if checks are skipped."""
     problem = EXAMPLES[name].problem
     with OneshotPlanner(name="metaplan") as planner:
         for planner.skip_checks in (False, True):
@@ -96,7 +96,7 @@ FRACTIONS = [Fraction(1, 3), Fraction(22, 7), Fraction(123456789012345678901, 10
 
 @pytest.mark.parametrize("value", FRACTIONS, ids=str)
 def test_fractions_stay_exact(value):
-    """In durations, initial values, conditions, effects and costs, on the way there and back."""
+    """Fractions stay exact in durations, initial values, conditions, effects and costs, in both directions."""
     timed = Problem("timed")
     timed.epsilon = value / 2
     done = timed.add_fluent("done", default_initial_value=False)
@@ -126,7 +126,7 @@ def test_fractions_stay_exact(value):
 
 
 def grid(rng):
-    """A random problem with Boolean fluents, of which each action changes some."""
+    """Returns a random problem with Boolean fluents; each action changes some of them."""
     problem = Problem("random")
     fluents = [problem.add_fluent(f"f{index}", default_initial_value=rng.random() < 0.3) for index in range(4)]
     for index in range(4):
@@ -145,7 +145,7 @@ def literal(fluents, rng):
 
 
 def traces(problem, steps):
-    """All sequences of states that plans of at most so many steps pass through, the shortest first."""
+    """Yields the state sequences of all plans up to a number of steps, the shortest first."""
     with SequentialSimulator(problem) as simulator:
         level = [[simulator.get_initial_state()]]
         for _ in range(steps + 1):
@@ -159,7 +159,7 @@ def traces(problem, steps):
 
 
 def reachable(problem):
-    """All states that can be reached."""
+    """Returns all reachable states."""
     with SequentialSimulator(problem) as simulator:
         found, queue = {}, [simulator.get_initial_state()]
         while queue:
@@ -176,7 +176,7 @@ def holds(formula, state):
 
 @pytest.mark.parametrize("seed", range(20))
 def test_optional_goals_are_chosen_best(seed):
-    """By enumeration of all states that can be reached; gains are fractions, and some are negative."""
+    """The oracle enumerates all reachable states; gains are fractions, and some are negative."""
     rng = random.Random(seed)
     problem, fluents = grid(rng)
     gains = {}
@@ -215,12 +215,12 @@ CONSTRAINTS = {
     "SometimeBefore": lambda a, b: all(any(b[:index]) for index, now in enumerate(a) if now),
     "SometimeAfter": lambda a, b: all(any(b[index:]) for index, now in enumerate(a) if now),
 }
-"""Constraints of PDDL 3 by their definition on a sequence of states."""
+"""Definition of each constraint of PDDL 3 on a sequence of states."""
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_constraints_on_trajectories_hold(seed):
-    """By enumeration of all plans of at most five steps."""
+    """The oracle enumerates all plans of at most five steps."""
     rng = random.Random(seed)
     problem, fluents = grid(rng)
     problem.add_goal(literal(fluents, rng))
@@ -276,7 +276,7 @@ def test_the_validator_agrees_with_that_of_the_package(name):
 
 
 def mutated(plan, rng):
-    """A plan without a step, with one twice, or with two exchanged."""
+    """Returns a random variant of a plan: one step removed, one step repeated, or two steps exchanged."""
     actions = list(plan.actions)
     at = rng.randrange(len(actions))
     match rng.randrange(3):

@@ -1,12 +1,12 @@
-//! Analysis of missing values of numeric functions, and of durations below 0.
+//! Analysis of numeric functions without a value, and of negative durations.
 //!
-//! For each numeric function that an action needs, the analysis enumerates the objects for which
-//! the action is possible according to the facts that no action changes (three-valued evaluation of
-//! its conditions, as in grounding). A mission may omit numbers for impossible cases. So a missing
-//! value causes a warning only in these cases: the function has no parameters of the action as
-//! arguments; three quarters of the objects have a value; or such a fact is about the same objects,
-//! and either two thirds of the objects have a value or the object is a design. For example,
-//! `(lit_aisle a b)` is about the objects of `(distance a b)`.
+//! For each numeric function that an action needs, the analysis enumerates the arguments for which
+//! the action is possible, judged by static facts (three-valued evaluation of its conditions, as in
+//! grounding). A mission may omit numbers for impossible cases. So a missing value causes a warning
+//! only in three cases. First, the arguments contain no parameter of the action. Second, at least
+//! three quarters of the enumerated arguments have a value. Third, a static fact in the conditions
+//! mentions all these parameters, and either at least two thirds have a value or the argument is a
+//! design. For example, `(lit_aisle a b)` mentions the parameters of `(distance a b)`.
 
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
@@ -30,52 +30,54 @@ use crate::message::Message;
 use crate::mission::conditions::written;
 use crate::number;
 
-/// Maximum number of evaluated conditions; the remaining ones are not checked.
+/// Maximum number of variable bindings that are examined; further ones are not checked.
 const BUDGET: usize = 50_000;
 
-/// A numeric function without a value that actions need, with its arguments.
+/// A numeric function with arguments for which an action needs a value that is missing.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct MissingValue {
-    /// The function with its arguments, as the domain writes it: `(distance a b)`; for a design,
-    /// `(ATTRIBUTE DESIGN)`.
+    /// The function with its arguments, such as `(distance a b)`. If the value is an estimation of
+    /// a design, `(ATTRIBUTE DESIGN)`.
     pub function: String,
     /// Actions that need the value.
     pub needed_by: Vec<String>,
-    /// The design whose estimation is missing, and the attribute, if the number is an estimation.
+    /// If the value is an estimation: the design and the attribute.
     pub estimation: Option<(String, String)>,
-    /// The file in which the value is missing.
+    /// Name of the file that should contain the value.
     pub file: String,
     pub(super) symbol: String,
-    /// `true` if the function has no value for any arguments.
+    /// `true` if the function has no value for any arguments, and no action assigns one.
     pub(super) is_silent: bool,
     /// `true` if the value is probably missing by mistake.
     pub(super) is_likely: bool,
 }
 
-/// Functions without a value: `true` if that is probably a mistake, and the actions that need the
-/// value.
+/// Maps a function with its arguments, without a value, to `true` if it is probably missing by
+/// mistake, and to the actions that need the value.
 type Needed = BTreeMap<(Name, Vec<Name>), (bool, BTreeSet<String>)>;
 
-/// A duration that is negative.
+/// A duration of an action that is negative for some arguments.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct NegativeDuration {
     pub(super) action: String,
     pub(super) duration: String,
-    /// The negative values that cause the negative duration, formatted.
+    /// The negative values from which the duration is computed, each as a phrase.
     pub(super) causes: Vec<String>,
     pub(super) design: Option<String>,
 }
 
-/// Facts about a mission's numbers in the initial state.
+/// The numbers and static facts of a mission in its initial state, prepared for the analysis.
 pub(super) struct Numbers<'m> {
     pub(super) mission: &'m Mission,
     pub(super) domain: &'m Domain,
     problem: Problem,
     types: TypeHierarchy,
-    /// Predicates that actions, axioms or the robot change.
+    /// Predicates that are not static: actions, derived predicates, timed literals or the
+    /// availability of designs change them.
     dynamic: HashSet<Name>,
-    /// Functions that actions change, and those that actions give a value.
+    /// Functions that actions change.
     changed: HashSet<Name>,
+    /// Functions to which actions assign a value.
     assigned: HashSet<Name>,
     facts: HashMap<Name, HashSet<Vec<Name>>>,
     values: HashMap<Name, HashMap<Vec<Name>, BigRational>>,
@@ -175,7 +177,7 @@ impl<'m> Numbers<'m> {
         }
     }
 
-    /// Returns the attribute whose estimation a function of a design is.
+    /// Returns the attribute whose estimations are the values of a function of designs.
     fn attribute(&self, function: &Name) -> String {
         let mut bound = self.mission.bindings().written().iter();
         let bound = bound.find(|(symbol, _)| Name::new(symbol) == *function);
@@ -184,7 +186,7 @@ impl<'m> Numbers<'m> {
         attribute.strip_prefix("fd_").unwrap_or(attribute).to_owned()
     }
 
-    /// Collects the functions that an action needs and that have no value.
+    /// Adds to `missing` the functions that an action needs and that have no value.
     fn missing(&self, action: &Action, missing: &mut Needed) {
         let conditions = conditions(&action.body);
         let mut checked = HashSet::new();
@@ -192,8 +194,8 @@ impl<'m> Numbers<'m> {
             let function = &atom.predicate.name;
             let is_own =
                 function.as_str().eq_ignore_ascii_case("total-cost") || !checked.insert(written(atom));
-            // A function that an action assigns may lack a value before, unless actions increase or
-            // decrease it.
+            // A function to which actions assign values may lack an initial value, unless actions
+            // also increase or decrease it.
             let is_stock = || self.domain.actions.iter().any(|action| grows(action, function));
             if is_own || (self.assigned.contains(function) && !is_stock()) {
                 continue;
@@ -224,7 +226,8 @@ impl<'m> Numbers<'m> {
         }
     }
 
-    /// Collects durations below 0 that follow from values that nothing changes.
+    /// Adds to `negative` the negative durations of an action, as far as they follow from values
+    /// that nothing changes.
     fn negative_durations(&self, action: &Action, negative: &mut BTreeSet<NegativeDuration>) {
         let ActionBody::Durative { duration, .. } = &action.body else { return };
         let conditions = conditions(&action.body);
@@ -284,7 +287,7 @@ impl<'m> Numbers<'m> {
         }
     }
 
-    /// Visits all objects for some variables for which the conditions may hold.
+    /// Calls `visit` for each binding of the variables for which the conditions may hold.
     fn each<'a>(
         &self,
         variables: &[(&'a Name, &'a TypeExpression)],
@@ -312,8 +315,9 @@ impl<'m> Numbers<'m> {
         }
     }
 
-    /// Truth of a condition in every state. Returns `None` if it depends on actions or on variables
-    /// that are not bound, or if it contains comparisons or quantifiers that decide it.
+    /// Evaluates a condition by static facts, in three-valued logic. Returns `None` (unknown) if
+    /// the value depends on facts that change, on unbound variables, on comparisons or on
+    /// quantifiers.
     fn truth(&self, condition: &Condition, binding: &Binding<'_>) -> Option<bool> {
         match condition {
             Condition::And(parts) => parts
@@ -350,7 +354,8 @@ impl<'m> Numbers<'m> {
         }
     }
 
-    /// Returns `true` if a static fact among the preconditions mentions all these variables.
+    /// Returns `true` if a static fact among the conjuncts or disjuncts of a condition holds and
+    /// mentions all these variables.
     fn is_linked(&self, condition: &Condition, variables: &[&Name], binding: &Binding<'_>) -> bool {
         match condition {
             Condition::And(parts) | Condition::Or(parts) => {
@@ -371,7 +376,7 @@ impl<'m> Numbers<'m> {
         designs.iter().find(|design| design.individual.name == name)
     }
 
-    /// A warning about a design, with its place in the knowledge base.
+    /// Creates a warning about a design, with its position in the knowledge base.
     pub(super) fn about(&self, design: &str, code: &str, text: String) -> Message {
         match (self.mission.knowledge(), self.design(design)) {
             (Some(knowledge), Some(design)) => doubt_about(knowledge, code, &design.individual.iri, text),
@@ -379,7 +384,7 @@ impl<'m> Numbers<'m> {
         }
     }
 
-    /// The file of the knowledge base that has a design.
+    /// Returns the name of the knowledge base's file that contains a design.
     fn file_of(&self, design: &str) -> String {
         self.about(design, "M230", String::new()).file.clone().unwrap_or_default()
     }

@@ -1,5 +1,5 @@
-//! Detects missing and unintended numbers. They make actions and designs unusable although no file
-//! is malformed.
+//! Detects missing and unintended numbers, which make actions and designs unusable although all
+//! files are well-formed.
 
 mod analysis;
 mod syntax;
@@ -14,8 +14,8 @@ pub use analysis::MissingValue;
 use crate::message::Message;
 use analysis::Numbers;
 
-/// Adds warnings about probable mistakes to a mission, once its situation is complete:
-/// [`Mission::doubts`], and for missions with a knowledge base [`doubts`].
+/// Adds warnings about probable mistakes to a mission, after its situation has been set:
+/// [`Mission::doubts`] and, if the mission has a knowledge base, [`doubts`].
 pub fn note_doubts(mission: &mut Mission) {
     mission.note_doubts();
     if mission.knowledge().is_some() {
@@ -24,7 +24,8 @@ pub fn note_doubts(mission: &mut Mission) {
     }
 }
 
-/// Returns warnings about missing numbers and about negative durations.
+/// Returns warnings about numbers that are probably missing by mistake, and about negative
+/// durations.
 pub fn doubts(mission: &Mission) -> Vec<Message> {
     let numbers = Numbers::new(mission);
     let (missing, negative) = numbers.check();
@@ -44,8 +45,8 @@ pub fn doubts(mission: &Mission) -> Vec<Message> {
     doubts
 }
 
-/// Returns the numeric functions without a value that actions need: the probable mistakes, or all
-/// of them if none is a probable mistake.
+/// Returns the numeric functions without a value that actions need. If some of them are probable
+/// mistakes, returns only these.
 pub fn missing_values(mission: &Mission) -> Vec<MissingValue> {
     let values = Numbers::new(mission).check().0;
     let is_told = |value: &MissingValue| value.is_likely || value.is_silent;
@@ -53,7 +54,8 @@ pub fn missing_values(mission: &Mission) -> Vec<MissingValue> {
     values.into_iter().filter(|value| !is_any || is_told(value)).collect()
 }
 
-/// Returns the reasons why a design can never be used although it may be available, as sentences.
+/// Returns sentences with the reasons why a design can never be used, even if it is available:
+/// missing estimations and negative durations.
 pub fn against(mission: &Mission, design: &str) -> Vec<String> {
     let (missing, negative) = Numbers::new(mission).check();
     let missing = missing.iter().filter_map(|value| {

@@ -1,10 +1,10 @@
-//! Collects the numeric functions that actions, conditions and effects need.
+//! Collects the numeric functions whose values an action needs, from its conditions and effects.
 
 use pddl::ast::{
     Action, ActionBody, Assignment, Atom, Condition, Effect, Expression, Name, Term, TypeExpression,
 };
 
-/// Bindings of variables to objects.
+/// A binding: variables with the objects that they denote.
 pub(super) type Binding<'a> = Vec<(&'a Name, Name)>;
 
 pub(super) fn constants(atom: &Atom) -> Vec<Name> {
@@ -17,7 +17,8 @@ pub(super) fn name_of(term: &Term) -> &Name {
     }
 }
 
-/// Returns the object that a term denotes, or `None` if its variable is not bound.
+/// Returns the object that a term denotes under a binding, or `None` if the term is an unbound
+/// variable.
 pub(super) fn object<'a>(term: &'a Term, binding: &'a Binding<'_>) -> Option<&'a Name> {
     match term {
         Term::Constant(constant) => Some(&constant.name),
@@ -27,12 +28,13 @@ pub(super) fn object<'a>(term: &'a Term, binding: &'a Binding<'_>) -> Option<&'a
     }
 }
 
-/// Returns the arguments of an atom, or `None` unless all of its variables are bound.
+/// Returns the arguments of an atom under a binding, or `None` if a variable of the atom is not
+/// bound.
 pub(super) fn bound_arguments(atom: &Atom, binding: &Binding<'_>) -> Option<Vec<Name>> {
     atom.arguments.iter().map(|term| object(term, binding).cloned()).collect()
 }
 
-/// The arguments of an atom whose variables are all bound.
+/// Returns the arguments of an atom under a binding that binds all its variables.
 pub(super) fn grounded(atom: &Atom, binding: &Binding<'_>) -> Vec<Name> {
     bound_arguments(atom, binding).unwrap_or_default()
 }
@@ -71,7 +73,7 @@ pub(super) fn effects(body: &ActionBody) -> Vec<&Effect> {
     }
 }
 
-/// Visits all parts of an effect that are not composed of other effects.
+/// Visits the elementary parts of an effect, i.e. those that do not contain other effects.
 pub(super) fn walk<'a>(effect: &'a Effect, visit: &mut dyn FnMut(&'a Effect)) {
     match effect {
         Effect::And(parts) => parts.iter().for_each(|part| walk(part, visit)),
@@ -80,7 +82,7 @@ pub(super) fn walk<'a>(effect: &'a Effect, visit: &mut dyn FnMut(&'a Effect)) {
     }
 }
 
-/// Returns `true` if the action increases or decreases the function.
+/// Returns `true` if an effect of the action increases, decreases or scales the function.
 pub(super) fn grows(action: &Action, function: &Name) -> bool {
     let mut is_changed = false;
     for effect in effects(&action.body) {
@@ -92,7 +94,8 @@ pub(super) fn grows(action: &Action, function: &Name) -> bool {
     is_changed
 }
 
-/// Returns the functions whose values an action always needs.
+/// Returns the functions whose values an action needs in every case: in its durations, its
+/// conjunctive conditions and its unconditional effects.
 pub(super) fn needed(action: &Action) -> Vec<&Atom> {
     let mut functions = Vec::new();
     if let ActionBody::Durative { duration, .. } = &action.body {
@@ -109,7 +112,7 @@ pub(super) fn needed(action: &Action) -> Vec<&Atom> {
     functions
 }
 
-/// Collects functions in comparisons that must be true.
+/// Collects the functions in comparisons that must hold for the condition to hold.
 pub(super) fn in_condition<'a>(condition: &'a Condition, needed: &mut Vec<&'a Atom>) {
     match condition {
         Condition::And(parts) => parts.iter().for_each(|part| in_condition(part, needed)),
@@ -121,7 +124,7 @@ pub(super) fn in_condition<'a>(condition: &'a Condition, needed: &mut Vec<&'a At
     }
 }
 
-/// Collects functions in unconditional effects.
+/// Collects the functions that the unconditional parts of an effect read.
 pub(super) fn in_effect<'a>(effect: &'a Effect, needed: &mut Vec<&'a Atom>) {
     match effect {
         Effect::And(parts) => parts.iter().for_each(|part| in_effect(part, needed)),

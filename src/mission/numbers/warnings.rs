@@ -1,5 +1,5 @@
-//! Warnings about missing numbers and negative durations, with the file and the place where they
-//! can be corrected.
+//! Warnings about missing numbers and negative durations, each with the position at which it can be
+//! corrected.
 
 use std::collections::BTreeSet;
 
@@ -9,10 +9,11 @@ use pddl::{Diagnostic, Severity, Source};
 use super::analysis::{MissingValue, NegativeDuration, Numbers};
 use crate::message::{Message, did_you_mean};
 
-/// Maximum number of functions without a value that a warning names; further ones are only counted.
+/// Maximum number of functions without a value that a warning names. Further functions are only
+/// counted.
 const MAX_NAMED: usize = 3;
 
-/// Messages about missing and negative numbers.
+/// Builds the warnings about missing numbers and negative durations.
 impl Numbers<'_> {
     pub(super) fn no_estimation(
         &self,

@@ -1,11 +1,12 @@
-//! Retries of operations on a log.
+//! Operations on a log that are retried until they succeed or fail definitely.
 
 use std::future::Future;
 use std::time::Duration;
 
 use crate::store::{Bucket, Fault, Store};
 
-/// Writes a value after a revision, retrying until it is stored or another value is found.
+/// Writes a value if the current revision is `after`. Retries until the value is stored, or until
+/// another value is found. Returns the new revision.
 pub(super) async fn write<S: Store>(
     store: &S,
     bucket: Bucket,
@@ -28,7 +29,7 @@ pub(super) async fn write<S: Store>(
     Err(Fault::Conflict)
 }
 
-/// Repeats an operation until it has a definite result.
+/// Repeats an operation with pauses until its result is known, i.e. not [`Fault::Unreachable`].
 pub(super) async fn persist<T, F: Future<Output = Result<T, Fault>>>(
     ask: impl Fn() -> F,
 ) -> Result<T, Fault> {
@@ -41,14 +42,14 @@ pub(super) async fn persist<T, F: Future<Output = Result<T, Fault>>>(
     Err(Fault::Conflict)
 }
 
-/// Waits before another attempt: a random time up to 10 ms, doubled with each attempt up to 5 s.
-/// Random pauses prevent synchronised retries.
+/// Waits for a random time before another attempt. The upper limit is 10 ms, doubled with each
+/// attempt, and at most 5 s. Random pauses prevent synchronised retries.
 pub(crate) async fn pause(attempt: u32) {
     let limit = 5_000.min(10_u64 << attempt.min(10));
     tokio::time::sleep(Duration::from_millis(fastrand::u64(1..=limit))).await;
 }
 
-/// Serialises a value.
+/// Serialises a value as JSON.
 pub(super) fn bytes(value: &impl serde::Serialize) -> Vec<u8> {
     serde_json::to_vec(value).unwrap_or_default()
 }

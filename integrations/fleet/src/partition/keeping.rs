@@ -1,4 +1,4 @@
-//! Checkpoints: saves robots and the progress of the partition.
+//! Checkpoints: stores snapshots of robots, and the progress of the partition.
 
 use std::sync::Arc;
 
@@ -9,7 +9,8 @@ use crate::store::{Bucket, Store};
 use crate::wire::{Address, Progress};
 
 impl<S: Store> Partition<S> {
-    /// Starts to save the robots that are due, or all. Returns `true` if there are any.
+    /// Starts to save those robots that were unsaved for too long, or all robots. Returns `true` if
+    /// a snapshot was started.
     pub(super) fn save(&mut self, all: bool) -> bool {
         let within = self.shared.settings.save_within;
         let is_due = |slot: &Slot| all || slot.since.is_some_and(|since| since.elapsed() >= within);
@@ -19,7 +20,8 @@ impl<S: Store> Partition<S> {
         begun > 0
     }
 
-    /// Starts to save a robot, if it is idle and has unsaved decisions.
+    /// Starts to save a robot that is idle and has unsaved decisions. Returns `true` if a snapshot
+    /// was started.
     pub(super) fn save_robot(&mut self, name: &str) -> bool {
         let Some(slot) = self.slots.get_mut(name) else { return false };
         let (Some(robot), Some(last)) = (&slot.robot, slot.unsaved.back()) else { return false };
@@ -37,7 +39,8 @@ impl<S: Store> Partition<S> {
         true
     }
 
-    /// Starts to write the progress, if it has advanced. Returns `true` if so.
+    /// Starts to write the progress if it has advanced: by at least one event or decision with
+    /// `must`, otherwise by [`Settings::save_every`]. Returns `true` if a write is running.
     pub(super) fn advance(&mut self, must: bool) -> bool {
         if self.is_progressing {
             return true;
@@ -62,7 +65,7 @@ impl<S: Store> Partition<S> {
                 next.decisions = next.decisions.min(decision);
             }
         }
-        // Decisions of former owners are needed until their events have been replayed.
+        // The stored progress must never decrease.
         next.events = next.events.max(self.progress.events);
         next.decisions = next.decisions.max(self.progress.decisions);
         let worth = if must { 1 } else { self.shared.settings.save_every as u64 };

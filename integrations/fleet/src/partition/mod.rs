@@ -1,11 +1,11 @@
-//! Robots of a partition, run by the worker that has its lease.
+//! A partition, i.e. a fixed group of robots, run by the worker that leases it.
 //!
-//! Events are read in order. Each robot handles a single event at a time, and robots run
-//! concurrently. A decision is appended after the robot's last one, so only one of two workers can
-//! decide an event. Robots are saved periodically, and the progress of the partition tells from
-//! where events and decisions must be read again. After a crash between any two of these
-//! operations, a new owner reads the saved states, replays later events with the recorded plans,
-//! and continues with the first undecided event.
+//! Events are read in order. Each robot handles one event at a time, and robots run concurrently. A
+//! decision is appended only if the robot's last decision has the expected sequence number. So only
+//! one of two workers can decide an event. Robots are saved periodically; the stored progress of
+//! the partition gives the positions from which events and decisions must be read again. A crash is
+//! possible between any two of these operations. A new owner reads the snapshots, replays later
+//! events with the recorded plans, and continues with the first undecided event.
 
 mod asking;
 mod keeping;
@@ -27,20 +27,23 @@ use crate::store::Store;
 pub(crate) use asking::pause;
 use own::Partition;
 
-/// Parameters of partitions.
+/// Parameters with which a worker runs its partitions.
 #[derive(Debug, Clone, Copy)]
 pub struct Settings {
-    /// Number of loops that work at the same time.
+    /// Maximum number of loops that run at the same time.
     pub threads: usize,
-    /// Number of robots loaded in memory. Others are kept as snapshots and loaded on demand.
+    /// Maximum number of robots loaded in memory. Others are kept as compressed snapshots and
+    /// loaded on demand.
     pub warm: usize,
-    /// Number of decisions after which a robot is saved and the progress is written.
+    /// Number of decisions after which a robot is saved, and number of events or decisions after
+    /// which the progress is written.
     pub save_every: usize,
-    /// Maximum time that a robot stays unsaved, which limits the retained events.
+    /// Time after which a robot with an unsaved decision is saved. It limits the number of events
+    /// that a new owner has to replay.
     pub save_within: Duration,
-    /// Interval between checks for robots to save.
+    /// Time between two checks whether robots have to be saved.
     pub look: Duration,
-    /// Number of events of a partition that are read in advance.
+    /// Maximum number of undecided events of a partition in memory.
     pub ahead: usize,
 }
 
@@ -57,55 +60,55 @@ impl Default for Settings {
     }
 }
 
-/// Shared state of a worker's partitions.
+/// State that all partitions of a worker share.
 #[derive(Debug)]
 pub struct Shared<S> {
-    /// The log.
+    /// The log with streams and buckets.
     pub store: S,
     /// The missions of the worker.
     pub missions: Missions,
     /// Name of the worker.
     pub worker: String,
-    /// Parameters of partitions.
+    /// Parameters of the partitions.
     pub settings: Settings,
-    /// Counters over all partitions.
+    /// Counters over all partitions of the worker.
     pub counts: Counts,
     threads: Semaphore,
 }
 
-/// Counters of current objects and of past events.
+/// Counters of a worker: current numbers of robots and events, and totals since the start.
 #[derive(Debug, Default)]
 pub struct Counts {
-    /// Number of robots.
+    /// Number of robots in the worker's partitions.
     pub robots: AtomicU64,
     /// Number of robots loaded in memory.
     pub warm: AtomicU64,
     /// Number of events that are read but not decided.
     pub waiting: AtomicU64,
-    /// Number of leased partitions.
+    /// Number of leased partitions that are running.
     pub partitions: AtomicU64,
     /// Number of decided events.
     pub decided: AtomicU64,
     /// Number of refused events.
     pub refused: AtomicU64,
-    /// Working time of loops in microseconds.
+    /// Total working time of loops in microseconds.
     pub busy: AtomicU64,
-    /// Sequence by partition up to which all events are decided or refused.
+    /// For each partition: sequence number up to which all events are decided or refused.
     pub reached: Mutex<BTreeMap<u32, u64>>,
 }
 
 impl<S> Shared<S> {
-    /// Creates the state with all counters at zero.
+    /// Creates the shared state of a worker, with all counters at zero.
     pub fn new(store: S, missions: Missions, worker: String, settings: Settings) -> Self {
         let threads = Semaphore::new(settings.threads.max(1));
         Self { store, missions, worker, settings, counts: Counts::default(), threads }
     }
 }
 
-/// Order to a partition.
+/// Order of the worker to a running partition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Order {
-    /// Continue.
+    /// Continue to handle events.
     Go,
     /// Finish running decisions, save everything and end.
     Drain,
@@ -113,16 +116,16 @@ pub enum Order {
     Abandon,
 }
 
-/// Reason why a partition has ended.
+/// Reason why the execution of a partition has ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum End {
-    /// An order.
+    /// The worker has ordered the end.
     Ordered,
-    /// Another worker has written what only the owner writes.
+    /// Another worker has written data that only the owner writes.
     Fenced,
 }
 
-/// Runs a partition until it is ordered to end or is fenced.
+/// Recovers and runs a partition until it is ordered to end, or until another worker writes in it.
 pub async fn serve<S: Store>(shared: Arc<Shared<S>>, partition: u32, orders: watch::Receiver<Order>) -> End {
     let mut abandoned = orders.clone();
     let work = async {

@@ -1,4 +1,4 @@
-//! Execution of a partition: reads events, runs robots, and triggers checkpoints.
+//! Execution of a partition: reads events, runs the loops of robots, and starts checkpoints.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::Ordering;
@@ -23,9 +23,9 @@ pub(super) struct Partition<S> {
     pub(super) progress: Progress,
     pub(super) revision: u64,
     pub(super) slots: BTreeMap<String, Slot>,
-    /// Sequences of the last event that was read and the last known decision.
+    /// Sequence numbers of the last event that was read, and of the last known decision.
     pub(super) seen: (u64, u64),
-    /// Revision of the last snapshot.
+    /// Revision of the last snapshot of a robot.
     pub(super) snapshots: u64,
     pub(super) jobs: FuturesUnordered<BoxFuture<'static, Done>>,
     /// Number of events that are read but not decided.
@@ -96,7 +96,7 @@ impl<S: Store> Partition<S> {
         }
     }
 
-    /// Handles the next event of the stream.
+    /// Queues the next event of the stream for its robot, or refuses it.
     fn read(&mut self, event: Stored) {
         if event.sequence <= self.seen.0 {
             return;
@@ -123,7 +123,8 @@ impl<S: Store> Partition<S> {
         }
         let has_slot = self.slots.contains_key(&address.robot);
         if !has_slot {
-            // Events of unknown missions are refused here, so that they create no robot.
+            // Events of unknown robots are refused here unless they enrol the robot, so that they
+            // create no state.
             let refused = match enrolment(&event.payload) {
                 Some(mission) if self.shared.missions.get(&mission).is_some() => None,
                 Some(_) => Some(Refused::Mission),
@@ -147,7 +148,7 @@ impl<S: Store> Partition<S> {
         self.begin(&address.robot);
     }
 
-    /// Starts the next pending event of a robot, if the robot is idle.
+    /// Starts to handle the next queued event of a robot, if the robot is idle.
     fn begin(&mut self, name: &str) {
         let last_decision = self.seen.1;
         let Some(slot) = self.slots.get_mut(name) else { return };
@@ -161,7 +162,8 @@ impl<S: Store> Partition<S> {
         }
         let is_next = slot.before.front().is_some_and(|(_, decided)| decided.event == event.sequence);
         let before = if is_next { slot.before.pop_front() } else { None };
-        // A former owner's decision is needed until it is listed as unsaved.
+        // The position of a replayed decision must not be passed by the progress until the decision
+        // is listed as unsaved.
         let last_decision =
             before.as_ref().map_or(last_decision, |(decision, _)| last_decision.min(decision - 1));
         slot.at = Some((event.sequence, last_decision));
@@ -212,7 +214,8 @@ impl<S: Store> Partition<S> {
                     self.recent.push_back((clock, name.clone()));
                     self.cool();
                 }
-                // A busy robot is never idle between events, so it is saved here.
+                // A busy robot is never idle between events, so it is saved between two events
+                // here.
                 if self
                     .slots
                     .get(&name)
@@ -246,7 +249,8 @@ impl<S: Store> Partition<S> {
         Ok(())
     }
 
-    /// Unloads robots until their number is within the limit.
+    /// Unloads the least recently used robots until the number of loaded robots is within the
+    /// limit.
     fn cool(&mut self) {
         let counts = &self.shared.counts;
         while counts.warm.load(Ordering::Relaxed) > self.shared.settings.warm as u64 {
@@ -259,7 +263,7 @@ impl<S: Store> Partition<S> {
         }
     }
 
-    /// Reports a refused event.
+    /// Counts a refused event, and publishes the reason.
     fn say(&self, event: &Stored, refused: Refused) {
         self.refuse(Some((event.subject.clone(), refused.sentence().to_owned())), refused.name());
     }
@@ -273,7 +277,8 @@ impl<S: Store> Partition<S> {
         }
     }
 
-    /// Marks a robot as faulted. Its events are kept for a worker that can handle them.
+    /// Marks a robot as faulted, so that it handles no events. Its events stay in the stream for a
+    /// worker that can handle them.
     pub(super) fn fault(&mut self, robot: &str, event: u64, decision: u64, why: &str) {
         metrics::counter!("metaplan_fleet_faulted_total").increment(1);
         tracing::error!(partition = self.number, robot, "does not go on: {why}");
@@ -303,7 +308,7 @@ impl<S> Drop for Partition<S> {
     }
 }
 
-/// Returns the mission of a message that requests an enrolment.
+/// Returns the name of the mission if a message requests an enrolment, otherwise `None`.
 fn enrolment(payload: &[u8]) -> Option<String> {
     #[derive(serde::Deserialize)]
     struct Head {

@@ -1,4 +1,4 @@
-//! A robot in its partition.
+//! A robot of a partition, with its queue and its unsaved decisions.
 
 use std::collections::VecDeque;
 use std::time::Instant;
@@ -7,42 +7,44 @@ use crate::robot::{Refused, Robot};
 use crate::store::{Fault, Stored};
 use crate::wire::{Decided, Progress};
 
-/// A robot with its pending events and unsaved decisions.
+/// A robot of a partition, with its queued events and unsaved decisions.
 #[derive(Default)]
 pub(super) struct Slot {
-    /// `None` while the robot is at work.
+    /// State of the robot. `None` while an event is being handled.
     pub(super) robot: Option<Box<Robot>>,
-    /// Sequences of the current event and of the last known decision at its start.
+    /// While an event is being handled: its sequence number, and the sequence number of the
+    /// partition's last decision at the start. For a replayed event, this is the number before its
+    /// decision.
     pub(super) at: Option<(u64, u64)>,
     pub(super) waiting: VecDeque<Stored>,
-    /// Sequence of the robot's last decision.
+    /// Sequence number of the robot's last decision.
     pub(super) chain: u64,
-    /// Decisions of former owners that are not replayed yet.
+    /// Decisions of former owners that are not replayed yet, with their sequence numbers.
     pub(super) before: VecDeque<(u64, Decided)>,
-    /// Sequences of events and decisions since the last save.
+    /// Sequence numbers of the events and their decisions since the last snapshot.
     pub(super) unsaved: VecDeque<(u64, u64)>,
     pub(super) since: Option<Instant>,
-    /// Revision of the saved state.
+    /// Revision of the last snapshot of the robot.
     pub(super) revision: u64,
     pub(super) is_saving: bool,
-    /// `true` if the robot cannot continue.
+    /// `true` if the robot cannot handle events.
     pub(super) faulted: bool,
     /// Time of the last use in ticks of the partition's clock; 0 if the robot is not loaded.
     pub(super) used: u64,
 }
 
-/// Result of a background job.
+/// Result of a background job of a partition.
 pub(super) enum Done {
-    /// An event was handled.
+    /// An event of a robot was handled.
     Taken { robot: String, own: Box<Robot>, event: Stored, outcome: Outcome },
-    /// A robot was saved up to an event, with this revision.
+    /// A snapshot of a robot was stored; it contains all events up to this one.
     Kept { robot: String, event: u64, revision: Result<u64, Fault> },
-    /// The progress was written.
+    /// The progress of the partition was stored.
     Progressed { progress: Progress, revision: Result<u64, Fault> },
 }
 
 pub(super) enum Outcome {
-    /// Decided, with the sequence of the decision.
+    /// The event was decided; the decision has this sequence number.
     Decided(u64),
     Refused(Refused),
     Faulted(String),

@@ -1,4 +1,4 @@
-//! Recovery of a partition from the data of former owners.
+//! Recovery of a partition from the stored data of former owners.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -14,7 +14,8 @@ use crate::store::{Bucket, Store, Stream};
 use crate::wire::{Address, Decided, Progress, Saved};
 
 impl<S: Store> Partition<S> {
-    /// Recovers a partition.
+    /// Takes ownership of a partition and restores its robots: increments the epoch, reads the
+    /// snapshots, and collects later decisions for replay.
     pub(super) async fn recover(shared: &Arc<Shared<S>>, number: u32) -> Result<Self, End> {
         let key = number.to_string();
         let store = &shared.store;
@@ -29,7 +30,8 @@ impl<S: Store> Partition<S> {
             let value = bytes(&progress);
             match persist(|| store.put(Bucket::Progress, &key, &value, revision)).await {
                 Ok(revision) => break (progress, revision),
-                // Another worker has written it, or an unacknowledged write succeeded.
+                // Another worker has written the progress, or an unacknowledged write has
+                // succeeded.
                 Err(_) => pause(1).await,
             }
         };
@@ -63,7 +65,7 @@ impl<S: Store> Partition<S> {
             if slot.chain >= message.sequence {
                 continue;
             }
-            // The next decision follows this message, whatever its contents.
+            // The next decision has to follow this message, even if the message cannot be parsed.
             slot.chain = message.sequence;
             match Decided::parse(&message.payload) {
                 Some(decided) => slot.before.push_back((message.sequence, decided)),

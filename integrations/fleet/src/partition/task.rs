@@ -1,5 +1,5 @@
-//! Handling of a single event: the loop runs in a separate thread, and the decision is appended
-//! after the last one.
+//! Handling of a single event: a separate thread runs the loop, then the decision is appended if
+//! the robot's last decision is the expected one.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -12,14 +12,15 @@ use crate::robot::{Faulted, Robot};
 use crate::store::{Fault, Message, Store, Stored, Stream};
 use crate::wire::Decided;
 
-/// Input of handling an event.
+/// Data for handling an event of a robot.
 pub(super) struct Task<S> {
     pub(super) shared: Arc<Shared<S>>,
     pub(super) name: String,
     pub(super) epoch: u64,
     pub(super) chain: u64,
     pub(super) before: Option<(u64, Decided)>,
-    /// `true` if a former owner has decided later events and not this one.
+    /// `true` if a former owner has decided later events of the robot but not this one, i.e. has
+    /// refused it.
     pub(super) was_refused: bool,
 }
 
@@ -39,7 +40,8 @@ impl<S: Store> Task<S> {
             (robot, event, decided)
         });
         let Ok((own, event, decided)) = work.await else {
-            // A panic loses the state of the robot. The next recovery starts from the saved state.
+            // A panic loses the state of the robot. The next recovery starts from its last
+            // snapshot.
             let event =
                 Stored { sequence: 0, subject: String::new(), id: None, time: 0, payload: Vec::new() };
             return Done::Taken { robot: self.name, own: Box::default(), event, outcome: Outcome::Fenced };
@@ -64,7 +66,8 @@ impl<S: Store> Task<S> {
         Done::Taken { robot: self.name, own, event, outcome }
     }
 
-    /// Appends a decision after the last one.
+    /// Appends a decision if the robot's last decision has the sequence number `chain`. Retries
+    /// until the result is known.
     async fn publish(&self, event: &Stored, decided: &Decided) -> Outcome {
         let (store, payload) = (&self.shared.store, bytes(decided));
         let id = format!("{}:{}:{}:{}", self.name, event.sequence, self.epoch, self.shared.worker);
@@ -85,7 +88,7 @@ impl<S: Store> Task<S> {
                     Ok(last) if last.as_ref().map_or(0, |last| last.sequence) != self.chain => {
                         return Outcome::Fenced;
                     }
-                    // An earlier attempt may still be in transit.
+                    // An earlier attempt may still be on its way to the server.
                     _ => {}
                 },
                 Err(Fault::TooLong(length)) => {

@@ -1,7 +1,8 @@
-//! Local directory with the same streams and buckets in a single file, for a single process.
+//! Log in a local directory, without a server and for a single process. All streams and buckets are
+//! in one file.
 //!
-//! All concurrent writes are combined into a transaction of `redb`, which is on disk before they
-//! are acknowledged.
+//! Concurrent writes are combined into one transaction of the database `redb`. The transaction is
+//! on disk before the writes are acknowledged.
 
 use std::collections::{HashMap, VecDeque};
 use std::path::Path;
@@ -16,33 +17,34 @@ use tokio::sync::{broadcast, mpsc, oneshot, watch};
 use super::{Bucket, Entry, Fault, Message, Receipt, Store, Stored, Stream};
 use crate::wire::Address;
 
-/// Name of the file in the directory.
+/// Name of the database file in the directory.
 const FILE: &str = "fleet.redb";
 
-/// Maximum number of writes in a transaction.
+/// Maximum number of writes in one transaction.
 const BATCH: usize = 4096;
 
-/// Maximum number of messages per read.
+/// Maximum number of messages that a subscriber reads at once.
 const PAGE: usize = 512;
 
 /// Cache size of the database in bytes.
 const CACHE: usize = 64 << 20;
 
-/// Value type of messages: (subject, id, time, payload); the key is (stream, sequence number).
+/// Type of a stored message: (subject, id, time, payload). The key is (stream, sequence number).
 type Parts = (&'static str, &'static str, u64, &'static [u8]);
 const MESSAGES: TableDefinition<'static, (u8, u64), Parts> = TableDefinition::new("messages");
-/// Index of the messages of a partition: (stream, partition, sequence number).
+/// Index of messages by partition: (stream, partition, sequence number).
 const OF_PARTITION: TableDefinition<'static, (u8, u32, u64), ()> = TableDefinition::new("of_partition");
 /// Sequence number of the last message by (stream, subject).
 const LAST: TableDefinition<'static, (u8, &str), u64> = TableDefinition::new("last");
 /// Sequence number of a message by (stream, message id).
 const IDS: TableDefinition<'static, (u8, &str), u64> = TableDefinition::new("ids");
-/// Revisions and values by (bucket, key).
+/// Revision and value by (bucket, key).
 const VALUES: TableDefinition<'static, (u8, &str), (u64, &[u8])> = TableDefinition::new("values");
-/// Counters by name: the number of partitions and the last sequence number.
+/// Counters by name: the number of partitions, the last sequence number of each stream, and the
+/// last revision.
 const NUMBERS: TableDefinition<'static, &str, u64> = TableDefinition::new("numbers");
 
-/// A log in a local directory.
+/// A log in a local directory. Clones share the database.
 #[derive(Debug, Clone)]
 pub struct Local(Arc<Inner>);
 
@@ -52,18 +54,18 @@ struct Inner {
     partitions: u32,
     lease: Duration,
     requests: mpsc::UnboundedSender<Request>,
-    /// Incremented on every append.
+    /// Number of transactions with appends, by which subscribers are notified.
     appended: watch::Receiver<u64>,
     notices: broadcast::Sender<(String, String)>,
 }
 
-/// A write with the receiver of its result.
+/// A write, with the channel for its result.
 struct Request {
     write: Write,
     done: oneshot::Sender<Answer>,
 }
 
-/// Sequence number or revision of a write.
+/// Result of a write: its sequence number or revision, or the fault.
 type Answer = Result<Receipt, Fault>;
 
 enum Write {
@@ -81,7 +83,7 @@ fn failed(error: impl std::fmt::Display) -> Fault {
 }
 
 impl Local {
-    /// Opens or creates a directory. The number of partitions is fixed on creation. Leases expire
+    /// Opens or creates a log in a directory. `partitions` applies only on creation. Leases expire
     /// unless they are renewed within `lease`.
     ///
     /// # Errors
@@ -107,7 +109,7 @@ impl Local {
         Ok(Self(Arc::new(Inner { database, partitions, lease, requests, appended, notices })))
     }
 
-    /// Subscribes to refusals: subjects and sentences.
+    /// Subscribes to refused events: subject and reason.
     pub fn notices(&self) -> broadcast::Receiver<(String, String)> {
         self.0.notices.subscribe()
     }
@@ -146,7 +148,8 @@ fn message(
     }))
 }
 
-/// Creates the tables. Returns the number of partitions.
+/// Creates missing tables, and removes old leases. Returns the number of partitions, which is
+/// `partitions` only for a new database.
 fn prepare(database: &Database, partitions: u32) -> Result<u32, redb::Error> {
     let transaction = database.begin_write()?;
     transaction.open_table(MESSAGES)?;
@@ -155,7 +158,7 @@ fn prepare(database: &Database, partitions: u32) -> Result<u32, redb::Error> {
     transaction.open_table(IDS)?;
     let known = {
         let mut values = transaction.open_table(VALUES)?;
-        // Only one process uses the file at a time, so all old leases are invalid.
+        // Only one process uses the file at a time, so leases of earlier processes are invalid.
         for bucket in Bucket::ALL.into_iter().filter(|bucket| bucket.expires()) {
             values.retain_in((bucket as u8, "")..(bucket as u8 + 1, ""), |_, _| false)?;
         }
@@ -169,10 +172,10 @@ fn prepare(database: &Database, partitions: u32) -> Result<u32, redb::Error> {
     Ok(known)
 }
 
-/// The writer thread.
+/// State of the writer thread.
 struct Writer {
     database: Arc<Database>,
-    /// Time at which expiring values were written.
+    /// Time of the last write of each value that expires.
     seen: HashMap<(Bucket, String), Instant>,
     lease: Duration,
 }
@@ -191,7 +194,7 @@ impl Writer {
                 if let (Write::Append { .. }, Ok(receipt)) = (&request.write, &answer) {
                     last = last.max(receipt.sequence);
                 }
-                // The requester may have stopped waiting.
+                // The requesting task may have been cancelled.
                 let _ = request.done.send(answer);
             }
             if last > 0 {
@@ -315,7 +318,7 @@ impl Tables<'_> {
     }
 }
 
-/// Position of a reader in a partition.
+/// Position of a subscriber in a partition, with the messages that were read ahead.
 struct Reader {
     store: Local,
     stream: Stream,
@@ -431,7 +434,7 @@ impl Store for Local {
     }
 
     async fn notice(&self, subject: &str, text: &str) {
-        // There may be no listener.
+        // There may be no subscriber.
         let _ = self.0.notices.send((subject.to_owned(), text.to_owned()));
     }
 }

@@ -1,9 +1,9 @@
-//! Interface of a log: streams of messages with conditional appends, and buckets of values with
-//! revisions.
+//! Interface of a log: streams of messages with conditional appends, and buckets with values that
+//! have revisions.
 //!
-//! It is implemented by NATS JetStream and by a local directory without a server. Both persist what
-//! they have acknowledged, number messages from 1 in the order of appends, and reject an append or
-//! a value if the expected predecessor is not the last one.
+//! NATS JetStream and a local directory implement the interface. Both store data durably before
+//! they acknowledge it, and number messages from 1 in the order of appends. They reject an append
+//! or a value if the last message or value is not the expected predecessor.
 
 pub mod local;
 pub mod nats;
@@ -13,12 +13,12 @@ use std::time::Duration;
 
 use futures::stream::BoxStream;
 
-/// The streams of a fleet.
+/// The two streams of messages of a fleet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Stream {
-    /// `ev.PARTITION.ROBOT`: events of robots.
+    /// Events of robots, with subjects `ev.PARTITION.ROBOT`.
     Events,
-    /// `dec.PARTITION.ROBOT`: decisions.
+    /// Decisions for robots, with subjects `dec.PARTITION.ROBOT`.
     Decisions,
 }
 
@@ -26,7 +26,7 @@ impl Stream {
     /// Both streams.
     pub const ALL: [Self; 2] = [Self::Events, Self::Decisions];
 
-    /// First token of the subjects.
+    /// Returns the first token of the stream's subjects.
     pub fn prefix(self) -> &'static str {
         match self {
             Self::Events => "ev",
@@ -35,16 +35,17 @@ impl Stream {
     }
 }
 
-/// The buckets of a fleet.
+/// The buckets of a fleet, i.e. tables from keys to values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Bucket {
-    /// Key `PARTITION`: the owner of the partition. Expires unless it is renewed.
+    /// Key `PARTITION`: the worker that leases the partition. Expires unless it is renewed.
     Leases,
-    /// Key: name of a worker. Expires unless it is renewed.
+    /// Key: name of a worker; value: its [status](crate::wire::Presence). Expires unless it is
+    /// renewed.
     Workers,
-    /// Key `PARTITION`: its [progress](crate::wire::Progress).
+    /// Key `PARTITION`: the [progress](crate::wire::Progress) of the partition.
     Progress,
-    /// Key `PARTITION.ROBOT`: the [saved](crate::wire::Saved) state of the robot.
+    /// Key `PARTITION.ROBOT`: the [snapshot](crate::wire::Saved) of the robot.
     Robots,
 }
 
@@ -52,7 +53,7 @@ impl Bucket {
     /// All buckets.
     pub const ALL: [Self; 4] = [Self::Leases, Self::Workers, Self::Progress, Self::Robots];
 
-    /// Name of the bucket, which follows the name of the fleet.
+    /// Returns the name of the bucket. The full name begins with the name of the fleet.
     pub fn name(self) -> &'static str {
         match self {
             Self::Leases => "leases",
@@ -68,10 +69,10 @@ impl Bucket {
     }
 }
 
-/// A message of a stream.
+/// A stored message of a stream.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Stored {
-    /// Sequence number from 1, over all subjects of the stream.
+    /// Sequence number in the stream, from 1, over all subjects.
     pub sequence: u64,
     /// Subject without the prefix of the stream.
     pub subject: String,
@@ -88,60 +89,61 @@ pub struct Stored {
 pub struct Message<'a> {
     /// Subject without the prefix of the stream.
     pub subject: &'a str,
-    /// Message id. A second message with the same id is not stored.
+    /// Message id. A further message with the same id is not stored. An empty id is not compared.
     pub id: &'a str,
-    /// Required sequence number of the last message of the subject, if the append is conditional; 0
-    /// requires that the subject has no message.
+    /// For a conditional append: the sequence number that the last message of the subject must
+    /// have. 0 requires that the subject has no message.
     pub after: Option<u64>,
     /// Contents of the message.
     pub payload: &'a [u8],
 }
 
-/// Acknowledgement of an append.
+/// Acknowledgement that a message is stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Receipt {
     /// Sequence number of the message.
     pub sequence: u64,
-    /// `true` if an earlier message with the same id was found instead.
+    /// `true` if the message was not stored, because an earlier message has the same id.
     pub is_known: bool,
 }
 
-/// A value of a bucket.
+/// A value of a bucket with its revision.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Entry {
-    /// Its key.
+    /// Key of the value.
     pub key: String,
-    /// The value.
+    /// Bytes of the value.
     pub value: Vec<u8>,
-    /// Revision, which grows with every value of the bucket.
+    /// Number of the write, which grows with every write in the bucket.
     pub revision: u64,
 }
 
-/// Reason for a failed operation.
+/// Reason why an operation on the log failed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Fault {
-    /// The expected predecessor is not the last message or value.
+    /// The last message or value is not the expected predecessor.
     #[error("another message or value is there than was expected")]
     Conflict,
-    /// The message exceeds the server's limit.
+    /// The message with this number of bytes is longer than the server accepts.
     #[error("the message has {0} bytes; that is more than the server takes")]
     TooLong(usize),
-    /// The result is unknown; the operation may succeed later and must be retried.
+    /// The result is unknown: the operation may still succeed. It has to be retried.
     #[error("{0}")]
     Unreachable(String),
 }
 
-/// The log of a fleet.
+/// The log of a fleet: streams and buckets. Clones share the log.
 pub trait Store: Clone + Send + Sync + 'static {
-    /// Number of partitions, which never changes.
+    /// Returns the number of partitions, which never changes.
     fn partitions(&self) -> u32;
 
-    /// Time after which leases and presences expire unless they are renewed. It never changes.
+    /// Returns the time after which leases and published statuses expire unless they are renewed.
+    /// The time never changes.
     fn lease(&self) -> Duration;
 
-    /// Returns the messages of a partition after a sequence number as an endless stream, in
-    /// ascending order.
+    /// Returns the messages of a partition after a sequence number, in ascending order. The stream
+    /// is endless: it waits for new messages.
     fn follow(
         &self,
         stream: Stream,
@@ -158,31 +160,31 @@ pub trait Store: Clone + Send + Sync + 'static {
         after: u64,
     ) -> impl Future<Output = Result<Vec<Stored>, Fault>> + Send;
 
-    /// Returns the sequence number of the last message of a partition; 0 for an empty partition.
+    /// Returns the sequence number of the last message of a partition, or 0 for an empty partition.
     fn end(&self, stream: Stream, partition: u32) -> impl Future<Output = Result<u64, Fault>> + Send;
 
-    /// Appends a message durably.
+    /// Appends a message and waits until it is stored durably.
     fn append(
         &self,
         stream: Stream,
         message: Message<'_>,
     ) -> impl Future<Output = Result<Receipt, Fault>> + Send;
 
-    /// Returns the last message of a subject.
+    /// Returns the last message of a subject, or `None` if the subject has no message.
     fn last(
         &self,
         stream: Stream,
         subject: &str,
     ) -> impl Future<Output = Result<Option<Stored>, Fault>> + Send;
 
-    /// Returns the message with a sequence number, of any subject.
+    /// Returns the message of a stream with this sequence number, whatever its subject.
     fn at(&self, stream: Stream, sequence: u64)
     -> impl Future<Output = Result<Option<Stored>, Fault>> + Send;
 
-    /// Returns a value.
+    /// Returns the value of a key with its revision, or `None` if there is no value.
     fn get(&self, bucket: Bucket, key: &str) -> impl Future<Output = Result<Option<Entry>, Fault>> + Send;
 
-    /// Writes a value if the current revision is the given one (0: no value). Returns the new
+    /// Writes a value if the current revision of the key is `after` (0: no value). Returns the new
     /// revision.
     fn put(
         &self,
@@ -192,7 +194,7 @@ pub trait Store: Clone + Send + Sync + 'static {
         after: u64,
     ) -> impl Future<Output = Result<u64, Fault>> + Send;
 
-    /// Removes a value if it has that revision.
+    /// Removes the value of a key if its revision is `revision`.
     fn remove(
         &self,
         bucket: Bucket,
@@ -200,8 +202,8 @@ pub trait Store: Clone + Send + Sync + 'static {
         revision: u64,
     ) -> impl Future<Output = Result<(), Fault>> + Send;
 
-    /// Returns all values of a bucket, or those of a partition's robots, at least as new as a
-    /// revision.
+    /// Returns all values of a bucket, or those of one partition's robots. The result contains at
+    /// least all writes up to the revision `at_least`.
     fn list(
         &self,
         bucket: Bucket,
@@ -209,6 +211,7 @@ pub trait Store: Clone + Send + Sync + 'static {
         at_least: u64,
     ) -> impl Future<Output = Result<Vec<Entry>, Fault>> + Send;
 
-    /// Publishes on `err.PARTITION.ROBOT` why an event was refused. The message is not persistent.
+    /// Publishes why an event of a robot was refused, on `err.PARTITION.ROBOT`. The message is not
+    /// persistent.
     fn notice(&self, subject: &str, text: &str) -> impl Future<Output = ()> + Send;
 }

@@ -1,9 +1,9 @@
 //! NATS JetStream as a log.
 //!
-//! Streams `FLEET-events` and `FLEET-decisions`, and a bucket for each [`Bucket`], all with the
-//! replicas that they were created with. Consistent reads are answered by the stream leader.
-//! Consumers may lag behind, so readers are given the sequence number up to which they have to
-//! read.
+//! The streams are called `FLEET-events` and `FLEET-decisions`, and there is a bucket for each
+//! [`Bucket`]. All have the number of replicas with which they were created. Consistent reads are
+//! answered by the stream leader. Consumers may lag behind, so a caller passes the sequence number
+//! up to which a consumer has to read.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -21,14 +21,14 @@ use metaplan::message::Message as Diagnostic;
 
 use super::{Bucket, Entry, Fault, Message, Receipt, Store, Stored, Stream};
 
-/// Connection settings of the servers.
+/// Settings for the connection to NATS servers.
 #[derive(Debug, Clone, Default)]
 pub struct Access {
-    /// Comma-separated URLs: `nats://HOST:PORT`, `tls://HOST:PORT`.
+    /// URLs of the servers, separated by commas: `nats://HOST:PORT`, `tls://HOST:PORT`.
     pub url: String,
-    /// NATS credentials file with the user's JWT and seed.
+    /// Path of a NATS credentials file with the user's JWT and seed.
     pub credentials: Option<PathBuf>,
-    /// User and password.
+    /// Name and password of the user.
     pub user: Option<(String, String)>,
     /// File with certificates of additional trusted authorities.
     pub authorities: Option<PathBuf>,
@@ -36,10 +36,10 @@ pub struct Access {
     pub certificate: Option<(PathBuf, PathBuf)>,
 }
 
-/// Parameters of new streams and buckets.
+/// Parameters with which missing streams and buckets are created.
 #[derive(Debug, Clone)]
 pub struct Layout {
-    /// Prefix of their names: letters, digits, `-` and `_`.
+    /// Name of the fleet, a prefix of all names: letters, digits, `-` and `_`.
     pub fleet: String,
     /// Number of partitions, which never changes.
     pub partitions: u32,
@@ -49,16 +49,16 @@ pub struct Layout {
     pub lease: Duration,
 }
 
-/// Number of messages per fetch.
+/// Number of messages that are fetched at once.
 const BATCH: usize = 500;
 
-/// Timeout of a request.
+/// Timeout of a request to the server.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// Period during which a message with a repeated id is discarded.
+/// Period during which a further message with the same id is discarded.
 const WINDOW: Duration = Duration::from_secs(600);
 
-/// JetStream as a log.
+/// The log of a fleet in NATS JetStream. Clones share the connection.
 #[derive(Debug, Clone)]
 pub struct Nats {
     client: Client,
@@ -75,10 +75,11 @@ fn failed(error: impl std::fmt::Display) -> Fault {
 }
 
 impl Nats {
-    /// Connects, and creates missing streams and buckets.
+    /// Connects to the servers, and creates missing streams and buckets.
     ///
     /// # Errors
-    /// No server can be reached, the server has no JetStream, or it refuses access.
+    /// No server can be reached, the server has no JetStream, it refuses access, or a stream of
+    /// this name does not belong to a fleet.
     pub async fn open(access: &Access, layout: &Layout) -> Result<Self, Diagnostic> {
         let wrong =
             |error: &dyn std::fmt::Display| Diagnostic::error("N311", format!("{}: {error}", access.url));
@@ -140,7 +141,7 @@ impl Nats {
                 Ok(store) => store,
                 Err(_) => match context.create_key_value(config).await {
                     Ok(store) => store,
-                    // Another client has created it in the meantime.
+                    // Another client may have created the bucket in the meantime.
                     Err(_) => context.get_key_value(&bucket).await.map_err(failed)?,
                 },
             });
@@ -150,7 +151,7 @@ impl Nats {
             context.get_stream_no_info(events).await.map_err(failed)?,
             context.get_stream_no_info(decisions).await.map_err(failed)?,
         ];
-        // The lease time is that of the creation, not the current option.
+        // The lease time is that of the creation of the bucket, not of `layout`.
         let leases: &kv::Store = &buckets[Bucket::Leases as usize];
         let lease = leases.status().await.map_err(failed)?.max_age();
         let buckets = buckets.try_into().map_err(|_| failed("a bucket is missing"))?;
@@ -165,7 +166,7 @@ impl Nats {
         Ok(self.stream(stream).get_info().await.map_err(failed)?.state.messages)
     }
 
-    /// Subscribes to refusals: subjects after `err.`, and sentences.
+    /// Subscribes to refused events: subject without `err.`, and reason.
     ///
     /// # Errors
     /// The server cannot be reached.
@@ -186,8 +187,9 @@ impl Nats {
         &self.buckets[bucket as usize]
     }
 
-    /// Reads all messages of a filter after a sequence number, up to the end and at least to the
-    /// required sequence number.
+    /// Reads all messages of a stream that match `filter`, beginning as `from` requires. Reads to
+    /// the end, and at least to the sequence number `reach`. Calls `take` with each message and its
+    /// sequence number.
     async fn read(
         &self,
         name: &str,
@@ -231,7 +233,7 @@ impl Nats {
                 return Err(failed("the server has no more messages, and should have"));
             }
         }
-        // The server would remove an unused consumer later anyway.
+        // The server would also remove an unused consumer by itself, but later.
         let _ = self.context.delete_consumer_from_stream(consumer.cached_info().name.as_str(), name).await;
         Ok(())
     }
@@ -257,7 +259,7 @@ fn stored(stream: Stream, message: &jetstream::Message) -> Result<Stored, Fault>
     })
 }
 
-/// Converts a message read from the stream leader.
+/// Converts a message that was read from the stream leader.
 fn raw(stream: Stream, message: &StreamMessage) -> Stored {
     Stored {
         sequence: message.sequence,
@@ -414,7 +416,7 @@ impl Store for Nats {
     }
 
     async fn notice(&self, subject: &str, text: &str) {
-        // The message is not persistent and may have no listener.
+        // The message is not persistent, and there may be no subscriber.
         let _ = self.client.publish(format!("err.{subject}"), text.to_owned().into()).await;
     }
 }

@@ -1,4 +1,4 @@
-//! Three servers and several workers as processes, and the faults that are injected.
+//! Three NATS servers and several workers as processes, and the injected faults.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -11,23 +11,23 @@ use std::time::Duration;
 
 use super::wires::{Wire, routes};
 
-/// The pairs of servers, by the number of the third one.
+/// For each server, the other two servers.
 const PAIRS: [[usize; 2]; 3] = [[1, 2], [0, 2], [0, 1]];
 
-/// Size of the third server's disk, if it can have a separate one.
+/// Size of the third server's disk, if this system supports a separate disk.
 const DISK: &str = "64m";
 
 fn program() -> String {
     std::env::var("NATS_SERVER").unwrap_or_else(|_| "nats-server".to_owned())
 }
 
-/// Returns `true` if the server program is available.
+/// Returns `Some` if the program `nats-server` can be started.
 pub(super) fn is_there() -> Option<()> {
     let out = Command::new(program()).arg("--version").stdout(Stdio::null()).status();
     out.ok().filter(std::process::ExitStatus::success).map(|_| ())
 }
 
-/// The processes of the cluster.
+/// The processes of the cluster. Clones share the processes.
 #[derive(Clone)]
 pub(super) struct Cluster(Arc<Inner>);
 
@@ -35,7 +35,7 @@ struct Inner {
     directory: tempfile::TempDir,
     clients: [u16; 3],
     monitors: [u16; 3],
-    /// Connections between two servers, by the number of the third one.
+    /// For each of the three servers, the proxy for the connections between the two other servers.
     wires: [Wire; 3],
     own_disk: bool,
     processes: Mutex<BTreeMap<String, Child>>,
@@ -56,7 +56,7 @@ fn free_port() -> u16 {
     listener.local_addr().expect("it has an address").port()
 }
 
-/// Returns `true` if processes can have a separate disk on this system.
+/// Returns `true` if this system allows a process to mount its own disk.
 fn can_mount() -> bool {
     let script = "mount -t tmpfs -o size=1m tmpfs /mnt";
     let status = Command::new("unshare").args(["-rm", "sh", "-c", script]).stderr(Stdio::null()).status();
@@ -64,7 +64,7 @@ fn can_mount() -> bool {
 }
 
 impl Cluster {
-    /// Starts three servers on free ports.
+    /// Starts three servers on free ports, connected through proxies.
     pub(super) fn begin(seed: u64) -> Self {
         let directory =
             tempfile::Builder::new().prefix(&format!("chaos-{seed}-")).tempdir().expect("a directory");
@@ -129,7 +129,8 @@ impl Cluster {
         self.processes().insert(name.to_owned(), child.expect("it can be begun"));
     }
 
-    /// Mounts a small disk for the lifetime of a process.
+    /// Mounts a small disk for the third server, by a process that keeps the disk mounted while it
+    /// runs.
     fn begin_disk(&self) {
         let (folder, ready) = (self.path("s2"), self.path("s2").join("ready"));
         let mount = format!(
@@ -163,7 +164,7 @@ impl Cluster {
         self.begin_process(&format!("s{own}"), command);
     }
 
-    /// Starts a worker.
+    /// Starts a worker process with this number of partitions, and a lease in seconds.
     pub(super) fn begin_worker(&self, own: usize, partitions: u32, lease: u64) {
         let missions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../missions");
         let mut command = Command::new(env!("CARGO_BIN_EXE_metaplan-fleet"));
@@ -188,7 +189,7 @@ impl Cluster {
         }
     }
 
-    /// Fills the disk of the third server, or frees it again.
+    /// Fills the disk of the third server, or frees the space again.
     fn fill(&self, full: bool) {
         let pid = self.processes().get("disk").map(Child::id);
         let Some(pid) = pid else { return };
@@ -204,7 +205,8 @@ impl Cluster {
         }
     }
 
-    /// Cuts the connection between two servers for a time. Both remain connected to the third one.
+    /// Cuts the connection between two servers for `millis` milliseconds. Both remain connected to
+    /// the server `third`.
     fn part(&self, third: usize, millis: u64) {
         let [one, other] = PAIRS[third];
         self.0.wires[third].cut();
@@ -221,7 +223,8 @@ impl Cluster {
         self.0.wires[third].mend();
     }
 
-    /// Injects random faults, one server at a time, then restores all processes.
+    /// Injects random faults, one at a time, until `over` is true, and restores all processes.
+    /// Returns a description with the number of faults of each kind.
     pub(super) fn trouble(&self, seed: u64, over: &AtomicBool, partitions: u32, lease: u64) -> String {
         let mut random = fastrand::Rng::with_seed(seed);
         let mut counts: BTreeMap<&str, u32> = BTreeMap::new();
@@ -277,7 +280,7 @@ impl Cluster {
         counts.iter().map(|(what, count)| format!("{count} {what}")).collect::<Vec<_>>().join(", ")
     }
 
-    /// Returns the memory of a process in megabytes.
+    /// Returns the resident memory of a process in megabytes.
     pub(super) fn memory(&self, name: &str) -> u64 {
         let pid = self.processes().get(name).map(Child::id).unwrap_or_default();
         let status = fs::read_to_string(format!("/proc/{pid}/status")).unwrap_or_default();
@@ -285,7 +288,7 @@ impl Cluster {
         line.split_whitespace().next().and_then(|text| text.parse::<u64>().ok()).unwrap_or_default() / 1024
     }
 
-    /// Returns the ends of all logs.
+    /// Returns the last lines of all logs.
     pub(super) fn logs(&self) -> String {
         let mut text = String::new();
         for entry in fs::read_dir(self.0.directory.path()).into_iter().flatten().flatten() {

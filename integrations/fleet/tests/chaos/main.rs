@@ -1,5 +1,5 @@
-//! Three servers, four workers and a thousand robots with faults at random times: every robot
-//! receives the answers of a single loop.
+//! Chaos test: three servers, four workers and a thousand robots, with faults at random times.
+//! Every robot must receive the answers that a single local loop gives.
 //!
 //! Ignored by default, because it needs `nats-server` (2.11 or newer), given by `NATS_SERVER` or
 //! found in the search path. Further variables: `SCHEDULES` (20), `SEED` (1), `ROBOTS` (1000),
@@ -34,11 +34,11 @@ fn number(name: &str, default: u64) -> u64 {
     std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
 }
 
-/// Events of a robot with the expected answers.
+/// Events of a robot, and the expected answers to each event.
 type Script = (Vec<String>, Vec<Vec<Value>>);
 
-/// Returns a script of the given length: observations of the simulated robot, followed by failures
-/// and recoveries of components.
+/// Returns a script with the given number of events: observations of a simulated robot, then
+/// failures and recoveries of a component.
 fn script(number: usize, lines: usize) -> Script {
     let (mission, scenario) = scripts::SCENARIOS[number % scripts::SCENARIOS.len()];
     let (mut events, _) = scripts::play(mission, scenario, number as u64, lines);
@@ -67,7 +67,7 @@ async fn open(cluster: &Cluster, lease: u64) -> Nats {
     panic!("the servers do not answer: {}", cluster.logs());
 }
 
-/// Reads the messages of a stream, with retries.
+/// Reads all messages of a partition, with retries.
 async fn read(store: &Nats, stream: Stream, partition: u32) -> Vec<Stored> {
     for _ in 0..60 {
         match store.history(stream, partition, 0).await {
@@ -78,7 +78,8 @@ async fn read(store: &Nats, stream: Stream, partition: u32) -> Vec<Stored> {
     panic!("partition {partition} cannot be read");
 }
 
-/// Sends invalid messages from time to time.
+/// Sends an invalid message every 100 ms until `over` is true. Returns the number of messages that
+/// were stored.
 async fn attack(store: Nats, over: Arc<AtomicBool>, seed: u64) -> u64 {
     let mut random = fastrand::Rng::with_seed(seed);
     let mut count = 0;
@@ -104,7 +105,8 @@ async fn attack(store: Nats, over: Arc<AtomicBool>, seed: u64) -> u64 {
     count
 }
 
-/// Runs a schedule: the robots' events during faults, and the check of the decisions.
+/// Runs one schedule: all robots send their events while faults are injected, then the decisions
+/// are checked.
 async fn schedule(seed: u64, robots: usize, scripts: &[Script]) {
     let cluster = Cluster::begin(seed);
     let store = Box::pin(open(&cluster, LEASE)).await;
@@ -138,7 +140,7 @@ async fn schedule(seed: u64, robots: usize, scripts: &[Script]) {
     }
     let said = begun.elapsed();
     let expected = sent.load(Ordering::Relaxed);
-    // All faults are over, and the remaining events are decided.
+    // From here on no faults are injected, and the remaining events are decided.
     over.store(true, Ordering::Relaxed);
     let what = trouble.join().expect("trouble ends");
     let attacks = attacker.await.expect("attacks end");
@@ -168,8 +170,8 @@ async fn schedule(seed: u64, robots: usize, scripts: &[Script]) {
     verify(&store, robots, scripts, seed).await;
 }
 
-/// Asserts that every robot has sent all events, in order and once, and received the answers of a
-/// single loop.
+/// Checks that every robot has sent all its events, in order and once, and that it received the
+/// answers of a single local loop.
 async fn verify(store: &Nats, robots: usize, scripts: &[Script], seed: u64) {
     let mut said: BTreeMap<String, Vec<Stored>> = BTreeMap::new();
     let mut made: BTreeMap<String, Vec<Decided>> = BTreeMap::new();
@@ -186,7 +188,7 @@ async fn verify(store: &Nats, robots: usize, scripts: &[Script], seed: u64) {
     assert_eq!(made.len(), robots, "seed {seed}");
     for robot in 0..robots {
         let (name, (events, answers)) = (format!("robot-{robot}"), &scripts[robot % scripts.len()]);
-        // Messages that other clients have sent in the robot's name have another id, or none.
+        // Messages that other clients have sent in the robot's name have another id, or no id.
         let prefix = format!("{name}:");
         let own = |message: &&Stored| {
             let id = message.id.as_deref().and_then(|id| id.strip_prefix(&prefix));
@@ -224,8 +226,8 @@ async fn nothing_is_lost_repeated_or_out_of_order() {
     }
 }
 
-/// Measures events per second and latencies for 1, 2 and 4 workers (`WORKERS`) in comparison with
-/// local loops, and the memory of a worker.
+/// Measures events per second, latencies and memory for 1, 2 and 4 workers (variable `WORKERS`), in
+/// comparison with local loops.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 #[ignore = "needs nats-server and an idle machine; figures mean something in a release build only"]
 async fn figures() {
@@ -275,7 +277,8 @@ fn rate(count: usize, time: Duration) -> f64 {
     count as f64 / time.as_secs_f64()
 }
 
-/// Sends all events of all robots. Returns the times until all are sent and until all are decided.
+/// Sends all events of all robots. Returns the time until all are sent, and the time until all are
+/// decided.
 async fn say_all(store: &Nats, robots: usize, scripts: &[Script]) -> (Duration, Duration) {
     let begun = Instant::now();
     let mut senders = tokio::task::JoinSet::new();
@@ -303,8 +306,8 @@ async fn say_all(store: &Nats, robots: usize, scripts: &[Script]) -> (Duration, 
     }
 }
 
-/// Returns the latencies from events to decisions in milliseconds as observed by an otherwise idle
-/// robot, sorted. Events alternately fail and restore a component.
+/// Sends events of otherwise idle robots, one at a time, which alternately fail and restore a
+/// component. Returns the times from sending to the visible decision in milliseconds, sorted.
 async fn calm(store: &Nats, robots: usize) -> Vec<f64> {
     let mut late = Vec::new();
     for number in 0..200 {
@@ -333,7 +336,8 @@ async fn calm(store: &Nats, robots: usize) -> Vec<f64> {
     late
 }
 
-/// Returns the latencies from events to decisions in milliseconds by their storage times, sorted.
+/// Returns the times between storage of an event and storage of its decision in milliseconds,
+/// sorted.
 async fn latencies(store: &Nats) -> Vec<f64> {
     let mut late = Vec::new();
     for partition in 0..PARTITIONS {

@@ -1,4 +1,4 @@
-//! Connections between servers, each of which can be cut.
+//! TCP connections between servers that can be cut.
 
 use std::io::{Read as _, Write as _};
 use std::net::{Shutdown, TcpListener, TcpStream};
@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-/// A proxy for the connection of two servers, regardless of which one has opened it.
+/// A proxy for the connections between two servers, regardless of which server opens them.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Wire {
     is_cut: Arc<AtomicBool>,
@@ -14,14 +14,14 @@ pub(super) struct Wire {
 }
 
 impl Wire {
-    /// Forwards a port, which it returns, to another one.
+    /// Forwards a new local port to port `to`. Returns the new port.
     pub(super) fn lead(&self, to: u16) -> u16 {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a port is free");
         let port = listener.local_addr().expect("it has an address").port();
         let own = self.clone();
         std::thread::spawn(move || {
             for incoming in listener.incoming().flatten() {
-                // Connections to an absent server are refused, like those over a cut connection.
+                // Connections to a stopped server are closed, like those over a cut connection.
                 let Ok(outgoing) = TcpStream::connect(("127.0.0.1", to)) else { continue };
                 let mut open = own.open.lock().unwrap_or_else(PoisonError::into_inner);
                 if own.is_cut.load(Ordering::SeqCst) {
@@ -37,7 +37,7 @@ impl Wire {
         port
     }
 
-    /// Closes all connections and refuses new ones.
+    /// Closes all open connections and refuses new ones.
     pub(super) fn cut(&self) {
         let mut open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
         self.is_cut.store(true, Ordering::SeqCst);
@@ -47,20 +47,21 @@ impl Wire {
         }
     }
 
-    /// Accepts connections again.
+    /// Accepts new connections again.
     pub(super) fn mend(&self) {
         self.is_cut.store(false, Ordering::SeqCst);
     }
 }
 
-/// Copies all bytes in a single direction.
+/// Copies all bytes in one direction until the connection is closed.
 fn carry(mut from: TcpStream, mut to: TcpStream) {
     // Either end may be closed.
     let _ = std::io::copy(&mut from, &mut to);
     let _ = to.shutdown(Shutdown::Both);
 }
 
-/// Returns a server's status of its connections to other servers. `None` without a reply.
+/// Returns a server's status of its connections to other servers, as JSON text. `None` if the
+/// server does not reply.
 pub(super) fn routes(monitor: u16) -> Option<String> {
     let mut stream = TcpStream::connect(("127.0.0.1", monitor)).ok()?;
     stream.set_read_timeout(Some(Duration::from_secs(2))).ok()?;

@@ -1,4 +1,4 @@
-//! Crashes of a worker between any two operations: nothing is lost or duplicated.
+//! Tests with a crash of a worker between any two operations: no event is lost or decided twice.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -12,27 +12,27 @@ use tokio::sync::{Notify, watch};
 
 use super::{assert_same, decided, decisions, open, scripts, shared, tell, work};
 
-/// A log that fails after a number of operations. The last operation may be carried out without an
-/// acknowledgement.
+/// A log that stops responding after a number of operations, as if the worker had crashed. The last
+/// operation is executed without an acknowledgement if `carries_out` is set.
 #[derive(Debug, Clone)]
 struct Crashing {
     inner: Local,
     left: Arc<AtomicU64>,
     carries_out: bool,
-    /// `false` to disable the comparison of decisions with their required predecessors.
+    /// `false` to omit the comparison of decisions with their required predecessors.
     fences: bool,
     over: Arc<Notify>,
 }
 
 impl Crashing {
-    /// Returns a log that never fails.
+    /// Creates a log that never stops responding.
     fn never(inner: Local, fences: bool) -> Self {
         let left = Arc::new(AtomicU64::new(u64::MAX));
         Self { inner, left, carries_out: false, fences, over: Arc::default() }
     }
 
-    /// Counts an operation and returns `true` if it succeeds. The last one depends on
-    /// `carries_out`.
+    /// Counts an operation, and executes it if the limit is not reached. Otherwise the returned
+    /// future never completes.
     async fn through<T>(&self, operation: impl Future<Output = Result<T, Fault>>) -> Result<T, Fault> {
         let left = self.left.fetch_update(Ordering::SeqCst, Ordering::SeqCst, |left| left.checked_sub(1));
         match left {
@@ -155,7 +155,7 @@ async fn a_crash_between_any_two_operations_neither_loses_nor_repeats() {
     assert!(crashes > 30, "there were {crashes} crashes");
 }
 
-/// Two workers that both rely on the lease of a partition: each event is decided once.
+/// Two workers run the same partition at the same time; each event must be decided once.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn two_owners_of_one_partition_decide_each_event_once() {
     for seed in 0..4 {
@@ -171,7 +171,7 @@ async fn two_owners_of_one_partition_decide_each_event_once() {
         let owner = tokio::spawn({
             let own = own("owner");
             async move {
-                // A partition that a former owner has fenced is recovered again.
+                // A partition that has stopped because of the other worker is recovered again.
                 loop {
                     serve(Arc::clone(&own), 0, heard.clone()).await;
                 }
@@ -188,12 +188,12 @@ async fn two_owners_of_one_partition_decide_each_event_once() {
     }
 }
 
-/// The comparison with the previous decision alone prevents two owners from deciding an event
-/// twice: without it, both decide.
+/// Checks that only the comparison with the previous decision prevents two owners from deciding an
+/// event twice: without the comparison, both decide.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn without_the_comparison_events_are_decided_twice() {
     let (events, answers) = scripts::play("ugv", "kinect_comes_and_goes", 1, 30);
-    // Progress, whose revision is compared as well, is not written.
+    // With these settings no progress is written, because its revision is also compared.
     let settings = Settings { save_every: 1_000, look: Duration::from_secs(3_600), ..Settings::default() };
     for fences in [true, false] {
         let folder = tempfile::tempdir().expect("a directory");
@@ -225,7 +225,7 @@ async fn without_the_comparison_events_are_decided_twice() {
     }
 }
 
-/// Decisions of former owners are kept until they are replayed, however often progress is written
+/// Decisions of former owners have to be kept until they are replayed, even if progress is written
 /// in between.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn owners_that_are_gone_at_any_time_leave_what_is_needed() {

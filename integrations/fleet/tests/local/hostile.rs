@@ -1,4 +1,4 @@
-//! Invalid messages change nothing and are counted.
+//! Tests with invalid messages, which change nothing and are counted.
 
 use std::sync::atomic::Ordering;
 
@@ -47,7 +47,7 @@ async fn hostile_messages_change_nothing_and_are_counted() {
     let made = decisions(&store).await;
     assert_eq!(made.keys().collect::<Vec<_>>(), ["good"]);
     assert_same("good", &made["good"], &sequences, &answers);
-    // Messages without an address belong to no partition and are not read.
+    // Messages without a valid address belong to no partition, so they are not read.
     assert_eq!(shared.counts.refused.load(Ordering::Relaxed), 8);
     assert_eq!(shared.counts.robots.load(Ordering::Relaxed), 0, "nothing is left behind");
     let mut told = 0;
@@ -57,7 +57,7 @@ async fn hostile_messages_change_nothing_and_are_counted() {
     assert_eq!(told, 8);
 }
 
-/// Invalid events of an enrolled robot are answered, as by `metaplan run`.
+/// Invalid events of an enrolled robot are answered with an error, as by `metaplan run`.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn nonsense_of_a_robot_is_answered_with_an_error() {
     let folder = tempfile::tempdir().expect("a directory");
@@ -77,7 +77,7 @@ async fn nonsense_of_a_robot_is_answered_with_an_error() {
     assert_eq!(made["r"][3].answers[0]["answer"], "error");
 }
 
-/// Message ids that another client has used do not prevent a robot from sending.
+/// A robot can send events even if another client has used its message ids.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn forged_ids_keep_nobody_from_saying_something() {
     let folder = tempfile::tempdir().expect("a directory");
@@ -102,7 +102,8 @@ async fn forged_ids_keep_nobody_from_saying_something() {
     assert_eq!(good, events.iter().map(String::as_bytes).collect::<Vec<_>>(), "each once, though sent twice");
 }
 
-/// A worker that was suspended for a long time appends after an outdated decision, and is rejected.
+/// A worker that was suspended for a long time tries to append after an outdated decision, and is
+/// rejected.
 #[tokio::test]
 async fn an_old_epoch_is_refused() {
     let folder = tempfile::tempdir().expect("a directory");

@@ -1,5 +1,5 @@
-//! Fleets in a directory, without a server: decisions of partitions equal those of `metaplan run`,
-//! with any interruptions.
+//! Tests of fleets in a directory, without a server. The decisions must equal those of `metaplan
+//! run`, whatever the interruptions.
 
 mod crashes;
 mod hostile;
@@ -20,7 +20,7 @@ use metaplan_fleet::worker;
 use serde_json::Value;
 use tokio::sync::watch;
 
-/// Missions of the project.
+/// Reads the missions of this repository.
 fn missions() -> Missions {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../missions");
     Missions::read(&folder).unwrap_or_else(|errors| panic!("{errors}"))
@@ -61,7 +61,7 @@ async fn decisions<S: Store>(store: &S) -> BTreeMap<String, Vec<Decided>> {
     all
 }
 
-/// Waits until the given number of decisions is stored.
+/// Waits until at least the given number of decisions is stored.
 async fn decided<S: Store>(store: &S, count: usize) {
     for _ in 0..6000 {
         if decisions(store).await.values().map(Vec::len).sum::<usize>() >= count {
@@ -72,7 +72,7 @@ async fn decided<S: Store>(store: &S, count: usize) {
     panic!("{count} decisions were expected; there are {:?}", decisions(store).await.len());
 }
 
-/// Runs a worker until the given number of decisions is stored, then stops it in an orderly way.
+/// Runs a worker until the given number of decisions is stored, then stops it regularly.
 async fn work<S: Store>(store: &S, name: &str, settings: Settings, count: usize) {
     let (stop, heard) = watch::channel(false);
     let shared = shared(store.clone(), name, settings);
@@ -82,7 +82,7 @@ async fn work<S: Store>(store: &S, name: &str, settings: Settings, count: usize)
     task.await.expect("a worker ends in order");
 }
 
-/// Asserts that a robot received the answers of a single loop, once per event.
+/// Checks that a robot received the answers of a single local loop, with one decision per event.
 fn assert_same(robot: &str, decided: &[Decided], sequences: &[u64], expected: &[Vec<Value>]) {
     let events: Vec<u64> = decided.iter().map(|own| own.event).collect();
     assert_eq!(events, sequences, "{robot}: each event once, in order");
@@ -109,7 +109,8 @@ async fn robots_are_answered_as_by_a_loop_of_their_own() {
         count += events.len();
         expected.insert(robot, (sequences, answers));
     }
-    // The limit of loaded robots is below their number, so that all pass through snapshots.
+    // The limit of loaded robots is below the number of robots, so that all robots are unloaded and
+    // restored.
     let settings = Settings { warm: 2, save_every: 5, ..Settings::default() };
     work(&store, "one", settings, count / 3).await;
     work(&store, "two", settings, count).await;

@@ -1,5 +1,5 @@
-//! Scripts of robots: the observations of a simulated robot, with the answers of a single loop to
-//! each.
+//! Scripts of robots: observations of a simulated robot, and the answers that a single local loop
+//! gives to each observation.
 
 use std::path::Path;
 use std::time::Duration;
@@ -10,7 +10,7 @@ use metaplan::setup::Setup;
 use metaplan::simulate::Strategy;
 use serde_json::{Value, json};
 
-/// Missions and scenarios that can be simulated.
+/// Missions, each with a scenario that can be simulated.
 pub(super) const SCENARIOS: [(&str, &str); 4] = [
     ("ugv", "kinect_comes_and_goes"),
     ("uuv", "battery_under_way"),
@@ -23,14 +23,14 @@ fn setup(mission: &str) -> Setup {
     Setup::read(&path).unwrap_or_else(|errors| panic!("{errors}"))
 }
 
-/// Returns at most the given number of lines, with the answers of a separate loop: the enrolment
-/// and the observations of a simulated robot, with their times.
+/// Returns at most the given number of event lines: the enrolment and the observations of a
+/// simulated robot, with their times. Also returns the answers of a separate loop to each line.
 pub(super) fn play(mission: &str, scenario: &str, seed: u64, most: usize) -> (Vec<String>, Vec<Vec<Value>>) {
     let own = setup(mission).experiment(scenario).unwrap_or_else(|errors| panic!("{errors}"));
     let mut events = vec![json!({"event": "enrol", "mission": mission}).to_string()];
     let mut is_first = true;
     let mut log = |observation: &Observation, _: &[_]| {
-        // The first entry represents the start.
+        // The first log entry is the start of the loop.
         if !std::mem::take(&mut is_first) {
             events.push(observation.to_json().to_string());
         }
@@ -41,7 +41,8 @@ pub(super) fn play(mission: &str, scenario: &str, seed: u64, most: usize) -> (Ve
     (events, answers)
 }
 
-/// Returns the answers of a single loop to lines, of which the first one enrols.
+/// Returns the answers of a single local loop to each event line. The first line must enrol the
+/// robot.
 pub(super) fn alone(mission: &str, events: &[String]) -> Vec<Vec<Value>> {
     let Setup { mission, settings, .. } = setup(mission);
     let mut control = Loop::new(mission, settings).unwrap_or_else(|errors| panic!("{errors}"));

@@ -1,4 +1,5 @@
-//! Several workers: partitions are shared, returned, and taken over after the loss of a worker.
+//! Tests with several workers: partitions are shared, returned, and taken over after the loss of a
+//! worker.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -13,7 +14,7 @@ use super::{assert_same, decided, decisions, scripts, shared, tell};
 
 const LEASE: Duration = Duration::from_millis(400);
 
-/// Waits for a distribution of the partitions.
+/// Waits until the workers own the given numbers of partitions.
 async fn distributed(store: &Local, wanted: &[usize]) {
     let mut counts = Vec::new();
     for _ in 0..1000 {
@@ -31,8 +32,8 @@ async fn distributed(store: &Local, wanted: &[usize]) {
     panic!("partitions are distributed as {counts:?}, not as {wanted:?}");
 }
 
-/// Waits until each partition was recovered the given number of times. A lease exists before the
-/// recovery is complete.
+/// Waits until each partition was recovered `epoch` times. A lease is visible before the recovery
+/// is complete.
 async fn taken_over(store: &Local, epoch: u64) {
     let mut partitions = Vec::new();
     for _ in 0..1000 {
@@ -61,7 +62,7 @@ async fn partitions_are_shared_and_taken_over() {
     let (_second_stop, second) = begin("second");
     distributed(&store, &[4, 4]).await;
     sequences.extend(tell(&store, "r", &events[10..20]).await);
-    // A worker is killed, so its leases expire.
+    // A worker is aborted, so its leases expire.
     second.abort();
     sequences.extend(tell(&store, "r", &events[20..]).await);
     distributed(&store, &[8]).await;
