@@ -287,8 +287,8 @@ pub(super) fn singly(mission: &Mission, repairs: &[Repair], limits: &Limits) -> 
 }
 
 /// Returns alterations that may change whether a design is available. They concern its components,
-/// and measurements that it depends on. New measurements are the values at which its requirements
-/// or estimations begin or cease to hold.
+/// and measurements that it depends on. New measurements are values at or just beyond the bounds in
+/// its requirements, or its estimations.
 fn candidates(knowledge: &Knowledge, design: &FunctionDesign) -> Vec<Alteration> {
     let is_own = |component: &str| design.components.iter().any(|needed| needed.iri == component);
     let mut alterations = components(knowledge, design.available, &is_own);

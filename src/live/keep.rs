@@ -40,8 +40,8 @@ pub(super) fn keys(answer: &str) -> Vec<String> {
     match about.answer.as_ref() {
         "request_action" | "goal_reached" => vec!["action".to_owned()],
         "suspend_action" | "resume_action" | "cancel_action" => vec!["suspension".to_owned()],
-        // These three kinds have separate keys, because all three lines are needed in their order:
-        // the cost of a kept plan is in the line of the plan that was found.
+        // Each of these kinds has its own key. For example, `plan_found` and `plan_kept` are both
+        // needed, because the cost of a kept plan is in the line of the plan that was found.
         kind @ ("plan_found" | "plan_none" | "plan_kept" | "ready" | "contradicted" | "unconcluded"
         | "unrecorded") => {
             vec![kind.to_owned()]

@@ -11,7 +11,7 @@
 //! |---|---|
 //! | `/`, `/live.css`, `/live.js` | the page |
 //! | `/plan` | the plan as it was when it was made: timeline, numbers, map |
-//! | `/events` | the current state, then all new lines |
+//! | `/events` | the current state, the retained lines, then all new lines |
 //!
 //! On a loopback address, local clients need no token unless one is configured. Requests from pages
 //! of other sites are rejected by their `Host` header. On any other address a token is required.

@@ -212,8 +212,8 @@ fn refuse(stream: &mut TcpStream, (status, words): Refused) -> io::Result<()> {
     send(stream, &(head + &text))
 }
 
-/// Sends the lines of the current state and then all new lines, until the run ends or the client is
-/// too slow.
+/// Sends the lines of the current state, the retained lines, and then all new lines, until the run
+/// ends or the client is too slow.
 fn events(shared: &SharedState, stream: &mut TcpStream) -> io::Result<()> {
     send(
         stream,

@@ -220,7 +220,8 @@ impl Checker<'_> {
     }
 }
 
-/// Returns the last key of a path in quotes, for use in a message.
+/// Returns the last key of a path in quotes, for use in a message; the word "it" if the path ends
+/// with an index.
 fn last(path: &[Key]) -> String {
     match path.last() {
         Some(Key::Name(name)) => format!("`{name}`"),

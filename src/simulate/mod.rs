@@ -144,7 +144,8 @@ impl Stage {
         log: &mut dyn FnMut(&Observation, &[Answer]),
     ) -> Result<Option<Ending>, Message> {
         let mut queue: VecDeque<Event> = self.world.first_look()?.into();
-        // The first observations are known before the first plan.
+        // The controller receives the observations of time 0 after its first plan, and after the
+        // events that its first answers cause.
         let early: Vec<Event> = queue.drain(..).collect();
         let answers = self.controller.start();
         let begun = Observation::from(Event::Tick);

@@ -47,7 +47,8 @@ pub(crate) fn verify(
     stopped.map_or_else(|| Ok((json(&VerificationAnswer::new(&report)), report.to_string())), Err)
 }
 
-/// Queries knowledge bases and rules. Returns the answer as JSON.
+/// Infers facts from knowledge bases and rules, with failed components `fail` and measured
+/// attributes `set`. Returns the answer as JSON.
 #[pyfunction]
 #[pyo3(signature = (documents, rules, fail, set))]
 pub(crate) fn reason(

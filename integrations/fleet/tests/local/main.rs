@@ -72,7 +72,8 @@ async fn decided<S: Store>(store: &S, count: usize) {
     panic!("{count} decisions were expected; there are {:?}", decisions(store).await.len());
 }
 
-/// Runs a worker until the given number of decisions is stored, then stops it regularly.
+/// Runs a worker until the given number of decisions is stored, then requests its end and waits
+/// for it.
 async fn work<S: Store>(store: &S, name: &str, settings: Settings, count: usize) {
     let (stop, heard) = watch::channel(false);
     let shared = shared(store.clone(), name, settings);
