@@ -32,12 +32,12 @@ struct RecordPart<'a> {
     record: u64,
     /// Number of the file with the record.
     segment: u64,
-    /// `event`, `decision` or `end`.
+    /// `event`, `reaction`, `decision` or `end`.
     kind: &'a str,
     /// For an event: time since the start of the mission.
     #[serde(skip_serializing_if = "Option::is_none")]
     microseconds: Option<u64>,
-    /// For a decision: its answers.
+    /// For a reaction or a decision: its answers.
     #[serde(skip_serializing_if = "Option::is_none")]
     answers: Option<&'a Value>,
     /// For an event: its line.
@@ -61,14 +61,14 @@ impl<'a> JournalAnswer<'a> {
 impl<'a> RecordPart<'a> {
     fn of(entry: &'a Entry) -> Self {
         let content = Some(&entry.content).filter(|content| !content.is_null());
-        let is_decision = entry.kind == "decision";
+        let has_answers = ["reaction", "decision"].contains(&entry.kind.as_str());
         Self {
             record: entry.record,
             segment: entry.segment,
             kind: &entry.kind,
             microseconds: entry.time,
-            answers: content.filter(|_| is_decision),
-            line: content.filter(|_| !is_decision),
+            answers: content.filter(|_| has_answers),
+            line: content.filter(|_| !has_answers),
         }
     }
 }

@@ -61,6 +61,8 @@ pub struct Measures {
     pub goal: f64,
     /// Probability of reaching the goal with a battery level of at least the reserve.
     pub goal_with_reserve: f64,
+    /// Probability of reaching the goal without a collision.
+    pub goal_without_collision: f64,
     /// Probability that no collision happens during the mission.
     pub no_collision: f64,
     /// Expected number of collisions.
@@ -118,6 +120,7 @@ fn measure<N: Number>(
     };
     let goal = set(&|state| process.is_goal(state));
     let above_reserve = set(&|state| process.is_goal(state) && state.situation().battery >= reserve);
+    let safe_goal = set(&|state| process.is_goal(state) && !state.situation().hit);
     let hit = set(&|state| state.situation().hit);
     let mut end = FixedBitSet::with_capacity(n);
     for state in 0..n {
@@ -159,6 +162,7 @@ fn measure<N: Number>(
     Measures {
         goal: success,
         goal_with_reserve: first(None, &above_reserve).unwrap_or(0.0),
+        goal_without_collision: first(None, &safe_goal).unwrap_or(0.0),
         no_collision: 1.0 - first(None, &hit).unwrap_or(0.0),
         collisions: sum(2).unwrap_or(f64::NAN),
         time,

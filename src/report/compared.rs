@@ -52,7 +52,7 @@ fn front(comparison: &Comparison) -> Points {
         comparison.candidates.iter().map(|candidate| candidate.kind.to_string()).collect();
     let kinds: Vec<(&Option<Pair>, &str)> = kinds.iter().map(|kind| (&None, kind.as_str())).collect();
     let points = comparison.candidates.iter().zip(labels(&kinds)).filter_map(|(candidate, label)| {
-        let (time, success) = (candidate.measures.time?, candidate.measures.no_collision);
+        let (time, success) = (candidate.measures.time?, candidate.measures.goal_without_collision);
         let about =
             format!("{label}, {}: time {}, probability {}", candidate.name, shown(time), shown(success));
         Some((label, about, time, success))
