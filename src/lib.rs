@@ -15,6 +15,7 @@ pub use {ontology, pddl, picture, rules};
 
 pub mod answers;
 pub mod certificate;
+pub mod cli;
 pub mod codes;
 pub mod comparison;
 pub mod configure;

@@ -1,9 +1,7 @@
-//! The command line of Metaplan.
-
-mod cli;
+//! The program `metaplan`.
 
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    cli::main()
+    metaplan::cli::main()
 }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use metaplan::planner::Planned;
+use crate::planner::Planned;
 use planner::Alternatives;
 
 use crate::cli::plan_text::steps_text;

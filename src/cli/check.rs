@@ -4,9 +4,9 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use metaplan::answers::{CheckAnswer, ChecksAnswer};
-use metaplan::file::source;
-use metaplan::message::Message;
+use crate::answers::{CheckAnswer, ChecksAnswer};
+use crate::file::source;
+use crate::message::Message;
 use probabilistic::check::{Exactness, Options, Outcome, PolicyTable, Precision, Report, check_all};
 use probabilistic::explore::Bounds;
 use probabilistic::prism::ast::Model;

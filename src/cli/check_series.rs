@@ -1,6 +1,6 @@
 //! Series of values of model constants for `metaplan check`, and tables of the results.
 
-use metaplan::message::Message;
+use crate::message::Message;
 use num_bigint::BigInt;
 use num_rational::BigRational;
 use num_traits::{One, Signed};

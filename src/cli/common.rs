@@ -4,7 +4,7 @@ use std::io::IsTerminal;
 use std::path::PathBuf;
 
 use clap::{Args, ColorChoice, ValueEnum};
-use metaplan::message::{Errors, Message};
+use crate::message::{Errors, Message};
 use planner::Limits;
 use probabilistic::{Diagnostic, Error};
 

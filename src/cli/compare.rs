@@ -4,13 +4,13 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
-use metaplan::answers::Pair;
-use metaplan::comparison::{
+use crate::answers::Pair;
+use crate::comparison::{
     Candidate, Coadaptation, Compared, Comparison, Config, Costs, Listener, NoResult, Risk, Roles, Tasked,
 };
-use metaplan::message::{Message, did_you_mean};
-use metaplan::mission::Mission;
-use metaplan::setup::Setup;
+use crate::message::{Message, did_you_mean};
+use crate::mission::Mission;
+use crate::setup::Setup;
 
 use crate::cli::common::{Common, Exit, Failure, process_failure};
 use crate::cli::compare_so_far::{Begun, Shared};

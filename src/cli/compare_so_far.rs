@@ -9,10 +9,10 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use metaplan::answers::{CompareAnswer, ComparisonAnswer, Pair, Row, begun_rows, rows};
-use metaplan::comparison::{Candidate, Comparison, Costs};
-use metaplan::message::Message;
-use metaplan::report::comparison_sheet;
+use crate::answers::{CompareAnswer, ComparisonAnswer, Pair, Row, begun_rows, rows};
+use crate::comparison::{Candidate, Comparison, Costs};
+use crate::message::Message;
+use crate::report::comparison_sheet;
 use planner::Limits;
 
 use crate::cli::common::{Common, Exit, Failure, Format};

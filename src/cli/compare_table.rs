@@ -2,10 +2,10 @@
 
 use std::fmt::Write as _;
 
-use metaplan::answers::{MEASURES, Pair, Row};
-use metaplan::comparison::{Comparison, Costs, Stages};
-use metaplan::file::source;
-use metaplan::message::Message;
+use crate::answers::{MEASURES, Pair, Row};
+use crate::comparison::{Comparison, Costs, Stages};
+use crate::file::source;
+use crate::message::Message;
 use serde_json::Value;
 
 use crate::cli::common::Failure;

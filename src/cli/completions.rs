@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Command};
 use clap_complete::Shell;
-use metaplan::message::Message;
+use crate::message::Message;
 
 use crate::cli::common::{Exit, Failure};
 use crate::cli::output;

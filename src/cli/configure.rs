@@ -5,10 +5,10 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
-use metaplan::answers::ConfigureAnswer;
-use metaplan::configure::{Choice, Configuration, Configurator, Goal, Verdict, Wishes, Worth};
-use metaplan::knowledge::Knowledge;
-use metaplan::message::Message;
+use crate::answers::ConfigureAnswer;
+use crate::configure::{Choice, Configuration, Configurator, Goal, Verdict, Wishes, Worth};
+use crate::knowledge::Knowledge;
+use crate::message::Message;
 use num_rational::BigRational;
 
 use crate::cli::common::{Common, Exit, Failure, Format};

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use metaplan::message::Message;
+use crate::message::Message;
 use ontology::OutputSyntax;
 
 use crate::cli::common::{Common, Exit, Failure};

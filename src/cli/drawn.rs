@@ -5,10 +5,10 @@ use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use metaplan::mission::Mission;
-use metaplan::picture::Sheet;
-use metaplan::report::timeline_picture;
-use metaplan::visible::visible;
+use crate::mission::Mission;
+use crate::picture::Sheet;
+use crate::report::timeline_picture;
+use crate::visible::visible;
 use planner::Solution;
 
 use crate::cli::common::Failure;

@@ -4,14 +4,14 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
-use metaplan::answers::{ChangesAnswer, CodeAnswer, DesignAnswer};
-use metaplan::codes::{self, Code};
-use metaplan::explain::{
+use crate::answers::{ChangesAnswer, CodeAnswer, DesignAnswer};
+use crate::codes::{self, Code};
+use crate::explain::{
     Alteration, Availability, BestPlan, DesignExplanation, SmallestChanges, Target, availability,
     smallest_changes,
 };
-use metaplan::message::{Errors, Message, did_you_mean};
-use metaplan::mission::Mission;
+use crate::message::{Errors, Message, did_you_mean};
+use crate::mission::Mission;
 use num_rational::BigRational;
 use planner::Limits;
 

@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use metaplan::answers::{MissionExport, ModelExport};
-use metaplan::comparison::{Coadaptation, Risk, Roles, Tasked, program, published_program};
-use metaplan::message::Message;
-use metaplan::mission::Mission;
-use metaplan::setup::Setup;
+use crate::answers::{MissionExport, ModelExport};
+use crate::comparison::{Coadaptation, Risk, Roles, Tasked, program, published_program};
+use crate::message::Message;
+use crate::mission::Mission;
+use crate::setup::Setup;
 use pddl::ast::Problem;
 use pddl::{portable, print_domain, print_problem};
 

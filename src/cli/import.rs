@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
-use metaplan::answers::ImportAnswer;
-use metaplan::comparison::{MapOptions, import_map};
-use metaplan::file::source;
-use metaplan::message::Message;
+use crate::answers::ImportAnswer;
+use crate::comparison::{MapOptions, import_map};
+use crate::file::source;
+use crate::message::Message;
 
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::output;

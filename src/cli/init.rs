@@ -4,10 +4,10 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use metaplan::answers::InitAnswer;
-use metaplan::message::Message;
-use metaplan::schemas::schema;
-use metaplan::templates::{MANIFEST, Template};
+use crate::answers::InitAnswer;
+use crate::message::Message;
+use crate::schemas::schema;
+use crate::templates::{MANIFEST, Template};
 
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::output;

@@ -4,10 +4,10 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use metaplan::answers::JournalAnswer;
-use metaplan::journal::{Entry, Journal, JournalReport};
-use metaplan::mapek::Loop;
-use metaplan::setup::Setup;
+use crate::answers::JournalAnswer;
+use crate::journal::{Entry, Journal, JournalReport};
+use crate::mapek::Loop;
+use crate::setup::Setup;
 use serde_json::Value;
 
 use crate::cli::common::{Common, Exit, Failure, Format};

@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use metaplan::message::Message;
+use crate::message::Message;
 use planner::Limits;
 use verify::memory;
 

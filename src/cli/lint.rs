@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use metaplan::answers::LintAnswer;
-use metaplan::lint::{in_order, lint};
+use crate::answers::LintAnswer;
+use crate::lint::{in_order, lint};
 
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::limits::TimeLimit;

@@ -48,7 +48,7 @@ mod verify;
 use std::process::ExitCode;
 
 use clap::{ColorChoice, CommandFactory as _, FromArgMatches as _, Parser, Subcommand, ValueEnum as _};
-use metaplan::message::Message;
+use crate::message::Message;
 
 use common::{Common, Exit, Failure, Format};
 use trace::Trace;

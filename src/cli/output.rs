@@ -8,11 +8,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use comfy_table::{ColumnConstraint, ContentArrangement, Table, TableStyle, Width};
 use console::{Term, measure_text_width};
-use metaplan::answers::ErrorAnswer;
-use metaplan::file;
-use metaplan::message::Message;
-pub use metaplan::visible::pretty;
-use metaplan::visible::{visible, visible_json};
+use crate::answers::ErrorAnswer;
+use crate::file;
+use crate::message::Message;
+pub use crate::visible::pretty;
+use crate::visible::{visible, visible_json};
 use serde::Serialize;
 
 use crate::cli::common::{Common, Failure, Format};

@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
-use metaplan::message::Message;
-use metaplan::mission::numbers::MissingValue;
-use metaplan::mission::{Mission, btcpp_text, plan_lines, popf_text};
-use metaplan::planner::{Planned, PlannedFront, Planner};
-use metaplan::report::Positions;
-use metaplan::visible::visible;
+use crate::message::Message;
+use crate::mission::numbers::MissingValue;
+use crate::mission::{Mission, btcpp_text, plan_lines, popf_text};
+use crate::planner::{Planned, PlannedFront, Planner};
+use crate::report::Positions;
+use crate::visible::visible;
 use planner::{Backend, Config, Limits, Plan, Solution, Status, StepSemantics};
 
 use crate::cli::alternatives;

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use metaplan::answers::{Preparation, milliseconds};
+use crate::answers::{Preparation, milliseconds};
 use planner::{PlannerPart, Solution, Status};
 
 use crate::cli::output::counted;

@@ -4,9 +4,9 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
-use metaplan::answers::{ReasonAnswer, statuses};
-use metaplan::knowledge::{Contradiction, Knowledge, Sources};
-use metaplan::message::Message;
+use crate::answers::{ReasonAnswer, statuses};
+use crate::knowledge::{Contradiction, Knowledge, Sources};
+use crate::message::Message;
 use ontology::Equality;
 use rules::{DEFAULT_STEP_BUDGET, Limits};
 

@@ -6,10 +6,10 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
-use metaplan::answers::{AssertionAnswer, EntailmentAnswer, ReasonsAnswer, SchemaAnswer};
-use metaplan::knowledge::Knowledge;
-use metaplan::message::Message;
-use metaplan::visible::visible_json;
+use crate::answers::{AssertionAnswer, EntailmentAnswer, ReasonsAnswer, SchemaAnswer};
+use crate::knowledge::Knowledge;
+use crate::message::Message;
+use crate::visible::visible_json;
 use ontology::entail::{Answer, Schema, annotations, entailments, schema};
 use ontology::vocab::{local_name, rdf};
 use rules::{Atom, Engine, Fact, Literal, Symbol, Term, Value};

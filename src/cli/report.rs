@@ -4,15 +4,15 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::Args;
-use metaplan::certificate::{Verification, Verifier};
-use metaplan::journal::JournalReport;
-use metaplan::message::Message;
-use metaplan::mission::Mission;
-use metaplan::picture::{Checked, Plan, Report};
-use metaplan::planner::Planner;
-use metaplan::report::{Cost, Positions, changes, log_picture};
-use metaplan::setup::Setup;
-use metaplan::visible::visible;
+use crate::certificate::{Verification, Verifier};
+use crate::journal::JournalReport;
+use crate::message::Message;
+use crate::mission::Mission;
+use crate::picture::{Checked, Plan, Report};
+use crate::planner::Planner;
+use crate::report::{Cost, Positions, changes, log_picture};
+use crate::setup::Setup;
+use crate::visible::visible;
 use num_rational::BigRational;
 use planner::{Limits, Solution, Status};
 

@@ -6,13 +6,13 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
-use metaplan::answers::{KeeperReadyLine, PlanningLine, ReadyLine};
-use metaplan::configure::Keeper;
-use metaplan::journal::{Journal, Policy, Recovery, Sync};
-use metaplan::knowledge::Knowledge;
-use metaplan::mapek::{Loop, Recoverable, Settings, Watch};
-use metaplan::message::Message;
-use metaplan::setup::Setup;
+use crate::answers::{KeeperReadyLine, PlanningLine, ReadyLine};
+use crate::configure::Keeper;
+use crate::journal::{Journal, Policy, Recovery, Sync};
+use crate::knowledge::Knowledge;
+use crate::mapek::{Loop, Recoverable, Settings, Watch};
+use crate::message::Message;
+use crate::setup::Setup;
 
 use crate::cli::common::{Common, Exit, Failure};
 use crate::cli::configure::Wanted;

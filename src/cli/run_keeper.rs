@@ -4,9 +4,9 @@
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::time::{Duration, Instant};
 
-use metaplan::configure::{Keeper, KeeperAnswer};
-use metaplan::journal::Journal;
-use metaplan::mapek::{Clock as _, Observation, SystemClock};
+use crate::configure::{Keeper, KeeperAnswer};
+use crate::journal::Journal;
+use crate::mapek::{Clock as _, Observation, SystemClock};
 
 use crate::cli::common::{Common, Failure};
 use crate::cli::run_lines::{Line, Lines};

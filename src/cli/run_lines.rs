@@ -5,9 +5,9 @@ use std::io::{self, BufRead, BufReader, Read as _};
 use std::path::Path;
 use std::time::Duration;
 
-use metaplan::mapek::LONGEST_LINE;
-use metaplan::message::Message;
-use metaplan::recording::{FIRST_BYTE, Replay};
+use crate::mapek::LONGEST_LINE;
+use crate::message::Message;
+use crate::recording::{FIRST_BYTE, Replay};
 
 use crate::cli::common::Common;
 use crate::cli::output;

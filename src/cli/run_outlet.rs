@@ -8,14 +8,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
-use metaplan::answers::{HandledLine, NumberedAnswer};
-use metaplan::live::{Address, Live, Token};
-use metaplan::mapek::{Answer, Beliefs, Loop};
-use metaplan::message::{Errors, Message};
-use metaplan::recording::{Form, Recorder};
-use metaplan::report::Painter;
-use metaplan::setup::Setup;
-use metaplan::visible::visible_json;
+use crate::answers::{HandledLine, NumberedAnswer};
+use crate::live::{Address, Live, Token};
+use crate::mapek::{Answer, Beliefs, Loop};
+use crate::message::{Errors, Message};
+use crate::recording::{Form, Recorder};
+use crate::report::Painter;
+use crate::setup::Setup;
+use crate::visible::visible_json;
 use serde::Serialize;
 
 use crate::cli::common::Common;
@@ -194,7 +194,7 @@ fn record(path: &Path, events: Recorded, mission: &str) -> Result<(Recorder, Str
         Recorded::String => Form::Text,
     };
     let name = path.display().to_string();
-    if metaplan::file::is_stdout(path) {
+    if crate::file::is_stdout(path) {
         let text = "standard output has the answers; name a file for the recording";
         return Err(Message::at("M331", &name, None, text));
     }

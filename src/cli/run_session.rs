@@ -12,9 +12,9 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 use std::time::{Duration, Instant};
 
-use metaplan::journal::Journal;
-use metaplan::mapek::{Answer, Clock as _, Loop, Observation, SystemClock, Thoughts};
-use metaplan::message::Message;
+use crate::journal::Journal;
+use crate::mapek::{Answer, Clock as _, Loop, Observation, SystemClock, Thoughts};
+use crate::message::Message;
 
 use crate::cli::common::{Common, Failure};
 use crate::cli::run_lines::{Line, Lines};

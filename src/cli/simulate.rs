@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
-use metaplan::answers::{LogLine, SimulateAnswer, accomplished_cost, beside_joint, runs_of, sample};
-use metaplan::mapek::{Answer, Observation};
-use metaplan::message::Message;
-use metaplan::mission::TimeUnit;
-use metaplan::report::simulation_sheet;
-use metaplan::setup::Setup;
-use metaplan::simulate::{Ending, Experiment, Run, SUAVE_COLUMNS, Sample, Strategy};
+use crate::answers::{LogLine, SimulateAnswer, accomplished_cost, beside_joint, runs_of, sample};
+use crate::mapek::{Answer, Observation};
+use crate::message::Message;
+use crate::mission::TimeUnit;
+use crate::report::simulation_sheet;
+use crate::setup::Setup;
+use crate::simulate::{Ending, Experiment, Run, SUAVE_COLUMNS, Sample, Strategy};
 use planner::Limits;
 use serde_json::Value;
 

@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use metaplan::file::source;
-use metaplan::knowledge::{COADAPTATION, Knowledge, Sources};
-use metaplan::message::{Errors, Message};
-use metaplan::mission::{Bindings, Mission, Names, numbers};
-use metaplan::planner;
-use metaplan::setup::Setup;
+use crate::file::source;
+use crate::knowledge::{COADAPTATION, Knowledge, Sources};
+use crate::message::{Errors, Message};
+use crate::mission::{Bindings, Mission, Names, numbers};
+use crate::planner;
+use crate::setup::Setup;
 use ontology::ReadOptions;
 
 use crate::cli::common::{Common, Exit, Failure};

@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use clap::Args;
 use clap::error::ErrorKind;
-use metaplan::message::{Errors, Message, did_you_mean};
-use metaplan::sweep::{Group, Line, Results, Shard, Study, SweepAnswer, Table, perform, read_lines};
+use crate::message::{Errors, Message, did_you_mean};
+use crate::sweep::{Group, Line, Results, Shard, Study, SweepAnswer, Table, perform, read_lines};
 
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::limits::Guard;

@@ -3,8 +3,8 @@
 
 use std::path::{Path, PathBuf};
 
-use metaplan::file::{Pending, create};
-use metaplan::message::Message;
+use crate::file::{Pending, create};
+use crate::message::Message;
 use tracing_chrome::{ChromeLayerBuilder, FlushGuard};
 use tracing_subscriber::layer::SubscriberExt as _;
 

@@ -4,10 +4,10 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
-use metaplan::answers::VerdictAnswer;
-use metaplan::file::source;
-use metaplan::message::Message;
-use metaplan::mission::{Mission, read_plan};
+use crate::answers::VerdictAnswer;
+use crate::file::source;
+use crate::message::Message;
+use crate::mission::{Mission, read_plan};
 use num_rational::BigRational;
 use pddl::validate::{Options, Verdict, validate};
 

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
-use metaplan::certificate::{Verification, Verifier};
+use crate::certificate::{Verification, Verifier};
 
 use ::verify::{Watch, json};
 
