@@ -1,7 +1,7 @@
 //! Stratification of derived predicates: each predicate is in a higher stratum than all derived predicates
 //! that its axioms negate.
 
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::ast::{Condition, Domain, Name};
 
@@ -45,7 +45,7 @@ impl<'d> Strata<'d> {
                 let required = level[body] + step;
                 if level[head] < required {
                     if required > limit {
-                        return Err(NegativeCycle(head));
+                        return Err(NegativeCycle(on_negative_cycle(&edges).unwrap_or(head)));
                     }
                     level.insert(head, required);
                     changed = true;
@@ -61,6 +61,25 @@ impl<'d> Strata<'d> {
     pub(crate) fn level(&self, name: &Name) -> Option<usize> {
         self.level.get(name).copied()
     }
+}
+
+/// Dependency of a derived predicate (first) on another (second). The number is 1 if the dependency is negated, else 0.
+type Dependency<'d> = (&'d Name, &'d Name, usize);
+
+/// Returns the first predicate that depends on its own negation.
+fn on_negative_cycle<'d>(edges: &[Dependency<'d>]) -> Option<&'d Name> {
+    let depends = |from: &'d Name, target: &Name| {
+        let (mut visited, mut open) = (FxHashSet::from_iter([from]), vec![from]);
+        while let Some(name) = open.pop() {
+            if name == target {
+                return true;
+            }
+            let bodies = edges.iter().filter(|(head, ..)| *head == name).map(|(_, body, _)| *body);
+            open.extend(bodies.filter(|body| visited.insert(*body)));
+        }
+        false
+    };
+    edges.iter().find(|(head, body, step)| *step == 1 && depends(body, head)).map(|(head, ..)| *head)
 }
 
 /// Calls `visit(predicate, negated)` for each atom of a condition. `negated` is `true` below an odd number of
