@@ -3,10 +3,10 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use clap::Args;
 use crate::answers::{CheckAnswer, ChecksAnswer};
 use crate::file::source;
 use crate::message::Message;
+use clap::Args;
 use probabilistic::check::{Exactness, Options, Outcome, PolicyTable, Precision, Report, check_all};
 use probabilistic::explore::Bounds;
 use probabilistic::prism::ast::Model;

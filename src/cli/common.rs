@@ -3,8 +3,8 @@
 use std::io::IsTerminal;
 use std::path::PathBuf;
 
-use clap::{Args, ColorChoice, ValueEnum};
 use crate::message::{Errors, Message};
+use clap::{Args, ColorChoice, ValueEnum};
 use planner::Limits;
 use probabilistic::{Diagnostic, Error};
 

@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use clap::{Args, ValueEnum};
 use crate::answers::Pair;
 use crate::comparison::{
     Candidate, Coadaptation, Compared, Comparison, Config, Costs, Listener, NoResult, Risk, Roles, Tasked,
@@ -11,6 +10,7 @@ use crate::comparison::{
 use crate::message::{Message, did_you_mean};
 use crate::mission::Mission;
 use crate::setup::Setup;
+use clap::{Args, ValueEnum};
 
 use crate::cli::common::{Common, Exit, Failure, process_failure};
 use crate::cli::compare_so_far::{Begun, Shared};

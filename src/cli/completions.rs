@@ -3,9 +3,9 @@
 
 use std::path::PathBuf;
 
+use crate::message::Message;
 use clap::{Args, Command};
 use clap_complete::Shell;
-use crate::message::Message;
 
 use crate::cli::common::{Exit, Failure};
 use crate::cli::output;

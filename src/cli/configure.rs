@@ -4,11 +4,11 @@
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-use clap::Args;
 use crate::answers::ConfigureAnswer;
 use crate::configure::{Choice, Configuration, Configurator, Goal, Verdict, Wishes, Worth};
 use crate::knowledge::Knowledge;
 use crate::message::Message;
+use clap::Args;
 use num_rational::BigRational;
 
 use crate::cli::common::{Common, Exit, Failure, Format};

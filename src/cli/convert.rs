@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
 use crate::message::Message;
+use clap::{Args, ValueEnum};
 use ontology::OutputSyntax;
 
 use crate::cli::common::{Common, Exit, Failure};

@@ -4,11 +4,11 @@
 use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
 use crate::mission::Mission;
 use crate::picture::Sheet;
 use crate::report::timeline_picture;
 use crate::visible::visible;
+use clap::{Args, ValueEnum};
 use planner::Solution;
 
 use crate::cli::common::Failure;

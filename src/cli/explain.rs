@@ -3,7 +3,6 @@
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-use clap::Args;
 use crate::answers::{ChangesAnswer, CodeAnswer, DesignAnswer};
 use crate::codes::{self, Code};
 use crate::explain::{
@@ -12,6 +11,7 @@ use crate::explain::{
 };
 use crate::message::{Errors, Message, did_you_mean};
 use crate::mission::Mission;
+use clap::Args;
 use num_rational::BigRational;
 use planner::Limits;
 

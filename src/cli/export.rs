@@ -2,12 +2,12 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
 use crate::answers::{MissionExport, ModelExport};
 use crate::comparison::{Coadaptation, Risk, Roles, Tasked, program, published_program};
 use crate::message::Message;
 use crate::mission::Mission;
 use crate::setup::Setup;
+use clap::{Args, ValueEnum};
 use pddl::ast::Problem;
 use pddl::{portable, print_domain, print_problem};
 

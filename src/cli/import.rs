@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, Subcommand, ValueEnum};
 use crate::answers::ImportAnswer;
 use crate::comparison::{MapOptions, import_map};
 use crate::file::source;
 use crate::message::Message;
+use clap::{Args, Subcommand, ValueEnum};
 
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::output;

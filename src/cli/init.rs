@@ -3,11 +3,11 @@
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
 use crate::answers::InitAnswer;
 use crate::message::Message;
 use crate::schemas::schema;
 use crate::templates::{MANIFEST, Template};
+use clap::{Args, ValueEnum};
 
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::output;

@@ -3,11 +3,11 @@
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-use clap::{Args, Subcommand};
 use crate::answers::JournalAnswer;
 use crate::journal::{Entry, Journal, JournalReport};
 use crate::mapek::Loop;
 use crate::setup::Setup;
+use clap::{Args, Subcommand};
 use serde_json::Value;
 
 use crate::cli::common::{Common, Exit, Failure, Format};

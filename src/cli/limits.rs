@@ -12,8 +12,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use clap::Args;
 use crate::message::Message;
+use clap::Args;
 use planner::Limits;
 use verify::memory;
 

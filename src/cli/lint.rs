@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
 use crate::answers::LintAnswer;
 use crate::lint::{in_order, lint};
+use clap::Args;
 
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::limits::TimeLimit;

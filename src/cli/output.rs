@@ -6,13 +6,13 @@ use std::io::{ErrorKind, IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use comfy_table::{ColumnConstraint, ContentArrangement, Table, TableStyle, Width};
-use console::{Term, measure_text_width};
 use crate::answers::ErrorAnswer;
 use crate::file;
 use crate::message::Message;
 pub use crate::visible::pretty;
 use crate::visible::{visible, visible_json};
+use comfy_table::{ColumnConstraint, ContentArrangement, Table, TableStyle, Width};
+use console::{Term, measure_text_width};
 use serde::Serialize;
 
 use crate::cli::common::{Common, Failure, Format};

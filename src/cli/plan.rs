@@ -4,13 +4,13 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use clap::{Args, ValueEnum};
 use crate::message::Message;
 use crate::mission::numbers::MissingValue;
 use crate::mission::{Mission, btcpp_text, plan_lines, popf_text};
 use crate::planner::{Planned, PlannedFront, Planner};
 use crate::report::Positions;
 use crate::visible::visible;
+use clap::{Args, ValueEnum};
 use planner::{Backend, Config, Limits, Plan, Solution, Status, StepSemantics};
 
 use crate::cli::alternatives;

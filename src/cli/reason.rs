@@ -3,10 +3,10 @@
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-use clap::Args;
 use crate::answers::{ReasonAnswer, statuses};
 use crate::knowledge::{Contradiction, Knowledge, Sources};
 use crate::message::Message;
+use clap::Args;
 use ontology::Equality;
 use rules::{DEFAULT_STEP_BUDGET, Limits};
 

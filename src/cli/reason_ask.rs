@@ -5,11 +5,11 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-use clap::Args;
 use crate::answers::{AssertionAnswer, EntailmentAnswer, ReasonsAnswer, SchemaAnswer};
 use crate::knowledge::Knowledge;
 use crate::message::Message;
 use crate::visible::visible_json;
+use clap::Args;
 use ontology::entail::{Answer, Schema, annotations, entailments, schema};
 use ontology::vocab::{local_name, rdf};
 use rules::{Atom, Engine, Fact, Literal, Symbol, Term, Value};

@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use clap::Args;
 use crate::certificate::{Verification, Verifier};
 use crate::journal::JournalReport;
 use crate::message::Message;
@@ -13,6 +12,7 @@ use crate::planner::Planner;
 use crate::report::{Cost, Positions, changes, log_picture};
 use crate::setup::Setup;
 use crate::visible::visible;
+use clap::Args;
 use num_rational::BigRational;
 use planner::{Limits, Solution, Status};
 

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-use clap::{Args, ValueEnum};
 use crate::answers::{KeeperReadyLine, PlanningLine, ReadyLine};
 use crate::configure::Keeper;
 use crate::journal::{Journal, Policy, Recovery, Sync};
@@ -13,6 +12,7 @@ use crate::knowledge::Knowledge;
 use crate::mapek::{Loop, Recoverable, Settings, Watch};
 use crate::message::Message;
 use crate::setup::Setup;
+use clap::{Args, ValueEnum};
 
 use crate::cli::common::{Common, Exit, Failure};
 use crate::cli::configure::Wanted;

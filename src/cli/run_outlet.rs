@@ -7,7 +7,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use clap::{Args, ValueEnum};
 use crate::answers::{HandledLine, NumberedAnswer};
 use crate::live::{Address, Live, Token};
 use crate::mapek::{Answer, Beliefs, Loop};
@@ -16,6 +15,7 @@ use crate::recording::{Form, Recorder};
 use crate::report::Painter;
 use crate::setup::Setup;
 use crate::visible::visible_json;
+use clap::{Args, ValueEnum};
 use serde::Serialize;
 
 use crate::cli::common::Common;

@@ -1,8 +1,8 @@
 //! The command `metaplan schema`, which prints the JSON Schema of a format.
 
-use clap::Args;
 use crate::message::{Message, did_you_mean};
 use crate::schemas::{FORMATS, schema};
+use clap::Args;
 
 use crate::cli::common::{Exit, Failure};
 use crate::cli::output;

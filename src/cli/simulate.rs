@@ -4,7 +4,6 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use clap::{Args, ValueEnum};
 use crate::answers::{LogLine, SimulateAnswer, accomplished_cost, beside_joint, runs_of, sample};
 use crate::mapek::{Answer, Observation};
 use crate::message::Message;
@@ -12,6 +11,7 @@ use crate::mission::TimeUnit;
 use crate::report::simulation_sheet;
 use crate::setup::Setup;
 use crate::simulate::{Ending, Experiment, Run, SUAVE_COLUMNS, Sample, Strategy};
+use clap::{Args, ValueEnum};
 use planner::Limits;
 use serde_json::Value;
 

@@ -2,13 +2,13 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
 use crate::file::source;
 use crate::knowledge::{COADAPTATION, Knowledge, Sources};
 use crate::message::{Errors, Message};
 use crate::mission::{Bindings, Mission, Names, numbers};
 use crate::planner;
 use crate::setup::Setup;
+use clap::Args;
 use ontology::ReadOptions;
 
 use crate::cli::common::{Common, Exit, Failure};

@@ -4,10 +4,10 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use clap::Args;
-use clap::error::ErrorKind;
 use crate::message::{Errors, Message, did_you_mean};
 use crate::sweep::{Group, Line, Results, Shard, Study, SweepAnswer, Table, perform, read_lines};
+use clap::Args;
+use clap::error::ErrorKind;
 
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::limits::Guard;

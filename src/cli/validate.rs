@@ -3,11 +3,11 @@
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-use clap::Args;
 use crate::answers::VerdictAnswer;
 use crate::file::source;
 use crate::message::Message;
 use crate::mission::{Mission, read_plan};
+use clap::Args;
 use num_rational::BigRational;
 use pddl::validate::{Options, Verdict, validate};
 

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use clap::Args;
 use crate::certificate::{Verification, Verifier};
+use clap::Args;
 
 use ::verify::{Watch, json};
 

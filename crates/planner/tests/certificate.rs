@@ -65,6 +65,61 @@ fn the_truth_is_accepted_and_nothing_else() {
     (0..150).for_each(check);
 }
 
+/// Returns a random task of sleds with limited capacity, in which more supplies can help and can hurt.
+fn expedition(seed: u64) -> (String, String) {
+    let mut random = Random(seed);
+    let domain = "(define (domain expedition) (:types sled place)
+        (:predicates (at ?s - sled ?p - place) (next ?p ?q - place))
+        (:functions (load ?s - sled) (capacity ?s - sled) (stock ?p - place) (total-cost))
+        (:action forwards :parameters (?s - sled ?p ?q - place)
+          :precondition (and (at ?s ?p) (>= (load ?s) 1) (next ?p ?q))
+          :effect (and (not (at ?s ?p)) (at ?s ?q) (decrease (load ?s) 1) (increase (total-cost) 1)))
+        (:action store :parameters (?s - sled ?p - place) :precondition (and (at ?s ?p) (>= (load ?s) 1))
+          :effect (and (increase (stock ?p) 1) (decrease (load ?s) 1) (increase (total-cost) 1)))
+        (:action retrieve :parameters (?s - sled ?p - place)
+          :precondition (and (at ?s ?p) (>= (stock ?p) 1) (> (capacity ?s) (load ?s)))
+          :effect (and (decrease (stock ?p) 1) (increase (load ?s) 1) (increase (total-cost) 1))))";
+    let mut init = "(= (total-cost) 0) (next p0 p1) (next p1 p2)".to_owned();
+    for place in 0..3 {
+        init.push_str(&format!(" (= (stock p{place}) {})", random.below(3)));
+    }
+    for sled in 0..2 {
+        let (capacity, load) = (1 + random.below(2), random.below(2));
+        init.push_str(&format!(
+            " (at s{sled} p0) (= (capacity s{sled}) {capacity}) (= (load s{sled}) {load})"
+        ));
+    }
+    let problem = format!(
+        "(define (problem p) (:domain expedition) (:objects s0 s1 - sled p0 p1 p2 - place) (:init {init})
+           (:goal (and (at s0 p{}) (at s1 p{}))) (:metric minimize (total-cost)))",
+        random.below(3),
+        1 + random.below(2)
+    );
+    (domain.to_owned(), problem)
+}
+
+#[test]
+fn tasks_in_which_more_can_help_and_hurt_have_certificates() {
+    let mut proved = 0;
+    for seed in 0..60 {
+        let (domain, problem) = expedition(seed);
+        let (domain, problem, _) = read(&Source::new("domain", domain), &Source::new("problem", problem))
+            .unwrap_or_else(|errors| panic!("seed {seed}: {errors:?}"));
+        let task = ground(&domain, &problem, &GroundConfig::default()).expect("small");
+        let solution = optimize(&task, &Config::default(), &mut |_| {});
+        let cost = solution.plan.as_ref().map(|plan| plan.cost.to_rational());
+        let Some(certificate) = certify(&task, &solution, &Limits::none()) else { continue };
+        let accepted = check_argument(&certificate.task, &certificate.argument, cost.as_ref());
+        assert!(accepted.is_ok(), "seed {seed}: {accepted:?}");
+        for claim in cost.iter().flat_map(false_claims) {
+            let accepted = check_argument(&certificate.task, &certificate.argument, claim.as_ref());
+            assert!(accepted.is_err(), "seed {seed}: {claim:?} is accepted");
+        }
+        proved += u32::from(cost.is_some_and(|cost| cost > BigRational::from_integer(2.into())));
+    }
+    assert!(proved > 10, "only {proved} tasks with certificates need more than two steps");
+}
+
 /// Changes a random value in a document: replaces a number, null or flag by another, or removes or doubles an
 /// element.
 fn mutate(value: &mut Value, random: &mut Random) {

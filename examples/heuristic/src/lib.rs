@@ -28,9 +28,10 @@ impl GoalCount {
             operator.effects.iter().chain(conditional).filter(|fact| goal_facts.contains(fact)).count()
         };
         let facts_per_step = task.operators.iter().map(facts_made_true).max().unwrap_or(0).max(1);
-        let costs = task.operators.iter().flat_map(|operator| {
-            operator.admitted_combinations().map(|designs| operator.cost_of(&designs))
-        });
+        let costs = task
+            .operators
+            .iter()
+            .flat_map(|operator| operator.admitted_combinations().map(|designs| operator.cost_of(&designs)));
         Self { cheapest: costs.min().unwrap_or(0), goal_facts, facts_per_step }
     }
 }

@@ -23,6 +23,7 @@ use task::task::number::TaskNumber;
 use task::task::{Fact, OperatorId, State, Task};
 
 use crate::search::heuristic::{Heuristic, LazyHeuristic};
+use crate::search::monotonicity::{Polarity, directions};
 use crate::search::open_list::OpenList;
 use crate::search::search_task::SearchTask;
 use crate::search::state_registry::{NONE, ParentLink, StateRegistry};
@@ -143,13 +144,24 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         order: OpenListOrder,
         limit: Option<N>,
     ) -> Self {
+        Self::with_polarities(space, initial, order, limit, directions(space.context.task))
+    }
+
+    /// Creates a search that compares the numeric variables by these polarities.
+    pub(super) fn with_polarities(
+        space: &SearchProblem<'a, N, E>,
+        initial: &State<N>,
+        order: OpenListOrder,
+        limit: Option<N>,
+        polarities: Vec<Polarity>,
+    ) -> Self {
         let SearchProblem { context: Context { task, limits }, bounds, prepared, ref orbits } = *space;
         let mut search = AStar {
             task,
             limits,
             bounds,
             prepared,
-            store: StateRegistry::new(task, orbits.clone(), limits.thresholds().front),
+            store: StateRegistry::new(task, polarities, orbits.clone(), limits.thresholds().front),
             open: OpenList::new(),
             states_dropped: false,
             order,

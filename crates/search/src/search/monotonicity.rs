@@ -113,6 +113,12 @@ impl<N: TaskNumber> PolarityAnalysis<'_, N> {
     }
 }
 
+/// Returns the polarities by which certificates compare states: either a higher value is never worse for all numeric
+/// variables, or all of them must be equal.
+pub(super) fn uniform_directions<N: TaskNumber>(task: &Task<N>) -> Vec<Polarity> {
+    vec![if is_monotone(task) { UP } else { BOTH }; task.initial.numbers.len()]
+}
+
 /// Returns `true` if a higher value is never worse, for every numeric variable of the task.
 pub fn is_monotone<N: TaskNumber>(task: &Task<N>) -> bool {
     directions(task).iter().all(|polarity| !polarity.down)

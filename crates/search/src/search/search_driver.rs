@@ -20,6 +20,7 @@ use crate::search::astar::{
     AStar, OpenListOrder, OutOfMemoryPolicy, ProgressCallback, SearchOutcome, SearchProblem,
 };
 use crate::search::heuristic::Heuristic;
+use crate::search::monotonicity::uniform_directions;
 use crate::search::search_task::SearchTask;
 use crate::search::statistics::SearchStatistics;
 use crate::search::stubborn_sets::{Stubborn, StubbornSetPruning};
@@ -323,7 +324,8 @@ pub fn closed_labels<N: TaskNumber>(
     let prepared = SearchTask::new(context).ok()??;
     let task = context.task;
     let space = SearchProblem { context, bounds, prepared: &prepared, orbits: None };
-    let mut search = AStar::new(&space, &task.initial, OpenListOrder::Fewest, None);
+    let polarities = uniform_directions(task);
+    let mut search = AStar::with_polarities(&space, &task.initial, OpenListOrder::Fewest, None, polarities);
     match (search.run_until_states(STATE_LIMIT, &mut |_, _| {})?, cost) {
         (SearchOutcome::Optimal(plan), Some(cost)) if plan.cost >= *cost => {}
         (SearchOutcome::None, None) => {}

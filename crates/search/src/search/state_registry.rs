@@ -14,7 +14,7 @@ use task::number::dense;
 use task::task::number::TaskNumber;
 use task::task::{State, Task};
 
-use crate::search::monotonicity::{Polarity, directions};
+use crate::search::monotonicity::Polarity;
 use crate::search::pareto_front::{Criteria, Front};
 use crate::search::symmetry::Orbits;
 
@@ -175,12 +175,18 @@ fn pack(fields: &[BitField], values: &[u32], words: usize, to: &mut Vec<u32>) {
 }
 
 impl<N: TaskNumber> StateRegistry<N> {
-    pub(super) fn new(task: &Task<N>, orbits: Option<Arc<Orbits>>, longest: usize) -> Self {
+    /// Creates an empty registry. `polarities` has the polarity by which each numeric variable is compared.
+    pub(super) fn new(
+        task: &Task<N>,
+        polarities: Vec<Polarity>,
+        orbits: Option<Arc<Orbits>>,
+        longest: usize,
+    ) -> Self {
         let sizes: Vec<usize> =
             task.variables[..task.basic].iter().map(|variable| variable.values.len()).collect();
         let (fields, words) = fields(&sizes);
         let (mut exact, mut compared) = (Vec::new(), Vec::new());
-        for (variable, asked) in directions(task).into_iter().enumerate() {
+        for (variable, asked) in polarities.into_iter().enumerate() {
             if asked.up && asked.down {
                 exact.push(variable);
             } else {
