@@ -13,7 +13,7 @@ use crate::configure::configurator::{Configurator, Goal};
 use crate::knowledge::{Fault, RobotReport};
 use crate::mapek::{
     Accepted, Answer, Event, FilterSettings, FilterStates, Filters, Numbers, Observation, Refusal,
-    Unrecorded, available, changes, doubts, inferred,
+    Unrecorded, available, changes, doubts, inferred, time_of_line,
 };
 use crate::message::Message;
 
@@ -215,9 +215,13 @@ impl Keeper {
     pub fn handle_at(&mut self, observation: &Observation, now: Duration) -> Vec<KeeperAnswer> {
         let mut answers = Vec::new();
         self.lines += u64::from(!observation.is_timer);
-        self.now = self.now.max(observation.time.unwrap_or(now));
+        let (time, refusal_of_time) = time_of_line(self.now, now, observation.time);
+        self.now = time;
         // A line that was received before must not have an effect again.
         if let Some(refusal) = observation.sequence.and_then(|seq| self.numbers.refused(seq)) {
+            return vec![KeeperAnswer::Loop(refusal)];
+        }
+        if let Some(refusal) = refusal_of_time {
             return vec![KeeperAnswer::Loop(refusal)];
         }
         self.elapse(&mut answers);

@@ -40,6 +40,29 @@ const MAX_GROWTH: usize = 1024;
 /// limit on gaps between sequence numbers.
 const MAX_TIME_STEP: Duration = Duration::from_secs(1_000_000);
 
+/// Returns the time at which a line is handled, and an error if the line's own time skips too much. Such a time is
+/// ignored. `previous` is the time of the previous line. `now` is used for a line without a time of its own. Time never
+/// decreases.
+pub(crate) fn time_of_line(
+    previous: Duration,
+    now: Duration,
+    own: Option<Duration>,
+) -> (Duration, Option<Answer>) {
+    let latest = previous.max(now).saturating_add(MAX_TIME_STEP);
+    match own {
+        Some(time) if time > latest => {
+            let message = format!(
+                "`time` is {} s, but may be {} s at most: it is in seconds since the start of the mission, and skips a million at \
+                 most",
+                time.as_secs_f64(),
+                latest.as_secs()
+            );
+            (previous.max(now), Some(Answer::Error { code: "M308".to_owned(), message }))
+        }
+        own => (previous.max(own.unwrap_or(now)), None),
+    }
+}
+
 /// Changes and findings since the last deliberation, which the next deliberation considers.
 #[derive(Debug, Clone, Default)]
 struct Agenda {
@@ -166,22 +189,15 @@ impl Loop {
         // Computed plans that no decision has recorded are obsolete.
         self.planner.computed.clear();
         self.beliefs.lines += u64::from(!observation.is_timer);
-        let latest = self.beliefs.now.max(now).saturating_add(MAX_TIME_STEP);
-        self.beliefs.now =
-            self.beliefs.now.max(observation.time.filter(|time| *time <= latest).unwrap_or(now));
+        let (time, refusal_of_time) = time_of_line(self.beliefs.now, now, observation.time);
+        self.beliefs.now = time;
         if let Some(refusal) =
             observation.sequence.and_then(|sequence| self.beliefs.numbers.refused(sequence))
         {
             return vec![refusal];
         }
-        if let Some(time) = observation.time.filter(|time| *time > latest) {
-            let text = format!(
-                "`time` is {} s, but may be {} s at most: it is in seconds since the start of the mission, and skips a million at \
-                 most",
-                time.as_secs_f64(),
-                latest.as_secs()
-            );
-            return vec![Answer::Error { code: "M308".to_owned(), message: text }];
+        if let Some(refusal) = refusal_of_time {
+            return vec![refusal];
         }
         let mut changes = Changes::default();
         let mut understood = false;

@@ -50,6 +50,7 @@ pub(crate) use analyze::{available, changes, doubts, fact_text, inferred, ruled_
 pub use answer::{Answer, Command, DesignChange, Effect, ObjectiveChange, OverdueOutcome};
 pub use beliefs::{Beliefs, Outlook};
 pub use control::Loop;
+pub(crate) use control::time_of_line;
 pub(crate) use digest::{checksum, knowledge_parts};
 pub use drive::{Clock, Effector, Observer, SystemClock, drive};
 pub use event::{Event, FORMAT, LONGEST_LINE, Observation, event_schema};

@@ -287,6 +287,19 @@ fn a_failed_design_is_replaced_and_requested_again_once_realisable() {
 }
 
 #[test]
+fn a_time_too_far_ahead_is_refused() {
+    let mut keeper = Keeper::new(Configurator::new(robot(), Wishes::default()).expect("no wishes"), None);
+    keeper.start();
+    let added = r#"{"event":"objective_added","objective":"o1","function":"f_look","time":1e9}"#;
+    let answers = deliver(&mut keeper, added);
+    let is_refused = |answer: &KeeperAnswer| matches!(answer, KeeperAnswer::Loop(Answer::Error { code, .. }) if code == "M308");
+    assert!(matches!(&answers[..], [only] if is_refused(only)), "{answers:?}");
+    assert_eq!(keeper.now(), std::time::Duration::ZERO);
+    let answers = deliver(&mut keeper, &added.replace("1e9", "5"));
+    assert_eq!(reconfigurations(&answers), [("o1", None, Some("fd_look_close"))]);
+}
+
+#[test]
 fn changes_of_an_objective_removed_by_its_iri_are_forgotten() {
     let mut keeper = Keeper::new(Configurator::new(robot(), Wishes::default()).expect("no wishes"), None);
     keeper.start();
