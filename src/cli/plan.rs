@@ -260,6 +260,15 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         let text = format!("the SAT solver gave up: {reason}");
         output::warnings(common, &[Message::warning("M114", text)]);
     }
+    let not_minimised = planned.not_minimised();
+    if !not_minimised.is_empty() {
+        let text = format!(
+            "the metric was not minimised: actions change {} by amounts that depend on the state",
+            not_minimised.join(" and ")
+        );
+        let help = "to exclude expensive plans, add an upper bound on the fluent to the goal";
+        output::warnings(common, &[Message::warning("M116", text).with_help(help)]);
+    }
     finish(&planned, &mission, (arguments, common))?;
     // The plan is shown before the certificate is written, which may take long.
     Ok(match arguments.certificate.as_deref().map_or(Ok(()), |directory| planned.certify(directory)) {

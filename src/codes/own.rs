@@ -63,6 +63,12 @@ pub const CODES: &[[&str; 4]] = &[
         "Omit `--memory-limit` and use the limits of the operating system.",
     ],
     [
+        "M116",
+        "The metric was not minimised.",
+        "Actions change a fluent of the metric by amounts that depend on the state. The plan is valid, but plans with lower values may exist.",
+        "Add an upper bound on the fluent to the goal, or give each amount an action of its own.",
+    ],
+    [
         "M120",
         "There is no certificate.",
         "The answer is not proved, certificates do not cover a part of the task, or the ground task could not be compared with the files.",

@@ -89,6 +89,17 @@ impl Planned<'_> {
         self.limits.reached()
     }
 
+    /// Returns the numeric fluents of the metric that actions change by state-dependent amounts, in PDDL. The search
+    /// did not minimise them. Always empty for overlapping actions, which have no certificates.
+    pub fn not_minimised(&self) -> Vec<String> {
+        let (fluents, names) = match &self.task {
+            Ground::Integers(task) => (&task.objective.rest, &task.number_names),
+            Ground::Exact(ExactTask(task)) => (&task.objective.rest, &task.number_names),
+            Ground::Concurrent => return Vec::new(),
+        };
+        fluents.iter().map(|(fluent, _)| names[fluent.0 as usize].clone()).collect()
+    }
+
     /// Returns `true` if the mission was planned with overlapping actions.
     pub fn overlaps(&self) -> bool {
         matches!(self.task, Ground::Concurrent)

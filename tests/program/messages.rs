@@ -198,3 +198,22 @@ fn debug_text_is_detected() {
         assert!(!is_debug_text(text), "{text}");
     }
 }
+
+#[test]
+fn a_metric_that_is_not_minimised_is_named() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let domain = "(define (domain market) (:requirements :strips :numeric-fluents)
+        (:predicates (ready) (bought)) (:functions (amount) (price) (total-cost))
+        (:action order :parameters () :effect (and (ready) (increase (amount) 5)))
+        (:action buy :parameters () :precondition (ready)
+          :effect (and (bought) (increase (total-cost) (* (amount) (price))))))";
+    let problem =
+        "(define (problem p) (:domain market) (:init (= (amount) 0) (= (price) 1000) (= (total-cost) 0))
+        (:goal (bought)) (:metric minimize (total-cost)))";
+    std::fs::write(directory.path().join("domain.pddl"), domain).expect("written");
+    std::fs::write(directory.path().join("problem.pddl"), problem).expect("written");
+    let outcome = metaplan_in(directory.path(), &["plan", "domain.pddl", "problem.pddl"], "");
+    assert!(outcome.stdout.contains("cost 5000: a plan, not proved optimal"), "{outcome:#?}");
+    assert!(outcome.stderr.contains("warning[M116]: the metric was not minimised"), "{outcome:#?}");
+    assert!(outcome.stderr.contains("total-cost"), "{outcome:#?}");
+}
