@@ -1,4 +1,5 @@
-//! Reports and statistics of a temporal search: better plans, rising lower bounds, counts of each part.
+//! Reports and statistics of a temporal search: improved plans, rising lower bounds, and node
+//! counts.
 
 use std::time::Instant;
 
@@ -7,18 +8,19 @@ use task::plan::solution::{Improvement, Moment, PlannerPart, Statistics};
 
 use crate::concurrent::temporal_task::TemporalTask;
 
-/// Lower bounds are reported if they rise by at least one part in this number.
+/// Lower bounds are reported only if they rise by at least the fraction `1 / REPORT_STEP`.
 const REPORT_STEP: Int = 100;
 
-/// Log of one run.
+/// Log of one temporal search: reports improvements, and collects statistics.
 pub(super) struct Record<'r> {
     concurrent: &'r TemporalTask,
     report: &'r mut dyn FnMut(Improvement),
     started: Instant,
-    /// Metric of the best plan and lower bound, in integers, as reported last.
+    /// Last reported integer metric of the best plan, and last reported integer lower bound.
     noted: Option<(Option<Rational>, Rational)>,
     cost: Option<Rational>,
-    /// Initial lower bound, if the search is incomplete. No higher bound can be claimed then.
+    /// Initial lower bound if the search is incomplete; later lower bounds are capped at this
+    /// value, because they are not proved.
     ceiling: Option<Rational>,
     pub(super) statistics: Statistics,
 }
@@ -39,7 +41,8 @@ impl<'r> Record<'r> {
         self.report_lower_bound(root);
     }
 
-    /// Records a better plan with `horizon` happenings, and a lower bound.
+    /// Records a better plan with the integer metric `value` and `horizon` happenings, found by
+    /// `part`, and a lower bound.
     pub(super) fn improve(&mut self, value: &Rational, horizon: usize, lower: Rational, part: PlannerPart) {
         self.statistics.found_by = Some(part);
         self.cost = Some(value.clone());
@@ -53,8 +56,8 @@ impl<'r> Record<'r> {
         }
     }
 
-    /// Records a lower bound and returns it, capped at the ceiling and at the cost of the
-    /// incumbent.
+    /// Records a lower bound. Returns the bound after capping it at the ceiling and at the cost of
+    /// the incumbent.
     pub(super) fn report_lower_bound(&mut self, lower: Rational) -> Rational {
         let caps = self.ceiling.iter().chain(&self.cost);
         let lower = caps.fold(lower, |lower, cap| if *cap < lower { cap.clone() } else { lower });
