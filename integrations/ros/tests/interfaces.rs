@@ -1,5 +1,6 @@
-//! The bytes of messages against CDR (OMG CORBA 3.4, 9.3: natural alignment from the start of the body, strings with their length and a
-//! zero), written by hand, and the type hashes against those of other implementations.
+//! Checks the bytes of messages against expected CDR written by hand, and the type hashes against
+//! other implementations. (CDR: OMG CORBA 3.4, 9.3: natural alignment from the start of the body,
+//! strings with their length and a zero.)
 
 use byteorder::LittleEndian;
 use cdr_encoding::{from_bytes, to_vec};
@@ -48,7 +49,8 @@ fn a_diagnostic_array() {
     );
 }
 
-/// Doubles are aligned to eight bytes. An empty sequence has only its length, also before doubles.
+/// Doubles are aligned to eight bytes. An empty sequence consists only of its length, even if its
+/// elements are doubles.
 #[test]
 fn a_parameter_value() {
     use rcl_interfaces::msg::{ParameterType, ParameterValue};

@@ -1,4 +1,4 @@
-//! Nodes for tests, each pair in a separate domain.
+//! Helpers for tests with nodes. Each test uses a separate ROS domain.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU16, Ordering};
@@ -6,10 +6,10 @@ use std::time::{Duration, Instant};
 
 use metaplan_ros::node::{Network, Node, Opening, Rmw, RosArguments};
 
-/// First domain for tests. Concurrent runs on a machine need different domains.
+/// First ROS domain for tests. Concurrent runs on one machine need different domains.
 const FIRST: u16 = 20;
 
-/// Returns a domain that no other test of this process uses.
+/// Returns a ROS domain that no other test of this process uses.
 pub fn domain() -> u16 {
     static USED: AtomicU16 = AtomicU16::new(0);
     let slot = (std::process::id() % 20) as u16 * 10;
@@ -25,7 +25,7 @@ pub fn node(domain: u16, name: &str, words: &str) -> Arc<Node> {
     Node::open(opening).expect("a node")
 }
 
-/// Waits for a condition.
+/// Waits until a condition holds; `what` describes the condition if the time runs out.
 pub fn until(what: &str, mut is_so: impl FnMut() -> bool) {
     let begun = Instant::now();
     while !is_so() {
