@@ -8,7 +8,8 @@ use task::plan::solution::{Improvement, Moment, PlannerPart, Statistics};
 
 use crate::concurrent::temporal_task::TemporalTask;
 
-/// Lower bounds are reported only if they rise by at least the fraction `1 / REPORT_STEP`.
+/// Inverse of the smallest reported rise of the lower bound, relative to the last reported bound. A
+/// bound that reaches the cost of the incumbent is always reported.
 const REPORT_STEP: Int = 100;
 
 /// Log of one temporal search: reports improvements, and collects statistics.

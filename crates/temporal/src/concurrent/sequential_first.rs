@@ -57,7 +57,7 @@ pub(super) struct SequentialTask {
 
 impl SequentialTask {
     /// Grounds the sequential task. Returns `None` if the source files are not kept, grounding
-    /// fails, or the task is too large.
+    /// fails or finds the goal unreachable, or the task is too large.
     pub(super) fn new(concurrent: &TemporalTask, limits: &Limits) -> Option<Self> {
         let split = &concurrent.task;
         if split.operators.len() > OPERATORS {

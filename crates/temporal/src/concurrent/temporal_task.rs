@@ -35,7 +35,8 @@ pub struct TemporalTask {
     /// Times of the timed initial literals in internal units and their operators, ascending.
     pub(super) events: Vec<(Int, OperatorId)>,
     /// Per access key: a variable whose latest change shows that all earlier accesses of this kind
-    /// are past. Every happening that waits for such an access requires a value of this variable.
+    /// are past. Every happening that waits for such an access, except timed initial literals,
+    /// requires a value of this variable.
     pub(super) guards: Vec<Option<u32>>,
     pub(super) measure: Measure,
     /// Per preference that can be violated: operators of which at least one is applicable in the
