@@ -26,18 +26,18 @@ pub struct Part {
 pub struct Interface {
     /// Distribution or package version to which the definition belongs. `None` for the default.
     pub variant: Option<String>,
-    /// Package, as in `std_msgs`.
+    /// Name of the package, such as `std_msgs`.
     pub package: String,
-    /// `msg`, `srv` or `action`.
+    /// Folder, which shows the kind of the interface: `msg`, `srv` or `action`.
     pub folder: &'static str,
-    /// Name, as in `String`.
+    /// Name of the interface, such as `String`.
     pub name: String,
     /// One structure for a message, two for a service, three for an action.
     pub parts: Vec<Part>,
 }
 
 impl Interface {
-    /// Full name, as in `std_msgs/msg/String`.
+    /// Full name of the interface, such as `std_msgs/msg/String`.
     pub fn full_name(&self) -> String {
         format!("{}/{}/{}", self.package, self.folder, self.name)
     }

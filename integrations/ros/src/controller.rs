@@ -152,7 +152,7 @@ impl Controller {
         }
     }
 
-    /// Requests the current domain and problem from PlanSys2.
+    /// Requests the current domain and problem from PlanSys2's experts, and returns them as PDDL.
     async fn request_problem(&self) -> Result<(String, String), String> {
         let domain = self.node.caller::<GetDomain>("domain_expert/get_domain");
         let domain = domain

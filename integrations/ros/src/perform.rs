@@ -85,7 +85,7 @@ pub enum End {
     Succeeded,
     /// The action was cancelled on request.
     Canceled,
-    /// The action failed for this reason.
+    /// The action failed; contains the reason.
     Failed(String),
 }
 
@@ -150,7 +150,7 @@ impl Performance {
     }
 }
 
-/// A performer of actions.
+/// Performer that executes actions of a plan on a robot.
 pub trait Perform: Send + Sync {
     /// Starts an action, and returns its handle. All errors are reported as the end of the action.
     fn start(&self, call: Call) -> Running;

@@ -114,7 +114,8 @@ fn arrays_have_no_length_and_empty_structures_have_a_byte() {
     check(&suave_msgs::action::SpiralSearchGoal::default(), &[&[0]]);
 }
 
-/// `i16` and `i8` before strings, a sequence of strings, an `f32` after a Boolean.
+/// Checks the alignment of `i16` and `i8` before strings, of a sequence of strings, and of an `f32`
+/// after a Boolean.
 #[test]
 fn an_action_execution() {
     use plansys2_msgs::msg::ActionExecution;

@@ -15,8 +15,9 @@ use task::number::dense;
 
 use crate::concurrent::rule::{Proposition, Rule};
 
-/// Limit on added rules: `MAX_RULES_PER_RULE` times the number of rules, plus `EXTRA_RULES`.
+/// Upper limit on added rules, per rule of the relaxed task. `EXTRA_RULES` is added to the limit.
 const MAX_RULES_PER_RULE: usize = 2;
+/// Constant part of the upper limit on added rules.
 const EXTRA_RULES: usize = 1_000;
 /// Work limit of the selection of conjunctions, in rule visits per rule.
 const MAX_VISITS_PER_RULE: usize = 64;
@@ -35,7 +36,7 @@ pub(super) struct Scope<'a> {
 
 /// Index of the rules by proposition and by variable.
 struct Index {
-    /// Conditions of the rules, followed by the goal.
+    /// Conditions of each rule; the last entry holds the conditions of the goal.
     needs: Lists,
     adding: Lists,
     needing: Lists,

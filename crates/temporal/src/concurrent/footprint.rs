@@ -43,8 +43,8 @@ pub(super) struct Footprint {
 }
 
 impl Footprint {
-    /// Returns `true` if the order of two happenings matters: one writes what the other reads, or
-    /// both write and do not commute.
+    /// Returns `true` if the order of two happenings matters: one writes an atom or number that the
+    /// other reads, or both write an atom or number and their effects do not commute.
     pub(super) fn interferes(&self, other: &Self) -> bool {
         let clash = |(number, way): &(NumericId, Way)| {
             let mut ways = other.numbers.iter().filter(|(candidate, _)| candidate == number);

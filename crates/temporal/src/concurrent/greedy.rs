@@ -108,7 +108,7 @@ pub(super) enum Outcome {
     Found,
     /// The open list is empty or the memory share is used up.
     Exhausted,
-    /// Stopped at a limit.
+    /// Stopped at a limit of time or work.
     Stopped,
 }
 
@@ -136,8 +136,8 @@ pub(super) struct Greedy<'a> {
     pub(super) figures: SearchStatistics,
 }
 
-/// Hash of a state. A collision only loses a state, which is harmless because this search proves
-/// nothing.
+/// Hash of a search state. A hash collision only loses a state, which is harmless because this
+/// search proves nothing.
 fn hash_of(key: &[u32]) -> u64 {
     let mut hasher = FxHasher::default();
     key.hash(&mut hasher);

@@ -12,7 +12,7 @@ pub(super) type Proposition = u32;
 /// A rule of the delete relaxation.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Rule {
-    /// Conditions, ascending.
+    /// Conditions of the rule, ascending.
     pub(super) needs: Vec<Proposition>,
     pub(super) adds: Vec<Proposition>,
     /// Facts to which the happening certainly sets their variables, so that other values are

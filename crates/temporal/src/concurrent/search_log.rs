@@ -81,7 +81,7 @@ impl<'r> Record<'r> {
         lower
     }
 
-    /// Ends the run and returns its statistics.
+    /// Ends the log, and returns the statistics of the search.
     pub(super) fn end(mut self) -> Statistics {
         self.statistics.search = self.started.elapsed();
         self.statistics

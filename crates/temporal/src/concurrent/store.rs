@@ -15,7 +15,7 @@ use crate::concurrent::simple_temporal_network::SimpleTemporalNetwork;
 use crate::concurrent::successors::TemporalState;
 use crate::concurrent::temporal_task::TemporalTask;
 
-/// Position of a finite-domain variable in a packed key.
+/// Position of a finite-domain variable in a packed key: word, and bits within the word.
 struct Field {
     word: usize,
     shift: u32,
@@ -59,7 +59,7 @@ pub(super) struct Packing<'a> {
     width: usize,
 }
 
-/// A packed temporal state.
+/// A temporal state in packed form: values, numbers, temporal network and cost.
 pub(super) struct PackedNode {
     values: Box<[u32]>,
     numbers: Box<[Int]>,

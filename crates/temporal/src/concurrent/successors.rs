@@ -21,7 +21,7 @@ const UNBOUNDED_RUNS: u32 = 4;
 pub(super) struct TemporalState {
     pub(super) state: State,
     pub(super) clocks: SimpleTemporalNetwork,
-    /// Cost in the task's cost unit.
+    /// Sum of the action costs so far, in the task's cost unit.
     pub(super) cost: Int,
 }
 
@@ -37,7 +37,7 @@ pub(super) enum DeadEnd {
     Unfit,
 }
 
-/// Successor function of the temporal state space.
+/// Successor function of the temporal state space: applicable happenings and resulting states.
 pub(super) struct Expansion<'a> {
     concurrent: &'a TemporalTask,
     index: SuccessorGenerator,

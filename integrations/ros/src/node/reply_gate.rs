@@ -46,7 +46,7 @@ impl<T> ReplyGate<T> {
         Self { topics: Topics::of(service), waiting: VecDeque::new(), admitted: BTreeSet::new() }
     }
 
-    /// Appends a request.
+    /// Appends a request to the queue.
     pub(crate) fn push(&mut self, id: RmwRequestId, request: T) {
         self.waiting.push_back(Waiting { since: Instant::now(), id, request });
     }

@@ -138,7 +138,7 @@ impl Meaning for SpiralSearch {
 impl Meaning for FollowPipeline {
     type Settings = ();
 
-    /// The planner decides when the inspection ends, so there is no timeout.
+    /// Creates a goal without a timeout, because the planner decides when the inspection ends.
     fn goal((): &(), _: &Call) -> Result<FollowPipelineGoal, String> {
         Ok(FollowPipelineGoal { timeout: 0.0 })
     }

@@ -25,9 +25,9 @@ use serde_json::{Value, json};
 /// Domain and problem of a planning request.
 #[derive(Debug, Clone)]
 pub struct Request<'r> {
-    /// The domain.
+    /// PDDL domain.
     pub domain: Source,
-    /// The problem.
+    /// PDDL problem.
     pub problem: Source,
     /// Mission whose knowledge base and bindings restrict the plan; `None` for plain PDDL.
     pub joint: Option<&'r Mission>,
@@ -100,7 +100,7 @@ pub enum NoPlan {
     Unsupported(Errors),
     /// No plan exists or none was found; contains the reason.
     None(String),
-    /// A fault of this program.
+    /// An error in this program; contains a description.
     Fault(String),
 }
 

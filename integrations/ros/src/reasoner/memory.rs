@@ -74,7 +74,7 @@ impl MemoryFile {
         Ok(Self { path, last })
     }
 
-    /// Returns the stored state.
+    /// Returns the state that was last read or written.
     pub(super) fn read(&self) -> Memory {
         self.last.clone()
     }

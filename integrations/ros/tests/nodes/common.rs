@@ -16,7 +16,7 @@ pub fn domain() -> u16 {
     FIRST + slot + USED.fetch_add(1, Ordering::Relaxed) % 10
 }
 
-/// Creates a node on loopback with arguments after `--ros-args`.
+/// Creates a node on the loopback network. `words` are the arguments after `--ros-args`.
 pub fn node(domain: u16, name: &str, words: &str) -> Arc<Node> {
     let words = ["p", "--ros-args"].into_iter().chain(words.split_whitespace()).map(str::to_owned);
     let (_, arguments) = RosArguments::split(words).expect("arguments");

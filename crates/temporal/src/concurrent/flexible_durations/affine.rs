@@ -11,7 +11,7 @@ pub(super) type Column = u32;
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
 pub(super) struct Affine {
     pub(super) constant: Rational,
-    /// Sorted by column; no factor is 0.
+    /// Columns with their factors, sorted by column; no factor is 0.
     pub(super) terms: Vec<(Column, Rational)>,
 }
 

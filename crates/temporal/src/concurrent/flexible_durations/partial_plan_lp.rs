@@ -38,7 +38,7 @@ pub(super) fn duration_of(position: usize) -> Column {
     2 * dense(position) + 3
 }
 
-/// A running action.
+/// A running action of a partial plan.
 #[derive(Debug, Clone)]
 pub(super) struct RunningAction {
     pub(super) instance: u32,
@@ -90,7 +90,7 @@ fn rational(number: Int) -> Rational {
 }
 
 impl Course {
-    /// Empty partial plan.
+    /// Empty partial plan, in the initial state.
     pub(super) fn new(concurrent: &TemporalTask) -> Self {
         let State { values, numbers } = concurrent.task.initial.clone();
         Self {

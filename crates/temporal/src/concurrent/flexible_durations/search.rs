@@ -69,7 +69,7 @@ pub(super) struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// Greedy search guided by relaxed plans. It proves nothing.
+    /// Greedy search guided by relaxed plans. The search may miss plans and proves nothing.
     pub(super) fn greedy(
         concurrent: &'a TemporalTask,
         expansion: &'a Expansion<'a>,
