@@ -1,7 +1,7 @@
 //! `popf` as called by PlanSys2's plugin, with the plugin's parser applied to the output.
 //!
-//! The files of PlanSys2's tests are read from `../shared`. If they are missing, the tests that
-//! need them print a message and return.
+//! The files of PlanSys2's tests are read from `../shared`. If they are missing, their cases report
+//! it and end.
 
 #![allow(clippy::print_stderr)] // a skipped test says so
 

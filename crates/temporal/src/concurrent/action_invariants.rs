@@ -174,8 +174,8 @@ impl<'a> Index<'a> {
 
     /// Like [`Self::excludes`], and also `true` for the end of an action whose condition over all
     /// contradicts the invariant. Both the condition and the invariant would have to hold right
-    /// before that end, unless the end takes place at the same time as the start of `own`, which is
-    /// ruled out.
+    /// before that end. The exception, an end at the same time as the start of `own`, is ruled out
+    /// separately.
     pub(super) fn is_outside(&self, invariant: &Invariant, own: &Instance, id: OperatorId) -> bool {
         if self.excludes(invariant, own, id) {
             return true;

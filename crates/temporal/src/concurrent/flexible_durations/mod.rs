@@ -57,9 +57,11 @@ pub(super) fn check(concurrent: TemporalTask) -> Result<TemporalTask, Errors> {
 /// Returns `true` if the exhaustive search covers every plan with all its possible times and
 /// durations.
 ///
-/// Returns `false` if an action may take no time or less than the separation (it then becomes a
-/// single happening), if several happenings can jointly maintain a condition at one time, or if the
-/// task has timed initial literals, since a plan may end right before them.
+/// Returns `false` in particular if
+/// - a chosen duration may be 0 or less than the separation (the action then becomes a single happening),
+/// - a duration depends on the state and is not chosen,
+/// - several happenings can jointly maintain a condition at one time, or
+/// - the task has timed initial literals, since a plan may end right before them.
 pub(super) fn is_exact(concurrent: &TemporalTask) -> bool {
     let takes_time = |instance: &Instance| {
         let condition = &concurrent.task.operators[instance.start.index()].condition;
