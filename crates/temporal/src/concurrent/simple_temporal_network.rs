@@ -40,7 +40,7 @@ pub(super) struct RunningAction {
 #[derive(Debug, Clone)]
 struct Start {
     lower: TimeExpression,
-    /// Upper bound on the time; `Int::MAX` if there is none.
+    /// Upper bound on the time; `Int::MAX` if the time is unbounded.
     upper: Int,
 }
 

@@ -224,7 +224,7 @@ impl TemporalTask {
         }
     }
 
-    /// Returns `true` if the condition over all of an instance holds in `state`, or there is none.
+    /// Returns `true` if the condition over all of an instance holds in `state` or is absent.
     pub(super) fn holds_over_all(&self, instance: u32, state: &State) -> bool {
         let condition = self.instances[instance as usize].over_all;
         let condition = condition.map(|id| &self.task.operators[id.index()].condition);
