@@ -154,7 +154,7 @@ impl<'a> Footprints<'a> {
         Ok(())
     }
 
-    /// Builds an index of all atoms and numbers in the write sets collected so far.
+    /// Builds an index of all atoms and numbers in the collected write sets.
     pub(super) fn index(&self) -> WriteIndex {
         let mut written = WriteIndex::default();
         for (index, (predicate, arguments)) in self.world.atoms.keys().enumerate() {

@@ -21,7 +21,7 @@ const UNBOUNDED_RUNS: u32 = 4;
 pub(super) struct TemporalState {
     pub(super) state: State,
     pub(super) clocks: SimpleTemporalNetwork,
-    /// Sum of the action costs so far, in the task's cost unit.
+    /// Sum of the costs of the happenings, in the task's cost unit.
     pub(super) cost: Int,
 }
 

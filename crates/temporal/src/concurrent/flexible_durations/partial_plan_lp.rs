@@ -80,7 +80,7 @@ pub(super) struct Course {
     ranges: Vec<(Column, Rational, Option<Rational>)>,
     /// Time of the last timed initial literals that have taken place, or -1.
     floor: Int,
-    /// Sum of the action costs so far, in the task's cost unit.
+    /// Sum of the costs of the happenings, in the task's cost unit.
     pub(super) cost: Int,
     pub(super) program: Program,
 }

@@ -63,7 +63,7 @@ pub(super) struct Search<'a> {
     order: u32,
     nearest: u64,
     bytes: usize,
-    /// Least metric of the plans found so far, before durations are rounded to decimals.
+    /// Least metric of all plans found, before durations are rounded to decimals.
     reached: Option<Rational>,
     pub(super) figures: SearchStatistics,
 }
