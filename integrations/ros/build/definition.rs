@@ -1,7 +1,9 @@
-//! Parses ROS definitions to interfaces: a message, a service of two parts, an action of three.
+//! Parses ROS definition files to interfaces. A message has one part, a service two, an action
+//! three.
 //!
-//! `PACKAGE/msg/X.msg`, `PACKAGE/srv/X.srv`, `PACKAGE/action/X.action`; definitions that differ in
-//! another ROS distribution or version of a package are below `variants/VARIANT/`.
+//! The files are `PACKAGE/msg/X.msg`, `PACKAGE/srv/X.srv` and `PACKAGE/action/X.action`.
+//! Definitions that differ in another ROS distribution or package version are below
+//! `variants/VARIANT/`.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -10,38 +12,38 @@ use hiroz_codegen::parser::msg::parse_msg_string;
 use hiroz_codegen::parser::parse_field;
 use hiroz_codegen::types::{Constant, Field};
 
-/// A structure of an interface.
+/// A structure of an interface, such as the request of a service.
 pub struct Part {
-    /// Suffix of the interface's name: empty, `_Request`, `_Goal`, …
+    /// Suffix that the structure adds to the name of the interface: empty, `_Request`, `_Goal`, …
     pub suffix: &'static str,
-    /// Fields in the order of the definition, which is the order of the bytes. Never empty.
+    /// Fields in the order of the definition, which is the order of serialisation. Never empty.
     pub fields: Vec<Field>,
-    /// Named values.
+    /// Constants of the definition.
     pub constants: Vec<Constant>,
 }
 
-/// A message, service or action.
+/// A ROS message, service or action definition.
 pub struct Interface {
-    /// Distribution or version of the interface, if it is not the default.
+    /// Distribution or package version to which the definition belongs. `None` for the default.
     pub variant: Option<String>,
-    /// Package, as in `std_msgs`.
+    /// Name of the package, such as `std_msgs`.
     pub package: String,
-    /// `msg`, `srv` or `action`.
+    /// Folder, which shows the kind of the interface: `msg`, `srv` or `action`.
     pub folder: &'static str,
-    /// Name, as in `String`.
+    /// Name of the interface, such as `String`.
     pub name: String,
     /// One structure for a message, two for a service, three for an action.
     pub parts: Vec<Part>,
 }
 
 impl Interface {
-    /// Full name, as in `std_msgs/msg/String`.
+    /// Full name of the interface, such as `std_msgs/msg/String`.
     pub fn full_name(&self) -> String {
         format!("{}/{}/{}", self.package, self.folder, self.name)
     }
 }
 
-/// Folders with the parts of their interfaces.
+/// Kinds of interfaces: folder, and suffixes of the parts of each interface in the folder.
 const FOLDERS: [(&str, &[&str]); 3] =
     [("msg", &[""]), ("srv", &["_Request", "_Response"]), ("action", &["_Goal", "_Result", "_Feedback"])];
 
@@ -110,7 +112,7 @@ fn parts(
         let parsed = parse_msg_string(section, package, file)?;
         let (mut fields, constants) = (parsed.fields, parsed.constants);
         if fields.is_empty() {
-            // As in rosidl, because C structures are not empty.
+            // The same member as in rosidl, because C structures cannot be empty.
             fields.push(parse_field("uint8 structure_needs_at_least_one_member", package, 0)?);
         }
         Ok(Part { suffix, fields, constants })

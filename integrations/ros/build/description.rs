@@ -1,9 +1,11 @@
-//! Interfaces → type descriptions → type hashes RIHS01.
+//! Computes type descriptions and type hashes (RIHS01) of interfaces.
 //!
-//! A service consists of four types, an action for thirteen: those of its services and of its feedback topic are made here, as rosidl makes
-//! them [1]. The hash of a type is the SHA-256 of the description of it and of all types that it refers to, in JSON [2].
+//! A service has four types, an action thirteen. The types of an action's services and feedback
+//! topic are derived here in the same way as by rosidl [1]. The hash of a type is the SHA-256 of
+//! the JSON description of the type and of all types that it refers to [2].
 //!
-//! `hiroz_codegen` has a resolver of its own, which is not used: it describes `CancelGoal` as a part of an action, and with one field too few.
+//! The resolver of `hiroz_codegen` is not used, because it describes `CancelGoal` as a part of an
+//! action and omits a field.
 //!
 //! [1] REP-2011, Evolving Message Types. [2] REP-2016, ROS 2 Interface Type Descriptions.
 
@@ -18,7 +20,7 @@ use hiroz_codegen::types::{ArrayType, Field};
 
 use crate::definition::Interface;
 
-/// Returns the hashes of the types of a variant, or of the defaults, by full name.
+/// Type hashes by variant (`None` for the default) and full name.
 pub type Hashes = BTreeMap<(Option<String>, String), String>;
 
 /// Type descriptions by full name.
@@ -27,7 +29,7 @@ type Descriptions = BTreeMap<String, TypeDescription>;
 const TIME: &str = "builtin_interfaces/msg/Time";
 const UUID: &str = "unique_identifier_msgs/msg/UUID";
 
-/// Returns the hashes of all types of all interfaces, including those of their services and
+/// Returns the hashes of all types of all interfaces, including the derived types of services and
 /// actions.
 pub fn hashes(interfaces: &[Interface]) -> Result<Hashes, Box<dyn Error>> {
     let mut common = Descriptions::new();
@@ -62,7 +64,8 @@ fn hash(name: &str, all: &Descriptions) -> Result<String, Box<dyn Error>> {
     Ok(calculate_hash(&message).to_rihs_string())
 }
 
-/// Returns a type with all types that it refers to.
+/// Adds the description of a type and of all types that it refers to, directly or indirectly, to
+/// `found`.
 fn collect(name: &str, all: &Descriptions, found: &mut Descriptions) -> Result<(), Box<dyn Error>> {
     if found.contains_key(name) {
         return Ok(());
@@ -120,7 +123,8 @@ fn add(all: &mut Descriptions, type_name: String, fields: Vec<FieldDescription>)
     all.insert(type_name.clone(), TypeDescription { type_name, fields });
 }
 
-/// Adds the event type of a service and the service type. Request and response already exist.
+/// Adds the event type of a service and the type of the whole service. The types of request and
+/// response already exist.
 fn service(all: &mut Descriptions, name: &str) {
     let part = |suffix: &str| format!("{name}_{suffix}");
     let at_most_one = |field: &str, suffix: &str| {
@@ -141,8 +145,8 @@ fn service(all: &mut Descriptions, name: &str) {
     add(all, name.to_owned(), whole);
 }
 
-/// Adds the services and the feedback topic of an action and the action type. Goal, result and
-/// feedback already exist.
+/// Adds the types of the services and of the feedback topic of an action, and the type of the whole
+/// action. The types of goal, result and feedback already exist.
 fn action(all: &mut Descriptions, name: &str) {
     let part = |suffix: &str| format!("{name}_{suffix}");
     let id = || nested("goal_id", UUID);

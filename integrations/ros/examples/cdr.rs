@@ -14,16 +14,16 @@ use metaplan_ros::interfaces::Structure;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-/// Plain CDR, little endian.
+/// Encapsulation header of plain CDR, little endian.
 const HEADER: [u8; 4] = [0, 1, 0, 0];
 
-/// Conversions of values of a type.
+/// Conversions between JSON and CDR for one type.
 struct Codec {
     encode: fn(Value) -> Result<Vec<u8>, String>,
     decode: fn(&[u8]) -> Result<Value, String>,
 }
 
-/// A type that has a hash.
+/// A type with its hash; `codec` is `None` if the type has no structure in this package.
 struct Entry {
     variant: Option<&'static str>,
     name: &'static str,
@@ -54,7 +54,7 @@ fn decode<T: Structure>(bytes: &[u8]) -> Result<Value, String> {
     serde_json::to_value(&value).map_err(|error| error.to_string())
 }
 
-/// A line of the input.
+/// A request: one line of the input.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Request {

@@ -33,16 +33,16 @@ use crate::planner::{
 /// Timeout for requests to the experts.
 const EXPERT_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Pause before the next attempt, unless the knowledge base changes.
+/// Pause before the next planning attempt if no plan was found, unless the knowledge base changes.
 const RETRY_PAUSE: Duration = Duration::from_secs(5);
 
-/// Pause after a failure.
+/// Pause after the execution of a plan has failed.
 const FAILURE_PAUSE: Duration = Duration::from_secs(1);
 
-/// Polling interval of the knowledge base.
+/// Polling interval of the knowledge base and the stop flag.
 const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
-/// Number of consecutive failures after which the controller gives up.
+/// Number of consecutive failed executions after which the controller gives up.
 const MAX_FAILURES: usize = 5;
 
 /// Options of the controller.
@@ -57,7 +57,8 @@ pub struct Options {
 /// Runs until PlanSys2's goal is reached or `stop` is set.
 ///
 /// # Errors
-/// The mission or a parameter of the command line is wrong, or all attempts have failed.
+/// Fails if the mission or a parameter of the command line is wrong, or
+/// `MAX_FAILURES` consecutive executions have failed.
 pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(), Errors> {
     let setup = Setup::read(&options.mission)?;
     for warning in setup.mission.warnings() {
@@ -81,7 +82,7 @@ struct Controller {
     plan_publisher: PlanPublisher,
 }
 
-/// Outcome of executing a plan.
+/// Outcome of executing one plan.
 enum Outcome {
     Done,
     Failed(String),
@@ -139,7 +140,8 @@ impl Controller {
         Ok(())
     }
 
-    /// Returns the best plan for PlanSys2's current problem. Without a plan, publishes the reason.
+    /// Returns the best plan for PlanSys2's current problem. Without a plan, publishes or logs the
+    /// reason and returns `None`.
     async fn find(&self) -> Option<Found> {
         match self.request_problem().await {
             Ok((domain, problem)) => self.plan(domain, problem).await.ok(),
@@ -150,7 +152,7 @@ impl Controller {
         }
     }
 
-    /// Requests the current domain and problem from PlanSys2.
+    /// Requests the current domain and problem from PlanSys2's experts, and returns them as PDDL.
     async fn request_problem(&self) -> Result<(String, String), String> {
         let domain = self.node.caller::<GetDomain>("domain_expert/get_domain");
         let domain = domain
@@ -184,7 +186,7 @@ impl Controller {
         outcome
     }
 
-    /// Executes a plan while its designs are available.
+    /// Executes a plan, and cancels it if one of its designs becomes unavailable or `stop` is set.
     async fn execute(&self, plan: Plan, found: &Found, stop: &AtomicBool) -> Outcome {
         let used: BTreeSet<String> =
             found.configuration.iter().flatten().map(|(_, design)| design.to_lowercase()).collect();
@@ -226,7 +228,7 @@ impl Controller {
         self.node.log(Severity::Debug, &(done + text));
     }
 
-    /// Waits for a change of the knowledge base, at most for `time`.
+    /// Waits until the available designs change or `stop` is set, at most for `time`.
     async fn pause(&self, time: Duration, stop: &AtomicBool) {
         let (start, available) = (Instant::now(), self.joint.available());
         while start.elapsed() < time && !stop.load(Ordering::Relaxed) && self.joint.available() == available {

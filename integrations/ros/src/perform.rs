@@ -42,21 +42,21 @@ use std::collections::BTreeMap;
 
 use smol::channel;
 
-/// An action to be executed.
+/// An action of a plan, to be executed by a performer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Call {
-    /// Name in the plan.
+    /// Name of the action in the plan.
     pub action: String,
-    /// Arguments in the order of the domain.
+    /// Arguments in the order of the parameters in the domain.
     pub arguments: Vec<String>,
-    /// Design of each function that the action requires.
+    /// Design to be used for each function that the action requires.
     pub configuration: BTreeMap<String, String>,
     /// Planned duration in seconds; 0 if the domain has no durations.
     pub duration: f64,
 }
 
 impl Call {
-    /// Formats the action as in PDDL and PlanSys2: `(move r1 kitchen hall)`.
+    /// Formats the action as in PDDL and PlanSys2, for example `(move r1 kitchen hall)`.
     pub fn text(&self) -> String {
         let words: Vec<&str> =
             std::iter::once(&self.action).chain(&self.arguments).map(String::as_str).collect();
@@ -64,17 +64,17 @@ impl Call {
     }
 }
 
-/// A message about a running action.
+/// A message of a performer about a running action.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Progress {
     /// Intermediate feedback.
     Feedback {
-        /// Completed share from 0 to 1, if it is known.
+        /// Completed share of the action from 0 to 1, if it is known.
         completion: Option<f32>,
         /// Description for users.
         text: String,
     },
-    /// The action has ended. This is the last message.
+    /// The action has ended; no further message follows.
     Ended(End),
 }
 
@@ -85,11 +85,11 @@ pub enum End {
     Succeeded,
     /// The action was cancelled on request.
     Canceled,
-    /// The action failed for this reason.
+    /// The action failed; contains the reason.
     Failed(String),
 }
 
-/// A running action. Dropping this handle does not stop it.
+/// The manager's handle of a running action. Dropping the handle does not stop the action.
 #[derive(Debug, Clone)]
 pub struct Running {
     events: channel::Receiver<Progress>,
@@ -97,7 +97,8 @@ pub struct Running {
 }
 
 impl Running {
-    /// Creates both ends of the channel: for the manager, and for the performer of the action.
+    /// Creates the two connected ends of an action: the handle for the manager, and the handle for
+    /// the performer.
     pub fn pair() -> (Self, Performance) {
         let (progress, events) = channel::unbounded();
         let (cancel, canceled) = channel::bounded(1);
@@ -110,14 +111,14 @@ impl Running {
         self.events.recv().await.unwrap_or_else(|_| lost())
     }
 
-    /// Requests cancellation, which is reported like any other end.
+    /// Requests cancellation. The performer reports the end of the action as usual.
     pub fn cancel(&self) {
         // A full channel means that cancellation was already requested.
         let _ = self.cancel.try_send(());
     }
 }
 
-/// The performer's end of a [`Running`] action.
+/// The performer's handle of a [`Running`] action.
 #[derive(Debug)]
 pub struct Performance {
     progress: channel::Sender<Progress>,
@@ -125,12 +126,12 @@ pub struct Performance {
 }
 
 impl Performance {
-    /// Reports intermediate feedback.
+    /// Reports intermediate feedback to the manager.
     pub fn feedback(&self, completion: Option<f32>, text: impl Into<String>) {
         self.forward(Progress::Feedback { completion, text: text.into() });
     }
 
-    /// Forwards a message.
+    /// Sends a message to the manager.
     pub(crate) fn forward(&self, progress: Progress) {
         // The receiver may have been dropped.
         let _ = self.progress.try_send(progress);
@@ -141,7 +142,7 @@ impl Performance {
         self.forward(Progress::Ended(end));
     }
 
-    /// Waits for a request to cancel, possibly forever.
+    /// Waits for a request to cancel the action, possibly forever.
     pub async fn canceled(&self) {
         if self.canceled.recv().await.is_err() {
             futures::future::pending::<()>().await;
@@ -149,9 +150,9 @@ impl Performance {
     }
 }
 
-/// A performer of actions.
+/// Performer that executes actions of a plan on a robot.
 pub trait Perform: Send + Sync {
-    /// Starts an action. All errors are reported as its end.
+    /// Starts an action, and returns its handle. All errors are reported as the end of the action.
     fn start(&self, call: Call) -> Running;
 }
 

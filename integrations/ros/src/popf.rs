@@ -2,9 +2,9 @@
 //! status is always 0.
 //!
 //! The plugin searches for a line with `Solution Found`, and parses each later line that does not
-//! begin with `;` as an action. It validates a domain with a problem that has neither an initial
-//! state nor a goal and names another domain. The answer is then `Solution Found` without any
-//! action.
+//! begin with `;` as an action. To validate a domain, the plugin plans for a problem that has
+//! neither an initial state nor a goal and names another domain. The output is then
+//! `Solution Found` without any action.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -18,10 +18,10 @@ use metaplan::setup::Setup;
 
 use crate::planner::{self, DOMAIN, Manner, NoPlan, PROBLEM, Request};
 
-/// PlanSys2 waits for 15 s.
+/// Default time limit of planning; PlanSys2 waits for 15 s.
 const TIME_LIMIT: Duration = Duration::from_secs(10);
 
-/// Output of a run.
+/// Output of a run of `popf`.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Said {
     /// Standard output, which the plugin parses.
@@ -31,26 +31,27 @@ pub struct Said {
 }
 
 impl Said {
-    /// Reports why there is no plan, in comments that the plugin ignores.
+    /// Output without a plan: the reason, in comments that the plugin ignores and on standard
+    /// error.
     fn reason(text: &str) -> Self {
         let comment = text.lines().fold(String::new(), |comment, line| comment + "; " + line + "\n");
         Self { out: comment, error: text.to_owned() + "\n" }
     }
 }
 
-/// Parsed arguments.
+/// Parsed arguments of a run.
 #[derive(Debug)]
 struct Invocation {
     domain: PathBuf,
     problem: PathBuf,
     mission: Option<PathBuf>,
     manner: Manner,
-    /// Arguments of POPF without meaning here.
+    /// Arguments of POPF that this replacement ignores.
     ignored: Vec<String>,
 }
 
-/// Runs the planner for these arguments. Environment variables are defaults: `METAPLAN_METRIC`,
-/// `METAPLAN_MISSION`, `METAPLAN_TIME_LIMIT`, `METAPLAN_OVERLAP`.
+/// Runs the planner for the command-line arguments. Environment variables provide defaults:
+/// `METAPLAN_METRIC`, `METAPLAN_MISSION`, `METAPLAN_TIME_LIMIT`, `METAPLAN_OVERLAP`.
 pub fn run(
     arguments: impl IntoIterator<Item = String>,
     environment: impl Fn(&str) -> Option<String>,
@@ -114,7 +115,7 @@ fn parse_invocation(
     let time_limit = non_empty(time_limit).map_or(Ok(TIME_LIMIT), |text| seconds(&text))?;
     let manner = Manner { metric: non_empty(metric), time_limit, overlap, alternatives: 0 };
     let mission = non_empty(mission).map(PathBuf::from);
-    // Values of POPF's own arguments precede the files.
+    // Positional arguments before the last two are values of POPF's own options.
     match files.len().checked_sub(2).map(|first| files.split_off(first)).as_deref() {
         Some([domain, problem]) => {
             ignored.extend(files.iter().map(|file| file.display().to_string()));
@@ -130,7 +131,7 @@ fn seconds(text: &str) -> Result<Duration, String> {
     Duration::try_from_secs_f64(value).ok().filter(|time| !time.is_zero()).ok_or_else(invalid)
 }
 
-/// Returns the text for the plugin, or the reason why there is no plan.
+/// Returns the output for the plugin, or the reason why there is no plan.
 fn solve(invocation: &Invocation) -> Result<String, String> {
     let domain = read(&invocation.domain, DOMAIN)?;
     let problem = read(&invocation.problem, PROBLEM)?;
@@ -146,7 +147,7 @@ fn solve(invocation: &Invocation) -> Result<String, String> {
     let mut text = format!("; cost {}\n; {}\n", solution.cost, solution.verdict.replace('\n', "\n; "));
     let best = solution.plans.first().map(Vec::as_slice).unwrap_or_default();
     if best.is_empty() {
-        // The plugin treats a plan without actions as no plan, as it does for POPF.
+        // The plugin treats a plan without actions as a failure, also with POPF.
         text += "; nothing has to be done: the goal holds already\n";
     }
     for (line, configuration) in best.iter().zip(&solution.configuration) {
@@ -167,7 +168,8 @@ fn all(messages: &[Message]) -> String {
     messages.iter().map(Message::text).collect::<Vec<_>>().join("\n")
 }
 
-/// Returns `true` if a problem serves only to validate the domain.
+/// Returns `true` if a problem only serves to validate the domain: it has no initial state and no
+/// goal, and contains `void`.
 fn is_void(problem: &str) -> bool {
     let code: String = problem.lines().map(|line| line.split(';').next().unwrap_or_default()).collect();
     let code = code.to_ascii_lowercase();

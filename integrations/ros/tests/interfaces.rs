@@ -1,5 +1,6 @@
-//! The bytes of messages against CDR (OMG CORBA 3.4, 9.3: natural alignment from the start of the body, strings with their length and a
-//! zero), written by hand, and the type hashes against those of other implementations.
+//! Checks the bytes of messages against expected CDR written by hand, and the type hashes against
+//! other implementations. (CDR: OMG CORBA 3.4, 9.3: natural alignment from the start of the body,
+//! strings with their length and a zero.)
 
 use byteorder::LittleEndian;
 use cdr_encoding::{from_bytes, to_vec};
@@ -48,7 +49,8 @@ fn a_diagnostic_array() {
     );
 }
 
-/// Doubles are aligned to eight bytes. An empty sequence has only its length, also before doubles.
+/// Doubles are aligned to eight bytes. An empty sequence consists only of its length, even if its
+/// elements are doubles.
 #[test]
 fn a_parameter_value() {
     use rcl_interfaces::msg::{ParameterType, ParameterValue};
@@ -112,7 +114,8 @@ fn arrays_have_no_length_and_empty_structures_have_a_byte() {
     check(&suave_msgs::action::SpiralSearchGoal::default(), &[&[0]]);
 }
 
-/// `i16` and `i8` before strings, a sequence of strings, an `f32` after a Boolean.
+/// Checks the alignment of `i16` and `i8` before strings, of a sequence of strings, and of an `f32`
+/// after a Boolean.
 #[test]
 fn an_action_execution() {
     use plansys2_msgs::msg::ActionExecution;

@@ -10,7 +10,7 @@ use std::process::{Command, Output};
 
 use metaplan_ros::interfaces::plansys2_msgs::msg::PlanItem;
 
-/// The problem by which the plugin validates a domain.
+/// The problem that the plugin uses to validate a domain.
 const VOID: &str = "(define (problem void) (:domain plansys2))";
 
 const DOMAIN: &str = "(define (domain d) (:requirements :durative-actions :typing)
@@ -19,7 +19,7 @@ const DOMAIN: &str = "(define (domain d) (:requirements :durative-actions :typin
     :condition (and (at start (at ?r ?a)) (at start (way ?a ?b)))
     :effect (and (at start (not (at ?r ?a))) (at end (at ?r ?b)) (at end (increase (spent) (price ?a ?b))))))";
 
-/// The direct way is short and expensive.
+/// The direct way from `a` to `c` is short and expensive.
 const PROBLEM: &str = "(define (problem p) (:domain d) (:objects r s - robot a b c - place)
   (:init (at r a) (at s a) (way a b) (way b c) (way a c) (= (price a b) 1) (= (price b c) 1) (= (price a c) 5) (= (spent) 0))
   (:goal (and (at r c) (at s b))))";
@@ -33,8 +33,8 @@ fn popf(arguments: &[&str], environment: &[(&str, &str)]) -> Output {
         .expect("the program")
 }
 
-/// Parses the redirected output like the plugin, which indexes into each line without a check. An
-/// index error is a test failure here.
+/// Parses the redirected output like the plugin, which accesses parts of each line without a bounds
+/// check. Such an access error fails the test.
 fn read_as_the_plugin(output: &Output) -> Option<Vec<PlanItem>> {
     assert_eq!(output.status.code(), Some(0), "{output:?}");
     let text = String::from_utf8(output.stdout.clone()).expect("text");
@@ -61,7 +61,7 @@ fn actions(items: &[PlanItem]) -> Vec<&str> {
     items.iter().map(|item| item.action.as_str()).collect()
 }
 
-/// Writes two files to a new directory.
+/// Writes a domain and a problem to a new directory. Returns the directory and the two paths.
 fn files(domain: &str, problem: &str) -> (tempfile::TempDir, [String; 2]) {
     let directory = tempfile::tempdir().expect("a directory");
     let paths = [("domain.pddl", domain), ("problem.pddl", problem)].map(|(name, text)| {
@@ -177,8 +177,8 @@ fn a_domain_is_checked_by_a_problem_that_asks_for_nothing() {
     }
 }
 
-/// With a mission's knowledge base, the domain's actions get designs, which are unknown to
-/// PlanSys2.
+/// With a mission's knowledge base, the actions of the domain get designs. PlanSys2 does not see
+/// the designs.
 #[test]
 fn the_knowledge_base_of_a_mission_joins_in() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
@@ -209,7 +209,8 @@ fn the_overlay_is_where_ros2_run_looks() {
     assert!(!Command::new(script).arg("nothing").output().expect("the script").status.success());
 }
 
-/// Domains of PlanSys2's own tests, including those that its tests declare invalid.
+/// Checks the domains of PlanSys2's own tests, including those that PlanSys2's tests declare
+/// invalid.
 #[test]
 fn domains_of_plansys2_are_valid() {
     let (_directory, [_, void]) = files("", VOID);
@@ -230,8 +231,8 @@ fn domains_of_plansys2_are_valid() {
     }
 }
 
-/// Problems of PlanSys2's own tests, with the number of actions that its tests expect of POPF, or
-/// without a plan.
+/// Solves the problems of PlanSys2's own tests. The expected number of actions is the one that
+/// these tests expect of POPF; `None` expects no plan.
 #[test]
 fn problems_of_plansys2_are_solved() {
     for (domain, problem, expected) in [

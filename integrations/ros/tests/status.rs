@@ -1,10 +1,10 @@
-//! Exit statuses of `metaplan-ros`, by which a supervisor decides on a restart.
+//! Exit statuses of `metaplan-ros`, from which a supervisor decides whether to restart the program.
 
 #![cfg(unix)]
 
 use std::process::Command;
 
-/// Runs the program with a limit of open files. Returns its status and its messages.
+/// Runs the program with an upper limit on open files. Returns the exit status and the messages.
 fn run(files: u32, words: &[&str], domain: &str) -> (Option<i32>, String) {
     let output = Command::new("sh")
         .args(["-c", &format!("ulimit -n {files} && exec \"$0\" \"$@\""), env!("CARGO_BIN_EXE_metaplan-ros")])
@@ -18,7 +18,7 @@ fn run(files: u32, words: &[&str], domain: &str) -> (Option<i32>, String) {
 
 #[test]
 fn the_status_says_if_a_restart_can_help() {
-    // The sockets exceed the limit of descriptors, so no participant is created, as without a
+    // The sockets exceed the limit on descriptors, so no DDS participant is created, as without a
     // network.
     for (files, mission, domain, status, code) in [
         (8, "../../missions/ugv.toml", "77", 75, "error[N120]"),

@@ -1,4 +1,5 @@
-//! Invariants of running actions: facts that hold while an action runs, and happenings that they exclude.
+//! Invariants of running actions: facts that hold while an action runs, and happenings that these
+//! facts exclude.
 
 use rustc_hash::FxHashMap;
 use task::number::{Int, dense};
@@ -7,11 +8,11 @@ use task::task::{Fact, NumericId, OperatorId, Task, VariableId};
 use crate::concurrent::happening::{Happening, Instance, Role};
 use crate::concurrent::simple_temporal_network::Key;
 
-/// Work limit in pairs of happenings. No bounds are computed for the actions that remain when it is
-/// reached.
+/// Work limit of an analysis, in visits of operators. Actions that are not analysed before the
+/// limit get no bounds.
 pub(super) const MAX_PAIR_CHECKS: usize = 20_000_000;
 
-/// Index of operators by access, variable and number.
+/// Index of the operators by access key, set variable and changed number.
 pub(super) struct Index<'a> {
     pub(super) task: &'a Task,
     pub(super) happenings: &'a [Happening],
@@ -20,15 +21,16 @@ pub(super) struct Index<'a> {
     pub(super) marking: FxHashMap<Key, Vec<OperatorId>>,
     setting: Vec<Vec<OperatorId>>,
     changing: FxHashMap<NumericId, Vec<OperatorId>>,
-    /// Atoms and numbers that a joint condition over all reads, ascending.
+    /// Atoms and numbers that joint conditions over all read, numbered as in [`Happening::writes`],
+    /// ascending.
     pub(super) joint: Vec<u32>,
 }
 
-/// Facts that hold while an action runs.
+/// Facts that hold strictly between the start and the end of a run of an action.
 #[derive(Default)]
 pub(super) struct Invariant {
     pub(super) facts: Vec<Fact>,
-    /// The facts among them that the condition over all requires.
+    /// Subset of the facts that the condition over all requires.
     pub(super) over_all: Vec<Fact>,
 }
 
@@ -63,9 +65,9 @@ impl<'a> Index<'a> {
         Self { task, happenings, instances, waiting, marking, setting, changing, joint }
     }
 
-    /// Facts that hold strictly between the start and the end of an action, for all other happenings.
-    /// If `alone`, other runs of the instance do not start or end in between. Returns `None` if the
-    /// work limit is reached.
+    /// Computes the facts that hold strictly between the start and the end of a run of `own`, as
+    /// seen by all other happenings. `alone` assumes that no other run of the same action starts or
+    /// ends in between. `left` is the remaining work. Returns `None` if it is used up.
     pub(super) fn invariant(&self, own: &Instance, alone: bool, left: &mut usize) -> Option<Invariant> {
         let start = &self.task.operators[own.start.index()];
         let basic = |fact: &&Fact| fact.variable.index() < self.task.basic;
@@ -94,9 +96,9 @@ impl<'a> Index<'a> {
         }
     }
 
-    /// Returns `true` if no happening strictly inside an action makes a fact false. If `alone`,
-    /// starts and ends of other runs of the instance are ignored. Returns `None` if the work limit
-    /// is reached.
+    /// Returns `true` if no happening strictly inside a run of `own` makes `fact` false. `alone`
+    /// ignores starts and ends of other runs of the same action. Returns `None` if the work limit
+    /// `left` is used up.
     fn is_kept(
         &self,
         fact: Fact,
@@ -107,7 +109,8 @@ impl<'a> Index<'a> {
         for id in &self.setting[fact.variable.index()] {
             *left = left.checked_sub(1)?;
             let is_own = [own.start, own.end].contains(id);
-            // The instance is running as long as another run is.
+            // The fact that the action is running remains true until the last simultaneous run
+            // ends.
             let is_nothing = is_own && (alone || own.under_way.is_some_and(|running| running == fact));
             if !is_nothing && self.changes(*id, fact) && !self.excludes(invariant, own, *id) {
                 return Some(false);
@@ -116,21 +119,21 @@ impl<'a> Index<'a> {
         Some(true)
     }
 
-    /// Happenings of other instances that change a variable.
+    /// Happenings other than the start and end of `own` that set a variable.
     pub(super) fn setting(&self, own: &Instance, variable: VariableId) -> impl Iterator<Item = OperatorId> {
         let [start, end] = [own.start, own.end];
         let operators = self.setting[variable.index()].iter().copied();
         operators.filter(move |id| ![start, end].contains(id))
     }
 
-    /// Happenings of other instances that change a number.
+    /// Happenings other than the start and end of `own` that change a number.
     pub(super) fn changing(&self, own: &Instance, number: NumericId) -> impl Iterator<Item = OperatorId> {
         let [start, end] = [own.start, own.end];
         let operators = self.changing.get(&number).into_iter().flatten().copied();
         operators.filter(move |id| ![start, end].contains(id))
     }
 
-    /// Returns `true` if a happening may make a fact false.
+    /// Returns `true` if an effect of the happening, possibly conditional, may make `fact` false.
     pub(super) fn changes(&self, id: OperatorId, fact: Fact) -> bool {
         let operator = &self.task.operators[id.index()];
         let conditional = operator.conditional.iter().flat_map(|effect| &effect.effects);
@@ -138,8 +141,8 @@ impl<'a> Index<'a> {
         effects.any(|effect| effect.variable == fact.variable && effect.value != fact.value)
     }
 
-    /// Returns `true` if a happening cannot take place strictly inside an action while the facts
-    /// hold.
+    /// Returns `true` if the happening `id` cannot take place strictly inside a run of `own` during
+    /// which the invariant facts hold.
     pub(super) fn excludes(&self, invariant: &Invariant, own: &Instance, id: OperatorId) -> bool {
         let (operator, happening) = (&self.task.operators[id.index()], &self.happenings[id.index()]);
         let invariant_fact =
@@ -149,8 +152,8 @@ impl<'a> Index<'a> {
         if operator.condition.facts.iter().any(contradicts) {
             return true;
         }
-        // A fact that the condition over all requires cannot be restored by a simultaneous
-        // happening: the two would interfere.
+        // A simultaneous happening cannot restore a fact that the condition over all requires: it
+        // would interfere with the happening that deletes the fact.
         let breaks = |fact: &Fact| {
             let mut required = invariant.over_all.iter();
             required.any(|candidate| candidate.variable == fact.variable && candidate.value != fact.value)
@@ -170,8 +173,9 @@ impl<'a> Index<'a> {
     }
 
     /// Like [`Self::excludes`], and also `true` for the end of an action whose condition over all
-    /// contradicts the facts: both would hold right before that end. This argument needs that the
-    /// end is not at the time of the start.
+    /// contradicts the invariant. Both the condition and the invariant would have to hold right
+    /// before that end. The exception, an end at the same time as the start of `own`, is ruled out
+    /// separately.
     pub(super) fn is_outside(&self, invariant: &Invariant, own: &Instance, id: OperatorId) -> bool {
         if self.excludes(invariant, own, id) {
             return true;
@@ -193,18 +197,20 @@ impl<'a> Index<'a> {
         })
     }
 
-    /// Facts that the condition over all of an instance requires.
+    /// Facts that the condition over all of an instance requires; empty without such a condition.
     pub(super) fn over_all(&self, instance: u32) -> &[Fact] {
         let over_all = self.instances[instance as usize].over_all;
         over_all.map_or(&[], |id| &self.task.operators[id.index()].condition.facts)
     }
 
-    /// Minimal duration of an instance.
+    /// Duration of an instance in internal time units; a lower bound if the duration is not
+    /// constant.
     pub(super) fn duration(&self, instance: u32) -> Int {
         self.instances[instance as usize].duration
     }
 
-    /// Starts of actions with their conditions over all.
+    /// Pairs of the start operator and the condition-over-all operator of all instances that have
+    /// such a condition.
     pub(super) fn holding(&self) -> impl Iterator<Item = (OperatorId, OperatorId)> {
         self.instances.iter().filter_map(|instance| Some((instance.start, instance.over_all?)))
     }

@@ -1,4 +1,5 @@
-//! Builds the operators of a split task: pairs of starts and ends, and what each reads and writes.
+//! Builder of the temporal task: pairs starts with ends, and computes the read and write sets of
+//! all operators.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 use task::context::Context;
@@ -20,8 +21,8 @@ use crate::concurrent::interference::{Designs, Keys, prune};
 use crate::concurrent::split::{Half, Split};
 use crate::concurrent::unit::{Divisors, Unit};
 
-/// Ground operators of an instance. There are several starts and ends if its numeric effects are
-/// conditional.
+/// Ground operators of one action instance. There are several starts and ends if its numeric
+/// effects are conditional.
 #[derive(Clone, Default)]
 struct Halves {
     starts: Vec<OperatorId>,
@@ -41,28 +42,30 @@ fn designs(task: &Task, operator: OperatorId) -> Designs {
     designs
 }
 
-/// Arguments of an operator, followed by an empty slot for each quantified variable.
+/// Binding of the schema's variables: the operator's arguments, then `None` for each quantified
+/// variable.
 fn binding(operator: &Operator, variables: usize) -> Binding {
     let mut binding: Binding = operator.arguments.iter().copied().map(object).collect();
     binding.resize(variables, None);
     binding
 }
 
-/// A schema of the domain and its arguments.
+/// Identifies an action instance: index of the schema in the domain, and arguments.
 type InstanceKey = (usize, Vec<ObjectId>);
 
 pub(super) struct Builder<'a> {
     footprints: Footprints<'a>,
     split: &'a Split,
-    /// Separation in the unit of all times; set once the unit is known.
+    /// Separation in internal time units; 0 until the unit is known.
     pub(super) separation: Int,
-    /// Writes of each operator.
+    /// Write set of each operator.
     written: Vec<Footprint>,
-    /// Writes of the start and of the end of operators whose start and end are one happening.
+    /// Operators of duration 0 that combine a start and an end, with the write sets of start and
+    /// end.
     joined: Vec<(OperatorId, [Footprint; 2])>,
     instances: FxHashMap<InstanceKey, Halves>,
     order: Vec<InstanceKey>,
-    /// Schemas with a condition over all that can change.
+    /// Schemas of the domain whose condition over all can change.
     held: FxHashSet<usize>,
 }
 
@@ -81,7 +84,8 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Pairs the starts and ends of instances, and collects the writes of all operators.
+    /// Groups the starts, ends and conditions over all of instances, and collects the write sets of
+    /// all operators.
     pub(super) fn collect(&mut self, context: Context<'_>) -> Result<(), Errors> {
         let Context { task, limits } = context;
         let mut errors = Vec::new();
@@ -96,7 +100,7 @@ impl<'a> Builder<'a> {
             let is_none = matches!(origin.half, Half::OverAll | Half::Choice | Half::Judge);
             let effects = if is_none { &[] } else { &schema.end_effects[..] };
             // Auxiliary predicates (running actions, event counters, waiting) do not occur in the
-            // files, so plans are not validated against them.
+            // PDDL files, so a plan validator does not require a separation for them.
             let time = (!self.split.events.is_empty()).then_some(self.split.lifted.time);
             let is_auxiliary =
                 |predicate| time.is_some_and(|time| [time.phase, time.waited].contains(&predicate));
@@ -142,9 +146,9 @@ impl<'a> Builder<'a> {
         if errors.is_empty() { Ok(()) } else { Err(errors.into()) }
     }
 
-    /// Creates a start and an end for each combination of conditional variants of an instance.
-    /// Returns `true` if an instance has several; simultaneous runs of different variants are not
-    /// searched.
+    /// Creates a start and an end for each combination of conditional variants of an instance, by
+    /// copying operators. Returns `true` if any operator was copied. Simultaneous runs of different
+    /// variants are not searched.
     pub(super) fn pair(&mut self, task: &mut Task) -> bool {
         let before = task.operators.len();
         for key in &self.order {
@@ -166,7 +170,7 @@ impl<'a> Builder<'a> {
         task.operators.len() > before
     }
 
-    /// Executable instances. Also sets the roles of their starts and ends.
+    /// Creates the executable instances, and sets the roles of their starts and ends in `roles`.
     pub(super) fn instances(
         &self,
         context: Context<'_>,
@@ -182,7 +186,7 @@ impl<'a> Builder<'a> {
         });
         for pair in limits.watch(pairs) {
             let (key, start, over_all, end) = pair?;
-            // The condition over all is unreachable.
+            // Without this operator, the condition over all is unreachable.
             if self.held.contains(&key.0) && over_all.is_none() {
                 continue;
             }
@@ -192,10 +196,11 @@ impl<'a> Builder<'a> {
             let placed = |error: Error| error.within(&format!("`{}`", schema.name), Some(schema.place));
             let factor = |timer| unit.factor(task, timer, divisor).map(|factor| (timer, factor));
             let is_chosen = self.split.chosen[key.0];
-            // A chosen duration is cleared at the end, and no happening sets it.
+            // The end always clears a chosen duration, whereas no happening sets a chosen duration.
             let timer = timer(task, if is_chosen { end } else { start });
             let timer = timer.map(factor).transpose().map_err(placed)?;
-            // A duration that depends on the state is checked at the start.
+            // A duration that depends on the state is compared with the separation when the action
+            // starts.
             let duration = match timer {
                 None if !is_chosen => unit.duration(task, start).map_err(placed)?,
                 _ => self.separation,
@@ -228,7 +233,8 @@ impl<'a> Builder<'a> {
         Ok(instances)
     }
 
-    /// Records the writes at the start and the end of a durative action without duration.
+    /// Records the separate write sets of the start and the end of a durative action that has
+    /// duration 0.
     fn join(&mut self, id: OperatorId, schema: usize, binding: &Binding) -> Result<(), Error> {
         let schema = &self.split.schemas[schema];
         if schema.duration.is_some() {
@@ -239,7 +245,7 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// Divisors of the numbers that hold durations.
+    /// Static divisors of state-dependent durations, by start operator.
     ///
     /// # Errors
     /// Fails if a divisor is not positive.
@@ -264,7 +270,7 @@ impl<'a> Builder<'a> {
         Ok(divisors)
     }
 
-    /// Operators whose start and end are one happening although they interfere.
+    /// Operators of duration 0 whose start and end interfere, although both are one happening.
     pub(super) fn contradictory(&self, context: Context<'_>) -> Result<FxHashSet<OperatorId>, Error> {
         let Context { task, limits } = context;
         let index = self.footprints.index();
@@ -293,12 +299,13 @@ impl<'a> Builder<'a> {
         contradictory.collect()
     }
 
-    /// Returns `true` if happenings are kept apart that do not interfere in every state.
+    /// Returns `true` if some interference constraints come from effects that do not apply in every
+    /// state.
     pub(super) fn assumes_conflicts(&self) -> bool {
         self.footprints.supposes
     }
 
-    /// Interference constraints of each operator, and the number of kinds of access.
+    /// Returns the temporal properties of each operator, and the number of access keys.
     pub(super) fn happenings(
         mut self,
         context: Context<'_>,
@@ -332,8 +339,8 @@ impl<'a> Builder<'a> {
         Ok((happenings, keys.len()))
     }
 
-    /// Atoms and numbers that an operator reads when it happens, and those that its condition over
-    /// all reads. Returns `None` if it never happens or is a timed literal.
+    /// Reads of an operator when it happens, and reads of its condition over all. Returns `None` if
+    /// the operator never happens or is a timed initial literal.
     fn reads(&self, task: &Task, id: OperatorId, role: Role) -> Option<(Reads, Reads)> {
         let operator = &task.operators[id.index()];
         let origin = self.split.origins[operator.schema as usize];
@@ -357,7 +364,8 @@ impl<'a> Builder<'a> {
     }
 }
 
-/// Number that holds the duration of an instance, if a happening sets or clears it.
+/// Number that holds the duration of an instance, i.e. a duration variable that the operator `id`
+/// sets or clears. Returns `None` if the duration is constant.
 fn timer(task: &Task, id: OperatorId) -> Option<NumericId> {
     let mut variables = task.operators[id.index()].numeric_effects.iter().map(|effect| effect.variable);
     variables.find(|number| {
@@ -366,7 +374,8 @@ fn timer(task: &Task, id: OperatorId) -> Option<NumericId> {
     })
 }
 
-/// Adds the constraints of conditions over all and of designs.
+/// Adds the interference constraints of conditions over all (with the reads `over_all`) and of
+/// designs to a happening. Also sets [`Instance::joint`].
 fn join(
     happening: &mut Happening,
     keys: &mut Keys,
@@ -397,7 +406,8 @@ fn join(
     }
 }
 
-/// Returns `true` if several happenings can maintain a condition jointly.
+/// Returns `true` if several simultaneous happenings can maintain the condition of `over_all`
+/// jointly, because it has a disjunction, a comparison or a derived fact.
 fn is_joint(task: &Task, over_all: OperatorId) -> bool {
     let condition = &task.operators[over_all.index()].condition;
     !condition.clauses.is_empty()
@@ -405,11 +415,13 @@ fn is_joint(task: &Task, over_all: OperatorId) -> bool {
         || condition.facts.iter().any(|fact| fact.variable.index() >= task.basic)
 }
 
+/// Written atoms and numbers, numbered by [`ids`].
 fn writes(written: &Footprint) -> Vec<u32> {
     let atoms: Vec<AtomId> = written.added.iter().chain(&written.deleted).copied().collect();
     ids(&atoms, written.numbers.iter().map(|(number, _)| *number))
 }
 
+/// Common numbering of atoms and numbers, ascending: `2a` for atom `a`, `2n + 1` for number `n`.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "atoms and numbers are held in memory with their names: there are fewer than 2^31"

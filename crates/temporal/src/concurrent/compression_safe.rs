@@ -1,11 +1,11 @@
-//! Compression-safe actions: their end can follow their start directly, so that they take one step
-//! of the search.
+//! Compression-safe actions: the end can directly follow the start in a sequence, so that the
+//! search applies both in one step.
 //!
 //! Happenings that do not interfere are unordered in time, independent of their order in a
-//! sequence. If an end interferes with nothing that can happen while its action runs, it can be
-//! moved before all of that without changing times or states. Coles et al. \[1\] require actions
-//! that only add facts at their end. Here the condition is about what can happen in between, by the
-//! facts that hold while the action runs, so more actions qualify and no plan is lost.
+//! sequence. If an end interferes with no happening that can take place while its action runs, the
+//! end can be moved to its start without changing times or states. Coles et al. \[1\] require
+//! actions that only add facts at their end. The condition here uses the facts that hold while the
+//! action runs, so more actions qualify and no plan is lost.
 //!
 //! \[1\] A. Coles, M. Fox, K. Halsey, D. Long, A. Smith: Managing concurrency in temporal planning using
 //! planner-scheduler interaction, Artificial Intelligence 173, 2009.
@@ -16,7 +16,8 @@ use task::task::Task;
 use crate::concurrent::action_invariants::{Index, MAX_PAIR_CHECKS};
 use crate::concurrent::happening::{Happening, Instance};
 
-/// Per instance: whether its end can directly follow its start.
+/// Returns for each instance whether its end can directly follow its start without loss of
+/// completeness.
 pub(super) fn compression_safe_actions(
     task: &Task,
     happenings: &[Happening],

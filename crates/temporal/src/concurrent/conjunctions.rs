@@ -1,9 +1,10 @@
-//! Explicit conjunctions in the delete relaxation, for facts that no action restores.
+//! Explicit conjunctions in the delete relaxation, for facts that no action adds again.
 //!
 //! A relaxed plan deletes nothing, so an action that deletes a fact needed later looks useful even
-//! if nothing adds the fact again. For each such fact the relaxed task gets conjunctions with the
-//! facts that are needed at the same time. Only rules that keep the fact achieve them. These are
-//! conjunctions of two facts as in the task Π^C \[1\], for a few selected facts.
+//! if nothing adds the fact again. For each such fact, the relaxed task gets conjunctions of this
+//! fact and each proposition that is needed at the same time. Only rules that keep the fact achieve
+//! these conjunctions. They are conjunctions of two facts as in the task Π^C \[1\], for a few
+//! selected facts.
 //!
 //! \[1\] E. Keyder, J. Hoffmann, P. Haslum: Improving delete relaxation heuristics through
 //! explicitly represented conjunctions, JAIR 50, 2014.
@@ -14,36 +15,37 @@ use task::number::dense;
 
 use crate::concurrent::rule::{Proposition, Rule};
 
-/// Limit on added rules: `MAX_RULES_PER_RULE` times the number of rules, plus `EXTRA_RULES`.
+/// Upper limit on added rules, per rule of the relaxed task. `EXTRA_RULES` is added to the limit.
 const MAX_RULES_PER_RULE: usize = 2;
+/// Constant part of the upper limit on added rules.
 const EXTRA_RULES: usize = 1_000;
 /// Work limit of the selection of conjunctions, in rule visits per rule.
 const MAX_VISITS_PER_RULE: usize = 64;
 
-/// A conjunction proposition and its two facts.
+/// A conjunction proposition, followed by its two members.
 pub(super) type Conjunction = [Proposition; 3];
 
-/// A relaxed task that is extended by conjunctions.
+/// The relaxed task to which conjunctions are added.
 pub(super) struct Scope<'a> {
     pub(super) rules: &'a mut Vec<Rule>,
     pub(super) goal: &'a mut Vec<Proposition>,
-    /// Propositions of each variable that happenings set.
+    /// Range of the propositions of each variable; empty for variables that are excluded.
     pub(super) variables: &'a [std::ops::Range<Proposition>],
     pub(super) propositions: &'a mut u32,
 }
 
-/// Index of rules by proposition.
+/// Index of the rules by proposition and by variable.
 struct Index {
-    /// Conditions of the rules, followed by the goal.
+    /// Conditions of each rule; the last entry holds the conditions of the goal.
     needs: Lists,
     adding: Lists,
     needing: Lists,
-    /// By variable: rules that set it, ascending.
+    /// Rules that set each variable, ascending.
     setting: Vec<Vec<u32>>,
 }
 
-/// Adds conjunctions to a relaxed task, and returns them. A conjunction holds initially if both
-/// facts do.
+/// Adds conjunctions to a relaxed task, rewrites rules and goal to require them, and returns them.
+/// A conjunction holds initially if both members hold.
 #[expect(clippy::arithmetic_side_effects, reason = "propositions and rules are held in memory")]
 pub(super) fn add_conjunctions(scope: &mut Scope<'_>) -> Vec<Conjunction> {
     let index = Index::new(scope);
@@ -114,8 +116,9 @@ impl Index {
         Self { needs, adding, needing, setting }
     }
 
-    /// Propositions that are needed together with a fact, directly or for another needed
-    /// proposition, and that may be achieved by a rule that deletes the fact. Ascending.
+    /// Propositions that are needed together with `fact`, directly or for achieving another needed
+    /// proposition, and that a rule in `deleting` may help to achieve. Ascending; empty if the work
+    /// limit `looks` is used up.
     fn together(
         &self,
         fact: Proposition,
@@ -180,7 +183,8 @@ mod tests {
         (:durative-action lock :parameters () :duration (= ?duration 1)
           :condition (and (at start (key)) (at start (open))) :effect (at end (locked))))";
 
-    /// Happenings that begin a relaxed plan. Returns `None` if no relaxed plan exists.
+    /// Names of the preferred happenings of the initial state. Returns `None` if no relaxed plan
+    /// exists.
     fn guide(facts: &str, goal: &str) -> Option<Vec<String>> {
         let problem = format!("(define (problem p) (:domain d) (:init {facts}) (:goal {goal}))");
         let (domain, problem, _) =

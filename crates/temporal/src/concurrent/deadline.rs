@@ -1,4 +1,4 @@
-//! Deadlines of trajectory constraints, checked on the times of a complete plan.
+//! Deadlines of trajectory constraints, checked on the scheduled states of a complete plan.
 
 use num_bigint::BigInt;
 use num_rational::BigRational;
@@ -8,16 +8,17 @@ use task::compile;
 use task::number::Int;
 use task::task::{OperatorId, State, Task};
 
-/// A deadline: after each state in which an operator of `begins` is applicable, there is one within
-/// a time limit in which an operator of `ends` is applicable. These operators are conditions and
-/// never take place.
+/// A deadline: each state in which an operator of `begins` is applicable must be followed, within a
+/// time limit, by a state in which an operator of `ends` is applicable. The operators only encode
+/// conditions and never occur in a plan.
 #[derive(Debug, Clone)]
 pub(super) struct Deadline {
-    /// Time limit in the unit of all times.
+    /// Time limit in internal time units.
     within: Int,
     pub(super) is_hard: bool,
     begins: Vec<OperatorId>,
-    /// The first one marks that a soft deadline was met.
+    /// Operators that encode the end condition. Applying the first of them marks a soft deadline as
+    /// met.
     pub(super) ends: Vec<OperatorId>,
 }
 
@@ -34,12 +35,14 @@ impl Deadline {
         Self { within: within.unwrap_or(Int::MAX), is_hard: deadline.is_hard, begins, ends }
     }
 
-    /// Returns `true` if the timed states of a plan meet the deadline.
+    /// Returns `true` if a plan meets the deadline. `trajectory` contains the states of the plan
+    /// with their times, ascending.
     pub(super) fn is_kept(&self, task: &Task, trajectory: &[(Int, State)]) -> bool {
         let holds = |ways: &[OperatorId], state: &State| {
             ways.iter().any(|id| task.operators[id.index()].applicable(state, &[]))
         };
-        // Time of the next state that ends the deadline; states are visited in reverse order.
+        // Time of the nearest later state in which an end condition holds; the states are visited
+        // in reverse order.
         let mut next: Option<Int> = None;
         trajectory.iter().rev().all(|(time, state)| {
             if holds(&self.ends, state) {

@@ -1,10 +1,10 @@
-//! Durations that depend on the state or that the planner chooses: one fluent per schema, set by
-//! the start and cleared by the end.
+//! Durations that depend on the state or that the planner chooses. One numeric fluent per schema
+//! holds the duration, from the start to the end of an action.
 //!
-//! `?duration` has the value of the expression in the state in which the action starts \[1\]. The
-//! start assigns it to the fluent, which the end, its effects and the temporal network read. A
-//! duration that the planner chooses is set by an operator that never happens; the reachability
-//! analysis lets it be any value from 0.
+//! `?duration` has the value of the duration expression in the state in which the action starts
+//! \[1\]. The start assigns this value to the fluent. The end, its effects and the temporal network
+//! read the fluent. A duration that the planner chooses has an auxiliary operator that never
+//! happens; it makes relaxed reachability assume any value from 0.
 //!
 //! \[1\] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 5.2.
 
@@ -15,9 +15,10 @@ use task::lifted::{
 use task::normalize::duration::CHOSEN;
 use task::number::dense;
 
-/// Prefix of the names of duration variables. No name in a file contains a blank.
+/// Prefix of the ground names of duration fluents. Names in PDDL files contain no blanks, so no
+/// clash is possible.
 pub(super) const DURATION_PREFIX: &str = "(duration of ";
-/// Prefix of the ground names of duration variables that the planner chooses.
+/// Prefix of the ground names of duration fluents whose values the planner chooses.
 pub(super) const FLEXIBLE_DURATION_PREFIX: &str = "(chosen duration of ";
 
 /// Returns `true` if an expression mentions a fluent that some action changes.
@@ -34,19 +35,21 @@ pub(super) fn depends_on_state(lifted: &Lifted, expression: &Expression) -> bool
     }
 }
 
-/// Function that holds the duration of a schema, if the planner chooses it.
+/// Function that holds the chosen duration. Returns `None` if the planner does not choose the
+/// duration.
 pub(super) fn chosen(lifted: &Lifted, duration: &Expression) -> Option<FunctionId> {
     let Expression::Function(function, ..) = duration else { return None };
     lifted.functions[function.index()].name.as_str().starts_with(CHOSEN).then_some(*function)
 }
 
-/// Function that holds the durations of a schema.
+/// Duration fluent of a schema: the function that holds the durations of its running instances.
 pub(super) struct Timer {
     pub(super) function: FunctionId,
     terms: Vec<Term>,
     /// Expression that the start assigns. `None` if the planner chooses the duration.
     numerator: Option<Expression>,
-    /// Static divisor: the duration is the number divided by it.
+    /// Static divisor: the duration is the value of the function divided by this expression. `None`
+    /// for no division.
     pub(super) divisor: Option<Expression>,
 }
 
@@ -85,12 +88,14 @@ impl Timer {
         }
     }
 
-    /// Effect of the start, if the planner does not choose the duration.
+    /// Effect of the start that sets the fluent. Returns `None` if the planner chooses the
+    /// duration.
     pub(super) fn set(&self, schema: &Schema) -> Option<Effect> {
         Some(self.assign(schema, Assignment::Assign, self.numerator.clone()?))
     }
 
-    /// Effect that lets relaxed reachability assume any value for a chosen duration.
+    /// Effect that lets relaxed reachability assume any value for a chosen duration. Returns `None`
+    /// if the planner does not choose the duration.
     pub(super) fn relaxed_increase(&self, schema: &Schema) -> Option<Effect> {
         let unit_increase = Expression::Number(Rational::from_integer(1));
         self.numerator.is_none().then(|| self.assign(schema, Assignment::Increase, unit_increase))
@@ -107,18 +112,21 @@ impl Timer {
         Effect { bound: Vec::new(), condition: Formula::truth(), change }
     }
 
+    /// Effect of the end that sets the fluent to 0.
     pub(super) fn clear(&self, schema: &Schema) -> Effect {
         self.assign(schema, Assignment::Assign, Expression::Number(Rational::from_integer(0)))
     }
 
-    /// Condition that the start has set the number.
+    /// Condition of the end that the start has set the fluent. Returns `None` if the planner
+    /// chooses the duration.
     pub(super) fn is_set(&self, schema: &Schema) -> Option<Formula> {
         let zero = Expression::Number(Rational::from_integer(0));
         let compare = || Formula::Compare(Comparison::Greater, self.number(schema), zero, schema.place);
         self.numerator.is_some().then(compare)
     }
 
-    /// Copy of a schema whose end reads its duration from the timer.
+    /// Copy of a schema whose end effects read the duration from the fluent instead of computing it
+    /// from the state.
     pub(super) fn with_end(&self, schema: &Schema) -> Schema {
         let Some(duration) = &schema.duration else { return schema.clone() };
         let replace = |expression: &Expression| replaced(expression, duration, &self.expression(schema));
@@ -132,7 +140,7 @@ impl Timer {
     }
 }
 
-/// Replaces each occurrence of `part` by `other`.
+/// Replaces each occurrence of the subexpression `part` by `other`.
 fn replaced(expression: &Expression, part: &Expression, other: &Expression) -> Expression {
     let each = |parts: &[Expression]| parts.iter().map(|inner| replaced(inner, part, other)).collect();
     if expression == part {

@@ -1,10 +1,12 @@
-//! Removes the variables that link a condition over all to an end, once both are paired.
+//! Removal of the auxiliary variables that link a condition over all to the end of its action
+//! during grounding.
 
 use task::task::{Condition, Fact, Task, VariableId};
 
 use crate::concurrent::happening::Instance;
 
-/// Removes the variables that only link a condition over all to an end.
+/// Removes the variables that condition-over-all operators set. During grounding, these variables
+/// let an end require its condition over all; afterwards they have no use.
 #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
 pub(super) fn drop_links(task: &mut Task, instances: &[Instance]) {
     let mut is_link = vec![false; task.variables.len()];

@@ -1,8 +1,8 @@
-//! Read and write sets of happenings, by the rule of no moving targets of PDDL 2.1 \[1\].
+//! Read and write sets of happenings, for the PDDL 2.1 rule of no moving targets \[1\].
 //!
-//! Everything that a condition or an effect mentions counts as read, even if it does not matter in
-//! a state: all instances of an atom below a quantifier, and everything that the axioms of a
-//! derived predicate depend on.
+//! A happening reads every atom and number that its condition or effects mention, even if the value
+//! does not matter in some states. This includes all instances of atoms with quantified variables,
+//! and all atoms on which a derived predicate depends.
 //!
 //! \[1\] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 8.4.
 
@@ -22,7 +22,8 @@ use task::lifted::{Change, Effect, Expression, FunctionId, ObjectId, PredicateId
 use task::number::dense;
 use task::task::quantity::NumericId;
 
-/// Kind of a numeric effect. Two effects of the same kind commute, unless both assign.
+/// Kind of a numeric effect. Two effects on one number commute if both are `Add` or both are
+/// `Scale`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(super) enum Way {
     Assign,
@@ -30,7 +31,8 @@ pub(super) enum Way {
     Scale,
 }
 
-/// Read and write sets of a happening, ascending. The ids are local to this module.
+/// Read and write sets of a happening, ascending. The ids belong to the `World` of [`Footprints`],
+/// not to the ground task.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Footprint {
     pub(super) reads: Vec<AtomId>,
@@ -41,8 +43,8 @@ pub(super) struct Footprint {
 }
 
 impl Footprint {
-    /// Returns `true` if the order of two happenings matters: one writes what the other reads, or
-    /// both write and do not commute.
+    /// Returns `true` if the order of two happenings matters: one writes an atom or number that the
+    /// other reads, or both write an atom or number and their effects do not commute.
     pub(super) fn interferes(&self, other: &Self) -> bool {
         let clash = |(number, way): &(NumericId, Way)| {
             let mut ways = other.numbers.iter().filter(|(candidate, _)| candidate == number);
@@ -61,10 +63,11 @@ impl Footprint {
     }
 }
 
-/// Collects write sets, then looks up which of the written atoms and numbers are read.
+/// Collects the write sets of all happenings, and indexes the written atoms and numbers for
+/// matching with reads.
 pub(super) struct Footprints<'a> {
     world: World<'a>,
-    /// Whether some write set contains writes that do not take place in every state.
+    /// Whether some write set contains an effect that does not apply in every state.
     pub(super) supposes: bool,
 }
 
@@ -73,10 +76,12 @@ impl<'a> Footprints<'a> {
         Self { world, supposes: false }
     }
 
-    /// Atoms and numbers that effects write or may write.
+    /// Returns the write set of the effects for a binding of the parameters, including conditional
+    /// effects that may apply.
     ///
     /// # Errors
-    /// Fails if a number has no value.
+    /// Fails if an effect changes a number that has no initial value, or if the computation is
+    /// interrupted.
     pub(super) fn writes(&mut self, effects: &[Effect], binding: &Binding) -> Result<Footprint, Error> {
         let mut footprint = Footprint::default();
         for effect in effects {
@@ -90,8 +95,8 @@ impl<'a> Footprints<'a> {
                 match residual(&mut self.world, &effect.condition, &mut binding) {
                     Ok(Residual::True) => self.write(&effect.change, &binding, &mut footprint)?,
                     Ok(Residual::False) | Err(Failure::Undefined) => {}
-                    // Whether the effect applies depends on the state. A possible write suffices
-                    // for interference.
+                    // The effect may apply or not, depending on the state. A possible write
+                    // suffices for interference.
                     Ok(_) => {
                         self.supposes = true;
                         self.write(&effect.change, &binding, &mut footprint)?;
@@ -111,7 +116,8 @@ impl<'a> Footprints<'a> {
         Ok(footprint)
     }
 
-    /// Value of an expression over static fluents. Returns `None` if it has none.
+    /// Returns the constant value of an expression. Returns `None` if the expression is undefined
+    /// or depends on the state.
     pub(super) fn constant(
         &mut self,
         expression: &Expression,
@@ -148,7 +154,7 @@ impl<'a> Footprints<'a> {
         Ok(())
     }
 
-    /// Index of all collected writes.
+    /// Builds an index of all atoms and numbers in the collected write sets.
     pub(super) fn index(&self) -> WriteIndex {
         let mut written = WriteIndex::default();
         for (index, (predicate, arguments)) in self.world.atoms.keys().enumerate() {
@@ -170,10 +176,10 @@ impl<'a> Footprints<'a> {
     }
 }
 
-/// Rows of arguments with their values.
+/// Argument lists of one predicate or function, each with the id of its atom or number.
 type Rows<V> = Vec<(Box<[ObjectId]>, V)>;
 
-/// Written atoms and numbers by symbol.
+/// Index of written atoms and numbers: by predicate or function, and atoms also by exact arguments.
 #[derive(Default)]
 pub(super) struct WriteIndex {
     atoms: FxHashMap<PredicateId, Rows<AtomId>>,
@@ -182,7 +188,7 @@ pub(super) struct WriteIndex {
 }
 
 impl WriteIndex {
-    /// Written atoms and numbers among those that are read.
+    /// Returns the written atoms and numbers that match the read patterns, each ascending.
     pub(super) fn look_up(&self, reads: &Reads) -> (Vec<AtomId>, Vec<NumericId>) {
         let (mut atoms, mut numbers) = (Vec::new(), Vec::new());
         for (predicate, pattern) in &reads.atoms {
@@ -205,6 +211,7 @@ impl WriteIndex {
     }
 }
 
+/// Appends the ids of all rows that match `pattern` to `into`. Without a pattern, all rows match.
 fn matching<V: Copy>(rows: Option<&Rows<V>>, pattern: Option<&[Slot]>, into: &mut Vec<V>) {
     let fits = |arguments: &[ObjectId]| pattern.is_none_or(|pattern| fits(pattern, arguments));
     into.extend(rows.into_iter().flatten().filter(|(arguments, _)| fits(arguments)).map(|(_, value)| *value));

@@ -2,10 +2,11 @@
 //!
 //! Temporal states are evaluated when they are expanded, and queued by the value of their
 //! predecessor. Preferred happenings have a second queue \[1\]. A third queue prefers successors of
-//! states with a novel fact, among states with as many unsatisfied goals \[2\]. If ends directly
-//! follow their starts in the sequence, far fewer states remain, and most tasks still have a plan;
-//! times overlap all the same. Only the first state with the same facts and running actions is
-//! expanded, so this search may miss plans and proves nothing.
+//! states with a fact that is new among the states with the same number of unsatisfied goals \[2\].
+//! In sequential mode, each end directly follows its start in the sequence. Far fewer states
+//! remain, and most tasks still have a plan; actions can still overlap in time. Among states with
+//! the same facts and running actions, only the first one is expanded, so this search may miss
+//! plans and proves nothing.
 //!
 //! \[1\] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010.
 //! \[2\] N. Lipovetzky, H. Geffner: Best-first width search, AAAI 2017.
@@ -33,25 +34,28 @@ use crate::concurrent::temporal_task::TemporalTask;
 /// hash.
 const OVERHEAD: usize = size_of::<Node>() + 80;
 
-/// A happening, and whether it takes place at the time of the previous one.
+/// A happening, and whether it takes place at the same time as the previous one.
 type Link = (OperatorId, bool);
 pub(super) type Links = SmallVec<[Link; 2]>;
 
-/// Successor relation of the search.
+/// Modes of the search: treatment of starts and ends, and of duplicate states.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Mode {
-    /// The end of an action directly follows its start in the sequence. Times may still overlap if
-    /// the actions do not interfere.
+    /// The end of an action directly follows its start in the sequence. Actions that do not
+    /// interfere may still overlap in time.
     Sequential,
     /// Starts and ends are separate successors.
     Overlapping,
-    /// Like `Overlapping`, with two additions. A state that is reached again with a smaller bound
-    /// on the makespan is expanded again. Successors with unsettled clocks are kept.
+    /// Like `Overlapping`, with two additions. A state reached again with a smaller lower bound on
+    /// the makespan is expanded again. Successors in which a condition over all is violated until a
+    /// simultaneous happening repairs it are kept.
     Sooner,
 }
 
 impl Mode {
-    /// Successor by a happening. Earlier timed initial literals are applied first.
+    /// Returns the successor by a happening, after applying timed initial literals that must
+    /// precede it. Appends all applied happenings to `links`. Returns `None` if the happening is
+    /// not applicable.
     pub(super) fn apply_happening(
         self,
         concurrent: &TemporalTask,
@@ -89,22 +93,22 @@ impl Mode {
 struct Node {
     packed: PackedNode,
     parent: u32,
-    /// Happenings since the parent.
+    /// Happenings that lead from the parent to this node.
     links: Links,
 }
 
 /// Queue key: whether the state has no novel fact, heuristic value, and lower bound on the
-/// makespan.
+/// makespan. Smaller keys come first.
 type Value = (bool, u64, Int);
 
-/// Outcome of one run.
+/// Outcome of one call of [`Greedy::run`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Outcome {
     /// Found a plan that is better than the incumbent.
     Found,
     /// The open list is empty or the memory share is used up.
     Exhausted,
-    /// Stopped at a limit.
+    /// Stopped at a limit of time or work.
     Stopped,
 }
 
@@ -116,24 +120,24 @@ pub(super) struct Greedy<'a> {
     guidance: RelaxedPlanHeuristic<'a>,
     packing: Packing<'a>,
     nodes: Vec<Node>,
-    /// Node that was expanded last, unpacked.
+    /// Id and unpacked state of the node that was expanded last.
     latest: Option<(u32, TemporalState)>,
-    /// Least makespan bound of each visited state, by a hash of the state.
+    /// Least lower bound on the makespan of each visited state, by a hash of the state.
     seen: FxHashMap<u64, Int>,
     /// Approximate memory use of the nodes in bytes.
     bytes: usize,
-    /// Queues of all happenings and of preferred ones by heuristic value, and a queue of all
-    /// happenings that prefers novel states.
+    /// Three queues: all happenings and preferred happenings by heuristic value, and all happenings
+    /// with successors of novel states first.
     open: AlternatingOpenList<Value>,
-    /// Facts that have held, by number of unsatisfied goals.
+    /// Facts that held in some visited state, by the number of unsatisfied goals in that state.
     known: Vec<FxHashSet<(u32, u32)>>,
     pub(super) mode: Mode,
     nearest: u64,
     pub(super) figures: SearchStatistics,
 }
 
-/// Hash of a state. A collision only loses a state, which is harmless because this search proves
-/// nothing.
+/// Hash of a search state. A hash collision only loses a state, which is harmless because this
+/// search proves nothing.
 fn hash_of(key: &[u32]) -> u64 {
     let mut hasher = FxHasher::default();
     key.hash(&mut hasher);
@@ -204,8 +208,9 @@ impl<'a> Greedy<'a> {
         }
     }
 
-    /// Successor of a node by a happening or, in sequential mode, by a whole action. Earlier timed
-    /// initial literals are applied first.
+    /// Returns the successor of a node by a happening or, in sequential mode, by a start and its
+    /// end. Timed initial literals that must precede a happening are applied first. The second part
+    /// lists the applied happenings.
     fn follow(&mut self, parent: u32, operator: OperatorId) -> Option<(TemporalState, Links)> {
         let cached = self.latest.take().filter(|(id, _)| *id == parent);
         let unpack = || (parent, self.packing.unpack(&self.nodes[parent as usize].packed));
@@ -222,7 +227,8 @@ impl<'a> Greedy<'a> {
         Some((next, links))
     }
 
-    /// Evaluates a state and queues its successors.
+    /// Evaluates a state and queues its successors. Returns `Found` if the state completes a plan
+    /// that is better than the incumbent; the plan then becomes the incumbent.
     fn take_up(
         &mut self,
         situation: &TemporalState,
@@ -273,7 +279,7 @@ impl<'a> Greedy<'a> {
     }
 
     /// Lower bounds on the metric and the makespan of plans through this state. Returns `None` if
-    /// it is a dead end or the metric overflows.
+    /// the state is a dead end or the metric overflows.
     fn value(&self, situation: &TemporalState) -> Option<(Int, Int)> {
         let TemporalState { state, clocks, cost } = situation;
         let makespan = self.estimate.left(state, clocks)?.makespan;
@@ -282,7 +288,7 @@ impl<'a> Greedy<'a> {
     }
 
     /// Returns `true` if a fact holds that held in no earlier state with the same number of
-    /// unsatisfied goals.
+    /// unsatisfied goals, and records the facts of this state.
     fn has_news(&mut self, TemporalState { state, .. }: &TemporalState) -> bool {
         let task = &self.concurrent.task;
         let to_go = task.goal.facts.iter().filter(|fact| !fact.holds(&state.values)).count();
@@ -294,6 +300,8 @@ impl<'a> Greedy<'a> {
         facts.fold(false, |news, (variable, value)| facts_so_far.insert((variable, *value)) || news)
     }
 
+    /// Returns `true` if the state is not a duplicate or, in mode `Sooner`, has a smaller makespan
+    /// bound than all earlier duplicates. Records the bound.
     fn is_new(&mut self, situation: &TemporalState, makespan: Int) -> bool {
         let TemporalState { state, clocks, .. } = situation;
         let mut key = state.values[..self.concurrent.task.basic].to_vec();
@@ -319,8 +327,8 @@ impl<'a> Greedy<'a> {
         }
     }
 
-    /// Plan that leads to a goal state. Returns `None` if its metric overflows or it violates a
-    /// deadline.
+    /// Plan that leads to a goal state. Returns `None` if the metric overflows or the plan violates
+    /// a hard deadline.
     fn sequence(&self, situation: &TemporalState, parent: u32, links: &Links) -> Option<Sequence> {
         let value = self.concurrent.value(situation)?;
         let mut sequence_links: Vec<Link> = links.iter().rev().copied().collect();
@@ -349,8 +357,8 @@ mod tests {
     use crate::concurrent::temporal_relaxation::TemporalRelaxation;
     use task::ground::GroundConfig;
 
-    /// Robots on a grid of two rows change places. A cell can only be entered after it has been
-    /// left.
+    /// Robots on a grid of two rows exchange places. A robot can enter a cell only after the
+    /// previous robot has left it.
     const DOMAIN: &str = "(define (domain crowd) (:requirements :strips :typing :durative-actions)
         (:types robot cell) (:predicates (at ?r - robot ?c - cell) (clear ?c - cell) (next ?a ?b - cell))
         (:durative-action move :parameters (?r - robot ?from ?to - cell) :duration (= ?duration 1)

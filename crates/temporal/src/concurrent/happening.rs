@@ -1,62 +1,70 @@
-//! Happenings and instances of durative actions.
+//! Happenings (instantaneous operators) and ground durative actions of a temporal task.
 
 use task::number::Int;
 use task::task::{Fact, NumericId, OperatorId};
 
 use crate::concurrent::interference::{Designs, InterferenceConstraints};
 
-/// Role of an operator.
+/// Role of an operator of the split task: the part of an action that the operator executes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum Role {
-    /// The start of an instance.
+    /// Start of the durative action with this instance index.
     Start(u32),
-    /// The end of an instance.
+    /// End of the durative action with this instance index.
     End(u32),
-    /// A whole action without duration.
+    /// A whole action: instantaneous or of duration 0.
     Whole,
-    /// Timed initial literals at this time.
+    /// Timed initial literals that take effect at this time, in internal time units.
     Timed(Int),
-    /// A condition over all, or half of an instance that cannot be executed. Never takes place.
+    /// Operator that never happens: a condition over all, or the start or end of an action that
+    /// cannot be executed.
     #[default]
     Never,
 }
 
-/// Temporal properties of an operator.
+/// Role, interference constraints and write set of an operator.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Happening {
     pub(super) role: Role,
     pub(super) accesses: InterferenceConstraints,
     pub(super) designs: Designs,
-    /// Atoms (even) and numbers (odd) that it writes, ascending.
+    /// Atoms and numbers that the happening writes, ascending. Atom `a` has the id `2a`, number `n`
+    /// the id `2n + 1`.
     pub(super) writes: Vec<u32>,
-    /// Variables that it sets and whose time of change matters.
+    /// Variables that the happening sets, ascending. Limited to guards of accesses and goal
+    /// variables, because only the times of their changes are recorded.
     pub(super) sets: Vec<u32>,
 }
 
-/// A ground durative action.
+/// A ground durative action: a pair of a start operator and an end operator.
 #[derive(Debug, Clone)]
 pub(super) struct Instance {
     pub(super) start: OperatorId,
     pub(super) end: OperatorId,
-    /// Operator whose condition must hold over all.
+    /// Operator whose condition is the action's condition over all. `None` if there is no such
+    /// condition.
     pub(super) over_all: Option<OperatorId>,
-    /// Duration. Only a lower bound if the duration depends on the state.
+    /// Duration in internal time units. Only a lower bound if the duration depends on the state or
+    /// is chosen by the planner.
     pub(super) duration: Int,
-    /// Number that holds the duration between start and end, and its factor, if the state or the
-    /// planner determines the duration.
+    /// Number that holds the duration while the action runs, and the factor from this number to
+    /// internal time units. `None` if the duration is constant.
     pub(super) timer: Option<(NumericId, Int)>,
     /// Whether the planner chooses the duration.
     pub(super) is_chosen: bool,
     pub(super) designs: Designs,
-    /// Atoms and numbers read by the condition over all if several happenings can maintain it
-    /// jointly, numbered as in `Happening::writes`.
+    /// Atoms and numbers that the condition over all reads, numbered as in `Happening::writes`.
+    /// Empty unless several simultaneous happenings can maintain the condition jointly.
     pub(super) joint: Vec<u32>,
-    /// Number of simultaneous runs that can be useful.
+    /// Upper bound on the number of simultaneous runs that can be useful; `u32::MAX` if no bound is
+    /// known.
     pub(super) most: u32,
-    /// Fact that the instance is running, if several simultaneous runs can be useful.
+    /// Fact that the action is running. `None` if at most one simultaneous run can be useful.
     pub(super) under_way: Option<Fact>,
-    /// Whether several runs can be useful, but a run whose end changes nothing cannot.
+    /// Whether several simultaneous runs can be useful, but a run whose end does not change the
+    /// state is useless.
     pub(super) counts_by_end: bool,
-    /// Whether its end can directly follow its start in a sequence without loss of completeness.
+    /// Whether the end can directly follow its start in every sequence of happenings without loss
+    /// of completeness.
     pub(super) compressible: bool,
 }

@@ -1,4 +1,4 @@
-//! Interference constraints from footprints: which accesses a happening waits for, and which wait for it.
+//! Interference constraints between happenings, computed from their read and write sets.
 
 use indexmap::IndexMap;
 use rustc_hash::{FxBuildHasher, FxHashSet};
@@ -10,40 +10,42 @@ use task::task::quantity::NumericId;
 use crate::concurrent::footprint::{Footprint, Way};
 use crate::concurrent::simple_temporal_network::Key;
 
-/// Kind of access to an atom, number or function.
+/// Kind of access to an atom or number, or use of a design for a function. Each value has a
+/// [`Key`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 enum Access {
     Read(AtomId),
     Added(AtomId),
     Deleted(AtomId),
-    /// Read by a condition over all.
+    /// The atom is read by a condition over all.
     Held(AtomId),
     ReadNumber(NumericId),
     Changed(NumericId, Way),
     HeldNumber(NumericId),
-    /// A function was used with a design by an action with duration.
+    /// An action with duration used the function (first) with the design (second).
     Used(ObjectId, ObjectId),
-    /// A function was used with a design by a happening without duration.
+    /// An instantaneous happening used the function (first) with the design (second).
     UsedAtOnce(ObjectId, ObjectId),
 }
 
-/// Accesses that a happening waits for, each with the required distance, and the accesses that it
-/// makes.
+/// Earlier accesses that constrain a happening (`after`), each with the least distance in time, and
+/// the accesses that the happening itself makes (`marks`).
 #[derive(Debug, Clone, Default)]
 pub(super) struct InterferenceConstraints {
     pub(super) after: Vec<(Key, Int)>,
     pub(super) marks: Vec<Key>,
 }
 
-/// Functions that an action requires, each with its design.
+/// Pairs of a function that an action requires and the design that the action uses for the
+/// function.
 pub(super) type Designs = Vec<(ObjectId, ObjectId)>;
 
-/// Assigns numbers to kinds of access.
+/// Assigns dense numbers ([`Key`]s) to kinds of access.
 pub(super) struct Keys {
     known: IndexMap<Access, (), FxBuildHasher>,
-    /// Separation in the task's time unit.
+    /// Least distance between interfering happenings, in internal time units.
     separation: Int,
-    /// Designs with which some action uses each function.
+    /// All pairs of a function and a design that some action uses for the function.
     designs: FxHashSet<(ObjectId, ObjectId)>,
 }
 
@@ -60,7 +62,7 @@ impl Keys {
         dense(self.known.insert_full(access, ()).0)
     }
 
-    /// Interference constraints of a happening, from its footprint.
+    /// Interference constraints of a happening with the given read and write sets.
     pub(super) fn of(&mut self, footprint: &Footprint) -> InterferenceConstraints {
         use Access::{Added, Changed, Deleted, Held, HeldNumber, Read, ReadNumber};
         let mut collector = InterferenceCollector::default();
@@ -90,8 +92,8 @@ impl Keys {
         self.resolve(&collector)
     }
 
-    /// Constraints of a condition over all: accesses that the start waits for, and accesses that
-    /// start and end mark.
+    /// Constraints of a condition over all with the given reads. The start waits for the accesses
+    /// in `after`; start and end make the accesses in `marks`.
     pub(super) fn over_all(&mut self, reads: &(Vec<AtomId>, Vec<NumericId>)) -> InterferenceConstraints {
         let mut collector = InterferenceCollector::default();
         for atom in &reads.0 {
@@ -107,7 +109,8 @@ impl Keys {
         self.resolve(&collector)
     }
 
-    /// Constraints that let each function have only one design at a time.
+    /// Constraints that prevent a function from having two designs at one time. Returns the earlier
+    /// uses that an action with these designs waits for.
     pub(super) fn designs(&mut self, designs: &Designs) -> Vec<(Key, Int)> {
         let mut collector = InterferenceCollector::default();
         for (function, design) in designs {
@@ -120,7 +123,8 @@ impl Keys {
         self.resolve(&collector).after
     }
 
-    /// Accesses that the end of an action, or an action without duration, marks.
+    /// Accesses that record the use of designs, made by the end of an action or, if `at_once`, by
+    /// an instantaneous happening.
     pub(super) fn used(&mut self, designs: &Designs, at_once: bool) -> Vec<Key> {
         let kind = if at_once { Access::UsedAtOnce } else { Access::Used };
         let access = |(function, design): &(ObjectId, ObjectId)| kind(*function, *design);
@@ -128,6 +132,8 @@ impl Keys {
         accesses.into_iter().map(|access| self.key(access)).collect()
     }
 
+    /// Translates accesses to keys. Accesses in `apart` require the separation as distance, those
+    /// in `not_before` distance 0.
     fn resolve(&mut self, collector: &InterferenceCollector) -> InterferenceConstraints {
         let separation = self.separation;
         let apart: Vec<_> = collector.apart.iter().map(|access| (self.key(*access), separation)).collect();
@@ -159,7 +165,7 @@ impl InterferenceConstraints {
         self.marks.extend(&other.marks);
     }
 
-    /// Sorts, and keeps the largest distance for each kind of access.
+    /// Sorts both lists, and keeps only the largest distance for each access.
     pub(super) fn tidy(&mut self) {
         self.after.sort_unstable_by(|a, b| (a.0, b.1).cmp(&(b.0, a.1)));
         self.after.dedup_by_key(|(key, _)| *key);
@@ -168,7 +174,8 @@ impl InterferenceConstraints {
     }
 }
 
-/// Removes accesses that no happening waits for, and waits for accesses that no happening makes.
+/// Sorts the constraints, and removes accesses that no happening waits for and waits for accesses
+/// that no happening makes.
 pub(super) fn prune<'a>(constraints: impl Iterator<Item = &'a mut InterferenceConstraints>) {
     let mut constraints: Vec<_> = constraints.collect();
     let waited: FxHashSet<Key> =

@@ -1,8 +1,9 @@
-//! Lower bound on the remaining time, for each goal variable separately.
+//! Makespan heuristic: lower bound on the remaining time, for each goal variable separately.
 //!
-//! A variable changes its values one after another. A change reads the variable, so it comes at least a
-//! separation after the change before, and an action that holds the variable from start to end takes its
-//! duration. The shortest path to the goal value is counted from the time of the last change.
+//! A variable changes its values one after another. A change reads the variable, so it takes place
+//! at least a separation after the previous change. An action that requires a value from its start
+//! to its end takes its duration. The bound is the length of a shortest path to the goal value,
+//! counted from the time of the last change.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -14,28 +15,29 @@ use crate::concurrent::happening::Role;
 use crate::concurrent::simple_temporal_network::SimpleTemporalNetwork;
 use crate::concurrent::temporal_task::TemporalTask;
 
-/// Remaining time for each value of a variable. `None` if the goal value is unreachable.
+/// Least time from the last change of a variable to its goal value, by current value. `None` if the
+/// goal value is unreachable.
 struct Path {
     variable: usize,
     left: Vec<Option<Int>>,
 }
 
-/// Remaining times for the variables of the goal.
+/// Makespan heuristic of a task: the least remaining times of all goal variables.
 pub(super) struct Estimate {
     paths: Vec<Path>,
     separation: Int,
 }
 
-/// A change of a variable: source value (`None` for any), target value, and least time after the
+/// A change of a variable: source value (`None` for any), target value, and least time since the
 /// previous change.
 type Edge = (Option<u32>, u32, Int);
 
-/// Lower bounds for a search node.
+/// Estimates for a search node.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct RemainingTime {
     /// Lower bound on the makespan.
     pub(super) makespan: Int,
-    /// Sum over the goal variables; not a lower bound.
+    /// Sum of the remaining times of the goal variables; not a lower bound.
     pub(super) sum: Int,
 }
 
@@ -47,7 +49,7 @@ impl Estimate {
         Self { paths, separation: concurrent.separation }
     }
 
-    /// Lower bounds for a temporal state. Returns `None` if the goal is unreachable.
+    /// Evaluates a temporal state. Returns `None` if the goal is unreachable.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "fewer than 2^32 happenings, less than 2^91 apart, and a variable has fewer than 2^32 values"
@@ -71,7 +73,7 @@ impl Estimate {
     }
 }
 
-/// Backward Dijkstra search from the goal value.
+/// Least times to the goal value of a variable, by backward Dijkstra search from the goal value.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "a path takes fewer steps than the variable has values, each less than 2^91"
@@ -102,7 +104,7 @@ fn path(concurrent: &TemporalTask, goal: Fact) -> Path {
     Path { variable: variable.index(), left: distances }
 }
 
-/// Changes of a variable.
+/// All changes of a variable by happenings, with their least distances from the previous change.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "durations and the separation are below 2^90; setters are counted in memory"

@@ -9,20 +9,21 @@ use task::plan::Exact;
 use task::task::Objective;
 use task::task::number::TaskNumber;
 
-/// The metric in integers: `time` per unit of time plus `cost` per unit of cost.
+/// The minimised metric as an integer: `time` per internal time unit plus `cost` per unit of the
+/// task's cost.
 #[derive(Debug, Clone)]
 pub(super) struct Measure {
     pub(super) time: Int,
     pub(super) cost: Int,
-    /// Factor between the integer value and the metric.
+    /// Integer value per unit of the PDDL metric.
     scale: Int,
     offset: Int,
     maximize: bool,
 }
 
 impl Measure {
-    /// Computes the weights for costs by an objective, and for times that are `time_scale` times
-    /// those of the files.
+    /// Computes the integer weights of costs and times. `weight` is the metric per PDDL time unit,
+    /// `time_scale` the number of internal time units per PDDL time unit.
     pub(super) fn new(objective: &Objective, weight: Rational, time_scale: Int) -> Result<Self, Error> {
         let overflow = || Error::overflow("the metric");
         let by_time = weight / Rational::from_integer(time_scale);
@@ -40,26 +41,27 @@ impl Measure {
         })
     }
 
-    /// Integer value of a plan with this makespan and cost. Returns `None` if it overflows.
+    /// Integer metric of a plan with this makespan and cost. Returns `None` if the metric
+    /// overflows.
     pub(super) fn total(&self, makespan: Int, cost: Int) -> Option<Int> {
         self.time.checked_mul(makespan)?.checked_add(self.cost.checked_mul(cost)?)
     }
 
-    /// Metric of the files for an integer value.
+    /// Converts an integer value to the metric of the PDDL problem.
     pub(super) fn metric(&self, total: &Rational) -> Exact {
         let sum = total.clone() + Rational::from_integer(self.offset);
         Exact::scaled(&if self.maximize { -sum } else { sum }, self.scale)
     }
 
-    /// Integer value for a metric of the files.
+    /// Converts a metric of the PDDL problem to an integer value.
     pub(super) fn total_of(&self, metric: &Exact) -> Rational {
         let scaled = Rational::from_big(metric.to_rational()) * Rational::from_integer(self.scale);
         (if self.maximize { -scaled } else { scaled }) - &Rational::from_integer(self.offset)
     }
 }
 
-/// Splits a metric to be minimised into the weight of the makespan and the remaining metric.
-/// Returns `None` if it is not linear in time or rewards time.
+/// Splits a metric into the weight of the makespan in the minimised metric and the metric without
+/// `total-time`. Returns `None` if the metric is not linear in time or rewards a longer makespan.
 pub(super) fn split(metric: &Metric) -> Option<(Rational, Metric)> {
     let factor = time_factor(&metric.expression)?;
     let weight = if metric.direction == Direction::Minimize { factor } else { -factor };

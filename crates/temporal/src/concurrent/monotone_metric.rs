@@ -1,5 +1,5 @@
-//! Monotonicity of numbers that only the metric reads: if they only grow, their current value is a
-//! lower bound.
+//! Monotonicity of the numbers in the metric. If their contribution only grows, its current value
+//! is a lower bound on its final value.
 
 use rustc_hash::FxHashSet;
 use task::number::{Int, Rational};
@@ -7,8 +7,8 @@ use task::task::{NumericId, Operator, Task};
 
 use crate::concurrent::happening::Instance;
 
-/// Returns `true` if no happening lowers the contribution of numbers that only the metric reads,
-/// for any durations.
+/// Returns `true` if no operator lowers the contribution of numbers to the minimised metric, for
+/// any durations. `instances` provides the numbers that hold durations.
 pub(super) fn only_grows(task: &Task, instances: &[Instance]) -> bool {
     let timers: FxHashSet<NumericId> =
         instances.iter().filter_map(|instance| Some(instance.timer?.0)).collect();

@@ -1,4 +1,4 @@
-//! The metric of a complete plan, with violated preferences.
+//! The metric of a complete plan, including the costs of violated preferences and soft deadlines.
 
 use task::number::Int;
 use task::task::{OperatorId, State};
@@ -12,27 +12,27 @@ use crate::concurrent::temporal_task::TemporalTask;
 pub(super) struct DeadlineMissed;
 
 impl TemporalTask {
-    /// Operators of the preferences that are violated in a state.
+    /// One detecting operator for each preference that is violated in a final state.
     pub(super) fn violated(&self, state: &State) -> impl Iterator<Item = OperatorId> {
         let is_violated = |id: &&OperatorId| self.task.operators[id.index()].applicable(state, &[]);
         self.violations.iter().filter_map(move |ways| ways.iter().find(is_violated).copied())
     }
 
-    /// Metric in integers and makespan of a plan that ends in this state. Returns `None` if they
-    /// overflow.
+    /// Integer metric and makespan of a plan that ends in this temporal state. Returns `None` if
+    /// the metric overflows.
     pub(super) fn value(&self, TemporalState { state, clocks, cost }: &TemporalState) -> Option<(Int, Int)> {
         let makespan = clocks.latest();
         Some((self.measure.total(makespan, cost.checked_add(self.penalty(state)?)?)?, makespan))
     }
 
     /// Cost of the preferences violated in a final state, in the task's cost unit. Returns `None`
-    /// if it overflows.
+    /// if the sum overflows.
     pub(super) fn penalty(&self, state: &State) -> Option<Int> {
         let penalty = |id: OperatorId| self.task.operators[id.index()].cost.constant;
         self.violated(state).try_fold(0, |sum: Int, id| sum.checked_add(penalty(id)))
     }
 
-    /// Final state of a sequence, in which the satisfied soft deadlines are marked.
+    /// Final state of a sequence, after the operators that mark soft deadlines as met.
     ///
     /// # Errors
     /// Fails if a hard deadline is missed.
@@ -74,9 +74,9 @@ impl TemporalTask {
         Ok(state)
     }
 
-    /// Adds the cost of violated preferences and deadlines to the value of a sequence; `cost` is
-    /// the cost of its actions. Returns `None` if a hard deadline is missed or the metric
-    /// overflows.
+    /// Updates the metric of a complete plan with the preferences and deadlines that it violates.
+    /// `cost` is the cost of its actions. Returns the plan unchanged if the task has no deadlines,
+    /// and `None` if the plan misses a hard deadline or the metric overflows.
     pub(super) fn judge(&self, sequence: Sequence, cost: Int) -> Option<Sequence> {
         if self.deadlines.is_empty() {
             return Some(sequence);

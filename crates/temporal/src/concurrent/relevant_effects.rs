@@ -1,4 +1,4 @@
-//! Relevance analysis: effects that no condition, goal or metric depends on are dropped.
+//! Relevance analysis: finds the effects on which a condition, the goal or the metric depends.
 
 use search::search::{Polarity, directions};
 use task::compile::is_hidden;
@@ -7,24 +7,29 @@ use task::task::{Fact, NumericEffect, NumericId, Task};
 
 use crate::concurrent::happening::Instance;
 
-/// Relevance information of a task.
+/// Input of the relevance analysis: which facts and number changes can be useful.
 pub(super) struct RelevanceContext<'k> {
-    /// Number of useful simultaneous runs of each instance, as far as bounded.
+    /// Upper bound on the useful simultaneous runs of each instance; `u32::MAX` if no bound is
+    /// known.
     pub(super) most: &'k [u32],
     pub(super) separation: Int,
-    /// Per variable: whether the falsity of its atoms may be needed.
+    /// Per variable: whether a fact with a value other than 0 may be needed, i.e. the falsity of a
+    /// single atom.
     pub(super) needed: &'k [bool],
-    /// Polarity of each number. Numbers beyond the end of the list have unknown polarity.
+    /// Polarity of each number, i.e. whether larger or smaller values can help. Numbers beyond the
+    /// end of the list have unknown polarity.
     pub(super) asked: &'k [Polarity],
 }
 
-/// Effect on a number, if it does not depend on the state.
+/// Constant effect on a number.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Change {
     Sets(Int),
     Adds(Int),
 }
 
+/// Returns the effect as an assignment or addition of a constant. Returns `None` if the effect
+/// depends on the state.
 pub(super) fn change(effect: &NumericEffect) -> Option<Change> {
     let value = &effect.value;
     let constant = value.quantity.tables.is_empty().then_some(value.quantity.constant)?;
@@ -36,13 +41,13 @@ pub(super) fn change(effect: &NumericEffect) -> Option<Change> {
 }
 
 impl RelevanceContext<'_> {
-    /// Effects that may be needed; removing the others does not make a plan worse.
+    /// Returns the effects that may be needed. A plan without the other effects is no worse.
     pub(super) fn relevant_effects(&self, effects: &[Fact]) -> Vec<Fact> {
         let is_relevant = |fact: &&Fact| fact.value == 0 || self.needed[fact.variable.index()];
         effects.iter().filter(is_relevant).copied().collect()
     }
 
-    /// Returns `true` if changing a number by this amount is never an improvement.
+    /// Returns `true` if adding `by` to a number is never an improvement.
     fn is_no_better(&self, number: NumericId, by: Int) -> bool {
         by == 0
             || self.asked.get(number.index()).is_some_and(|asked| !if by < 0 { asked.down } else { asked.up })
@@ -53,8 +58,8 @@ impl RelevanceContext<'_> {
         matches!(change(effect), Some(Change::Adds(by)) if self.is_no_better(effect.variable, by))
     }
 
-    /// Returns `true` if a number set to `value` is not worse after another effect, so that setting
-    /// it again is no improvement.
+    /// Returns `true` if setting the number to `value` again after the effect `other` is never an
+    /// improvement.
     pub(super) fn keeps(&self, other: &NumericEffect, value: Int) -> bool {
         match change(other) {
             Some(Change::Sets(next)) => self.is_no_better(other.variable, value.saturating_sub(next)),
@@ -64,16 +69,17 @@ impl RelevanceContext<'_> {
     }
 }
 
-/// Polarity of each number. Empty if other parts than conditions read numbers: durations, metrics,
-/// preferences and trajectory constraints.
+/// Polarity of each number. Empty if durations, the metric, preferences or trajectory constraints
+/// may read numbers, so that conditions alone do not determine the polarity.
 pub(super) fn asked(task: &Task, instances: &[Instance]) -> Vec<Polarity> {
     let is_judged = task.schema_names.iter().any(|name| is_hidden(name));
     let is_timed = instances.iter().any(|instance| instance.is_chosen || instance.timer.is_some());
     if is_judged || is_timed || !task.objective.rest.is_empty() { Vec::new() } else { directions(task) }
 }
 
-/// Per variable: whether the falsity of its atoms may be needed. It is not if the variable is a
-/// single atom that only occurs positively.
+/// Per variable: whether the falsity of its atoms may be needed. `false` only for a variable of a
+/// single atom that occurs positively in conditions and the goal, and neither in axioms nor in
+/// conditions of conditional effects.
 pub(super) fn needed(task: &Task) -> Vec<bool> {
     let mut falsity_needed: Vec<bool> =
         task.variables.iter().map(|variable| variable.values.len() != 2).collect();
@@ -88,7 +94,7 @@ pub(super) fn needed(task: &Task) -> Vec<bool> {
             }
         }
     }
-    // Effects of conditional effects may be needed either way, so their conditions are as well.
+    // Either truth value of the condition of a conditional effect may be needed.
     let effects = task.operators.iter().flat_map(|operator| &operator.conditional);
     for literal in effects.flat_map(|effect| &effect.condition) {
         falsity_needed[literal.fact.variable.index()] = true;

@@ -1,29 +1,35 @@
-//! A rule of a relaxed task: conditions, effects and cost.
+//! Rules of the delete relaxation: conditions, effects and cost.
 
 use rustc_hash::FxHashMap;
 
 use task::number::Int;
 use task::task::OperatorId;
 
-/// A fact, a clause, or a numeric condition.
+/// Proposition of the delete relaxation: a fact, a clause, a numeric condition, or a conjunction of
+/// two facts.
 pub(super) type Proposition = u32;
 
-/// A rule of the relaxation.
+/// A rule of the delete relaxation.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Rule {
-    /// Conditions, ascending.
+    /// Conditions of the rule, ascending.
     pub(super) needs: Vec<Proposition>,
     pub(super) adds: Vec<Proposition>,
-    /// Facts that it certainly sets.
+    /// Facts to which the happening certainly sets their variables, so that other values are
+    /// deleted. Empty for clauses and derived facts.
     pub(super) sets: Vec<Proposition>,
+    /// Numeric conditions that the rule increases.
     pub(super) raises: Vec<NumericEffect>,
+    /// Cost of the rule in a relaxed plan.
     pub(super) weight: u32,
+    /// Happening that the rule represents. `None` for clauses and derived facts.
     pub(super) origin: Option<OperatorId>,
 }
 
 impl Rule {
-    /// Copy of the rule for states in which `fact` holds before and after it. `numbers` maps each
-    /// proposition to its conjunction with `fact`.
+    /// Copy of the rule for states in which `fact` holds before and after the rule. `needs` are the
+    /// conditions of the rule. `numbers` maps a proposition to its conjunction with `fact`; other
+    /// effects are dropped.
     pub(super) fn with(
         &self,
         fact: Proposition,
@@ -39,6 +45,6 @@ impl Rule {
     }
 }
 
-/// A numeric condition by index, and the amount that a rule adds to it. `None` if the amount
-/// depends on the state.
+/// Index of a numeric condition, and the amount that a rule adds to its expression. The amount is
+/// `None` if it depends on the state.
 pub(super) type NumericEffect = (u32, Option<Int>);

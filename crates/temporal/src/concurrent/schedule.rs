@@ -1,4 +1,4 @@
-//! The earliest times of a sequence of happenings.
+//! Computation of the earliest times of a sequence of happenings.
 
 use std::collections::VecDeque;
 
@@ -10,11 +10,13 @@ use crate::concurrent::happening::Role;
 use crate::concurrent::simple_temporal_network::Key;
 use crate::concurrent::temporal_task::TemporalTask;
 
-/// Lower bound between two happenings of the sequence: indices, and least distance.
+/// Constraint between two happenings: position of the first, position of the second, and least time
+/// from the first to the second.
 type Bound = (usize, usize, Int);
 
-/// Earliest times of a sequence (Bellman-Ford algorithm). `together` tells which happenings take
-/// place at the time of the previous one.
+/// Computes the earliest times of a sequence by the Bellman-Ford algorithm. `together` marks the
+/// happenings that take place at the same time as the previous one. `durations` are as returned by
+/// [`durations`].
 #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
 pub(super) fn schedule(
     concurrent: &TemporalTask,
@@ -41,7 +43,8 @@ pub(super) fn schedule(
     times
 }
 
-/// Durations of the actions that start in a sequence, by index; 0 for other happenings.
+/// Durations of the actions that start in a sequence, by position; 0 for happenings other than
+/// starts.
 pub(super) fn durations(concurrent: &TemporalTask, sequence: &[OperatorId]) -> Vec<Int> {
     let mut state = concurrent.task.initial.clone();
     let mut durations = Vec::with_capacity(sequence.len());
@@ -73,8 +76,8 @@ fn bounds(
     let mut marked: FxHashMap<Key, Vec<usize>> = FxHashMap::default();
     // Runs of an instance end in the order of their starts.
     let mut open_starts: FxHashMap<u32, VecDeque<usize>> = FxHashMap::default();
-    // Running actions with a joint condition over all, with the last happening that wrote what it
-    // reads.
+    // Running actions with a joint condition over all, each with the last happening that wrote an
+    // atom or number in this condition.
     let mut joint: Vec<(u32, usize)> = Vec::new();
     let mut floor = 0;
     for (index, id) in sequence.iter().enumerate() {

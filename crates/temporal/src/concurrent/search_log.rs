@@ -1,4 +1,5 @@
-//! Reports and statistics of a temporal search: better plans, rising lower bounds, counts of each part.
+//! Reports and statistics of a temporal search: improved plans, rising lower bounds, and node
+//! counts.
 
 use std::time::Instant;
 
@@ -7,18 +8,20 @@ use task::plan::solution::{Improvement, Moment, PlannerPart, Statistics};
 
 use crate::concurrent::temporal_task::TemporalTask;
 
-/// Lower bounds are reported if they rise by at least one part in this number.
+/// Inverse of the smallest reported rise of the lower bound, relative to the last reported bound. A
+/// bound that reaches the cost of the incumbent is always reported.
 const REPORT_STEP: Int = 100;
 
-/// Log of one run.
+/// Log of one temporal search: reports improvements, and collects statistics.
 pub(super) struct Record<'r> {
     concurrent: &'r TemporalTask,
     report: &'r mut dyn FnMut(Improvement),
     started: Instant,
-    /// Metric of the best plan and lower bound, in integers, as reported last.
+    /// Last reported integer metric of the best plan, and last reported integer lower bound.
     noted: Option<(Option<Rational>, Rational)>,
     cost: Option<Rational>,
-    /// Initial lower bound, if the search is incomplete. No higher bound can be claimed then.
+    /// Initial lower bound if the search is incomplete; later lower bounds are capped at this
+    /// value, because they are not proved.
     ceiling: Option<Rational>,
     pub(super) statistics: Statistics,
 }
@@ -39,7 +42,8 @@ impl<'r> Record<'r> {
         self.report_lower_bound(root);
     }
 
-    /// Records a better plan with `horizon` happenings, and a lower bound.
+    /// Records a better plan with the integer metric `value` and `horizon` happenings, found by
+    /// `part`, and a lower bound.
     pub(super) fn improve(&mut self, value: &Rational, horizon: usize, lower: Rational, part: PlannerPart) {
         self.statistics.found_by = Some(part);
         self.cost = Some(value.clone());
@@ -53,8 +57,8 @@ impl<'r> Record<'r> {
         }
     }
 
-    /// Records a lower bound and returns it, capped at the ceiling and at the cost of the
-    /// incumbent.
+    /// Records a lower bound. Returns the bound after capping it at the ceiling and at the cost of
+    /// the incumbent.
     pub(super) fn report_lower_bound(&mut self, lower: Rational) -> Rational {
         let caps = self.ceiling.iter().chain(&self.cost);
         let lower = caps.fold(lower, |lower, cap| if *cap < lower { cap.clone() } else { lower });
@@ -77,7 +81,7 @@ impl<'r> Record<'r> {
         lower
     }
 
-    /// Ends the run and returns its statistics.
+    /// Ends the log, and returns the statistics of the search.
     pub(super) fn end(mut self) -> Statistics {
         self.statistics.search = self.started.elapsed();
         self.statistics

@@ -1,9 +1,9 @@
-//! Upper bounds on the number of simultaneous runs of one ground action.
+//! Upper bounds on the number of simultaneous runs of a ground action that can be useful.
 //!
-//! PDDL 2.1 lets an action start while it runs. Most cannot, because their start requires a fact
-//! that it deletes. A run that starts and ends without a change is redundant. Both are proved by
-//! the facts that hold while the action runs; docs/decisions/self-overlapping-actions.md has the
-//! arguments.
+//! In PDDL 2.1, an action can start again while it runs. Most actions cannot, because their start
+//! requires a fact that the start deletes. A run whose start and end change nothing is redundant.
+//! Both are proved from the facts that hold while the action runs;
+//! docs/decisions/self-overlapping-actions.md has the arguments.
 
 use std::collections::BTreeMap;
 
@@ -17,11 +17,11 @@ use crate::concurrent::happening::{Happening, Instance, Role};
 use crate::concurrent::relevant_effects::{Change, RelevanceContext, asked, change, needed};
 use crate::concurrent::split::UNDER_WAY;
 
-/// Rounds of the fixpoint computation. A bound for one instance can improve the bounds of others.
+/// Number of iterations of the analysis: a bound for one instance can improve the bounds of others.
 const FIXPOINT_ROUNDS: usize = 2;
 
-/// Sets the number of simultaneous runs of each instance that can be useful, and the fact that it
-/// is running if there can be several.
+/// Sets `most`, `under_way` and `counts_by_end` of each instance: the bound on useful simultaneous
+/// runs, the fact that the action is running, and whether only ends count.
 pub(super) fn bound_self_overlap(
     task: &Task,
     happenings: &[Happening],
@@ -37,8 +37,9 @@ pub(super) fn bound_self_overlap(
     let mut work_left = MAX_PAIR_CHECKS;
     for instance in limits.watch(&mut *instances) {
         let instance = instance?;
-        // With two values the variable belongs to this instance alone. Otherwise its other atoms
-        // are false while it runs, and the start requires one of them, so runs exclude each other.
+        // A variable with two values belongs to this instance alone. Otherwise the other atoms of
+        // the variable are false while the action runs. The start requires such an atom, so runs
+        // exclude each other.
         let is_alone = |fact: Fact| task.variables[fact.variable.index()].values.len() == 2;
         let is_single = !instance.under_way.is_some_and(is_alone)
             || index.excludes_itself(instance, &mut work_left) == Some(true);
@@ -69,18 +70,20 @@ pub(super) fn bound_self_overlap(
     Ok(())
 }
 
-/// Fact that an instance is running.
+/// Fact that marks the action as running: a condition of its end.
 fn under_way(task: &Task, own: &Instance) -> Option<Fact> {
     let name = |fact: &Fact| &task.variables[fact.variable.index()].values[fact.value as usize];
     let required = &task.operators[own.end.index()].condition.facts;
     required.iter().find(|fact| name(fact).starts_with(UNDER_WAY)).copied()
 }
 
+/// Returns `true` if another fact requires another value of the variable of `fact`.
 fn clashes(fact: Fact, others: &[Fact]) -> bool {
     others.iter().any(|other| other.variable == fact.variable && other.value != fact.value)
 }
 
-/// Context: happenings during a run of an instance.
+/// Data for analysing the happenings during a run of `own`: facts that hold during the run, and the
+/// relevance of effects.
 #[derive(Clone, Copy)]
 struct Inside<'i> {
     own: &'i Instance,
@@ -89,8 +92,8 @@ struct Inside<'i> {
 }
 
 impl Index<'_> {
-    /// Returns `true` if no run can start during another one. Returns `None` if the work limit is
-    /// reached.
+    /// Returns `true` if no run of the action can start during another run. Returns `None` if the
+    /// work limit `left` is used up.
     fn excludes_itself(&self, own: &Instance, left: &mut usize) -> Option<bool> {
         let invariant = self.invariant(own, true, left)?;
         if self.excludes(&invariant, own, own.start) {
@@ -110,8 +113,8 @@ impl Index<'_> {
         Some(false)
     }
 
-    /// Returns `true` if other happenings can change a variable from the value that the start has
-    /// set to `to`.
+    /// Returns `true` if other happenings during a run may change a variable from the fact `from`,
+    /// which the start sets, to the value `to`. Returns `None` if the work limit is used up.
     fn is_reached(
         &self,
         own: &Instance,
@@ -147,8 +150,8 @@ impl Index<'_> {
         Some(reached.contains(&to))
     }
 
-    /// Number of simultaneous runs that can be useful. Returns `None` if no bound is known or the
-    /// work limit is reached.
+    /// Upper bound on the number of simultaneous runs that can be useful. Returns `None` if no
+    /// bound is proved or the work limit is used up.
     fn most(&self, own: &Instance, known: &RelevanceContext<'_>, left: &mut usize) -> Option<u32> {
         let [start, end] = [own.start, own.end].map(|id| &self.task.operators[id.index()]);
         if own.is_chosen || ![start, end].into_iter().all(is_plain) {
@@ -170,8 +173,8 @@ impl Index<'_> {
         let [starts, ends] = [start, end].map(|operator| -> Vec<Fact> {
             operator.effects.iter().filter(|fact| fact.variable != under_way).copied().collect()
         });
-        // The run that ends first deletes a fact that the other one needs over all. So they start
-        // and end together, and one run has the effect of both.
+        // The run that ends first deletes a fact that the condition over all of the other run
+        // requires. So the runs start and end together, and one run has the effect of both.
         if ends.iter().any(|fact| clashes(*fact, &alone.over_all)) {
             return Some(1);
         }
@@ -194,13 +197,14 @@ impl Index<'_> {
             let undoing = self.undoing(inside, (&facts, assigned), left)?;
             bound = bound.saturating_add(self.times_together(inside, undoing, left)?);
         }
-        // Ends of earlier runs undo effects of starts. Then it is only proved that two runs, the
-        // first ones that overlap, need not overlap.
+        // Ends of earlier runs undo effects of starts. The argument then only proves that the first
+        // two overlapping runs need not overlap, so only the bound 1 is valid.
         let is_cut = set.iter().any(|fact| clashes(*fact, &ends) && !hidden.contains(&fact.variable));
         u32::try_from(bound).ok().filter(|bound| *bound == 1 || !is_cut)
     }
 
-    /// Happenings of other instances that undo effects during a run.
+    /// Operators other than the start and end of `own` that undo one of the facts or numeric
+    /// assignments during a run. Returns `None` if the work limit is used up.
     fn undoing(
         &self,
         Inside { own, invariant, known }: Inside<'_>,
@@ -223,10 +227,9 @@ impl Index<'_> {
         Some(operators)
     }
 
-    /// Upper bound on the total number of occurrences of some happenings during a run. Returns
-    /// `None` if there is no bound. Among happenings that only serve the same facts, only the first
-    /// one is useful, and one after each happening that undoes the facts; a plan without the others
-    /// is no worse.
+    /// Upper bound on the total number of useful occurrences of the operators `happenings` during a
+    /// run. Returns `None` if there is no bound. Among happenings that only serve the same facts,
+    /// only the first one is useful, and one more after each happening that undoes these facts.
     fn times_together(
         &self,
         inside: Inside<'_>,
@@ -246,7 +249,7 @@ impl Index<'_> {
         }
         for (facts, times) in groups {
             let undoing = self.undoing(inside, (&facts, &[]), left)?;
-            // The number of runs of the instance itself is not bounded.
+            // The number of runs of the instance itself has no bound yet.
             let is_undone = facts
                 .iter()
                 .any(|fact| [inside.own.start, inside.own.end].iter().any(|id| self.changes(*id, *fact)));
@@ -264,8 +267,8 @@ impl Index<'_> {
         Some(total)
     }
 
-    /// Facts served by the run that a happening ends. Returns `None` if the run serves any other
-    /// purpose.
+    /// Facts that are the only useful effects of the run that the end `id` completes. Returns
+    /// `None` if the run has other useful effects or `id` is not an end.
     fn purpose(&self, id: OperatorId, known: &RelevanceContext<'_>) -> Option<Vec<Fact>> {
         let Role::End(instance) = self.happenings[id.index()].role else { return None };
         let instance = &self.instances[instance as usize];
@@ -288,8 +291,8 @@ impl Index<'_> {
         is_good_for_facts.then(|| wanted(end))
     }
 
-    /// Upper bound on the occurrences of a happening during a run. Returns `None` if there is no
-    /// bound or the duration is not constant.
+    /// Upper bound on the number of occurrences of a happening during a run of `own`. Returns
+    /// `None` if there is no bound or the duration of `own` is not constant.
     fn times(&self, id: OperatorId, own: &Instance, known: &RelevanceContext<'_>) -> Option<Int> {
         let happening = &self.happenings[id.index()];
         let apart = match happening.role {
@@ -307,7 +310,7 @@ impl Index<'_> {
         duration.checked_div(apart)?.checked_add(1)
     }
 
-    /// Returns `true` if a run that starts during another one has the same duration.
+    /// Returns `true` if a run that starts during another run is certain to have the same duration.
     fn lasts_as_long(&self, own: &Instance, start: &Operator, invariant: &Invariant) -> bool {
         start.numeric_effects.iter().all(|effect| {
             let mut numbers =
@@ -316,7 +319,8 @@ impl Index<'_> {
         })
     }
 
-    /// Returns `true` if no other happening reads or sets a variable during a run.
+    /// Returns `true` if no happening during a run, other than those of `own`, reads or sets the
+    /// variable.
     fn is_hidden(
         &self,
         own: &Instance,
@@ -351,7 +355,7 @@ impl Index<'_> {
     }
 }
 
-/// Returns `true` if a happening reads or sets a variable.
+/// Returns `true` if a condition or effect of the operator mentions the variable.
 fn mentions(operator: &Operator, variable: VariableId) -> bool {
     let facts = operator.condition.facts.iter().chain(&operator.effects);
     let conditional = operator.conditional.iter().flat_map(|effect| &effect.effects);
@@ -361,13 +365,13 @@ fn mentions(operator: &Operator, variable: VariableId) -> bool {
     facts.into_iter().any(|fact| fact.variable == variable)
 }
 
-/// Returns `true` if the propositional effects of a happening are unconditional and its cost is not
+/// Returns `true` if an operator has no conditional effects and a constant cost that is not
 /// negative.
 fn is_plain(operator: &Operator) -> bool {
     operator.conditional.is_empty() && operator.cost.tables.is_empty() && operator.cost.constant >= 0
 }
 
-/// Returns `true` if only the end of a run has relevant effects, and repeating the end has no
+/// Returns `true` if only the end of a run has relevant effects, and ending another run has no
 /// further effect.
 fn counts_by_end(task: &Task, own: &Instance, under_way: Fact, known: &RelevanceContext<'_>) -> bool {
     let [start, end] = [own.start, own.end].map(|id| &task.operators[id.index()]);
@@ -379,12 +383,12 @@ fn counts_by_end(task: &Task, own: &Instance, under_way: Fact, known: &Relevance
         && assigns_constants(own, end)
 }
 
-/// Returns `true` if a number holds the duration of an instance.
+/// Returns `true` if `number` holds the duration of the instance.
 fn is_timer(own: &Instance, number: NumericId) -> bool {
     own.timer.is_some_and(|(timer, _)| timer == number)
 }
 
-/// Returns `true` if the end sets all numbers to constants, so that another end changes nothing.
+/// Returns `true` if the end sets numbers only to constants, so that a second end changes nothing.
 fn assigns_constants(own: &Instance, end: &Operator) -> bool {
     let is_set = |effect: &NumericEffect| matches!(change(effect), Some(Change::Sets(_)));
     end.numeric_effects.iter().all(|effect| is_timer(own, effect.variable) || is_set(effect))
@@ -398,8 +402,9 @@ mod tests {
     use crate::concurrent::ground_concurrent;
     use task::ground::GroundConfig;
 
-    /// Number of useful simultaneous runs of `charge` with the additional effects `more`. `pump`
-    /// requires a charge and only serves the fact `p`; other actions need `p` both true and false.
+    /// Bound on useful simultaneous runs of `charge` with the additional effects `more`. The action
+    /// `pump` requires a charge and only serves the fact `p`; other actions need `p` both true and
+    /// false.
     fn charges(more: &str) -> u32 {
         let domain = format!(
             "(define (domain d) (:requirements :durative-actions :fluents) (:predicates (p) (q) (r)) (:functions (battery))

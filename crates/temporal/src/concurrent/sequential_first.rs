@@ -1,12 +1,13 @@
-//! Sequential plans, moved to the earliest times. If a task does not require overlap, they give a
-//! first plan, whose cost is an upper bound on the cost of a best plan.
+//! First plans of a temporal task from sequential plans, moved to the earliest times. Such a plan
+//! exists only if the task does not require concurrency; its cost is an upper bound on the optimal
+//! cost.
 //!
-//! These plans solve the sequential task, in which actions do not overlap. Searches for the
-//! sequential task are better informed: it has fewer variables, with more values, and also
-//! landmarks, mutexes and interchangeable objects. Each resulting sequence is executed in the
-//! overlapping task at the earliest times, so that its actions overlap where they can. Every
-//! returned plan is therefore a plan of the overlapping task. A sequence that cannot be executed is
-//! dropped, for example if a timed initial literal would interrupt an action.
+//! The sequential task, in which actions do not overlap, is easier to search. It has fewer variables
+//! with more values, and the search can exploit landmarks, mutexes and interchangeable objects. Each
+//! sequential plan is executed in the temporal task at the earliest times, so that its actions
+//! overlap where possible. Every returned plan is therefore a plan of the temporal task. A
+//! sequential plan that cannot be executed is dropped, for example if a timed initial literal would
+//! interrupt an action.
 
 use std::cell::OnceCell;
 
@@ -30,30 +31,33 @@ use crate::concurrent::search::Sequence;
 use crate::concurrent::successors::{Expansion, TemporalState};
 use crate::concurrent::temporal_task::TemporalTask;
 
-/// Tasks with more operators are not ground a second time.
+/// Upper limit on the operators of the temporal task; for larger tasks, no sequential task is
+/// ground.
 const OPERATORS: usize = 100_000;
 
-/// Work per evaluation of the greedy search: work units of the satisficing search, and stored
-/// states of the optimal search.
+/// Work units of the satisficing search per evaluation of the greedy temporal search.
 const WORK: u64 = 1_000;
+/// States that the optimal search may store per evaluation of the greedy temporal search.
 const STATES: usize = 4;
-/// Maximum number of states of the optimal search.
+/// Upper limit on the number of stored states of the optimal search.
 const MOST_STATES: usize = 1_000_000;
 
 /// Name and arguments of an action.
 type Call = (String, Vec<String>);
 
-/// The task in which actions do not overlap.
+/// The ground sequential task, in which actions do not overlap.
 pub(super) struct SequentialTask {
     task: Task,
-    /// Start happenings of each action.
+    /// Operators of the temporal task that start each action.
     begins: FxHashMap<Call, Vec<OperatorId>>,
-    /// Heuristics and successor data of the optimal search, computed on first use.
+    /// Heuristics and successor data of the optimal search, computed on first use. `None` inside if
+    /// not supported.
     parts: OnceCell<Option<(Bounds, SearchTask)>>,
 }
 
 impl SequentialTask {
-    /// Returns `None` if there is no such task or it is too large.
+    /// Grounds the sequential task. Returns `None` if the source files are not kept, grounding
+    /// fails or finds the goal unreachable, or the task is too large.
     pub(super) fn new(concurrent: &TemporalTask, limits: &Limits) -> Option<Self> {
         let split = &concurrent.task;
         if split.operators.len() > OPERATORS {
@@ -80,8 +84,8 @@ impl SequentialTask {
         Some(SearchProblem { context, bounds, prepared, orbits: None })
     }
 
-    /// Happenings of a sequential plan. Returns `None` if they cannot be executed or the metric
-    /// overflows.
+    /// Translates a sequential plan into happenings of the temporal task at their earliest times.
+    /// Returns `None` if the happenings cannot be executed or the metric overflows.
     fn sequence(
         &self,
         concurrent: &TemporalTask,
@@ -103,7 +107,7 @@ impl SequentialTask {
                 }
                 continue;
             }
-            // Violated preferences are determined from the final state instead.
+            // The temporal task derives violated preferences from the final state instead.
             if is_hidden(&self.task.schema_names[operator.schema as usize]) {
                 continue;
             }
@@ -133,21 +137,21 @@ fn call(task: &Task, operator: &Operator, choice: &[u32]) -> Call {
     (task.schema_names[operator.schema as usize].clone(), arguments(task, operator, choice))
 }
 
-/// Searches for sequential plans: satisficing search and optimal search. The latter is faster if
-/// the heuristics are misleading.
+/// Runs a satisficing and an optimal search for sequential plans. The optimal search is faster if
+/// the heuristics of the satisficing search are misleading.
 pub(super) struct SequentialPlanner<'w> {
     whole: &'w SequentialTask,
     limits: &'w Limits,
     satisficer: Option<Satisficer<'w, Int>>,
     exact: Exact<'w>,
-    /// Number of states that the optimal search may store by now.
+    /// Number of states that the optimal search may store up to the current turn.
     stored: usize,
-    /// Lowest known cost of a plan without overlap.
+    /// Cost of the cheapest sequential plan that the satisficing search has found.
     known: Option<Int>,
 }
 
 enum Exact<'w> {
-    /// The search has not begun. Computing its heuristics may take longer than finding a plan.
+    /// Not started yet, because computing the heuristics may take longer than finding a plan.
     Later,
     Begun(Box<InterleavedSearch<'w, Int, Bounds>>),
     Over,
@@ -159,8 +163,9 @@ impl<'w> SequentialPlanner<'w> {
         Self { whole, limits, satisficer, exact: Exact::Later, stored: 0, known: None }
     }
 
-    /// Resumes both searches for the work of `situations` evaluations of the greedy search. Returns
-    /// the better of their executable plans.
+    /// Resumes both searches for the work that corresponds to `situations` evaluations of the
+    /// greedy temporal search. Returns the better of the plans that are executable in the temporal
+    /// task.
     pub(super) fn run(
         &mut self,
         of: (&TemporalTask, &Expansion<'_>),

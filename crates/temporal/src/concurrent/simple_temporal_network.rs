@@ -1,12 +1,12 @@
 //! The temporal part of a search node: an incrementally propagated simple temporal network \[1\].
 //!
 //! The times of a sequence of happenings and the constraints between them form a simple temporal
-//! network. Later happenings only add lower bounds: not before a time, and not within the
-//! separation of a time. The network therefore keeps, for each kind of access to each atom, only
-//! the latest time as a lower bound. Starts of running actions are *time points* that can still be
-//! delayed, together with the happenings that depend on them, so that an end meets its constraints.
-//! An end fixes its time point at the earliest possible time. Happenings that do not interfere are
-//! not ordered by their position in the sequence \[2\].
+//! network. Later happenings only add lower bounds: a time may not be before an earlier time, or
+//! must keep the separation from it. The network therefore keeps only the latest time of each kind
+//! of access to each atom. Starts of running actions are *time points* that can still be delayed,
+//! together with the happenings that depend on them, so that an end meets its constraints. An end
+//! fixes its time point at the earliest possible time. Happenings that do not interfere are not
+//! ordered by their position in the sequence \[2\].
 //!
 //! Times are sums over the happenings of a sequence: fewer than 2^32 terms, each below 2^91 (a
 //! duration plus the separation). Missing upper bounds (`Int::MAX`) take no part in arithmetic.
@@ -21,49 +21,51 @@ use task::number::{Int, dense};
 
 use crate::concurrent::time::{TimeExpression, TimePoint, place};
 
-/// A kind of access to an atom or a number.
+/// Id of an access kind: a way of accessing (such as read or delete) one atom, number or design.
 pub(super) type Key = u32;
 
-/// A running action. It starts `offset` after its time point.
+/// A running action. The action starts `offset` after its time point `float`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct RunningAction {
     pub(super) instance: u32,
     pub(super) float: TimePoint,
     pub(super) offset: Int,
     pub(super) duration: Int,
-    /// For an action whose condition over all several happenings can maintain jointly: time of the
-    /// last such happening.
+    /// Time of the last happening that wrote an atom or number in the condition over all of the
+    /// action, initially its start. `None` unless several happenings can maintain this condition
+    /// jointly.
     last: Option<TimeExpression>,
 }
 
 #[derive(Debug, Clone)]
 struct Start {
     lower: TimeExpression,
-    /// Upper bound on the start.
+    /// Upper bound on the time; `Int::MAX` if the time is unbounded.
     upper: Int,
 }
 
-/// The simple temporal network of a search node.
+/// The simple temporal network of a search node: the times that constrain future happenings.
 #[derive(Debug, Clone)]
 pub(super) struct SimpleTemporalNetwork {
-    /// Latest access per kind, sorted by key.
+    /// Time of the latest access of each kind, sorted by key.
     entries: Vec<(Key, TimeExpression)>,
-    /// Time at which each variable got its value, sorted by variable. Variables that kept their
-    /// initial value have no entry.
+    /// Time of the latest change of each variable, sorted by variable. Variables that never changed
+    /// have no entry.
     changed: Vec<(u32, TimeExpression)>,
     floats: Vec<Start>,
-    /// Sorted by instance; runs of one instance in the order of their starts, which is also the
-    /// order of their ends.
+    /// Running actions, sorted by instance. Runs of one instance are in the order of their starts,
+    /// which is also the order of their ends.
     opens: Vec<RunningAction>,
-    /// Time at which all further happenings take place until every condition over all holds again.
+    /// Time point and offset at which all further happenings take place until every condition over
+    /// all holds again. `None` if all these conditions hold.
     group: Option<(TimePoint, Int)>,
-    /// Time of the last happening; negative without happenings.
+    /// Time of the last happening; negative before the first one.
     latest: TimeExpression,
-    /// Time of the last timed initial literals; negative before the first ones.
+    /// Time of the last timed initial literals that were applied; negative before the first ones.
     floor: Int,
 }
 
-/// Kind of a happening: start, end, or both at once.
+/// Kind of a happening: start, end, or whole action.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
     Start,
@@ -71,35 +73,35 @@ pub(super) enum Kind {
     Whole,
 }
 
-/// Temporal constraints of a happening.
+/// Temporal constraints and accesses of a happening.
 pub(super) struct Happening<'h> {
     pub(super) kind: Kind,
     pub(super) instance: u32,
-    /// Duration of the instance, if it starts.
+    /// Duration of the instance in internal time units, if the happening is a start.
     pub(super) duration: Int,
-    /// Required distance after the last access of each kind.
+    /// Access kinds that the happening must follow, each with the required distance.
     pub(super) after: &'h [(Key, Int)],
     pub(super) marks: &'h [Key],
-    /// Whether the instance has a condition over all that several happenings can maintain jointly.
+    /// Whether several happenings can jointly maintain the condition over all of the instance.
     pub(super) joint: bool,
-    /// Returns `true` if the happening writes an atom or number that such a condition of the given
-    /// instance reads.
+    /// Returns `true` if the happening writes an atom or number in a condition over all that
+    /// several happenings can maintain jointly. The argument is the instance with this condition.
     pub(super) touches: &'h dyn Fn(u32) -> bool,
     /// Variables whose value changes.
     pub(super) changes: &'h [u32],
-    /// Whether every condition over all holds afterwards.
+    /// Whether every condition over all of a running action holds after the happening.
     pub(super) settled: bool,
 }
 
-/// Temporal constraints of timed initial literals.
+/// Temporal constraints and accesses of timed initial literals.
 pub(super) struct Event<'h> {
     pub(super) time: Int,
-    /// Required distance after the last access of each kind.
+    /// Access kinds that the literals must follow, each with the required distance.
     pub(super) after: &'h [(Key, Int)],
     pub(super) marks: &'h [Key],
     /// Variables whose value changes.
     pub(super) changes: &'h [u32],
-    /// Whether every condition over all holds afterwards.
+    /// Whether every condition over all of a running action holds after the literals.
     pub(super) settled: bool,
 }
 
@@ -114,12 +116,12 @@ impl SimpleTemporalNetwork {
         self.group.is_some()
     }
 
-    /// Number of runs of an instance that are running.
+    /// Number of simultaneous runs of an instance.
     pub(super) fn runs(&self, instance: u32) -> u32 {
         dense(self.opens.iter().filter(|open| open.instance == instance).count())
     }
 
-    /// Time of the last timed initial literals; negative before the first ones.
+    /// Time of the last timed initial literals that were applied; negative before the first ones.
     pub(super) fn floor(&self) -> Int {
         self.floor
     }
@@ -130,19 +132,20 @@ impl SimpleTemporalNetwork {
         self.opens.is_empty() && self.floor > self.latest()
     }
 
-    /// Returns `true` if future timed initial literals are far enough from the accesses that they
-    /// interfere with, provided that all happenings take place as early as possible.
+    /// Returns `true` if timed initial literals at `time` keep the distances in `after` from all
+    /// earlier accesses, provided that all happenings take place as early as possible.
     #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     pub(super) fn are_apart(&self, time: Int, after: &[(Key, Int)]) -> bool {
         after.iter().all(|(key, by)| self.entry(*key).is_none_or(|entry| entry.base + by <= time))
     }
 
-    /// Returns `true` if all happenings are at or before `time` and none of them can be delayed.
+    /// Returns `true` if all happenings take place at or before `time` and no delay of a running
+    /// action can delay them.
     pub(super) fn finishes_by(&self, time: Int) -> bool {
         self.latest.lags.is_empty() && self.latest() <= time
     }
 
-    /// Network without happenings.
+    /// Network without happenings: the initial network.
     pub(super) fn new() -> Self {
         Self {
             entries: Vec::new(),
@@ -166,8 +169,8 @@ impl SimpleTemporalNetwork {
         self.floats[place(open.float)].lower.base + open.offset
     }
 
-    /// Earliest possible time at which a variable got its value. Returns `None` if it still has its
-    /// initial value.
+    /// Earliest possible time of the latest change of a variable. Returns `None` if the variable
+    /// never changed.
     pub(super) fn changed(&self, variable: u32) -> Option<Int> {
         self.change(variable).map(|time| time.base)
     }
@@ -182,7 +185,8 @@ impl SimpleTemporalNetwork {
         Some(&self.entries[position].1)
     }
 
-    /// Network after a happening. Returns `None` if the constraints are inconsistent.
+    /// Returns the network after a further happening, or `None` if the constraints are
+    /// inconsistent.
     #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     pub(super) fn after(&self, happening: &Happening<'_>) -> Option<Self> {
         let mut next = self.clone();
@@ -226,8 +230,8 @@ impl SimpleTemporalNetwork {
         Some(next)
     }
 
-    /// Constrains the end of a running action, given by index, to follow the earlier accesses.
-    /// Returns `None` if that is inconsistent.
+    /// Constrains the end of the running action at `position` to keep the distances in `after` from
+    /// earlier accesses. Returns `None` if the network becomes inconsistent.
     #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     pub(super) fn expect_end(&mut self, position: usize, after: &[(Key, Int)]) -> Option<()> {
         let RunningAction { float, offset, duration, .. } = self.opens[position];
@@ -253,7 +257,8 @@ impl SimpleTemporalNetwork {
         }
     }
 
-    /// Time point for a happening not before `lower`: the time point of the group, or a new one.
+    /// Time point and offset for a happening not before `lower`. The pair is `group`, or a new time
+    /// point and 0. Returns `None` if the network becomes inconsistent.
     fn moment(&mut self, lower: TimeExpression, group: Option<(TimePoint, Int)>) -> Option<(TimePoint, Int)> {
         if let Some((float, offset)) = group {
             self.tighten_lower_bound(float, &lower, offset)?;
@@ -273,13 +278,14 @@ impl SimpleTemporalNetwork {
         self.opens.insert(position, RunningAction { instance, float, offset, duration, last: None });
     }
 
-    /// Time expression for `offset` after a time point.
+    /// Time expression for the time `offset` after a time point.
     fn at(&self, float: TimePoint, offset: Int) -> TimeExpression {
         let mut time = self.floats[place(float)].lower.shifted(offset);
         time.put_off_after(float, offset);
         time
     }
 
+    /// Records the accesses and changes of a happening that takes place at `time`.
     fn note(&mut self, happening: &Happening<'_>, time: &TimeExpression) {
         for key in happening.marks {
             match self.entries.binary_search_by_key(key, |(candidate, _)| *candidate) {
@@ -310,7 +316,7 @@ impl SimpleTemporalNetwork {
         }
     }
 
-    /// All time expressions except those of the time points.
+    /// All time expressions of the network except the lower bounds of time points.
     fn times(&mut self) -> impl Iterator<Item = &mut TimeExpression> {
         let entries = self.entries.iter_mut().map(|(_, time)| time);
         let changed = self.changed.iter_mut().map(|(_, time)| time);
@@ -318,8 +324,8 @@ impl SimpleTemporalNetwork {
         entries.chain(changed).chain(lasts).chain([&mut self.latest])
     }
 
-    /// Constrains `float + offset` to be at least `lower`, and propagates. Returns `None` if that
-    /// is inconsistent.
+    /// Constrains `float + offset` to be at least `lower`, and propagates. Returns `None` if the
+    /// network becomes inconsistent.
     #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     fn tighten_lower_bound(&mut self, float: TimePoint, lower: &TimeExpression, offset: Int) -> Option<()> {
         let mut bound = lower.shifted(-offset);
@@ -355,8 +361,8 @@ impl SimpleTemporalNetwork {
         self.propagate_upper_bounds()
     }
 
-    /// Propagates upper bounds backwards along lower bounds. Returns `None` if an upper bound falls
-    /// below a lower bound.
+    /// Propagates upper bounds of time points backwards along lower bounds. Returns `None` if an
+    /// upper bound falls below a lower bound.
     #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     fn propagate_upper_bounds(&mut self) -> Option<()> {
         for _ in 0..self.floats.len() {
@@ -371,8 +377,8 @@ impl SimpleTemporalNetwork {
         self.floats.iter().all(|start| start.lower.base <= start.upper).then_some(())
     }
 
-    /// Merges time point `float` into `other`, as `other + by`. Returns `None` if that is
-    /// inconsistent.
+    /// Replaces the time point `float` by `other + by` everywhere. Returns `None` if the network
+    /// becomes inconsistent.
     #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     fn merge_time_points(&mut self, float: TimePoint, other: TimePoint, by: Int) -> Option<()> {
         let Start { mut lower, upper } = self.floats[place(float)].clone();
@@ -407,8 +413,8 @@ impl SimpleTemporalNetwork {
         self.propagate_upper_bounds()
     }
 
-    /// Removes time points that no running action or group refers to, and renumbers the others in
-    /// the order of the running actions.
+    /// Removes time points that neither a running action nor the group refers to, and renumbers the
+    /// others in the order of the running actions.
     fn compact(&mut self) {
         let mut order: Vec<TimePoint> = Vec::new();
         for float in self.opens.iter().map(|open| open.float).chain(self.group.map(|(float, _)| float)) {
@@ -435,8 +441,9 @@ impl SimpleTemporalNetwork {
         self.group = self.group.map(|(float, offset)| (renumbered(float), offset));
     }
 
-    /// Network after timed initial literals: earlier happenings are not after them, later ones not
-    /// before. Returns `None` if that is inconsistent.
+    /// Returns the network after timed initial literals. Earlier happenings must take place no
+    /// later than the literals, and later happenings no earlier. Returns `None` if the network
+    /// becomes inconsistent.
     #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     pub(super) fn timed(&self, event: &Event<'_>) -> Option<Self> {
         let mut next = self.clone();
@@ -473,7 +480,8 @@ impl SimpleTemporalNetwork {
         Some(next)
     }
 
-    /// Constrains a time to be at most `moment`. Returns `None` if that is inconsistent.
+    /// Constrains `time` to be at most `moment`. Returns `None` if the earliest value is already
+    /// later.
     #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     fn bound(&mut self, time: &TimeExpression, moment: Int) -> Option<()> {
         for (float, lag) in &time.lags {

@@ -1,4 +1,4 @@
-//! The result of a search as a solution: the plan in names, or none.
+//! Converts the result of a search to a solution, with the plan in PDDL names.
 
 use std::collections::VecDeque;
 
@@ -15,7 +15,7 @@ use crate::concurrent::search::Sequence;
 use crate::concurrent::search_log::Record;
 use crate::concurrent::temporal_task::TemporalTask;
 
-/// Solution without a plan.
+/// Solution without a plan, with the given status and proof and the statistics of the run.
 pub(super) fn ended(status: Status, proof: Option<Proof>, record: Record<'_>) -> Solution {
     Solution {
         status,
@@ -29,7 +29,7 @@ pub(super) fn ended(status: Status, proof: Option<Proof>, record: Record<'_>) ->
     }
 }
 
-/// Plan with names, sorted by the starts of its actions.
+/// Converts a sequence of happenings to a plan with PDDL names. The steps are sorted by start time.
 pub(super) fn in_names(concurrent: &TemporalTask, sequence: &Sequence) -> Plan {
     let durations = schedule::durations(concurrent, &sequence.happenings);
     let times = schedule::schedule(concurrent, &sequence.happenings, &sequence.together, &durations);

@@ -1,4 +1,4 @@
-//! The PDDL task of a temporal task, from which sequential plans are computed.
+//! PDDL domain and problem of a temporal task, kept for the computation of sequential plans.
 
 use std::sync::Arc;
 
@@ -6,15 +6,16 @@ use pddl::ast::{Domain, Problem};
 
 use task::ground::GroundConfig;
 
-/// Maximum number of initial facts and values of a problem that is kept.
+/// Upper limit on the number of initial facts and values of a kept problem.
 const MAX_INITIAL_FACTS: usize = 20_000;
 
-/// The files of a task.
+/// PDDL domain, problem and grounding options of a temporal task.
 #[derive(Debug, Clone)]
 pub(super) struct SourceTask(Arc<(Domain, Problem, GroundConfig)>);
 
 impl SourceTask {
-    /// Clones the files. Returns `None` if the problem has too many initial elements.
+    /// Clones the domain, problem and options. Returns `None` if the problem exceeds
+    /// [`MAX_INITIAL_FACTS`].
     pub(super) fn new(domain: &Domain, problem: &Problem, config: &GroundConfig) -> Option<Self> {
         let is_small = problem.init.len() <= MAX_INITIAL_FACTS;
         is_small.then(|| Self(Arc::new((domain.clone(), problem.clone(), config.clone()))))

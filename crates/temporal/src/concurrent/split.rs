@@ -1,8 +1,8 @@
 //! Splits durative actions into starts and ends: a lifted task in which each schema is a single happening.
 //!
-//! A durative action becomes two instantaneous ones, the *snap actions* of Fox and Long \[1\],
-//! joined by an atom that holds while the instance runs. Its condition over all becomes a third
-//! schema that never happens; the condition is checked while the instance runs. An instance of
+//! A durative action becomes two instantaneous operators, the *snap actions* of Fox and Long \[1\].
+//! An atom that holds while the action runs links both. The condition over all becomes a third
+//! schema that never happens; the search checks its condition while the action runs. An action of
 //! duration 0 is one happening without a condition over all. Timed initial literals become a
 //! sequence of schemas without parameters.
 //!
@@ -20,56 +20,61 @@ use task::number::dense;
 use crate::concurrent::duration_fluents::{Timer, depends_on_state};
 use pddl::ast::{Comparison, Name, Span};
 
-/// Part of an action that a schema of the split task represents.
+/// Part of an action of the domain that a schema of the split task represents.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Half {
     Start,
-    /// No happening: the condition over all.
+    /// The condition over all; no happening.
     OverAll,
     End,
-    /// The whole action: an instantaneous action, or one of duration 0.
+    /// The whole action: instantaneous or of duration 0.
     Whole,
-    /// Timed initial literals, by index.
+    /// Timed initial literals with this index in [`Split::events`].
     Timed(usize),
-    /// No happening: makes every value of a chosen duration reachable.
+    /// Auxiliary operator that makes every value of a chosen duration reachable in the relaxed
+    /// task; no happening.
     Choice,
-    /// No happening: a condition on the trajectory of a plan.
+    /// Preference or trajectory constraint, checked on a plan; no happening.
     Judge,
 }
 
-/// Prefix of atoms that mark running instances. No name in a file contains a parenthesis.
+/// Prefix of the names of atoms that mark running actions. Names in PDDL files contain no
+/// parentheses, so no clash is possible.
 pub(super) const UNDER_WAY: &str = "((running) ";
 
-/// Origin of a schema of the split task.
+/// Origin of a schema of the split task: a schema of the domain and its part.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Origin {
-    /// Schema of the domain; meaningless for timed initial literals.
+    /// Index of the schema of the domain; `usize::MAX` for timed initial literals.
     pub(super) schema: usize,
     pub(super) half: Half,
 }
 
-/// A lifted task that is split into happenings.
+/// A lifted task whose schemas are happenings, with the data to relate them to the original
+/// actions.
 pub(super) struct Split {
     pub(super) lifted: Lifted,
-    /// Schemas of the domain.
+    /// Schemas of the original domain.
     pub(super) schemas: Vec<Schema>,
     /// Origin of each schema of the split task.
     pub(super) origins: Vec<Origin>,
-    /// The design parameters of each schema of the split task.
+    /// Design parameters of each schema of the split task.
     pub(super) designs: Vec<Vec<SlotParameter>>,
     pub(super) events: Vec<Event>,
-    /// Functions that hold durations.
+    /// Functions that hold durations that depend on the state or are chosen.
     pub(super) durations: Vec<FunctionId>,
     /// Per schema of the domain: whether the planner chooses its duration.
     pub(super) chosen: Vec<bool>,
-    /// Per schema of the domain: divisor of the number that holds its duration.
+    /// Per schema of the domain: static divisor of its duration. The duration is the number that
+    /// holds it, divided by this value.
     pub(super) divisors: Vec<Option<Expression>>,
-    /// Whether no duration was fixed although another one could be better.
+    /// Whether no duration was fixed although another duration could be better.
     pub(super) is_exact: bool,
 }
 
-/// Splits a task into happenings. `solves` names the predicates that say which design solves which
-/// function. `mentions` returns `true` if the end of the action at an index mentions `?duration`.
+/// Splits a task into happenings. `solves` names the predicates that relate designs to the
+/// functions that they solve. `mentions` returns `true` if the end effects of the action with a
+/// given index mention `?duration`.
 pub(super) fn split(mut lifted: Lifted, solves: &[Name], mentions: &dyn Fn(u32) -> bool) -> Split {
     let mut schemas = std::mem::take(&mut lifted.schemas);
     let (mut durations, mut divisors, mut chosen) = (Vec::new(), Vec::new(), Vec::new());
@@ -77,9 +82,9 @@ pub(super) fn split(mut lifted: Lifted, solves: &[Name], mentions: &dyn Fn(u32) 
     let (mut origins, mut designs) = (Vec::new(), Vec::new());
     let waited = lifted.time.waited;
     if !events.is_empty() {
-        // A plan must end with the end of an action, not with a timed initial literal: literals
-        // after time 0 add `waited`, and ends delete it. An action without effects may therefore be
-        // useful, because it extends the plan beyond a literal.
+        // A plan must end with the end of an action, not with a timed initial literal. The literals
+        // after time 0 therefore add `waited`, and ends delete it. An action without effects may
+        // thus be useful to extend the plan beyond a literal.
         let done = Formula::Literal { positive: false, predicate: waited, terms: Vec::new() };
         let goal = std::mem::replace(&mut lifted.goal, Formula::truth());
         lifted.goal = Formula::And(vec![goal, done]);
@@ -124,7 +129,7 @@ fn literal(predicate: PredicateId, terms: &[Term]) -> Formula {
     Formula::Literal { positive: true, predicate, terms: terms.to_vec() }
 }
 
-/// Happenings of a schema.
+/// Splits a schema into its happenings and auxiliary operators.
 fn parts(lifted: &mut Lifted, schema: &Schema, timer: Option<&Timer>) -> Vec<(Half, Schema)> {
     let instantaneous = |condition: Vec<Formula>, effects: Vec<Effect>| Schema {
         start_condition: Formula::And(condition),
@@ -191,13 +196,14 @@ fn parts(lifted: &mut Lifted, schema: &Schema, timer: Option<&Timer>) -> Vec<(Ha
     happenings
 }
 
-/// Static conjuncts of some conditions.
+/// Static conjuncts of the conditions.
 fn settled_of(lifted: &Lifted, conditions: &[Formula]) -> Vec<Formula> {
     let conjuncts_of_all = conditions.iter().flat_map(conjuncts);
     conjuncts_of_all.filter(|conjunct| is_static(lifted, conjunct)).cloned().collect()
 }
 
-/// Schema of timed initial literals at one time, after those of earlier times.
+/// Schema of the timed initial literals of one event. The phase atoms enforce the order of the
+/// events.
 #[expect(clippy::arithmetic_side_effects, reason = "phases are objects, which are held in memory")]
 fn timed(lifted: &Lifted, index: u32, event: &Event) -> Schema {
     let phase = |number: u32| vec![Term::Object(ObjectId(lifted.time.first_phase.0 + number))];
@@ -237,7 +243,7 @@ fn timed(lifted: &Lifted, index: u32, event: &Event) -> Schema {
     }
 }
 
-/// Declares a new predicate; `running` if it marks running instances.
+/// Declares a new predicate. `running` is set for predicates that mark running actions.
 fn symbol(lifted: &mut Lifted, name: &str, arity: usize, running: bool) -> PredicateId {
     let id = PredicateId(dense(lifted.predicates.len()));
     let name = Name::new(name);

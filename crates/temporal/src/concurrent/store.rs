@@ -1,8 +1,8 @@
 //! Packed temporal states of the exact search.
 //!
-//! Finite-domain values take as many bits as they need, and times as many bytes. States that can
-//! dominate each other share a *place*: the state, the running actions, and the numbers that are
-//! not comparable.
+//! Finite-domain values take as many bits as they need, and times as many bytes. A *place* groups
+//! the states that may dominate each other: states with the same values and running actions and,
+//! unless larger numbers are never worse, the same numbers.
 
 use std::hash::{Hash, Hasher};
 
@@ -15,23 +15,23 @@ use crate::concurrent::simple_temporal_network::SimpleTemporalNetwork;
 use crate::concurrent::successors::TemporalState;
 use crate::concurrent::temporal_task::TemporalTask;
 
-/// Position of a finite-domain variable in a packed key.
+/// Position of a finite-domain variable in a packed key: word, and bits within the word.
 struct Field {
     word: usize,
     shift: u32,
     mask: u32,
 }
 
-/// Parent link of a node.
+/// Parent link of a search node: the step that created the node.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Origin {
     pub(super) parent: u32,
     pub(super) operator: OperatorId,
-    /// Whether the end of the action was applied as well.
+    /// Whether the same step also applied the end of the started action.
     pub(super) compressed: bool,
-    /// Whether the happening takes place at the time of the previous one.
+    /// Whether the happening takes place at the same time as the previous one.
     pub(super) together: bool,
-    /// Number of happenings from the root.
+    /// Number of happenings on the path from the root.
     pub(super) depth: u32,
 }
 
@@ -48,18 +48,18 @@ struct Node {
 
 struct Place {
     key: Box<[u32]>,
-    /// Nodes that no other node of the place dominates.
+    /// Nodes of this place that no other node of the place dominates.
     front: Vec<u32>,
 }
 
-/// Packs temporal states.
+/// Packs temporal states into compact form and unpacks them.
 pub(super) struct Packing<'a> {
     concurrent: &'a TemporalTask,
     fields: Vec<Field>,
     width: usize,
 }
 
-/// A packed temporal state.
+/// A temporal state in packed form: values, numbers, temporal network and cost.
 pub(super) struct PackedNode {
     values: Box<[u32]>,
     numbers: Box<[Int]>,
@@ -75,17 +75,17 @@ impl PackedNode {
     }
 }
 
-/// Registry of packed temporal states.
+/// Registry of packed temporal states, with detection of dominated states.
 pub(super) struct Store<'a> {
     concurrent: &'a TemporalTask,
     packing: Packing<'a>,
-    /// Whether more of a number is never worse.
+    /// Whether a larger value of a number is never worse.
     monotone: bool,
     places: Vec<Place>,
     table: HashTable<u32>,
     nodes: Vec<Node>,
     bytes: usize,
-    /// Number of pairs of nodes that were compared.
+    /// Number of pairs of nodes that were compared for dominance.
     pub(super) compared: usize,
 }
 
@@ -121,7 +121,7 @@ impl<'a> Packing<'a> {
         words
     }
 
-    /// State with these values and numbers.
+    /// Rebuilds a state from packed values and numbers, and derives the derived variables.
     fn state(&self, words: &[u32], numbers: &[Int]) -> State {
         let task = &self.concurrent.task;
         let mut values = task.initial.values.clone();
@@ -176,7 +176,8 @@ impl<'a> Store<'a> {
         self.nodes[id as usize].origin
     }
 
-    /// Adds a temporal state. Returns `None` if a stored node dominates it.
+    /// Adds a temporal state, and returns its node id. Returns `None` if a stored node dominates
+    /// the state. Stored nodes that the new state dominates are marked as dominated.
     pub(super) fn add(&mut self, situation: &TemporalState, origin: Option<Origin>) -> Option<u32> {
         let key = self.key(situation);
         let hash = hash_of(&key);
@@ -226,14 +227,15 @@ impl<'a> Store<'a> {
         Some(id)
     }
 
-    /// Temporal state of a node that is not dominated.
+    /// Unpacks the temporal state of a node. The node must not be dominated, because the networks
+    /// of dominated nodes are discarded.
     pub(super) fn situation(&self, id: u32) -> TemporalState {
         let node = &self.nodes[id as usize];
         let state = self.packing.state(&self.places[node.place as usize].key, &node.numbers);
         TemporalState { state, clocks: SimpleTemporalNetwork::unpack(&node.clocks), cost: node.cost }
     }
 
-    /// Key of a place: the parts that must be equal for one state to dominate another one.
+    /// Key of a place: the parts of a state that must be equal for dominance between two states.
     fn key(&self, TemporalState { state, clocks, .. }: &TemporalState) -> Vec<u32> {
         let mut key = self.packing.values(state);
         clocks.signature(&mut key);
@@ -243,14 +245,14 @@ impl<'a> Store<'a> {
         key
     }
 
-    /// Returns `true` if a node dominates a temporal state of the same place.
+    /// Returns `true` if a stored node dominates a new temporal state of the same place.
     fn dominates(&self, node: &Node, TemporalState { state, clocks, cost }: &TemporalState) -> bool {
         let (guards, separation) = (&self.concurrent.guards, self.concurrent.separation);
         node.cost <= *cost
             && node.latest <= clocks.latest()
             && node.numbers.iter().zip(&state.numbers).all(|(stored, new)| stored >= new)
             && {
-                // Most comparisons are decided by the head, so the accesses are unpacked only if
+                // The head decides most comparisons, so the access times are unpacked only if
                 // necessary.
                 let mut head = SimpleTemporalNetwork::unpack_head(&node.clocks);
                 head.clocks.dominates_ignoring_accesses(clocks) && {
@@ -260,7 +262,7 @@ impl<'a> Store<'a> {
             }
     }
 
-    /// Returns `true` if a temporal state dominates a node of the same place.
+    /// Returns `true` if a new temporal state dominates a stored node of the same place.
     fn is_worse(&self, node: &Node, TemporalState { state, clocks, cost }: &TemporalState) -> bool {
         let (guards, separation) = (&self.concurrent.guards, self.concurrent.separation);
         node.cost >= *cost

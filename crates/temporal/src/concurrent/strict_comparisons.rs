@@ -1,11 +1,12 @@
-//! Detects strict comparisons with fluents in a lifted task.
+//! Detection of strict comparisons (`<`, `>`) of fluents in a lifted task.
 
 use task::lifted::{Formula, Lifted};
 
 use crate::concurrent::duration_fluents::depends_on_state;
 use pddl::ast::Comparison;
 
-/// Returns `true` if a comparison of fluents is strict.
+/// Returns `true` if a condition, axiom or goal contains a strict comparison with an expression
+/// that depends on the state.
 pub(super) fn compares_strictly(lifted: &Lifted) -> bool {
     let schemas = lifted.schemas.iter().flat_map(|schema| {
         let effects = schema.start_effects.iter().chain(&schema.end_effects);

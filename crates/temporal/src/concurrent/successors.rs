@@ -1,4 +1,5 @@
-//! Successors of a temporal state: one happening, or the start and the end of an action at once.
+//! Successors of a temporal state: by one happening, or by the start and the end of an action in
+//! one step.
 
 use search::search::successor_generator::SuccessorGenerator;
 use task::number::Int;
@@ -9,33 +10,34 @@ use crate::concurrent::interference::InterferenceConstraints;
 use crate::concurrent::simple_temporal_network::{self, Kind, SimpleTemporalNetwork};
 use crate::concurrent::temporal_task::TemporalTask;
 
-/// Limit on the number of simultaneous runs of an instance that are searched if the number of
-/// useful runs is bounded; `UNBOUNDED_RUNS` if it is not.
+/// Limit on searched simultaneous runs of an instance if the number of useful runs is bounded.
 const MAX_PARALLEL_RUNS: u32 = 16;
+/// Limit on searched simultaneous runs of an instance if no bound on the number of useful runs is
+/// known.
 const UNBOUNDED_RUNS: u32 = 4;
 
-/// State after a sequence of happenings.
+/// State after a sequence of happenings, with the temporal network of the sequence.
 #[derive(Debug, Clone)]
 pub(super) struct TemporalState {
     pub(super) state: State,
     pub(super) clocks: SimpleTemporalNetwork,
-    /// Cost in the task's cost unit.
+    /// Sum of the costs of the happenings, in the task's cost unit.
     pub(super) cost: Int,
 }
 
-/// Reason for rejecting a happening.
+/// Reason why a happening has no successor state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum DeadEnd {
-    /// It is not applicable.
+    /// The happening is not applicable, or its temporal constraints are inconsistent.
     Impossible,
-    /// Timed initial literals come first.
+    /// Timed initial literals must take place before the happening.
     TooLate,
-    /// Numbers overflow, or there are too many runs of an instance or runs of different duration.
-    /// The search becomes incomplete.
+    /// Numbers overflow, or an instance has too many simultaneous runs or simultaneous runs of
+    /// different durations. Discarding such a successor makes the search incomplete.
     Unfit,
 }
 
-/// Successor function of the temporal state space.
+/// Successor function of the temporal state space: applicable happenings and resulting states.
 pub(super) struct Expansion<'a> {
     concurrent: &'a TemporalTask,
     index: SuccessorGenerator,
@@ -59,8 +61,8 @@ impl<'a> Expansion<'a> {
         }
     }
 
-    /// Candidate happenings: starts whose propositional condition holds, and ends of running
-    /// actions.
+    /// Candidate happenings: starts, instantaneous actions and timed initial literals whose
+    /// propositional condition holds, and ends of running actions.
     pub(super) fn candidates(&self, situation: &TemporalState) -> Vec<OperatorId> {
         let mut next = self.starts(&situation.state);
         let mut opens: Vec<u32> = situation.clocks.opens().iter().map(|open| open.instance).collect();
@@ -69,22 +71,22 @@ impl<'a> Expansion<'a> {
         next
     }
 
-    /// Happenings other than ends whose propositional condition holds.
+    /// Candidate happenings other than ends: those whose propositional condition holds.
     pub(super) fn starts(&self, state: &State) -> Vec<OperatorId> {
         self.index.applicable(&self.concurrent.task, state)
     }
 
-    /// Next timed initial literals.
+    /// Time and operator of the next timed initial literals. Returns `None` if none are pending.
     pub(super) fn next_event(&self, clocks: &SimpleTemporalNetwork) -> Option<(Int, OperatorId)> {
         let events = &self.concurrent.events;
         events.get(events.partition_point(|(time, _)| *time <= clocks.floor())).copied()
     }
 
-    /// Returns `true` if a plan can end here.
+    /// Returns `true` if a plan can end in this temporal state.
     pub(super) fn is_goal(&self, TemporalState { state, clocks, .. }: &TemporalState) -> bool {
         let concurrent = self.concurrent;
-        // All events up to the end of the plan have taken place, none after it has, and those that
-        // follow keep the separation.
+        // All timed initial literals up to the end of the plan have taken place, no later ones
+        // have, and the later ones keep the separation.
         let mut to_come = concurrent.events.iter().filter(|(time, _)| *time > clocks.floor());
         let is_apart = |(time, event): &(Int, OperatorId)| {
             let after = &concurrent.happenings[event.index()].accesses.after;
@@ -97,10 +99,11 @@ impl<'a> Expansion<'a> {
             && to_come.all(is_apart)
     }
 
-    /// Successor of a state by a happening, and whether the end of its action was applied as well.
-    /// An end is applied together with its start if that preserves completeness. A plan may have to
-    /// wait with its last end for timed initial literals, so compression can lose plans while some
-    /// are pending, unless `exact` is set.
+    /// Returns the successor of a state by a happening, and whether the end of the started action
+    /// was applied as well. An end is applied together with its start if this preserves
+    /// completeness. A plan may have to delay its last end until timed initial literals have taken
+    /// place. While some are pending, start and end are therefore combined only if `exact` is not
+    /// set.
     pub(super) fn after(
         &self,
         situation: &TemporalState,
@@ -118,8 +121,9 @@ impl<'a> Expansion<'a> {
         Ok(if in_time && !ended.clocks.unsettled() { (ended, true) } else { (after_start, false) })
     }
 
-    /// End that directly follows a start. Only for the first run of an instance, because the first
-    /// run also ends first.
+    /// Returns the end to apply directly after a start, or `None` if the start and the end are
+    /// separate steps. Only the first run of an instance qualifies, because the first run also ends
+    /// first.
     fn compressed(
         &self,
         before: &TemporalState,
@@ -132,7 +136,7 @@ impl<'a> Expansion<'a> {
         (is_first && instance.compressible && !started.clocks.unsettled()).then_some(instance.end)
     }
 
-    /// Successor of a state by one happening.
+    /// Returns the successor of a state by one happening.
     pub(super) fn step(
         &self,
         situation: &TemporalState,
@@ -163,7 +167,7 @@ impl<'a> Expansion<'a> {
             return Err(DeadEnd::Unfit);
         }
         let mut after = concurrent.task.successor(operator, state, &[]).ok_or(DeadEnd::Unfit)?;
-        // The run changes nothing, so the plan is as good without it.
+        // The run changes nothing, so the plan without the run is as good.
         if kind == Kind::End && counts_by_end && after == *state {
             return Err(DeadEnd::Impossible);
         }
@@ -209,7 +213,8 @@ impl<'a> Expansion<'a> {
             let after = &concurrent.happenings[running.end.index()].accesses.after;
             clocks.expect_end(position, after).ok_or(DeadEnd::Impossible)?;
         }
-        // No happening can come after later happenings of the sequence.
+        // Happenings that the network places after the next event must not precede it in the
+        // sequence.
         if self.next_event(&clocks).is_some_and(|(time, _)| clocks.latest() > time) {
             return Err(DeadEnd::TooLate);
         }
@@ -218,7 +223,7 @@ impl<'a> Expansion<'a> {
         Ok(TemporalState { state: after, clocks, cost })
     }
 
-    /// Returns `true` if a running action uses a function with another design.
+    /// Returns `true` if a running action uses a function of the happening with another design.
     fn clashes(&self, clocks: &SimpleTemporalNetwork, happening: &Happening) -> bool {
         happening.designs.iter().any(|(function, design)| {
             clocks.opens().iter().any(|open| {

@@ -1,10 +1,10 @@
 //! Delete relaxation of the split task: rules from conditions to effects.
 //!
 //! Each start, end and instantaneous action becomes a rule, as in the relaxed planning graphs of
-//! CRIKEY \[1\]. That an instance runs is a fact that its start adds and its end requires, so
-//! required concurrency is visible. An end requires the condition over all as well. A numeric
-//! condition needs as many applications of a rule as its amount \[2\]; a condition on a duration
-//! that the planner chooses always holds.
+//! CRIKEY \[1\]. A start adds the fact that its action runs, and the end requires this fact, so
+//! required concurrency is visible. An end also requires the condition over all. A numeric
+//! condition needs enough applications of rules to reach its amount \[2\]; a condition on a
+//! duration that the planner chooses always holds.
 //!
 //! \[1\] A. Coles, M. Fox, D. Long, A. Smith: Planning with problems requiring temporal
 //! coordination, AAAI 2008.
@@ -21,26 +21,27 @@ use crate::concurrent::happening::Role;
 use crate::concurrent::rule::{NumericEffect, Proposition, Rule};
 use crate::concurrent::temporal_task::TemporalTask;
 
-/// A linear expression that must be at least 0.
+/// A numeric condition: a linear expression that must be at least 0, and its proposition.
 #[derive(Debug, Clone)]
 pub(super) struct Numeric {
     pub(super) linear: Linear<Int>,
     pub(super) proposition: Proposition,
 }
 
-/// The delete relaxation of a temporal task.
+/// The delete relaxation of a temporal task, as lists indexed by rule or proposition.
 pub(super) struct TemporalRelaxation {
-    /// Proposition of each variable's first value.
+    /// Proposition of the first value of each variable; the other values have the following
+    /// numbers.
     pub(super) first: Vec<Proposition>,
     pub(super) propositions: usize,
     /// Conditions of each rule, ascending.
     pub(super) needs: Lists,
     /// Number of conditions of each rule.
     pub(super) unmet: Vec<u32>,
-    /// Rules without conditions.
+    /// Indices of the rules without conditions.
     pub(super) free: Vec<u32>,
     pub(super) adds: Lists,
-    /// Numeric conditions that each rule increases.
+    /// Numeric conditions that each rule increases, with the amounts.
     pub(super) raises: Vec<Box<[NumericEffect]>>,
     /// Weight of each rule in a relaxed plan.
     pub(super) weights: Vec<u32>,
@@ -51,16 +52,16 @@ pub(super) struct TemporalRelaxation {
     pub(super) numeric: Vec<Numeric>,
     /// Conditions of the goal, ascending.
     pub(super) goal: Vec<Proposition>,
-    /// Rule of the end of each instance.
+    /// Index of the rule for the end of each instance.
     pub(super) ends: Vec<u32>,
-    /// Initial values of derived variables.
+    /// Propositions of the initial values of derived variables.
     pub(super) defaults: Vec<Proposition>,
     pub(super) conjunctions: Vec<Conjunction>,
 }
 
 struct RelaxationBuilder<'a> {
     task: &'a Task,
-    /// Numbers that hold chosen durations.
+    /// Numbers that hold durations chosen by the planner.
     chosen: FxHashSet<NumericId>,
     first: Vec<Proposition>,
     propositions: u32,
@@ -151,6 +152,8 @@ impl<'a> RelaxationBuilder<'a> {
         self.propositions - 1
     }
 
+    /// Propositions of the facts, clauses and comparisons of a condition, ascending. Comparisons
+    /// with chosen durations are omitted.
     fn needs(&mut self, condition: &Condition) -> Vec<Proposition> {
         let mut needs: Vec<_> = condition.facts.iter().map(|fact| self.fact(*fact)).collect();
         for clause in &condition.clauses {
@@ -167,7 +170,8 @@ impl<'a> RelaxationBuilder<'a> {
         needs
     }
 
-    /// Proposition that holds if any of the literals does.
+    /// Proposition that holds if any of the literals holds. Creates the proposition and its rules
+    /// on first use.
     fn clause(&mut self, literals: &[Literal]) -> Proposition {
         if let Some(clause) = self.clauses.get(literals) {
             return *clause;
@@ -201,8 +205,8 @@ impl<'a> RelaxationBuilder<'a> {
             Role::Timed(_) => 0,
             Role::Whole => 1,
             Role::Start(instance) => {
-                // The condition over all must hold before the start, except for facts that the
-                // start adds. Only simultaneous happenings could establish it otherwise.
+                // The facts of the condition over all that the start does not set must already hold
+                // before the start. Only simultaneous happenings could establish them otherwise.
                 let over_all = concurrent.instances[instance as usize].over_all;
                 let required =
                     over_all.into_iter().flat_map(|id| &self.task.operators[id.index()].condition.facts);
@@ -240,7 +244,8 @@ impl<'a> RelaxationBuilder<'a> {
         self.rules.extend(conditional);
     }
 
-    /// Adds conjunctions for facts that no action restores.
+    /// Adds a conjunction for each pair of facts selected by [`add_conjunctions`], and rewrites
+    /// `goal` to use these conjunctions.
     fn conjoin(&mut self, concurrent: &TemporalTask, goal: &mut Vec<Proposition>) -> Vec<Conjunction> {
         let ends =
             |first: Proposition, variable: &Variable| first.saturating_add(dense(variable.values.len()));
@@ -250,8 +255,8 @@ impl<'a> RelaxationBuilder<'a> {
             .zip(&self.task.variables)
             .map(|(first, variable)| *first..ends(*first, variable));
         let mut variables: Vec<_> = ranges.take(self.task.basic).collect();
-        // Effects that mark an instance as no longer running are implicit, so these variables are
-        // excluded.
+        // The task has no explicit effects that mark an instance as no longer running, so these
+        // variables are excluded.
         for fact in concurrent.instances.iter().filter_map(|instance| instance.under_way) {
             variables[fact.variable.index()].start = variables[fact.variable.index()].end;
         }
@@ -259,7 +264,7 @@ impl<'a> RelaxationBuilder<'a> {
         add_conjunctions(&mut Scope { rules, goal, variables: &variables, propositions })
     }
 
-    /// Determines which rules increase which numeric conditions.
+    /// Determines the numeric conditions that each rule increases, with the amounts.
     fn raise(&mut self, task: &Task) {
         let mut mentioning: FxHashMap<u32, Vec<u32>> = FxHashMap::default();
         for (index, numeric) in (0..).zip(&self.numeric) {
@@ -284,7 +289,8 @@ impl<'a> RelaxationBuilder<'a> {
     }
 }
 
-/// Amount that an operator adds to a linear expression. Returns `None` if it depends on the state.
+/// Amount that an operator adds to a linear expression. Returns `None` if the amount depends on the
+/// state.
 fn difference(linear: &Linear<Int>, operator: &Operator) -> Option<Int> {
     let mut sum: Int = 0;
     for effect in &operator.numeric_effects {

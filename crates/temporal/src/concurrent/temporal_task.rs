@@ -1,4 +1,5 @@
-//! The temporal task: happenings with paired starts and ends, their constraints, and integer times.
+//! The ground temporal task: happenings, pairs of starts and ends, interference constraints, and
+//! integer times.
 
 use std::collections::BTreeMap;
 
@@ -24,41 +25,42 @@ use crate::concurrent::source_task::SourceTask;
 use crate::concurrent::split::{Half, Split};
 use crate::concurrent::unit::{LIMIT as TIME_LIMIT, Unit};
 
-/// A ground task whose actions can overlap.
+/// A ground task whose actions can overlap in time.
 #[derive(Debug, Clone)]
 pub struct TemporalTask {
     pub(crate) task: Task,
-    /// By operator.
+    /// Temporal properties of each operator, by operator id.
     pub(super) happenings: Vec<Happening>,
     pub(super) instances: Vec<Instance>,
-    /// Timed initial literals, sorted by time.
+    /// Times of the timed initial literals in internal units and their operators, ascending.
     pub(super) events: Vec<(Int, OperatorId)>,
-    /// Per kind of access: a variable whose change shows that earlier accesses of this kind are
-    /// past, because everything that waits for such accesses reads its current value.
+    /// Per access key: a variable whose latest change shows that all earlier accesses of this kind
+    /// are past. Every happening that waits for such an access, except timed initial literals,
+    /// requires a value of this variable.
     pub(super) guards: Vec<Option<u32>>,
     pub(super) measure: Measure,
-    /// Per preference that can be violated: operators one of which is applicable in the final state
-    /// if the preference is violated. They are never part of a plan.
+    /// Per preference that can be violated: operators of which at least one is applicable in the
+    /// final state if the preference is violated. These operators never occur in a plan.
     pub(super) violations: Vec<Vec<OperatorId>>,
-    /// Deadlines of hard and soft trajectory constraints.
+    /// Deadlines of hard and soft trajectory constraints, checked on complete plans.
     pub(super) deadlines: Vec<Deadline>,
-    /// Whether the search covers every plan with all its possible times.
+    /// Whether the search covers every plan with all its possible times, so that exhausting the
+    /// search is a proof.
     pub(super) is_exact: bool,
-    /// Whether the lower bounds of the search hold for every plan. If not, the only known bound is
-    /// that costs and times are not negative.
+    /// Whether the heuristic lower bounds hold for every plan. If not, 0 is the only lower bound.
     pub(super) is_bounded: bool,
-    /// Whether the search minimises the whole metric.
+    /// Whether the search minimises the whole metric, not only a part.
     pub(super) is_whole: bool,
-    /// Least distance between interfering happenings, in the task's time unit.
+    /// Least distance between interfering happenings, in internal time units.
     pub(super) separation: Int,
-    /// Variant of the task with minimal durations, if durations are chosen and the variant is
-    /// supported.
+    /// Variant of the task in which chosen durations are minimal. `None` if no duration is chosen
+    /// or the variant is not supported.
     pub(super) shortest: Option<Box<Self>>,
-    /// Source files, if sequential plans may be searched as well.
+    /// PDDL files of the task, if sequential plans may be searched as well.
     pub(super) kept: Option<SourceTask>,
 }
 
-/// Computes the happenings of a split ground task.
+/// Builds the temporal task from a ground split task.
 pub(super) fn compile(
     mut task: Task,
     split: &Split,
@@ -68,7 +70,7 @@ pub(super) fn compile(
     limits: &Limits,
 ) -> Result<TemporalTask, Errors> {
     let to_errors = |error| vec![error];
-    // Interruption is checked here per operator, so the inner computation needs no limits.
+    // The loops below check for interruption, so the builder's own computations need no limits.
     let unlimited = Limits::none();
     let mut builder = Builder::new(split, reached, &unlimited);
     let context = Context::new(&task, limits);
@@ -129,9 +131,10 @@ pub(super) fn compile(
     Ok(concurrent)
 }
 
-/// Makes the next run of an instance wait for the end of the previous one, unless simultaneous runs
-/// can be useful. For those, ends neither clear the fact that the instance is running nor its
-/// duration. Returns the number of kinds of access.
+/// Makes each run of an instance wait for the end of its previous run, unless simultaneous runs can
+/// be useful. For instances with useful simultaneous runs, removes the end effects that clear the
+/// running fact and the duration, because only the end of the last run clears them. Returns the new
+/// number of access keys.
 fn keep_runs_apart(
     task: &mut Task,
     instances: &[Instance],
@@ -156,11 +159,11 @@ fn keep_runs_apart(
 }
 
 impl TemporalTask {
-    /// Computes the guards of accesses and the variables that happenings set.
+    /// Computes `guards`, and the variables that each happening sets.
     fn guard(&mut self, limits: &Limits) -> Result<(), Interrupted> {
         let mut common: Vec<Option<Vec<u32>>> = vec![None; self.guards.len()];
-        // A run may end before another run that precedes it in the sequence has begun, so these
-        // variables are no guards.
+        // A run may end before another run that precedes it in the sequence has begun, so facts of
+        // running instances are no guards.
         let under_way: FxHashSet<VariableId> =
             self.instances.iter().filter_map(|instance| Some(instance.under_way?.variable)).collect();
         for pair in limits.watch(self.task.operators.iter().zip(&mut self.happenings)) {
@@ -174,8 +177,8 @@ impl TemporalTask {
                 .filter(|variable| variable.index() < self.task.basic && !under_way.contains(variable))
                 .map(|variable| variable.0)
                 .collect();
-            // A timed literal cannot be delayed: it bounds the earlier accesses, so it needs no
-            // guard.
+            // Timed initial literals cannot be delayed: they bound the times of earlier accesses
+            // and need no guard.
             let waits_for = match happening.role {
                 Role::Timed(_) => &[][..],
                 _ => &happening.accesses.after,
@@ -201,15 +204,16 @@ impl TemporalTask {
         Ok(())
     }
 
-    /// Duration of an instance that has just started. Returns `None` if it is shorter than the
-    /// separation or overflows.
+    /// Duration of an instance that has just started, in internal time units, read from the state
+    /// after the start. Returns `None` if the duration is shorter than the separation or overflows.
     pub(super) fn duration(&self, instance: &Instance, after: &State) -> Option<Int> {
         let Some((timer, factor)) = instance.timer else { return Some(instance.duration) };
         let duration = after.numbers[timer.index()].checked_mul(factor)?;
         (self.separation..TIME_LIMIT).contains(&duration).then_some(duration)
     }
 
-    /// Marks an instance as not running after its last run has ended.
+    /// Clears the running fact and the duration of an instance in `state`, after the last of its
+    /// simultaneous runs has ended.
     pub(super) fn end_last_run(&self, instance: u32, state: &mut State) {
         if let Some(fact) = self.instances[instance as usize].under_way {
             // The fact has two values; derived variables do not depend on it.
@@ -220,7 +224,7 @@ impl TemporalTask {
         }
     }
 
-    /// Returns `true` if the condition over all of an instance holds in a state.
+    /// Returns `true` if the condition over all of an instance holds in `state` or is absent.
     pub(super) fn holds_over_all(&self, instance: u32, state: &State) -> bool {
         let condition = self.instances[instance as usize].over_all;
         let condition = condition.map(|id| &self.task.operators[id.index()].condition);
@@ -230,7 +234,8 @@ impl TemporalTask {
         })
     }
 
-    /// End of the action that a happening starts. A happening that starts no action is its own end.
+    /// Returns the end operator of the action that `operator` starts. Any operator other than a
+    /// start is returned unchanged.
     pub(super) fn end_of(&self, operator: OperatorId) -> OperatorId {
         match self.happenings[operator.index()].role {
             Role::Start(instance) => self.instances[instance as usize].end,
@@ -238,8 +243,8 @@ impl TemporalTask {
         }
     }
 
-    /// Returns `true` if a happening writes an atom or number that the joint condition over all of
-    /// an instance reads.
+    /// Returns `true` if a happening writes an atom or number that the condition over all of an
+    /// instance reads. Always `false` unless happenings can maintain this condition jointly.
     pub(super) fn touches(&self, operator: OperatorId, instance: u32) -> bool {
         let joint = &self.instances[instance as usize].joint;
         let writes = &self.happenings[operator.index()].writes;
@@ -247,7 +252,7 @@ impl TemporalTask {
     }
 }
 
-/// Operators that detect violated preferences, per preference.
+/// Operators that detect violations, grouped by preference.
 fn violations(task: &Task) -> Vec<Vec<OperatorId>> {
     let mut violations: BTreeMap<u32, Vec<OperatorId>> = BTreeMap::new();
     for (operator, id) in task.operators.iter().zip((0..).map(OperatorId)) {

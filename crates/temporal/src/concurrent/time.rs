@@ -1,21 +1,22 @@
-//! Time expressions: lower bounds, some of them relative to starts that can still be delayed.
+//! Time expressions: lower bounds on times, possibly relative to starts of running actions that can
+//! still be delayed.
 
 use smallvec::SmallVec;
 use task::number::Int;
 
-/// A time point of the network: the start of a running action that can still be delayed, by index.
+/// Index of a time point of the network: the start of a running action, which can still be delayed.
 pub(super) type TimePoint = u32;
 
-/// Index of a time point.
+/// Position of a time point in a vector.
 pub(super) fn place(float: TimePoint) -> usize {
     float as usize
 }
 
-/// Lower bound on a time: at least `base`, and at least a lag after each of some time points.
+/// Lower bound on a time: at least `base`, and at least the given lag after each listed time point.
 #[derive(Debug, PartialEq, Eq, Default)]
 pub(super) struct TimeExpression {
     pub(super) base: Int,
-    /// Lag after each time point, sorted by time point.
+    /// Least distance after each time point, sorted by time point.
     pub(super) lags: SmallVec<[(TimePoint, Int); 1]>,
 }
 
@@ -32,17 +33,18 @@ impl TimeExpression {
         Self { base, lags: SmallVec::new() }
     }
 
+    /// Lag after a time point. Returns `None` if the expression does not depend on it.
     pub(super) fn lag(&self, float: TimePoint) -> Option<Int> {
         self.lags.iter().find(|(point, _)| *point == float).map(|(_, lag)| *lag)
     }
 
-    /// Expression shifted by an amount, which may be negative.
+    /// Expression shifted by `by`, which may be negative.
     #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     pub(super) fn shifted(&self, by: Int) -> Self {
         Self { base: self.base + by, lags: self.lags.iter().map(|(float, lag)| (*float, lag + by)).collect() }
     }
 
-    /// Raises the bound to at least `other + by`.
+    /// Raises this lower bound to at least `other + by`.
     #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     pub(super) fn delay_to(&mut self, other: &Self, by: Int) {
         self.base = self.base.max(other.base + by);
@@ -51,6 +53,7 @@ impl TimeExpression {
         }
     }
 
+    /// Raises this lower bound to at least `by` after the time point.
     pub(super) fn put_off_after(&mut self, float: TimePoint, by: Int) {
         match self.lags.binary_search_by_key(&float, |(point, _)| *point) {
             Ok(position) => self.lags[position].1 = self.lags[position].1.max(by),
@@ -58,21 +61,22 @@ impl TimeExpression {
         }
     }
 
-    /// Removes a time point, and returns the lag after it.
+    /// Removes a time point from the expression. Returns the lag after it, or `None` if the
+    /// expression did not contain it.
     pub(super) fn forget(&mut self, float: TimePoint) -> Option<Int> {
         let position = self.lags.iter().position(|(point, _)| *point == float)?;
         Some(self.lags.remove(position).1)
     }
 
-    /// Returns `true` if this time is at least `by` before `other` for all values of the time
-    /// points.
+    /// Returns `true` if this time is at least `by` before the time `other`, for all values of the
+    /// time points.
     #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     pub(super) fn precedes(&self, other: &Self, by: Int) -> bool {
         self.base + by <= other.base
             && self.lags.iter().all(|(float, lag)| other.lag(*float).is_some_and(|later| lag + by <= later))
     }
 
-    /// Renumbers the time points; those without a new number are removed.
+    /// Renumbers the time points by `numbers`. Time points without a new number are removed.
     pub(super) fn renumber(&mut self, numbers: &[Option<TimePoint>]) {
         self.lags.retain(|(float, _)| match numbers[place(*float)] {
             Some(number) => {

@@ -1,4 +1,4 @@
-//! The unit of all times.
+//! Internal unit of time: small enough that all times of a task are integers.
 
 use num_traits::ToPrimitive as _;
 use rustc_hash::FxHashMap;
@@ -10,20 +10,20 @@ use task::task::{OperatorId, Task};
 
 use crate::concurrent::split::Split;
 
-/// Upper limit on times and durations.
+/// Upper limit on times and durations, in internal time units.
 pub(super) const LIMIT: Int = 1 << 90;
 
-/// Divisors of the numbers that hold durations, by start operator.
+/// Divisor of each state-dependent duration, by start operator: the duration is a number of the
+/// task divided by this constant.
 pub(super) type Divisors = FxHashMap<OperatorId, Rational>;
 
-/// Internal unit of time, in which all times are integers: the number of internal units per time unit
-/// of the PDDL files.
+/// Number of internal time units per PDDL time unit. All times are integers in internal units.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Unit(pub(super) Int);
 
 impl Unit {
-    /// Finds a unit in which durations, separation and times of timed initial literals are
-    /// integers.
+    /// Computes a unit in which all durations, the separation and the times of timed initial
+    /// literals are integers.
     pub(super) fn new(
         task: &Task,
         split: &Split,
@@ -50,12 +50,14 @@ impl Unit {
         common.map(Self).ok_or_else(|| Error::overflow("durations and times"))
     }
 
+    /// Converts a time in PDDL time units to internal units.
     pub(super) fn of(self, time: &Rational) -> Result<Int, Error> {
         let units = (time.clone() * &Rational::from_integer(self.0)).to_int();
         units.filter(|units| (-LIMIT..LIMIT).contains(units)).ok_or_else(|| Error::overflow("a time"))
     }
 
-    /// Factor from a number of the task, divided by `divisor`, to a time in this unit.
+    /// Factor from the value of the number `timer`, divided by `divisor`, to a duration in internal
+    /// time units.
     pub(super) fn factor(self, task: &Task, timer: NumericId, divisor: &Rational) -> Result<Int, Error> {
         let multiple = task.number_multiples.get(timer.index()).copied().unwrap_or(1);
         let scale = Rational::from_integer(task.number_scale) * Rational::from_integer(multiple);
@@ -63,7 +65,7 @@ impl Unit {
         (by / divisor.clone()).to_int().ok_or_else(|| Error::overflow("a duration"))
     }
 
-    /// Duration of an operator in this unit.
+    /// Constant duration of an operator in internal time units.
     pub(super) fn duration(self, task: &Task, operator: OperatorId) -> Result<Int, Error> {
         let factor = self.0.checked_div(task.time_scale);
         let task_duration = task.operators[operator.index()].duration.constant;

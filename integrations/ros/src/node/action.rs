@@ -25,15 +25,16 @@ use crate::node::{Node, Severity, client_name, creation_error, dds_type, latched
 
 pub use caller::{Accepted, ActionCaller, GoalError, Pursued};
 
-/// Polling interval, because the client library has no stream of all events of an action server.
+/// Interval between two polls of an action server, because the client library has no stream of all
+/// events of a server.
 const POLL_INTERVAL: Duration = Duration::from_millis(2);
 
-/// Lifetime of a result for later requests, as in `rcl_action`.
+/// Time for which the result of an ended goal remains available to clients, as in `rcl_action`.
 const LIFETIME: Duration = Duration::from_secs(15 * 60);
 
 type Server<A> = ActionServer<<A as Action>::Goal, <A as Action>::Result, <A as Action>::Feedback>;
 
-/// Outcome of a goal.
+/// Outcome of a goal of an action server.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GoalEnd {
     /// The goal was reached.
@@ -54,23 +55,23 @@ impl GoalEnd {
     }
 }
 
-/// Request of a client of an action server.
+/// Request that a client sends to an action server.
 #[derive(Debug)]
 pub enum GoalEvent<A: Action> {
-    /// A new goal, to be answered by [`Goals::accept`] or [`Goals::reject`].
+    /// Request for a new goal, to be answered by [`Goals::accept`] or [`Goals::reject`].
     Wanted(Wanted, A::Goal),
-    /// A request to cancel, to be answered by [`Goals::canceling`].
+    /// Request to cancel a goal, to be answered by [`Goals::canceling`].
     Cancel(GoalId, CancelRequest),
 }
 
-/// A goal that awaits an answer.
+/// Request for a new goal that the server has not answered yet.
 #[derive(Debug, Clone, Copy)]
 pub struct Wanted {
     request: RmwRequestId,
     goal: GoalId,
 }
 
-/// A request to cancel that awaits an answer.
+/// Request to cancel a goal that the server has not answered yet.
 #[derive(Debug, Clone, Copy)]
 pub struct CancelRequest {
     request: RmwRequestId,
@@ -78,18 +79,18 @@ pub struct CancelRequest {
     goal: GoalId,
 }
 
-/// An accepted goal.
+/// State of an accepted goal.
 #[derive(Debug)]
 struct Known<R> {
     accepted: Time,
     status: GoalStatusEnum,
-    /// Result with the time of its end.
+    /// Result of the goal and the time at which the goal ended. `None` while the goal is running.
     result: Option<(R, Instant)>,
-    /// Requests that wait for the result.
+    /// Requests for the result, to be answered when the goal ends.
     result_requests: Vec<RmwRequestId>,
 }
 
-/// Goals of an action server.
+/// Accepted goals of an action server.
 pub struct Goals<A: Action> {
     server: OnceLock<Server<A>>,
     goals: Mutex<BTreeMap<GoalId, Known<A::Result>>>,
@@ -101,7 +102,7 @@ impl<A: Action> std::fmt::Debug for Goals<A> {
     }
 }
 
-/// Pending requests to the three services of an action.
+/// Requests to the three services of an action that wait until the client can receive the reply.
 struct Gates<A: Action> {
     goals: ReplyGate<(GoalId, A::Goal)>,
     cancels: ReplyGate<ros2_client::action::CancelGoalRequest>,
@@ -123,7 +124,7 @@ impl<A: Action> Goals<A> {
         self.goals.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Accepts a goal and starts it.
+    /// Accepts a requested goal and marks it as executing. Returns the id of the goal.
     pub fn accept(&self, wanted: Wanted) -> GoalId {
         let accepted = Time::now();
         let goal_state =
@@ -134,7 +135,8 @@ impl<A: Action> Goals<A> {
         wanted.goal
     }
 
-    /// Registers a goal as running that was accepted before this program started.
+    /// Registers a running goal that a previous run of this program had accepted. Returns the id of
+    /// the goal.
     pub fn go_on(&self, goal: [u8; 16]) -> GoalId {
         // The library has no constructor for goal ids other than deserialisation.
         let id = serde_json::from_value(serde_json::json!({ "uuid": goal })).unwrap_or(GoalId::ZERO);
@@ -148,7 +150,7 @@ impl<A: Action> Goals<A> {
         id
     }
 
-    /// Rejects a goal.
+    /// Rejects a requested goal.
     pub fn reject(&self, wanted: Wanted) {
         self.answer(wanted, false, Time::now());
     }
@@ -160,7 +162,7 @@ impl<A: Action> Goals<A> {
         }
     }
 
-    /// Answers whether a goal will be cancelled.
+    /// Answers a request to cancel a goal: `will_be` states whether the goal will be cancelled.
     pub fn canceling(&self, request: CancelRequest, will_be: bool) {
         let goals_canceling =
             if will_be { vec![GoalInfo { goal_id: request.goal, stamp: request.info }] } else { Vec::new() };
@@ -181,14 +183,15 @@ impl<A: Action> Goals<A> {
         }
     }
 
-    /// Publishes feedback.
+    /// Publishes feedback on a goal.
     pub fn feedback(&self, goal: GoalId, feedback: A::Feedback) {
         if let Some(server) = self.server.get() {
             let _ = server.send_feedback(goal, feedback);
         }
     }
 
-    /// Ends a goal and sends its result.
+    /// Ends a goal, and sends the result to all clients that have requested it. Unknown goals are
+    /// ignored.
     pub fn finish(&self, goal: GoalId, end: GoalEnd, result: A::Result) {
         let mut goals = self.goals();
         let Some(known) = goals.get_mut(&goal) else { return };
@@ -209,7 +212,7 @@ impl<A: Action> Goals<A> {
         }
     }
 
-    /// Publishes the status of all goals.
+    /// Publishes the status of all accepted goals.
     fn publish_status(&self) {
         let status = |(goal_id, known): (&GoalId, &Known<A::Result>)| GoalStatus {
             goal_info: GoalInfo { goal_id: *goal_id, stamp: known.accepted },
@@ -221,7 +224,8 @@ impl<A: Action> Goals<A> {
         }
     }
 
-    /// Receives new requests and handles those whose client can receive the reply; returns errors.
+    /// Receives new requests, and handles the waiting requests whose client can receive the reply.
+    /// Returns descriptions of invalid requests.
     fn poll(&self, graph: &Graph, gates: &mut Gates<A>, take: &mut impl FnMut(GoalEvent<A>)) -> Vec<String> {
         let Some(server) = self.server.get() else { return Vec::new() };
         let mut errors = Vec::new();
@@ -241,7 +245,7 @@ impl<A: Action> Goals<A> {
             Err(error) => errors.push(error.to_string()),
         }
         while let Some((request, (id, goal))) = gates.goals.pop(graph) {
-            // A known goal was sent twice.
+            // The client has sent a goal with a known id again.
             if !self.goals().contains_key(&id) {
                 take(GoalEvent::Wanted(Wanted { request, goal: id }, goal));
             }
@@ -271,8 +275,9 @@ impl<A: Action> Goals<A> {
         }
     }
 
-    /// Selects the goals of a cancel request: a single one, all, or those accepted up to a time
-    /// (`action_msgs/srv/CancelGoal`).
+    /// Passes on each goal that a cancel request selects: a single goal, all goals, or the goals
+    /// accepted up to a time (`action_msgs/srv/CancelGoal`). Answers with an error code if the
+    /// request selects no running goal.
     fn cancel(
         &self,
         request: RmwRequestId,
@@ -290,7 +295,7 @@ impl<A: Action> Goals<A> {
         let (requested, stamp) = (cancel.goal_info.goal_id.uuid, cancel.goal_info.stamp);
         let until = i128::from(stamp.sec) * 1_000_000_000 + i128::from(stamp.nanosec);
         let nanoseconds = |time: Time| i128::from(ros2_client::ros_time::ROSTime::from(time).to_nanos());
-        // An id of zeros selects all goals, and a time of 0 does not restrict them.
+        // An id of zeros selects all goals, and a time of 0 sets no time limit.
         let (any, always) = (requested == [0; 16], until == 0);
         let is_selected = |(goal, known): &(&GoalId, &Known<A::Result>)| {
             let is_requested = goal.uuid.into_bytes() == requested;
@@ -317,7 +322,7 @@ impl<A: Action> Goals<A> {
     }
 }
 
-/// Registers the types of all topics of an action.
+/// Registers the expected types and hashes of all topics of an action in the graph.
 fn expect_action<A: Action>(graph: &Graph, full: &str) {
     use crate::interfaces::action_msgs::srv::CancelGoal;
     let part = |name: &str| format!("{}_{name}", A::NAME);
@@ -347,10 +352,11 @@ fn expect_action<A: Action>(graph: &Graph, full: &str) {
 }
 
 impl Node {
-    /// Serves an action once the mapping of services is known.
+    /// Serves an action as soon as the service mapping of the middleware is determined. `take`
+    /// receives the requests of clients.
     ///
     /// # Errors
-    /// The name is not a valid action name.
+    /// Fails if the name is not a valid action name.
     pub fn serve_action<A: Action + 'static>(
         self: &Arc<Self>,
         name: &str,

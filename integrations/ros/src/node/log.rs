@@ -11,7 +11,7 @@ use ros2_client::rosout::RosoutRaw as _;
 
 use crate::node::Node;
 
-/// Maximum number of remembered warnings, which are printed once each.
+/// Upper limit on the number of remembered warnings, each of which is logged only once.
 const MAX_WARNED: usize = 1000;
 
 /// Severity of a log message.
@@ -30,9 +30,10 @@ pub enum Severity {
 }
 
 impl Severity {
-    /// Parses the argument of `--log-level`.
+    /// Parses the argument of `--log-level`. Returns `None` if the level is unknown.
     pub(crate) fn parse(word: &str) -> Option<Self> {
-        // `node:=level` selects a node of a process, and this process has a single node.
+        // The form `node:=level` selects one node of a process. This process has a single node, so
+        // the name is ignored.
         Some(match word.rsplit(":=").next().unwrap_or(word) {
             "debug" => Self::Debug,
             "info" => Self::Info,
@@ -65,12 +66,12 @@ impl Severity {
 }
 
 impl Node {
-    /// Returns `true` if messages of this severity are logged.
+    /// Returns `true` if the node logs messages of this severity.
     pub(crate) fn is_logged(&self, severity: Severity) -> bool {
         severity >= self.least
     }
 
-    /// Logs a warning unless it was logged before.
+    /// Logs a warning unless the same text was logged before.
     pub(crate) fn warn_once(&self, text: &str) {
         let mut warned = self.warned.lock().unwrap_or_else(PoisonError::into_inner);
         if warned.len() >= MAX_WARNED {
@@ -82,7 +83,7 @@ impl Node {
         }
     }
 
-    /// Logs a message.
+    /// Logs a message to `/rosout` and standard error, unless its severity is below the log level.
     pub fn log(&self, severity: Severity, text: &str) {
         if !self.is_logged(severity) {
             return;
@@ -95,7 +96,7 @@ impl Node {
             since.as_secs(),
             since.subsec_nanos()
         );
-        // A closed standard error is ignored.
+        // Errors are ignored, for example if standard error is closed.
         let _ = std::io::stderr().write_all(visible(&line).as_bytes());
         self.inner().rosout_raw(Time::now(), severity.level(), &name, text, file!(), "", line!());
     }

@@ -1,17 +1,17 @@
-//! Domain and network of a node, from the environment variables of ROS 2.
+//! ROS domain and network interface of a node, from the environment variables of ROS 2.
 
 use std::net::Ipv4Addr;
 
 use metaplan::message::Message;
 use ros2_client::dds::rustdds::DomainParticipantBuilder;
 
-/// Greatest domain with valid ports (RTPS 2.5, section 9.6.1.1).
+/// Greatest domain id with valid ports (RTPS 2.5, section 9.6.1.1).
 const GREATEST_DOMAIN: u16 = 232;
 
-/// Discovery range.
+/// ROS domain and discovery range of a node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Network {
-    /// `ROS_DOMAIN_ID`.
+    /// ROS domain id: `ROS_DOMAIN_ID`, by default 0.
     pub domain: u16,
     /// `true` to restrict discovery to this machine: `ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST`, or
     /// `ROS_LOCALHOST_ONLY=1` of older distributions.
@@ -19,10 +19,11 @@ pub struct Network {
 }
 
 impl Network {
-    /// Reads the environment variables. Also returns warnings about unsupported values.
+    /// Reads the environment variables, which `variable` returns by name. Also returns warnings
+    /// about unsupported values.
     ///
     /// # Errors
-    /// A variable has an invalid value.
+    /// Fails if a variable has an invalid value.
     pub fn from_environment(
         variable: impl Fn(&str) -> Option<String>,
     ) -> Result<(Self, Vec<Message>), Message> {
@@ -67,7 +68,7 @@ impl Network {
         Ok((Self { domain, loopback }, warnings))
     }
 
-    /// Creates a builder of a participant in this network.
+    /// Creates a builder of a DDS participant in this domain and discovery range.
     pub(crate) fn participant(self) -> DomainParticipantBuilder {
         let builder = DomainParticipantBuilder::new(self.domain);
         if self.loopback { builder.with_only_networks([Ipv4Addr::LOCALHOST]) } else { builder }
@@ -82,7 +83,8 @@ fn network_error(text: String) -> Message {
 mod tests {
     use super::Network;
 
-    /// Checks the domain and the restriction to loopback; `None` expects an error.
+    /// Checks the domain, the restriction to loopback and the number of warnings; `None` expects an
+    /// error.
     fn check(variables: &[(&str, &str)], expected: Option<(u16, bool, usize)>) {
         let value = |name: &str| {
             variables.iter().find(|(known, _)| *known == name).map(|(_, value)| (*value).to_owned())

@@ -1,9 +1,9 @@
-//! Delays requests until the reply can arrive.
+//! Delays requests to a service until the client can receive the reply.
 //!
-//! A server discovers a client's request writer and reply reader separately. A reply that is
-//! written before the reply reader is matched is lost, and the client waits forever.
+//! A server discovers the request writer and the reply reader of a client separately. A reply that
+//! is written before the reply reader is matched is lost, and the client waits forever.
 //! `rmw_send_response` of `rmw_fastrtps` and `rmw_cyclonedds` therefore waits up to 100 ms for the
-//! reader. Requests wait here instead, so that a server never blocks.
+//! reader. Here, the requests wait instead, so that a server never blocks.
 
 use std::collections::{BTreeSet, VecDeque};
 use std::time::{Duration, Instant};
@@ -14,21 +14,22 @@ use smol::Timer;
 
 use crate::node::graph::{Graph, Topics};
 
-/// Maximum time that a request waits for its reply reader, as in the middlewares of ROS 2.
+/// Upper limit on the time that a request waits for the reply reader of its client, as in the
+/// middlewares of ROS 2.
 const TIMEOUT: Duration = Duration::from_millis(100);
 
-/// Interval between two checks of waiting requests.
+/// Interval between two checks of the waiting requests.
 const RECHECK: Duration = Duration::from_millis(1);
 
-/// Upper limit on the number of remembered clients.
+/// Upper limit on the number of remembered clients; all clients are forgotten when the limit is reached.
 const MAX_CLIENTS: usize = 4096;
 
-/// Queue of requests to one service.
+/// Queue of the requests to one service that wait for the reply reader of their client.
 #[derive(Debug)]
 pub(crate) struct ReplyGate<T> {
     topics: Topics,
     waiting: VecDeque<Waiting<T>>,
-    /// Clients that have passed once.
+    /// Clients one of whose requests was already removed. Their further requests do not wait.
     admitted: BTreeSet<Gid>,
 }
 
@@ -40,17 +41,18 @@ struct Waiting<T> {
 }
 
 impl<T> ReplyGate<T> {
-    /// Empty queue of the service with this full name.
+    /// Creates an empty queue for the service with the full name `service`.
     pub(crate) fn new(service: &str) -> Self {
         Self { topics: Topics::of(service), waiting: VecDeque::new(), admitted: BTreeSet::new() }
     }
 
-    /// Appends a request.
+    /// Appends a request to the queue.
     pub(crate) fn push(&mut self, id: RmwRequestId, request: T) {
         self.waiting.push_back(Waiting { since: Instant::now(), id, request });
     }
 
-    /// Removes the first request whose reply can arrive, or which has waited long enough. Requests of one client keep their order.
+    /// Removes and returns the first request whose client can receive the reply, or which has
+    /// waited for [`TIMEOUT`]. The requests of one client keep their order.
     pub(crate) fn pop(&mut self, graph: &Graph) -> Option<(RmwRequestId, T)> {
         self.pop_if(|topics, client| graph.can_reply(topics, client))
     }

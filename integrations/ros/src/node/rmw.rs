@@ -1,8 +1,9 @@
-//! Mapping of services to DDS, which depends on the middleware of the other side.
+//! Mapping of ROS services to DDS topics, which depends on the middleware of the other
+//! participants.
 //!
 //! `rmw_fastrtps` and Connext relate a reply to its request outside of the data (OMG DDS-RPC 1.0,
 //! section 7.8.2, "enhanced"). `rmw_cyclonedds` writes a header before the data. With the wrong
-//! mapping a service is discovered but never answers.
+//! mapping, a client discovers a service but never receives a reply.
 
 use std::fmt;
 
@@ -21,7 +22,7 @@ pub enum Rmw {
     Cyclonedds,
 }
 
-/// Mapping of services.
+/// Mapping of ROS services to DDS topics, named after a middleware that uses it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Mapping {
     Enhanced,
@@ -36,7 +37,7 @@ impl Mapping {
         }
     }
 
-    /// Value of `--rmw` that selects the other mapping.
+    /// Value of the option `--rmw` that selects the other one of the two mappings.
     pub(crate) fn other(self) -> &'static str {
         match self {
             Self::Enhanced => "cyclonedds",
@@ -55,7 +56,8 @@ impl fmt::Display for Mapping {
 }
 
 impl Rmw {
-    /// Returns the mapping that is selected independently of discovery.
+    /// Returns the mapping that the user has selected, or `None` if the vendors of discovered
+    /// participants determine it.
     pub(crate) fn fixed(self) -> Option<Mapping> {
         match self {
             Self::Auto => None,
@@ -65,14 +67,14 @@ impl Rmw {
     }
 }
 
-/// Vendor of a participant (RTPS 2.5, section 8.3.3.1.3; ids are assigned by the OMG).
+/// Vendor of a DDS participant (RTPS 2.5, section 8.3.3.1.3; the OMG assigns the ids).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Vendor {
     /// RTI Connext, 01.01, or eProsima Fast DDS, 01.0F.
     Enhanced,
     /// Eclipse Cyclone DDS, 01.10.
     Cyclone,
-    /// `RustDDS`, 01.12, the library of this program, which supports both mappings.
+    /// `RustDDS`, 01.12, the DDS library of this program, which supports both mappings.
     Own,
     /// Another vendor.
     Other,
@@ -88,7 +90,8 @@ impl Vendor {
         }
     }
 
-    /// Returns the mapping of the vendor, if it supports only a single one.
+    /// Returns the mapping that the vendor uses, or `None` if the vendor is unknown or supports
+    /// both.
     pub(crate) fn mapping(self) -> Option<Mapping> {
         match self {
             Self::Enhanced => Some(Mapping::Enhanced),

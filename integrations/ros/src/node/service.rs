@@ -20,11 +20,11 @@ use crate::node::reply_gate::ReplyGate;
 use crate::node::rmw::Mapping;
 use crate::node::{Node, Severity, client_name, creation_error, dds_type};
 
-/// Time after the discovery of a server during which it discovers this client. Its earlier replies
-/// would be lost.
+/// Time for which the client waits after discovering a server, so that the server can discover the
+/// client. Earlier replies would be lost.
 const MATCHING_TIME: Duration = Duration::from_millis(100);
 
-/// Sender of the reply to a request. If it is dropped, the client receives no reply.
+/// Sender of the reply to one request. Dropping it without a reply leaves the client waiting.
 pub struct Responder<S: Service> {
     id: RmwRequestId,
     answers: channel::Sender<(RmwRequestId, S::Response)>,
@@ -37,14 +37,14 @@ impl<S: Service> fmt::Debug for Responder<S> {
 }
 
 impl<S: Service> Responder<S> {
-    /// Sends the reply.
+    /// Sends the reply to the client.
     pub fn send(self, response: S::Response) {
-        // The node may no longer exist.
+        // The channel is closed if the node no longer exists; the reply is then discarded.
         let _ = self.answers.try_send((self.id, response));
     }
 }
 
-/// Reason for a missing reply.
+/// Reason why a service call returned no reply.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum CallError {
     /// The service has no server.
@@ -55,15 +55,15 @@ pub enum CallError {
         /// Time waited, in seconds.
         waited: String,
     },
-    /// The server has another type.
+    /// The server has another type or type hash.
     #[error("{service} is not what it should be: {complaint}")]
     Unfit {
         /// Full name of the service.
         service: String,
-        /// Difference of the types.
+        /// Difference between the expected and the actual type.
         complaint: String,
     },
-    /// The reply did not arrive in time.
+    /// The server exists, but the reply did not arrive in time.
     #[error(
         "no answer from {service} after {waited} s; it was called with the mapping of {mapping}, `--rmw {other}` has the other one"
     )]
@@ -74,10 +74,10 @@ pub enum CallError {
         waited: String,
         /// Middleware whose mapping was used.
         mapping: String,
-        /// Value of `--rmw` for the other mapping.
+        /// Value of the option `--rmw` that selects the other mapping.
         other: &'static str,
     },
-    /// The reply is not a message of its type, or the request could not be written.
+    /// The reply is not a message of the service's type, or the request could not be written.
     #[error("{service}: {because}")]
     Broken {
         /// Full name of the service.
@@ -89,7 +89,7 @@ pub enum CallError {
 
 type Connection<S> = (Server, Client<<S as Service>::Request, <S as Service>::Response>);
 
-/// Service client that sends a single request at a time.
+/// Service client that waits for the reply to each request before it sends the next one.
 pub struct Caller<S: Service> {
     node: Arc<Node>,
     full: String,
@@ -110,29 +110,29 @@ impl<S: Service> Caller<S> {
         &self.full
     }
 
-    /// Returns `true` if the service has a server now.
+    /// Returns `true` if a server of the service is currently known.
     pub fn is_served(&self) -> bool {
         self.node.graph.server(&self.topics).is_some()
     }
 
-    /// Returns the GUIDs of the current servers. A restarted server has a new one.
+    /// Returns the GUIDs of the current servers. A restarted server has a new GUID.
     pub fn servers(&self) -> BTreeSet<[u8; 16]> {
         self.node.graph.readers(&self.topics.requests)
     }
 
-    /// Connects as soon as the service has a server, so that the first call need not wait for
-    /// discovery.
+    /// Waits up to `within` for a server and connects to it, so that the first call need not wait
+    /// for discovery.
     ///
     /// # Errors
-    /// The service has no server in time, or the server has another type.
+    /// Fails if the service has no server in time, or the server has another type.
     pub async fn ready(&self, within: Duration) -> Result<(), CallError> {
         self.connect(&mut *self.connection.lock().await, within).await.map(|_| ())
     }
 
-    /// Calls the service.
+    /// Calls the service. `within` limits the time to wait for a server and its reply.
     ///
     /// # Errors
-    /// No valid reply arrives in time.
+    /// Fails if no valid reply arrives in time.
     pub async fn call(&self, request: S::Request, within: Duration) -> Result<S::Response, CallError> {
         let start = Instant::now();
         let mut connection = self.connection.lock().await;
@@ -155,7 +155,7 @@ impl<S: Service> Caller<S> {
         }
     }
 
-    /// Returns a client with the mapping of the current server.
+    /// Returns the current server, and a client with the service mapping of this server.
     async fn connect<'c>(
         &self,
         connection: &'c mut Option<Connection<S>>,
@@ -197,7 +197,7 @@ fn seconds(duration: Duration) -> String {
 }
 
 impl Node {
-    /// Creates a client of a service.
+    /// Creates a client of the service `name`.
     pub fn caller<S: Service>(self: &Arc<Self>, name: &str) -> Caller<S> {
         let full = self.resolve(name);
         self.expect_service::<S>(&full);
@@ -210,11 +210,11 @@ impl Node {
         }
     }
 
-    /// Serves a service once the mapping is known. The closure receives requests and the senders of
-    /// their replies.
+    /// Serves a service as soon as the service mapping of the middleware is determined. `take`
+    /// receives each request and the sender of the reply.
     ///
     /// # Errors
-    /// The name is not a valid service name.
+    /// Fails if the name is not a valid service name.
     pub fn serve<S: Service + 'static>(
         self: &Arc<Self>,
         name: &str,

@@ -14,15 +14,17 @@ use crate::interfaces::Msg;
 use crate::node::graph::Expected;
 use crate::node::{Node, Severity, client_name, creation_error, dds_type};
 
-/// Number of invalid samples of a topic per log message.
+/// A log message about invalid samples of a topic is written once per this number of invalid
+/// samples.
 const INVALID_PER_LOG_MESSAGE: u64 = 1000;
 
-/// Time after its creation during which a subscription checks the age of samples.
+/// Time after the creation of a subscription during which it discards samples that are older than
+/// the subscription.
 const AGE_CHECK_PERIOD: Duration = Duration::from_secs(5);
 
-/// Filter of samples that were published before the subscription existed. Writers keep the samples
-/// that a killed reader has not acknowledged, and send them to the next reader although it has not
-/// requested them.
+/// Filter of samples that were published before the subscription existed. A writer keeps the
+/// samples that a killed reader has not acknowledged, and sends them to the next reader even if
+/// this reader has not requested old samples.
 struct Old {
     since: SystemTime,
     is_wanted: bool,
@@ -48,7 +50,7 @@ impl<M: Msg> std::fmt::Debug for Publisher<M> {
 }
 
 impl<M: Msg> Publisher<M> {
-    /// Publishes a message. A message that cannot be written is lost, as on any topic.
+    /// Publishes a message. A message that cannot be written is lost without an error.
     pub fn publish(&self, message: M) {
         // Slow readers lose samples, because the publisher does not wait for them.
         let _ = self.inner.publish(message);
@@ -56,10 +58,10 @@ impl<M: Msg> Publisher<M> {
 }
 
 impl Node {
-    /// Creates a publisher.
+    /// Creates a publisher of messages on a topic.
     ///
     /// # Errors
-    /// The name is wrong, or the topic exists with another type.
+    /// Fails if the name is invalid, or the topic exists with another type.
     pub fn publisher<M: Msg>(&self, name: &str, qos: QosProfile) -> Result<Publisher<M>, Message> {
         let full = self.resolve(name);
         let topic_name = client_name(&full)?;
@@ -73,10 +75,10 @@ impl Node {
         Ok(Publisher { inner })
     }
 
-    /// Subscribes to a topic for the lifetime of the node.
+    /// Subscribes to a topic for the lifetime of the node. `take` receives each valid message.
     ///
     /// # Errors
-    /// The name is wrong, or the topic exists with another type.
+    /// Fails if the name is invalid, or the topic exists with another type.
     pub fn subscribe<M: Msg>(
         self: &Arc<Self>,
         name: &str,

@@ -1,4 +1,4 @@
-//! ROS actions that perform actions of a plan.
+//! Performers that execute an action of a plan by a goal for a ROS action server.
 
 use std::marker::PhantomData;
 use std::sync::Arc;
@@ -17,26 +17,27 @@ use crate::node::{Accepted, ActionCaller, GoalEnd, Node, Pursued};
 use crate::perform::{Call, End, Perform, Performance, Progress, Running};
 use crate::performer::{feedback, part};
 
-/// Timeout for a server, and for its answer to a goal.
+/// Upper limit on the time to wait for a server and its reply.
 pub(super) const SERVER_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Mapping of an action of a plan to a ROS action.
+/// Mapping of an action of a plan to goals, feedback and results of a ROS action.
 pub(super) trait Meaning: Action + Sized + 'static {
-    /// Settings that a goal needs in addition to the arguments.
+    /// Settings that are needed to create a goal, in addition to the arguments of the action.
     type Settings: Clone + Send + Sync + 'static;
 
-    /// Creates the goal of a call. The error is the reason why no goal can be created.
+    /// Creates the goal for an action of a plan. The error is the reason why no goal can be
+    /// created.
     fn goal(settings: &Self::Settings, call: &Call) -> Result<Self::Goal, String>;
 
-    /// Converts feedback.
+    /// Converts feedback of the ROS action to progress of the action of the plan.
     fn progress(call: &Call, feedback: &Self::Feedback) -> Progress;
 
-    /// Returns the reason why a goal that succeeded according to its server has not achieved its
-    /// purpose.
+    /// Returns the reason why a goal has not achieved its purpose according to its result, even if
+    /// the server reports success. Returns `None` if the purpose is achieved.
     fn shortfall(result: &Self::Result) -> Option<String>;
 }
 
-/// Client of such an action.
+/// Performer that executes actions of a plan as goals for a ROS action server.
 pub(super) struct Client<A: Meaning> {
     caller: Arc<ActionCaller<A>>,
     settings: A::Settings,
@@ -73,7 +74,7 @@ impl<A: Meaning> Perform for Client<A> {
     }
 }
 
-/// Sends a goal and follows it until it ends.
+/// Sends a goal and forwards its progress until the goal ends.
 async fn follow<A: Meaning>(
     caller: &ActionCaller<A>,
     goal: A::Goal,
@@ -87,7 +88,7 @@ async fn follow<A: Meaning>(
     pursue_on(&pursued, performance, |message| A::progress(call, message), A::shortfall).await
 }
 
-/// Follows a goal until it ends, and cancels it on request.
+/// Forwards the progress of an accepted goal until the goal ends, and cancels the goal on request.
 pub(super) async fn pursue_on<A: Action>(
     pursued: &Pursued<A>,
     performance: &Performance,
@@ -137,7 +138,7 @@ impl Meaning for SpiralSearch {
 impl Meaning for FollowPipeline {
     type Settings = ();
 
-    /// The planner decides when the inspection ends, so there is no timeout.
+    /// Creates a goal without a timeout, because the planner decides when the inspection ends.
     fn goal((): &(), _: &Call) -> Result<FollowPipelineGoal, String> {
         Ok(FollowPipelineGoal { timeout: 0.0 })
     }

@@ -1,4 +1,4 @@
-//! Action of a plan that sets the design of a function: `/<function>/change_mode` of
+//! Performer that sets the design of a function by the service `/<function>/change_mode` of
 //! `system_modes`.
 
 use std::num::NonZeroUsize;
@@ -11,7 +11,8 @@ use crate::performer::action::SERVER_TIMEOUT;
 use crate::performer::settings::argument;
 
 /// Performer that executes an action by a call of `change_mode`. The fields `function` and `design`
-/// are the positions of these values among the arguments of the action, if the settings state them.
+/// are the positions of these values among the arguments of the action, counted from 1. `None`
+/// selects the last argument but one and the last argument.
 #[derive(Debug)]
 pub(super) struct ChangeMode {
     node: Arc<Node>,

@@ -1,5 +1,5 @@
-//! Execution of a whole plan by PlanSys2's executor: its action `execute_plan`, in the types of its
-//! versions.
+//! Client of PlanSys2's executor, which executes a whole plan: its action `execute_plan`, with the
+//! message types of each version.
 
 use std::sync::Arc;
 
@@ -36,7 +36,7 @@ enum Caller {
 }
 
 impl ExecutePlans {
-    /// Creates a client. `server` is `/execute_plan` unless that is remapped.
+    /// Creates a client of the action server `server`, normally `/execute_plan`.
     pub fn new(node: &Arc<Node>, server: &str, version: PlanVersion) -> Self {
         let caller = match version {
             PlanVersion::Older => Caller::Older(Arc::new(node.action_caller(server))),
@@ -45,7 +45,7 @@ impl ExecutePlans {
         Self { caller }
     }
 
-    /// Starts a plan. The progress is the completed share of its actions.
+    /// Starts the execution of a plan. The progress is the completed share of the plan's actions.
     pub fn start(&self, plan: Plan) -> Running {
         let (running, performance) = Running::pair();
         match &self.caller {
@@ -98,7 +98,7 @@ fn progress_older(message: &older::ExecutePlanFeedback) -> Progress {
     feedback(part(done, message.total_actions as f32), message.current_action.clone())
 }
 
-/// Progress of a plan: a completed action counts as 1, a running one by its completed share.
+/// Progress of a plan: a completed action counts as 1, a running action as its completed share.
 fn progress(actions: &[ActionExecutionInfo]) -> Progress {
     let done = |action: &ActionExecutionInfo| match action.status {
         ActionExecutionInfo::SUCCEEDED => 1.0,

@@ -21,16 +21,16 @@ use crate::node::{Node, Publisher, depth};
 use crate::perform::{Call, End, Perform, Performance, Progress, Running};
 use crate::performer::feedback;
 
-/// Queue depth in PlanSys2.
+/// Queue depth of the topic, as in PlanSys2.
 pub(super) const QUEUE_DEPTH: usize = 100;
 
-/// Period of the requests for a performer.
+/// Period of repeated requests while no performer has responded.
 const REQUEST_PERIOD: Duration = Duration::from_secs(1);
 
-/// Timeout of the search for a performer.
+/// Upper limit on the time to wait for a performer.
 const SEARCH_TIMEOUT: Duration = Duration::from_secs(30);
 
-/// The topic and its listeners.
+/// Publisher and subscription of `actions_hub`, with local listeners.
 pub(super) struct Hub {
     name: String,
     publisher: Publisher<ActionExecution>,
@@ -52,7 +52,7 @@ impl Hub {
         Ok(Arc::new(Self { name, publisher, listeners }))
     }
 
-    /// Name of this participant in messages.
+    /// Name of this node in messages on the topic.
     pub(super) fn name(&self) -> &str {
         &self.name
     }
@@ -61,7 +61,7 @@ impl Hub {
         self.publisher.publish(message);
     }
 
-    /// Returns a receiver of all future messages.
+    /// Returns a receiver of all future messages on the topic.
     pub(super) fn listen(&self) -> Receiver<ActionExecution> {
         let (sender, receiver) = channel::unbounded();
         self.listeners.lock().unwrap_or_else(PoisonError::into_inner).push(sender);
@@ -69,7 +69,7 @@ impl Hub {
     }
 }
 
-/// Request of an action, from the view of the executor.
+/// Execution of one action by a performer of PlanSys2, seen by the executor.
 #[derive(Debug)]
 struct Negotiation {
     executor: String,
@@ -78,7 +78,7 @@ struct Negotiation {
     performer: Option<String>,
 }
 
-/// Reaction to a message.
+/// Reaction of the executor to a message.
 #[derive(Debug, PartialEq)]
 enum Reaction {
     Nothing,
@@ -109,7 +109,7 @@ impl Negotiation {
         let sender = &message.node_id;
         let is_ours = self.performer.as_ref() == Some(sender);
         match message.r#type {
-            // A repeated response of our performer means that the confirmation was lost.
+            // A repeated response of the chosen performer means that the confirmation was lost.
             ActionExecution::RESPONSE if self.performer.is_none() || is_ours => {
                 self.performer = Some(sender.clone());
                 Reaction::Reply(self.message(ActionExecution::CONFIRM, sender))
@@ -152,7 +152,7 @@ async fn negotiate(
     messages: &Receiver<ActionExecution>,
     performance: &Performance,
 ) -> End {
-    /// The next event.
+    /// Event that ends a wait.
     enum Next {
         Message(Option<ActionExecution>),
         Canceled,
@@ -184,7 +184,8 @@ async fn negotiate(
                 hub.send(negotiation.message(ActionExecution::CANCEL, &performer));
                 return End::Canceled;
             }
-            // A performer that starts later has not received the earlier requests.
+            // Requests are repeated, because a performer that starts later has not received the
+            // earlier ones.
             Next::Time => {
                 last_request = Instant::now();
                 if negotiation.performer.is_none() {

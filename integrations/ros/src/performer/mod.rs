@@ -1,4 +1,5 @@
-//! Performers of the actions of a plan, by the settings; see [`perform`](crate::perform).
+//! Performers of the actions of a plan, as configured in the settings; see
+//! [`perform`](crate::perform).
 
 mod action;
 mod change_mode;
@@ -28,10 +29,10 @@ pub use execute_plan::{ExecutePlans, PlanVersion};
 pub use offer::{offer, offers};
 pub use settings::{By, Distribution, Offered, Pose, Poses};
 
-/// Creates the configured performers by action names.
+/// Creates the performers that the settings configure, by action name.
 ///
 /// # Errors
-/// All invalid names of topics and actions.
+/// Fails with all invalid names of topics and actions.
 pub fn performers(
     node: &Arc<Node>,
     actions: &BTreeMap<String, By>,
@@ -76,12 +77,12 @@ fn performer(
     })
 }
 
-/// Completed share of a known total.
+/// Completed share from 0 to 1. Returns `None` if the total is not positive, i.e. unknown.
 fn part(done: f32, whole: f32) -> Option<f32> {
     (whole > 0.0).then(|| (done / whole).clamp(0.0, 1.0))
 }
 
-/// Creates feedback.
+/// Creates a feedback message.
 fn feedback(completion: Option<f32>, text: impl Into<String>) -> Progress {
     Progress::Feedback { completion, text: text.into() }
 }

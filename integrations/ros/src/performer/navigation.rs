@@ -1,4 +1,5 @@
-//! Nav2: an action of the plan becomes a goal for `navigate_to_pose`, with the pose of an argument.
+//! Performer for Nav2: an action of the plan becomes a goal for `navigate_to_pose`, with the pose
+//! of one of its arguments.
 
 use std::num::NonZeroUsize;
 use std::sync::Arc;
@@ -10,7 +11,7 @@ use crate::performer::action::{Client, Meaning};
 use crate::performer::settings::argument;
 use crate::performer::{Distribution, Poses, feedback, part};
 
-/// Settings from which goals are created.
+/// Settings from which goals for Nav2 are created.
 #[derive(Debug, Clone)]
 pub(super) struct Navigation {
     poses: Poses,
@@ -18,7 +19,7 @@ pub(super) struct Navigation {
     behavior_tree: String,
 }
 
-/// Creates a client with the types of a distribution.
+/// Creates a client of the action server `server` with the message types of a distribution.
 pub(super) fn performer(
     node: &Arc<Node>,
     server: &str,
@@ -50,12 +51,12 @@ impl Navigation {
     }
 }
 
-/// Travelled share of the route, estimated from the times.
+/// Progress with the completed share of the route, estimated from elapsed and remaining seconds.
 fn progress_of(elapsed: i32, remaining: i32, distance: f32, recoveries: i16) -> Progress {
     let (elapsed, remaining) = (elapsed as f32, remaining as f32);
     let recovered = if recoveries > 0 { format!(", {recoveries} recoveries") } else { String::new() };
     let text = format!("{distance:.2} m left{recovered}");
-    // Nav2 reports no remaining time while it is unknown.
+    // Nav2 reports 0 as long as the remaining time is unknown.
     feedback(if remaining > 0.0 { part(elapsed, elapsed + remaining) } else { None }, text)
 }
 
@@ -64,7 +65,8 @@ fn error(code: u16, text: &str) -> Option<String> {
     (code != 0).then(|| format!("Nav2 says error {code}{because}"))
 }
 
-/// The types of the distributions have the same fields, except for additional ones.
+/// Implements [`Meaning`] for the types of one distribution. The types have the same fields, except
+/// for additional fields of the result.
 macro_rules! meaning {
     ($($path:ident)::+, |$result:ident| $shortfall:expr) => {
         impl Meaning for $($path)::+::action::NavigateToPose {

@@ -1,5 +1,5 @@
-//! Performer for PlanSys2: actions that its executor requests on `actions_hub` are executed by the
-//! configured performers.
+//! Performer for PlanSys2: executes the actions that PlanSys2's executor requests on `actions_hub`,
+//! by the configured performers.
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
@@ -14,36 +14,37 @@ use crate::perform::{Call, End, Perform, Progress, Running};
 use crate::performer::hub::{Hub, QUEUE_DEPTH};
 use crate::performer::{Offered, Poses, performers};
 
-/// Period of the heartbeat.
+/// Period of the published status.
 const HEARTBEAT: Duration = Duration::from_secs(1);
 
-/// Time after which a silent executor is assumed to have chosen another performer.
+/// Time without a confirmation after which the executor is assumed to have chosen another
+/// performer.
 const EXECUTOR_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// State of a performer.
+/// State of an offered action.
 enum Stage {
     Idle,
-    /// The performer has responded to a request with these arguments.
+    /// The performer has responded to a request for these arguments at this time.
     Committed(Vec<String>, Instant),
     Running(Vec<String>, Running),
 }
 
-/// A performer of an action.
+/// An action that this program offers to perform for PlanSys2.
 struct Offer {
     hub: Arc<Hub>,
     action: String,
-    /// Required arguments. An empty one admits every argument.
+    /// Required arguments by position. An empty string admits every argument.
     specialized: Vec<String>,
     performer: Arc<dyn Perform>,
     stage: Mutex<Stage>,
     status: Publisher<ActionPerformerStatus>,
 }
 
-/// Performs an action for PlanSys2's executor, during the lifetime of the node. `specialized` has
-/// the required arguments. An empty or missing one admits every argument.
+/// Performs an action for PlanSys2's executor during the lifetime of the node. `specialized` has
+/// the required arguments by position; an empty or missing argument admits every value.
 ///
 /// # Errors
-/// A topic cannot be created.
+/// Fails if a topic cannot be created.
 pub fn offer(
     node: &Arc<Node>,
     action: &str,
@@ -75,10 +76,10 @@ pub fn offer(
     Ok(())
 }
 
-/// Performs actions for PlanSys2's executor, by the settings.
+/// Performs the actions that the settings offer for PlanSys2's executor.
 ///
 /// # Errors
-/// All invalid names of topics and actions.
+/// Fails with all invalid names of topics and actions.
 pub fn offers(node: &Arc<Node>, offered: &BTreeMap<String, Offered>, poses: &Poses) -> Result<(), Errors> {
     let by = offered.iter().map(|(action, offered)| (action.clone(), offered.by.clone())).collect();
     for (action, performer) in performers(node, &by, poses)? {
@@ -129,7 +130,8 @@ impl Offer {
         match (message.r#type, &*stage) {
             // A busy performer does not respond.
             (ActionExecution::REQUEST, Stage::Running(..)) => {}
-            // A response to one executor is binding, until its request counts as abandoned.
+            // A response to one request is binding for `EXECUTOR_TIMEOUT`, after which the
+            // request counts as abandoned.
             (ActionExecution::REQUEST, Stage::Committed(other, since))
                 if *other != message.arguments && since.elapsed() < EXECUTOR_TIMEOUT => {}
             (ActionExecution::REQUEST, _) if self.is_ours(message) => {
@@ -166,7 +168,7 @@ impl Offer {
         }
     }
 
-    /// Reports the progress to the executor until the action ends.
+    /// Reports the progress and the end of the action to the executor.
     async fn report_progress(&self, running: &Running) {
         loop {
             let progress = running.next().await;
@@ -182,7 +184,7 @@ impl Offer {
                 Progress::Ended(End::Succeeded) => (1.0, "done".to_owned(), true),
                 Progress::Ended(End::Failed(because)) => (0.0, because, false),
                 Progress::Ended(End::Canceled) => {
-                    // A client that cancels does not wait for a reply.
+                    // An executor that cancels an action does not wait for a reply.
                     *stage = Stage::Idle;
                     return;
                 }

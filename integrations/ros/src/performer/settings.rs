@@ -11,21 +11,21 @@ use crate::interfaces::geometry_msgs::msg::Pose as PoseMessage;
 use crate::interfaces::geometry_msgs::msg::{Point, PoseStamped, Quaternion};
 use crate::interfaces::std_msgs::msg::Header;
 
-/// Performer of an action.
+/// Performer of an action, as configured in the settings.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(tag = "by", rename_all = "snake_case", deny_unknown_fields)]
 pub enum By {
-    /// Nav2, with the pose of an argument.
+    /// Nav2: the action becomes a navigation goal with the pose of an argument.
     NavigateToPose {
         /// Name of Nav2's action.
         #[serde(default = "navigate_to_pose")]
         server: String,
-        /// Position of the argument from 1; by default the last.
+        /// Position of the argument with the pose, counted from 1; by default the last argument.
         pose: Option<NonZeroUsize>,
-        /// Distribution whose types are used.
+        /// Distribution of ROS 2 whose Nav2 message types are used.
         #[serde(default)]
         types: Distribution,
-        /// Behaviour tree for Nav2.
+        /// File of the behaviour tree for Nav2; empty for Nav2's default.
         #[serde(default)]
         behavior_tree: String,
     },
@@ -36,43 +36,43 @@ pub enum By {
         /// Name of the topic.
         topic: String,
     },
-    /// `system_modes`: an argument is a function, another one its new design.
+    /// `system_modes`: the action sets the design of a function. Its arguments contain both.
     ChangeMode {
-        /// Position of the function from 1; by default the last but one.
+        /// Position of the function, counted from 1; by default the last argument but one.
         function: Option<NonZeroUsize>,
-        /// Position of the design from 1; by default the last.
+        /// Position of the design, counted from 1; by default the last argument.
         design: Option<NonZeroUsize>,
     },
-    /// SUAVE's search.
+    /// SUAVE's search for a pipeline.
     SpiralSearch {
-        /// Name of the action.
+        /// Name of SUAVE's action.
         #[serde(default = "spiral_search")]
         server: String,
     },
-    /// SUAVE's inspection.
+    /// SUAVE's inspection of a pipeline.
     FollowPipeline {
-        /// Name of the action.
+        /// Name of SUAVE's action.
         #[serde(default = "follow_pipeline")]
         server: String,
     },
-    /// SUAVE's repair.
+    /// SUAVE's recovery of thrusters.
     RecoverThrusters {
-        /// Name of the action.
+        /// Name of SUAVE's action.
         #[serde(default = "recover_thrusters")]
         server: String,
     },
-    /// SUAVE's charging.
+    /// SUAVE's charging of the battery.
     RechargeBattery {
-        /// Name of the action.
+        /// Name of SUAVE's action.
         #[serde(default = "recharge_battery")]
         server: String,
     },
 }
 
-/// An action that is performed for PlanSys2's executor.
+/// Settings of an action that is performed for PlanSys2's executor.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Offered {
-    /// Required arguments. An empty or missing one admits every argument.
+    /// Required arguments by position. An empty or missing argument admits every value.
     #[serde(default)]
     pub specialized_arguments: Vec<String>,
     /// Performer of the action.
@@ -100,7 +100,7 @@ fn recharge_battery() -> String {
     "/recharge_battery".to_owned()
 }
 
-/// Distribution of ROS 2 with its own Nav2 types.
+/// Distribution of ROS 2 with its own message types of Nav2.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Distribution {
@@ -115,10 +115,10 @@ pub enum Distribution {
     Rolling,
 }
 
-/// Poses of objects in a common frame.
+/// Poses of the objects in a problem, in a common coordinate frame.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Poses {
-    /// Coordinate frame.
+    /// Name of the coordinate frame.
     #[serde(default = "map")]
     pub frame: String,
     /// Poses by object names.
@@ -136,15 +136,15 @@ fn map() -> String {
     "map".to_owned()
 }
 
-/// Position and orientation.
+/// Position and orientation of an object.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Pose {
-    /// Coordinate in metres.
+    /// x-coordinate in metres.
     pub x: f64,
-    /// Coordinate in metres.
+    /// y-coordinate in metres.
     pub y: f64,
-    /// Coordinate in metres.
+    /// z-coordinate in metres; 0 by default.
     #[serde(default)]
     pub z: f64,
     /// Orientation in radians, counter-clockwise from the x-axis.
@@ -153,13 +153,14 @@ pub struct Pose {
 }
 
 impl Poses {
-    /// Returns the pose of an object, for the current time.
+    /// Returns the pose of an object, or `None` if the settings have none. Names are compared
+    /// without case.
     pub(super) fn find(&self, object: &str) -> Option<PoseStamped> {
         let is_object = |(name, _): &(&String, &Pose)| name.eq_ignore_ascii_case(object);
         let (_, pose) = self.places.iter().find(is_object)?;
         let half = pose.yaw / 2.0;
         Some(PoseStamped {
-            // Time 0 selects the latest transform.
+            // Time 0 selects the latest coordinate transform.
             header: Header { stamp: Time::default(), frame_id: self.frame.clone() },
             pose: PoseMessage {
                 position: Point { x: pose.x, y: pose.y, z: pose.z },
@@ -168,14 +169,15 @@ impl Poses {
         })
     }
 
-    /// Error about a missing pose, with a suggestion.
+    /// Error message about a missing pose, with a suggestion for a similar name.
     pub(super) fn lacking(&self, object: &str) -> String {
         let suggestion = did_you_mean(object, self.places.keys().map(String::as_str));
         format!("`[poses]` has no `{object}`{suggestion}")
     }
 }
 
-/// Returns an argument by its position from 1, or counted from the end, where 0 is the last.
+/// Returns an argument by its position `number`, counted from 1. Without a position, `from_end`
+/// counts from the end, where 0 is the last argument. The error describes a missing argument.
 pub(super) fn argument(
     arguments: &[String],
     number: Option<NonZeroUsize>,

@@ -1,4 +1,4 @@
-//! Action of the environment, which ends when a `std_msgs/Bool` on a topic is true.
+//! Performer of an action of the environment, which ends when a `std_msgs/Bool` on a topic is true.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -8,7 +8,7 @@ use crate::interfaces::std_msgs::msg::Bool;
 use crate::node::{Node, depth};
 use crate::perform::{Call, End, Perform, Running};
 
-/// Listeners of a topic.
+/// Actions that wait for the value `true` on a topic.
 #[derive(Debug)]
 pub(super) struct Awaited {
     waiting: Arc<Mutex<Vec<smol::channel::Sender<()>>>>,
@@ -18,7 +18,7 @@ impl Awaited {
     pub(super) fn new(node: &Arc<Node>, topic: &str) -> Result<Self, Message> {
         let waiting = Arc::new(Mutex::new(Vec::<smol::channel::Sender<()>>::new()));
         let listeners = Arc::clone(&waiting);
-        // A volatile subscription matches both latched and volatile publishers.
+        // A volatile subscription matches both transient-local and volatile publishers.
         node.subscribe::<Bool>(topic, depth(10), move |message| {
             if message.data {
                 for listener in listeners.lock().unwrap_or_else(PoisonError::into_inner).drain(..) {

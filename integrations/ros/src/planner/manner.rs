@@ -9,13 +9,13 @@ use ros2_client::ParameterValue;
 use crate::node::{Declared, Node, Severity, any_value};
 use crate::planner::Manner;
 
-/// Default timeout in seconds, that of PlanSys2.
+/// Default of `plan_solver_timeout` in seconds, as in PlanSys2.
 const DEFAULT_TIMEOUT: f64 = 15.0;
 
-/// Share of the timeout for planning. The reply must arrive before the client's timeout.
+/// Share of the timeout for planning. The reply must arrive before the client times out.
 const PLANNING_SHARE: f64 = 0.9;
 
-/// Number of alternative plans in the reply of `get_plan_array`.
+/// Default number of alternative plans in the reply of `get_plan_array`.
 const DEFAULT_ALTERNATIVES: usize = 3;
 
 fn declared() -> Vec<Declared> {
@@ -82,17 +82,18 @@ fn alternatives(value: &ParameterValue) -> Result<(), &'static str> {
     }
 }
 
-/// Planning parameters, updated by the node's parameters.
+/// Planning parameters that follow the ROS parameters of the node.
 #[derive(Debug)]
 pub(crate) struct Chosen {
     manner: Mutex<Manner>,
 }
 
 impl Chosen {
-    /// Declares the planning parameters of a node without parameters, and follows their changes.
+    /// Declares the planning parameters, and follows their changes. The node must not have declared
+    /// parameters before.
     ///
     /// # Errors
-    /// The command line gives a value of another type.
+    /// Fails if the command line gives a parameter a value of another type.
     pub(crate) fn declare(node: &Arc<Node>) -> Result<Arc<Self>, Errors> {
         let manner = Manner {
             metric: None,
@@ -114,7 +115,7 @@ impl Chosen {
         Ok(chosen)
     }
 
-    /// Returns the current parameters.
+    /// Returns the current planning parameters.
     pub(crate) fn get(&self) -> Manner {
         self.lock().clone()
     }

@@ -1,6 +1,6 @@
-//! PlanSys2's planner node: the services `planner/get_plan`, `planner/get_plan_array` and
-//! `planner/validate_domain`, the parameters that PlanSys2 sets, and the lifecycle by which its
-//! manager starts the node.
+//! Replacement of PlanSys2's planner node. It has the services `planner/get_plan`,
+//! `planner/get_plan_array` and `planner/validate_domain`, the parameters that PlanSys2 sets, and
+//! the lifecycle by which PlanSys2's manager starts the node.
 //!
 //! Each request is planned on a separate thread, so that the node answers other requests in the
 //! meantime. With a mission, its knowledge base restricts the designs and is updated from
@@ -27,16 +27,16 @@ use crate::planner::manner::Chosen;
 use crate::planner::solve::{DOMAIN, Found, Manner, NoPlan, PROBLEM, Request, check_domain, solve};
 use crate::planner::told::PlanPublisher;
 
-/// Stack size of planning threads: syntax trees may be deeply nested.
+/// Stack size of planning threads in bytes, because syntax trees may be deeply nested.
 const STACK_SIZE: usize = 64 << 20;
 
-/// Limit on concurrent requests. Further requests are refused.
+/// Upper limit on concurrent planning requests. Further requests are refused.
 const MAX_REQUESTS: usize = 8;
 
-/// The planner behind the services.
+/// State of the planner that the services share.
 struct Planner {
     node: Arc<Node>,
-    /// Number of requests being planned.
+    /// Number of requests that are currently being planned.
     busy: AtomicUsize,
     /// Mission whose knowledge base restricts the designs.
     joint: Option<Arc<Joint>>,
@@ -44,11 +44,11 @@ struct Planner {
     plan_publisher: PlanPublisher,
 }
 
-/// Serves as PlanSys2's planner. The node must have no parameters yet. Returns its lifecycle, which
-/// is unconfigured.
+/// Serves as PlanSys2's planner. The node must not have declared parameters before. Returns the
+/// lifecycle of the node, in the state unconfigured.
 ///
 /// # Errors
-/// A parameter of the command line is wrong, or a topic cannot be created.
+/// Fails if a parameter of the command line is wrong, or a topic cannot be created.
 pub fn serve(node: &Arc<Node>, setup: Option<Setup>) -> Result<Arc<Lifecycle>, Errors> {
     let manner = Chosen::declare(node)?;
     let joint = setup.map(|setup| Joint::listen(node, setup.mission)).transpose()?;
@@ -70,7 +70,8 @@ pub fn serve(node: &Arc<Node>, setup: Option<Setup>) -> Result<Arc<Lifecycle>, E
 pub struct Options {
     /// Manifest of a mission whose knowledge base restricts the designs.
     pub mission: Option<PathBuf>,
-    /// Settings of the robot, with the performers of actions for PlanSys2's executor.
+    /// Settings of the robot, with the performers of actions that are offered to PlanSys2's
+    /// executor.
     pub settings: Option<PathBuf>,
 }
 
@@ -81,7 +82,7 @@ const STOP_POLL_INTERVAL: Duration = Duration::from_millis(50);
 /// offer.
 ///
 /// # Errors
-/// The mission, the settings or a parameter of the command line is wrong.
+/// Fails if the mission, the settings or a parameter of the command line is wrong.
 pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(), Errors> {
     let setup = options.mission.as_deref().map(Setup::read).transpose()?;
     for warning in setup.iter().flat_map(|setup| setup.mission.warnings()) {
@@ -103,7 +104,7 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
 }
 
 impl Planner {
-    /// Serves the three services.
+    /// Creates the three services.
     fn answer(self: &Arc<Self>, lifecycle: &Arc<Lifecycle>) -> Result<(), Message> {
         let (planner, phase) = (Arc::clone(self), Arc::clone(lifecycle));
         self.node.serve::<GetPlan>("planner/get_plan", move |request, answer| {
@@ -130,7 +131,7 @@ impl Planner {
         })
     }
 
-    /// Runs work on a separate thread.
+    /// Runs work on a separate planning thread. If no thread can be created, logs an error.
     fn run_in_background(self: &Arc<Self>, name: &str, work: impl FnOnce(&Self) + Send + 'static) {
         let planner = Arc::clone(self);
         if let Err(error) = on_a_thread(name, move || work(&planner)) {
@@ -149,12 +150,13 @@ impl Planner {
         if !is_ready {
             return Err(NoPlan::None(UNCONFIGURED.to_owned()));
         }
-        // Requests are counted before the comparison, so that concurrent ones cannot exceed the limit together.
+        // Requests are counted before the comparison, so that concurrent requests cannot exceed the
+        // limit together.
         if self.busy.fetch_add(1, Ordering::Relaxed) >= MAX_REQUESTS {
             self.busy.fetch_sub(1, Ordering::Relaxed);
             return Err(NoPlan::None(format!("{MAX_REQUESTS} other plans are being looked for")));
         }
-        // The request is counted until it ends, also if planning panics.
+        // The guard decrements the count when the request ends, also if planning panics.
         let _request = CountedRequest(&self.busy);
         self.plan_now(domain, problem, alternatives)
     }
@@ -173,10 +175,10 @@ impl Planner {
     }
 }
 
-/// Runs long work on a separate thread with a large stack.
+/// Runs long work on a separate thread with a large stack, without waiting for its end.
 ///
 /// # Errors
-/// The thread cannot be created.
+/// Fails if the thread cannot be created.
 pub(crate) fn on_a_thread(name: &str, work: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
     std::thread::Builder::new().name(name.to_owned()).stack_size(STACK_SIZE).spawn(work).map(|_| ())
 }
@@ -187,7 +189,7 @@ fn is_ready(lifecycle: &Lifecycle) -> bool {
     matches!(lifecycle.phase(), Phase::Inactive | Phase::Active)
 }
 
-/// Converts a plan to PlanSys2's message, with times in seconds.
+/// Converts a plan to PlanSys2's message type, with times in seconds.
 pub(crate) fn plan_message(lines: &[PlanLine]) -> Plan {
     let item = |line: &PlanLine| PlanItem {
         time: line.start.to_f64() as f32,
@@ -232,7 +234,7 @@ fn validate_domain_response(is_ready: bool, domain: &str) -> ValidateDomainRespo
     }
 }
 
-/// A request in the number of current requests.
+/// Guard that decrements the number of current requests when dropped.
 struct CountedRequest<'a>(&'a AtomicUsize);
 
 impl Drop for CountedRequest<'_> {

@@ -1,9 +1,9 @@
 //! Planning for PlanSys2: computes the best plan of a domain and a problem, or the reason why no plan exists.
 //!
-//! PlanSys2's problems have no metric, so a default metric can be given. Durative actions may
-//! overlap, as in POPF, and the makespan is minimised if there is no metric. If no such plan is
-//! found in time, or with a knowledge base, plans are sequential: a function has a single design at
-//! a time.
+//! PlanSys2's problems have no metric, so the parameters can provide one. Durative actions may
+//! overlap, as in POPF, and the makespan is minimised if there is no metric. Plans are sequential
+//! if no overlapping plan is found in time or a knowledge base is used, because a function has only
+//! one design at a time.
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -22,42 +22,43 @@ use metaplan::planner::{
 };
 use serde_json::{Value, json};
 
-/// Planning request.
+/// Domain and problem of a planning request.
 #[derive(Debug, Clone)]
 pub struct Request<'r> {
-    /// The domain.
+    /// PDDL domain.
     pub domain: Source,
-    /// The problem.
+    /// PDDL problem.
     pub problem: Source,
-    /// Mission whose knowledge base and bindings are applied.
+    /// Mission whose knowledge base and bindings restrict the plan; `None` for plain PDDL.
     pub joint: Option<&'r Mission>,
 }
 
-/// Planning parameters.
+/// Parameters of planning.
 #[derive(Debug, Clone)]
 pub struct Manner {
-    /// Default metric if the problem has none: an expression, or the name of a function.
+    /// Metric for problems without a metric: an expression, or the name of a function.
     pub metric: Option<String>,
     /// Time limit of planning.
     pub time_limit: Duration,
-    /// `true` if actions may overlap; by default durative actions without a knowledge base.
+    /// Whether actions may overlap. `None` allows overlap for durative actions without a knowledge
+    /// base.
     pub overlap: Option<bool>,
-    /// Maximum number of alternative optimal plans.
+    /// Upper limit on the number of alternative optimal plans.
     pub alternatives: usize,
 }
 
-/// Result of planning.
+/// A plan with its alternatives and cost.
 #[derive(Debug, Clone)]
 pub struct Found {
     /// The best plan, followed by alternatives of the same cost.
     pub plans: Vec<Vec<PlanLine>>,
-    /// Functions and designs of each action of the best plan.
+    /// Pairs of a function and its design, for each action of the best plan.
     pub configuration: Vec<Vec<(String, String)>>,
-    /// Cost by the metric.
+    /// Cost of the plan by the metric.
     pub cost: Exact,
-    /// `true` if the plan is proved to be optimal.
+    /// Whether the plan is proved to be optimal.
     pub proved: bool,
-    /// Claim about the plan, in a sentence.
+    /// Sentence that states the quality of the plan, such as optimality.
     pub verdict: String,
     /// Warnings about the domain and the problem.
     pub warnings: Vec<Message>,
@@ -90,7 +91,7 @@ impl Found {
     }
 }
 
-/// Reason why there is no plan.
+/// Reason why planning returned no plan.
 #[derive(Debug, Clone)]
 pub enum NoPlan {
     /// The domain, the problem or the contribution of the knowledge base is wrong.
@@ -99,7 +100,7 @@ pub enum NoPlan {
     Unsupported(Errors),
     /// No plan exists or none was found; contains the reason.
     None(String),
-    /// A fault of this program.
+    /// An error in this program; contains a description.
     Fault(String),
 }
 
@@ -130,12 +131,12 @@ impl NoPlan {
     }
 }
 
-/// File name of domains in messages.
+/// Name of the domain in messages.
 pub(crate) const DOMAIN: &str = "domain";
-/// File name of problems in messages.
+/// Name of the problem in messages.
 pub(crate) const PROBLEM: &str = "problem";
 
-/// Formats errors with their locations on a single line.
+/// Formats the errors among the messages, with their locations, on a single line.
 fn one_line(messages: &[Message]) -> String {
     let texts = messages.iter().filter(|message| message.is_error()).map(|message| {
         let place = match (&message.file, message.line, message.column) {
@@ -148,14 +149,14 @@ fn one_line(messages: &[Message]) -> String {
     texts.collect::<Vec<_>>().join("; ")
 }
 
-/// Share of the time for plans with overlapping actions. The remaining time is for sequential
+/// Share of the time limit for plans with overlapping actions. The remaining time is for sequential
 /// plans.
 const OVERLAPPING_SHARE: f64 = 0.7;
 
-/// Computes a plan.
+/// Computes the best plan for a request. A panic of the planner is returned as [`NoPlan::Fault`].
 ///
 /// # Errors
-/// The reason why there is no plan.
+/// Fails with the reason why there is no plan.
 pub fn solve(request: Request<'_>, manner: &Manner) -> Result<Found, NoPlan> {
     let solved = catch_unwind(AssertUnwindSafe(|| solve_or_panic(request, manner)));
     solved.unwrap_or_else(|panic| Err(NoPlan::Fault(Message::of_panic(&*panic).message.clone())))
@@ -196,7 +197,7 @@ fn solve_or_panic(Request { domain, problem, joint }: Request<'_>, manner: &Mann
     })
 }
 
-/// A mission with its completed problem.
+/// A mission, its problem completed with the knowledge base, and the planning parameters.
 struct FilledMission<'a> {
     mission: &'a Mission,
     problem: &'a Problem,
@@ -204,8 +205,8 @@ struct FilledMission<'a> {
 }
 
 impl FilledMission<'_> {
-    /// Computes a plan with overlapping actions, or a proof that no plan exists. Returns `None` on
-    /// timeout or for unsupported features.
+    /// Computes a plan with overlapping actions, or a proof that no plan exists. Returns `None` if
+    /// neither is found in time or the task has unsupported features.
     fn overlapping(&self, limits: &Limits) -> Result<Option<Solution>, NoPlan> {
         let separation = instant();
         let Ok(task) = self.mission.ground_concurrent(self.problem, &[], &separation, limits) else {
@@ -219,7 +220,7 @@ impl FilledMission<'_> {
         Ok(Some(solution).filter(|solution| solution.status != Status::Unknown))
     }
 
-    /// Computes a sequential plan and alternatives of the same cost.
+    /// Computes an optimal sequential plan and alternatives of the same cost.
     fn sequence(&self, limits: Limits) -> Result<(Solution, Vec<Plan>), NoPlan> {
         let config = Config::default().with_limits(limits);
         let task = match self.mission.ground(self.problem, &[], &config.limits) {
@@ -253,7 +254,7 @@ impl FilledMission<'_> {
         Ok((solution, other_plans))
     }
 
-    /// Computes a plan of a task whose numbers exceed the range of the SAT encoding.
+    /// Computes a sequential plan for a task whose numbers exceed the range of the SAT encoding.
     fn exact(&self, config: &Config) -> Result<Solution, NoPlan> {
         let task =
             self.mission.ground_exact(self.problem, &[], &config.limits).map_err(NoPlan::Unsupported)?;
@@ -264,7 +265,8 @@ impl FilledMission<'_> {
         Ok(solution)
     }
 
-    /// Returns a plan once the validator has executed it, with start times that show which actions follow each other.
+    /// Validates a plan by execution. Returns the plan with start times that show which actions
+    /// follow each other.
     fn confirmed(&self, plan: Plan, reading: &Reading, limits: &Limits) -> Result<Plan, NoPlan> {
         match confirm(self.mission, self.problem, &plan, reading, limits) {
             Ok(()) => Ok(spaced(self.mission, self.problem, plan, reading, limits)),
@@ -288,10 +290,10 @@ impl FilledMission<'_> {
     }
 }
 
-/// Checks that a text is a valid domain.
+/// Checks that a source is a valid PDDL domain.
 ///
 /// # Errors
-/// All errors of the domain.
+/// Fails with all errors of the domain.
 pub(crate) fn check_domain(domain: &Source) -> Result<(), Errors> {
     let (tree, mut diagnostics) = pddl::parse_domain(domain);
     if let Some(tree) = &tree {

@@ -1,5 +1,5 @@
-//! Publication of planning results: in the log, and as JSON on the topic `~/plan`, with the
-//! designs, which PlanSys2's plans cannot contain.
+//! Publication of planning results: in the log, and as JSON on the topic `~/plan`. The JSON
+//! contains the designs, for which PlanSys2's plans have no field.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use crate::interfaces::std_msgs::msg::String as Text;
 use crate::node::{Node, Publisher, Severity, latched};
 use crate::planner::{Found, NoPlan};
 
-/// Publisher of planning results.
+/// Publisher of planning results in the log and on the topic `~/plan`.
 #[derive(Debug)]
 pub(crate) struct PlanPublisher {
     node: Arc<Node>,
@@ -17,16 +17,16 @@ pub(crate) struct PlanPublisher {
 }
 
 impl PlanPublisher {
-    /// Creates the topic.
+    /// Creates the publisher and its topic.
     ///
     /// # Errors
-    /// The topic cannot be created.
+    /// Fails if the topic cannot be created.
     pub(crate) fn new(node: &Arc<Node>) -> Result<Self, Errors> {
         let plans = node.publisher("~/plan", latched(1))?;
         Ok(Self { node: Arc::clone(node), plans })
     }
 
-    /// Publishes a plan, or the reason why no plan was found.
+    /// Publishes a plan in the log and on the topic, or logs the reason why no plan was found.
     pub(crate) fn publish_result(&self, found: &Result<Found, NoPlan>) {
         match found {
             Ok(found) => {

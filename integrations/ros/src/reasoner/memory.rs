@@ -1,7 +1,7 @@
-//! State of a reasoner that must survive a restart: its goals, their designs, and the latest
-//! reports.
+//! State of a reasoner that must survive a restart: its goals, the designs of their functions, and
+//! the latest reports.
 //!
-//! The state is a single file, which is replaced atomically on changes.
+//! The state is a single file, which is replaced atomically on each change.
 
 use std::collections::BTreeMap;
 use std::io::Write as _;
@@ -13,30 +13,31 @@ use serde::{Deserialize, Serialize};
 
 use crate::interfaces::mros2_msgs::msg::QoS;
 
-/// Version of the file format.
+/// Version of the file format, as written to the file.
 const FORMAT: &str = "metaplan-reasoner/1";
 
-/// Contents of the file.
+/// Contents of the state file.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Memory {
     format: String,
-    /// Last event by subject.
+    /// Last reported event by subject, such as a measured attribute.
     pub(super) reports: BTreeMap<String, String>,
     pub(super) goals: Vec<Remembered>,
 }
 
-/// A goal.
+/// A goal of the reasoner that had not ended.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Remembered {
-    /// Goal id of the client.
+    /// Id that the client gave to the goal.
     pub(super) goal: [u8; 16],
-    /// Requested objective, with its final name.
+    /// Requested objective. Its `objective_id` is the final name, which the client may have
+    /// omitted.
     pub(super) wanted: QoS,
-    /// Design of the function.
+    /// Design of the goal's function. `None` if no design was set.
     pub(super) design: Option<String>,
 }
 
-/// File of the state.
+/// State file and the contents that were last read or written.
 #[derive(Debug)]
 pub(super) struct MemoryFile {
     path: PathBuf,
@@ -50,10 +51,11 @@ impl Memory {
 }
 
 impl MemoryFile {
-    /// Opens the file in a directory, which is created if needed.
+    /// Opens the state file in a directory, and creates the directory if needed. A missing file is
+    /// an empty state.
     ///
     /// # Errors
-    /// The directory cannot be used, or the file is damaged.
+    /// Fails if the directory cannot be used, or the file is damaged or has another format.
     pub(super) fn open(directory: &Path) -> Result<Self, Message> {
         let path = directory.join("reasoner.json");
         let failed = |text: String| Message::at("N141", &path.display().to_string(), None, text);
@@ -72,15 +74,15 @@ impl MemoryFile {
         Ok(Self { path, last })
     }
 
-    /// Returns the stored state.
+    /// Returns the state that was last read or written.
     pub(super) fn read(&self) -> Memory {
         self.last.clone()
     }
 
-    /// Stores the state if it has changed.
+    /// Writes the state to the file if it differs from the stored state.
     ///
     /// # Errors
-    /// The file cannot be written.
+    /// Fails if the file cannot be written.
     pub(super) fn write(&mut self, memory: Memory) -> Result<(), Message> {
         if memory == self.last {
             return Ok(());

@@ -1,4 +1,4 @@
-//! Nodes for tests, each pair in a separate domain.
+//! Helpers for tests with nodes. Each test uses a separate ROS domain.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU16, Ordering};
@@ -6,17 +6,17 @@ use std::time::{Duration, Instant};
 
 use metaplan_ros::node::{Network, Node, Opening, Rmw, RosArguments};
 
-/// First domain for tests. Concurrent runs on a machine need different domains.
+/// First ROS domain for tests. Concurrent runs on one machine need different domains.
 const FIRST: u16 = 20;
 
-/// Returns a domain that no other test of this process uses.
+/// Returns a ROS domain that no other test of this process uses.
 pub fn domain() -> u16 {
     static USED: AtomicU16 = AtomicU16::new(0);
     let slot = (std::process::id() % 20) as u16 * 10;
     FIRST + slot + USED.fetch_add(1, Ordering::Relaxed) % 10
 }
 
-/// Creates a node on loopback with arguments after `--ros-args`.
+/// Creates a node on the loopback network. `words` are the arguments after `--ros-args`.
 pub fn node(domain: u16, name: &str, words: &str) -> Arc<Node> {
     let words = ["p", "--ros-args"].into_iter().chain(words.split_whitespace()).map(str::to_owned);
     let (_, arguments) = RosArguments::split(words).expect("arguments");
@@ -25,7 +25,7 @@ pub fn node(domain: u16, name: &str, words: &str) -> Arc<Node> {
     Node::open(opening).expect("a node")
 }
 
-/// Waits for a condition.
+/// Waits until a condition holds; `what` describes the condition if the time runs out.
 pub fn until(what: &str, mut is_so: impl FnMut() -> bool) {
     let begun = Instant::now();
     while !is_so() {

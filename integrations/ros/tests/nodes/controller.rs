@@ -18,7 +18,7 @@ use crate::common::{domain, node, until};
 use crate::nav2::file;
 use crate::performers::serve;
 
-/// PlanSys2's experts.
+/// Simulates PlanSys2's experts for domain and problem.
 fn experts(robot: &Arc<Node>) -> Arc<Mutex<String>> {
     let text = |name: &str| std::fs::read_to_string(file(name)).expect("a file");
     let domain = text("domain.pddl");
@@ -46,7 +46,7 @@ fn failed(component: &str) -> DiagnosticArray {
     DiagnosticArray { status, ..Default::default() }
 }
 
-/// Waits for the result of the controller.
+/// Starts the controller on a thread, which returns its result.
 fn control(domain: u16, stop: &Arc<AtomicBool>) -> std::thread::JoinHandle<Result<(), String>> {
     let controller = node(domain, "metaplan", "");
     let (options, stop) =
@@ -67,7 +67,7 @@ fn a_plan_whose_design_is_lost_is_cancelled_and_made_anew() {
         let mut seen = seen.lock().expect("no panic");
         seen.push(goal.plan.items.iter().map(|item| item.duration).sum::<f32>());
         let done = ExecutePlanResult { success: true, ..Default::default() };
-        // The first plan does not end, the second one fails, and the third one succeeds.
+        // The first plan never ends, the second fails, and the third succeeds.
         match seen.len() {
             1 => None,
             2 => Some((GoalEnd::Aborted, ExecutePlanResult::default())),
@@ -84,8 +84,8 @@ fn a_plan_whose_design_is_lost_is_cancelled_and_made_anew() {
         controls.is_finished()
     });
     assert_eq!(controls.join().expect("no panic"), Ok(()));
-    // Calculated by hand: 18 m at 1 s each, and at 2 s with cameras for localisation; two pictures
-    // of 2 s.
+    // Calculated by hand: 18 m at 1 s each, or at 2 s each with cameras for localisation, and two
+    // pictures of 2 s.
     assert_eq!(*durations.lock().expect("no panic"), [22.0, 40.0, 40.0]);
 }
 

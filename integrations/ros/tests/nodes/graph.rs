@@ -1,4 +1,4 @@
-//! Topics, services, actions, parameters and states between two nodes.
+//! Topics, services, actions, parameters and lifecycle states between two nodes.
 
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -76,7 +76,7 @@ fn services_answer_or_it_is_said_why_not() {
         error.contains("no answer from /uuv/task/request after 0.3 s") && error.contains("--rmw"),
         "{error}"
     );
-    // A late reply is not taken for the reply to the next call.
+    // A late reply must not be taken as the reply to the next call.
     assert_eq!(call("search_pipeline", LONG), Ok(true));
     let nobody = client.caller::<Task>("/task/cancel");
     let error =

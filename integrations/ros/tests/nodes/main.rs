@@ -1,4 +1,4 @@
-//! Two nodes of this package over loopback.
+//! Tests with two nodes of this package over loopback.
 
 mod common;
 mod controller;

@@ -17,12 +17,12 @@ use metaplan_ros::planner::{self, Found, Manner, NoPlan, Request};
 use crate::common::{domain, node, until};
 use crate::performers::{Cast, hear, serve};
 
-/// A file of the example.
+/// Path of a file of the example.
 pub fn file(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/nav2").join(name)
 }
 
-/// Returns the best plan with some failed components.
+/// Returns the best plan after the given components have failed.
 fn plan(failed: &[&str]) -> Result<Found, NoPlan> {
     let mut mission = Setup::read(&file("mission.toml")).expect("a mission").mission;
     for component in failed {
@@ -74,8 +74,8 @@ fn the_round_is_driven() {
     assert_eq!(places, [(4.0, 0.0), (4.0, 3.0), (6.0, 3.0), (4.0, 0.0), (0.0, 0.0)]);
 }
 
-/// Calculated by hand: 16 m at 1 s each, and two pictures of 2 s; an additional 1 s per metre with
-/// cameras for localisation.
+/// Calculated by hand: 18 m at 1 s each, or at 2 s each with cameras for localisation, and two
+/// pictures of 2 s each, or of 15 s each by warmth.
 #[test]
 fn the_designs_follow_the_components() {
     let designs = |found: &Found| {

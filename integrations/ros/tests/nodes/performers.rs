@@ -52,7 +52,7 @@ fn call(text: &str) -> Call {
     Call { action, arguments: words.collect(), configuration: BTreeMap::new(), duration: 0.0 }
 }
 
-/// Collects all messages about an action.
+/// Collects all messages about an action until it ends. Returns the feedback and the end.
 pub fn hear(running: &Running) -> (Vec<Progress>, End) {
     let mut heard = Vec::new();
     loop {
@@ -63,7 +63,7 @@ pub fn hear(running: &Running) -> (Vec<Progress>, End) {
     }
 }
 
-/// Creates the performers of settings.
+/// The performers that a settings file configures, by action name.
 pub struct Cast(BTreeMap<String, Box<dyn Perform>>);
 
 impl Cast {
@@ -86,8 +86,8 @@ fn cast(domain: u16, settings: &str) -> (Arc<Node>, Cast) {
     (manager, cast)
 }
 
-/// A server that accepts goals, sends a feedback, and ends them with a given outcome. Goals are
-/// cancelled on request.
+/// Serves an action: accepts each goal, sends one feedback message, and ends the goal with a given
+/// outcome. Goals are cancelled on request.
 pub fn serve<A: Action + 'static>(
     node: &Arc<Node>,
     name: &str,
@@ -146,7 +146,7 @@ fn nav2_moves_the_robot() {
     let goal = goals.lock().expect("no panic")[0].clone();
     let (position, way) = (&goal.pose.pose.position, &goal.pose.pose.orientation);
     assert_eq!((goal.pose.header.frame_id.as_str(), position.x, position.y), ("map", 1.0, -2.5));
-    // Half a turn.
+    // The expected orientation is half a turn around the z-axis.
     assert!((way.z - 1.0).abs() < 1e-9 && way.w.abs() < 1e-9 && way.x == 0.0 && way.y == 0.0, "{way:?}");
     // A goal that takes long is cancelled.
     let running = cast.start(call("(move r1 hall hell)"));
@@ -195,7 +195,7 @@ fn the_world_and_the_modes_of_functions_do_their_part() {
     assert_eq!(end.join().expect("no panic"), End::Succeeded);
 }
 
-/// Both ends of the topic: a simulated executor and a simulated performer of PlanSys2.
+/// Tests both ends of `actions_hub`: a simulated executor and a simulated performer of PlanSys2.
 #[test]
 fn actions_go_over_the_hub() {
     let domain = domain();
@@ -254,7 +254,7 @@ fn actions_go_over_the_hub() {
     assert_eq!(said, BTreeSet::from(all));
 }
 
-/// PlanSys2's executor requests an action of the settings, which changes a mode.
+/// PlanSys2's executor requests an action that the settings offer. The action changes a mode.
 #[test]
 fn what_the_settings_offer_is_done_for_plansys2() {
     let domain = domain();
@@ -278,7 +278,7 @@ fn what_the_settings_offer_is_done_for_plansys2() {
     assert!(matches!(&end, End::Failed(because) if because.contains("refused")), "{end:?}");
 }
 
-/// Behaves according to the name of the robot.
+/// Performer whose outcome depends on the first argument, the name of the robot.
 struct Own {
     begun: Arc<Mutex<Vec<Call>>>,
 }

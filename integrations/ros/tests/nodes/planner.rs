@@ -1,5 +1,5 @@
-//! Replacement of PlanSys2's planner, called like by PlanSys2's planner client and lifecycle
-//! manager.
+//! Replacement of PlanSys2's planner, called in the same way as by PlanSys2's planner client and
+//! lifecycle manager.
 
 use std::path::Path;
 use std::sync::{Arc, Mutex};
@@ -36,7 +36,7 @@ const PROBLEM: &str = "(define (problem p) (:domain d) (:objects a b c d - place
     (= (price a b) 1) (= (price b d) 1) (= (price a c) 1) (= (price c d) 1) (= (price a d) 5))
   (:goal (at d)))";
 
-/// A pigeonhole problem, which cannot be solved in reasonable time.
+/// A pigeonhole problem, which is unsolvable and too hard to decide in reasonable time.
 fn hopeless() -> (String, String) {
     let domain = "(define (domain holes) (:requirements :typing) (:types pigeon hole)
       (:predicates (free ?h - hole) (out ?p - pigeon) (in ?p - pigeon ?h - hole) (home ?p - pigeon)
@@ -68,7 +68,7 @@ fn hopeless() -> (String, String) {
     (domain.to_owned(), problem)
 }
 
-/// Creates a configured planner and a client node.
+/// Creates a planner node in the state configured, and a client node.
 fn planner(setup: Option<Setup>, words: &str) -> (Arc<Node>, Arc<Node>) {
     let domain = domain();
     let (planner, client) = (node(domain, "planner", words), node(domain, "client", ""));
@@ -161,7 +161,7 @@ fn others_are_answered_while_a_plan_is_looked_for_and_its_time_is_kept() {
     assert!(!found.success && found.error_info.contains("a limit was reached"), "{}", found.error_info);
 }
 
-/// Diagnostics report a failed component: its design is no longer used.
+/// After diagnostics report a failed component, its design is no longer used.
 #[test]
 fn the_knowledge_base_of_a_mission_joins_in() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
@@ -176,7 +176,7 @@ fn the_knowledge_base_of_a_mission_joins_in() {
     let get_plan = client.caller::<GetPlan>("/planner/get_plan");
     let before = ask(&get_plan, &domain, &problem);
     assert!(before.success, "{}", before.error_info);
-    // Information that PlanSys2's plans cannot contain.
+    // The JSON contains the designs, for which PlanSys2's plans have no field.
     until("the plan as JSON", || !told.lock().expect("no panic").is_empty());
     let plan: serde_json::Value = serde_json::from_str(&told.lock().expect("no panic")).expect("JSON");
     assert_eq!((&plan["optimal"], &plan["steps"][0]["action"]), (&true.into(), &"search_pipeline".into()));

@@ -4,14 +4,14 @@ use num_traits::{One, Zero};
 
 use task::number::Rational;
 
-/// A column of a linear program: a variable that is at least 0.
+/// Column of a linear program: a variable that must be at least 0.
 pub(super) type Column = u32;
 
 /// An affine expression: a constant plus multiples of columns.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
 pub(super) struct Affine {
     pub(super) constant: Rational,
-    /// Sorted by column; no factor is 0.
+    /// Columns with their factors, sorted by column; no factor is 0.
     pub(super) terms: Vec<(Column, Rational)>,
 }
 
@@ -24,17 +24,18 @@ impl Affine {
         Self { constant: Rational::zero(), terms: vec![(column, Rational::one())] }
     }
 
-    /// Value of the expression, if it contains no column.
+    /// Value of the expression if it contains no column; otherwise `None`.
     pub(super) fn known(&self) -> Option<&Rational> {
         self.terms.is_empty().then_some(&self.constant)
     }
 
+    /// Factor of a column. Returns `None` if the column does not occur.
     pub(super) fn coefficient(&self, column: Column) -> Option<&Rational> {
         let position = self.terms.binary_search_by_key(&column, |(candidate, _)| *candidate).ok()?;
         Some(&self.terms[position].1)
     }
 
-    /// Sum of this expression and `times` times another one.
+    /// Sum of this expression and `times` times `other`.
     pub(super) fn plus(&self, other: &Self, times: &Rational) -> Self {
         let mut terms = Vec::with_capacity(self.terms.len().saturating_add(other.terms.len()));
         let (mut left_terms, mut right_terms) = (self.terms.iter().peekable(), other.terms.iter().peekable());
@@ -74,7 +75,7 @@ impl Affine {
         Self::default().plus(self, factor)
     }
 
-    /// Replaces a column by an expression.
+    /// Replaces a column by the expression `by`.
     pub(super) fn substitute(&mut self, column: Column, by: &Self) {
         if let Ok(position) = self.terms.binary_search_by_key(&column, |(candidate, _)| *candidate) {
             let (_, factor) = self.terms.remove(position);

@@ -1,4 +1,5 @@
-//! A goal sequence of happenings to a plan: optimal durations first, then the earliest times.
+//! Converts a goal sequence of happenings to a plan: optimal durations first, then the earliest
+//! times.
 
 use num_traits::One;
 use pddl::to_decimal;
@@ -16,12 +17,13 @@ use crate::concurrent::temporal_task::TemporalTask;
 pub(super) struct Answer {
     /// Metric value in the integer scale of [`crate::concurrent::measure::Measure`].
     pub(super) value: Rational,
-    /// Metric value of the same sequence if durations need not be decimals.
+    /// Optimal metric value of the same sequence if durations need not be decimals.
     pub(super) least: Rational,
     pub(super) plan: Plan,
 }
 
-/// Best plan of a sequence. Returns `None` if its numeric variables do not reach the goal.
+/// Returns the best plan of a sequence, or `None` if no times and durations reach the numeric
+/// goals.
 ///
 /// Minimises, in this order: metric, makespan, sum of durations, start times. A metric without a
 /// minimum is skipped. Durations are decimals if possible, even if that increases the metric
@@ -50,8 +52,8 @@ fn sum(expressions: &[Affine]) -> Affine {
     expressions.iter().fold(Affine::default(), |sum, expression| sum.plus(expression, &Rational::one()))
 }
 
-/// Lexicographic optimum of several objectives, the most important first. An objective without a
-/// minimum is skipped.
+/// Optimises several objectives lexicographically, the most important first. An objective without a
+/// minimum is skipped. Returns the program, constrained to the optimum of each objective.
 fn best(program: &Program, objectives: &[&Affine]) -> Program {
     let mut best = program.clone();
     for objective in objectives {
@@ -66,7 +68,7 @@ fn best(program: &Program, objectives: &[&Affine]) -> Program {
     best
 }
 
-/// Fixes durations at their values in the optimum.
+/// Constrains each duration to its value at the optimum of `program`.
 fn fix(program: &Program, durations: &[Affine]) -> Program {
     let mut fixed = program.clone();
     for duration in durations {
@@ -77,15 +79,15 @@ fn fix(program: &Program, durations: &[Affine]) -> Program {
     fixed
 }
 
-/// Returns `true` if a time has a finite decimal expansion.
+/// Returns `true` if a time, converted to PDDL time units, has a finite decimal expansion.
 fn is_decimal(concurrent: &TemporalTask, time: &Rational) -> bool {
     let unit = Rational::from_integer(concurrent.task.time_scale);
     to_decimal(&(time.clone() / unit).to_big()).is_some()
 }
 
-/// Rounds the durations to decimals one after another, each to the best neighbouring value, because
-/// plans are written and must be valid in decimals. Returns `None` if no such durations are
-/// feasible.
+/// Rounds the durations to decimals one after another, each to the better feasible neighbouring
+/// value. Plans are written in decimals and must remain valid. Returns `None` if no such durations
+/// are feasible.
 fn rounded(
     concurrent: &TemporalTask,
     program: &Program,
@@ -109,8 +111,8 @@ fn rounded(
     Some(rounded)
 }
 
-/// Granularity of rounded durations: a power of ten of the files' time unit, at most a thousandth
-/// of the separation.
+/// Granularity of rounded durations: a negative power of ten of the PDDL time unit, at most a
+/// thousandth of the separation.
 fn grain(concurrent: &TemporalTask) -> Option<Rational> {
     let unit = Rational::from_integer(concurrent.task.time_scale);
     let limit = Rational::from_integer(concurrent.separation) / Rational::from_integer(1000);
@@ -128,7 +130,7 @@ fn in_names(
     let task = &concurrent.task;
     let mut steps = Vec::new();
     let mut before = at(&Course::new(concurrent).measured(concurrent));
-    // Running actions: instance and index of the step, in the order of their starts.
+    // Running actions in the order of their starts: instance and index of the step.
     let mut open: Vec<(u32, usize)> = Vec::new();
     for passed in &course.passed {
         let operator = &task.operators[passed.operator.index()];

@@ -1,9 +1,9 @@
-//! Linear programs in exact rationals, solved again after each added constraint.
+//! Linear programs in exact rational arithmetic, reoptimised after each added constraint.
 //!
 //! A program is stored as a *dictionary* \[1\]: basic columns and slacks as expressions over the
-//! nonbasic columns. The dual simplex algorithm repairs a violated constraint from the last
-//! optimum; the primal one minimises another objective. Both use Bland's rule, so that they
-//! terminate \[2\].
+//! nonbasic columns. The dual simplex algorithm restores feasibility after adding a constraint; the
+//! primal simplex algorithm minimises another objective. Both use Bland's rule to guarantee
+//! termination \[2\].
 //!
 //! \[1\] V. Chvátal: Linear Programming, 1983. \[2\] R. Bland: New finite pivoting rules for the
 //! simplex method, Mathematics of Operations Research 2, 1977.
@@ -27,13 +27,13 @@ pub(super) struct Program {
 }
 
 impl Program {
-    /// Program without constraints other than that all columns are at least 0. The factors of the
+    /// Program whose only constraints are that all columns are at least 0. The factors of the
     /// objective must not be negative.
     pub(super) fn new(objective: Affine) -> Self {
         Self { rows: Vec::new(), objective, slacks: FIRST_SLACK_COLUMN }
     }
 
-    /// Minimum of the objective.
+    /// Minimum of the current objective.
     pub(super) fn least(&self) -> &Rational {
         &self.objective.constant
     }
@@ -43,13 +43,13 @@ impl Program {
         self.rows.iter().fold(self.objective.bytes(), |sum, (_, row)| sum.saturating_add(row.bytes()))
     }
 
-    /// Value of an expression at the optimum.
+    /// Value of an expression at the current optimum.
     pub(super) fn value(&self, expression: &Affine) -> Rational {
         self.reduced(expression).constant
     }
 
-    /// Adds constraints that each expression is at least 0, and reoptimises. Returns `false` if
-    /// they are infeasible; the program must not be used then.
+    /// Adds the constraints that each expression is at least 0, and reoptimises. Returns `false` if
+    /// the constraints are infeasible; the program must not be used then.
     pub(super) fn constrain<'e>(&mut self, expressions: impl IntoIterator<Item = &'e Affine>) -> bool {
         for expression in expressions {
             let row = self.reduced(expression);
@@ -65,8 +65,8 @@ impl Program {
         self.mend()
     }
 
-    /// Minimises another objective by the primal simplex algorithm. Returns `false` if it is
-    /// unbounded.
+    /// Minimises another objective by the primal simplex algorithm. Returns `false` if the
+    /// objective is unbounded below.
     pub(super) fn minimise(&mut self, objective: &Affine) -> bool {
         self.objective = self.reduced(objective);
         loop {
@@ -87,7 +87,8 @@ impl Program {
         }
     }
 
-    /// Rewrites an expression over the nonbasic columns, which are 0 at the optimum.
+    /// Rewrites an expression over the nonbasic columns. Its constant is then the value at the
+    /// current optimum, where nonbasic columns are 0.
     fn reduced(&self, expression: &Affine) -> Affine {
         let mut reduced = Affine::constant(expression.constant.clone());
         for (column, factor) in &expression.terms {
@@ -99,8 +100,8 @@ impl Program {
         reduced
     }
 
-    /// Restores feasibility by the dual simplex algorithm. Returns `false` if there is no feasible
-    /// solution.
+    /// Restores feasibility by the dual simplex algorithm. Returns `false` if no feasible solution
+    /// exists.
     fn mend(&mut self) -> bool {
         loop {
             let broken = self.rows.iter().find(|(_, row)| row.constant.is_negative());
@@ -151,7 +152,8 @@ mod tests {
         }
     }
 
-    /// Minimum over two columns, attained at an intersection of two constraints.
+    /// Brute-force minimum of an objective over two columns, attained at an intersection of two
+    /// constraints.
     fn least(constraints: &[Affine], objective: &Affine) -> Option<Rational> {
         let mut half_planes = constraints.to_vec();
         half_planes.extend([affine(0, [1, 0]), affine(0, [0, 1])]);

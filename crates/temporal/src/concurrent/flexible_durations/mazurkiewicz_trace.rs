@@ -1,8 +1,9 @@
 //! Mazurkiewicz traces \[1\]: sequences that differ only in the order of happenings that do not interfere.
 //!
-//! The sequences of a trace reach the same state and have the same linear program up to the names of columns.
-//! Only the lexicographically first sequence of each trace is searched. An end names the run of its instance
-//! that it ends; runs of one instance keep their order.
+//! The sequences of a trace reach the same state and have the same linear program up to the names
+//! of columns. Only the lexicographically first sequence of each trace is searched. An end is
+//! identified by its operator and the index of the run that it ends; runs of one instance keep
+//! their order.
 //!
 //! \[1\] A. Mazurkiewicz: Concurrent program schemes and their interpretations, DAIMI PB 78, Aarhus
 //! University, 1977.
@@ -14,7 +15,8 @@ use crate::concurrent::flexible_durations::partial_plan_lp::gap;
 use crate::concurrent::happening::Role;
 use crate::concurrent::temporal_task::TemporalTask;
 
-/// Memoised interference relation between happenings.
+/// Computes the lexicographically first sequence of a trace. Memoises the interference relation
+/// between happenings.
 pub(super) struct Traces<'a> {
     concurrent: &'a TemporalTask,
     known: FxHashMap<(OperatorId, OperatorId), bool>,
@@ -25,7 +27,8 @@ impl<'a> Traces<'a> {
         Self { concurrent, known: FxHashMap::default() }
     }
 
-    /// Lexicographically first sequence of the trace.
+    /// Lexicographically first sequence in the trace of `sequence`. Each element is an operator and
+    /// the index of the run that it ends.
     pub(super) fn first(&mut self, sequence: &[(OperatorId, u32)]) -> Vec<(OperatorId, u32)> {
         let mut remaining = sequence.to_vec();
         let mut first = Vec::with_capacity(remaining.len());

@@ -2,11 +2,11 @@
 //! happenings.
 //!
 //! The bounds of a duration are conditions at the start of its action, and effects may depend on
-//! it. A sequence has a plan if some times and durations satisfy all constraints. This is a linear
-//! program, as in COLIN \[1\]. It is solved in exact arithmetic (`linear_program`): a plan must not
-//! be wrong by a rounded epsilon, and infeasibility is part of proofs. An exhaustive and a greedy
-//! search run interleaved (`search`). If every action can have its minimal duration, the searches
-//! for fixed durations are used as well.
+//! the duration. A sequence has a plan if some times and durations satisfy all constraints, which
+//! form a linear program as in COLIN \[1\]. The program is solved in exact arithmetic
+//! (`linear_program`), because rounding errors could make plans invalid and infeasibility is part
+//! of proofs. An exhaustive and a greedy search run interleaved (`search`). If every action can
+//! have its minimal duration, the searches for fixed durations are used as well.
 //!
 //! \[1\] A. Coles, A. Coles, M. Fox, D. Long: COLIN: planning with continuous linear numeric
 //! change, JAIR 44, 2012.
@@ -37,7 +37,7 @@ use answer::Answer;
 use partial_plan_lp::Course;
 use search::{Outcome, Search};
 
-/// Returns the task if its chosen durations are supported.
+/// Returns the task unchanged if its chosen durations are supported.
 ///
 /// # Errors
 /// Fails if a derived predicate compares numbers, because its truth would depend on durations.
@@ -57,9 +57,11 @@ pub(super) fn check(concurrent: TemporalTask) -> Result<TemporalTask, Errors> {
 /// Returns `true` if the exhaustive search covers every plan with all its possible times and
 /// durations.
 ///
-/// It does not if an action may take no time or less than the separation (it then becomes a single
-/// happening), if several happenings can jointly maintain a condition at one time, or if the task
-/// has timed initial literals, since a plan may end right before them.
+/// Returns `false` in particular if
+/// - a chosen duration may be 0 or less than the separation (the action then becomes a single happening),
+/// - a duration depends on the state and is not chosen,
+/// - several happenings can jointly maintain a condition at one time, or
+/// - the task has timed initial literals, since a plan may end right before them.
 pub(super) fn is_exact(concurrent: &TemporalTask) -> bool {
     let takes_time = |instance: &Instance| {
         let condition = &concurrent.task.operators[instance.start.index()].condition;
@@ -83,11 +85,13 @@ pub(super) fn is_exact(concurrent: &TemporalTask) -> bool {
             .all(|instance| instance.joint.is_empty() && is_decided(instance) && takes_time(instance))
 }
 
-/// Finds an optimal plan; among these one with the least makespan and the shortest durations.
+/// Finds a plan with the least metric and, among these plans, the least makespan and then the
+/// shortest durations.
 pub(super) fn optimize(concurrent: &TemporalTask, limits: &Limits, mut record: Record<'_>) -> Solution {
     let span = info_span!("optimize", operators = concurrent.task.operators.len());
     let (is_over, lower, best) = span.in_scope(|| take_turns_choosing(concurrent, limits, &mut record));
-    // Rounding durations to decimals may cost a little, and then the value exceeds the bound.
+    // Rounding durations to decimals may increase the metric slightly; then the value exceeds the
+    // bound.
     let is_proved = is_over && concurrent.is_exact && best.as_ref().is_none_or(|best| lower >= best.value);
     let status = match (&best, is_proved) {
         (Some(_), true) => Status::Optimal,
@@ -108,8 +112,8 @@ pub(super) fn optimize(concurrent: &TemporalTask, limits: &Limits, mut record: R
     }
 }
 
-/// Interleaves the searches. Returns whether the exhaustive search is complete, the lower bound on
-/// the metric, and the best plan.
+/// Interleaves the searches. Returns whether the exhaustive search has visited all sequences, the
+/// lower bound on the metric, and the best plan.
 fn take_turns_choosing(
     concurrent: &TemporalTask,
     limits: &Limits,
@@ -153,8 +157,8 @@ fn take_turns_choosing(
     let mut greedy = Search::greedy(concurrent, &expansion, RelaxedPlanHeuristic::new(&relaxed));
     let (mut work, mut rounds) = (soon.max(1), 1..);
     while exhaustive_outcome != Outcome::Exhausted && !limits.reached() {
-        // These searches restart in each round with twice the work, so they only run again while no
-        // plan is known.
+        // The searches with minimal durations restart in each round with twice the work, so after
+        // the first round they only run while no plan is known.
         if let Some(rounds) = rounds.next().filter(|rounds| *rounds == 1 || best.is_none()) {
             shortest(concurrent, (limits, rounds), &mut best, (record, &bound));
         }
@@ -168,7 +172,8 @@ fn take_turns_choosing(
     (exhaustive_outcome == Outcome::Exhausted, bound, best)
 }
 
-/// Searches for a plan with minimal durations, if the task supports them, for a number of rounds.
+/// Runs the searches for fixed durations on the variant with minimal durations, for a number of
+/// rounds, if the variant exists. Updates `best`.
 fn shortest(
     concurrent: &TemporalTask,
     (limits, rounds): (&Limits, usize),

@@ -1,10 +1,11 @@
-//! Partial plans with open times and durations: a prefix of happenings and its linear program.
+//! Partial plans with open times and durations: a prefix of happenings and a linear program.
 //!
-//! As in POPF \[1\] and COLIN \[2\]. Each start has a column for its time, and one for its duration
-//! if the planner chooses the duration. Numeric fluents are expressions over earlier durations. So
-//! are conditions, each of which is a constraint. Interfering happenings are a separation apart, in
-//! the order of the sequence. The end of a running action is constrained as soon as its
-//! predecessors have happened. The first column is the makespan.
+//! The encoding follows POPF \[1\] and COLIN \[2\]. Each start has a column for its time, and
+//! another one for its duration if the planner chooses the duration. The values of numeric fluents
+//! are affine expressions over earlier durations, so each numeric condition is a linear constraint.
+//! Interfering happenings are a separation apart, in the order of the sequence. The end of a
+//! running action is constrained as soon as its predecessors have happened. The first column is the
+//! makespan.
 //!
 //! \[1\] A. Coles, A. Coles, M. Fox, D. Long: Forward-chaining partial-order planning, ICAPS 2010.
 //! \[2\] A. Coles, A. Coles, M. Fox, D. Long: COLIN: planning with continuous linear numeric
@@ -24,43 +25,44 @@ use crate::concurrent::temporal_task::TemporalTask;
 /// Column of the makespan.
 pub(super) const MAKESPAN: Column = 0;
 
-/// Column of the start time of the happening at a position.
+/// Column of the time of the happening at a position in the sequence. Ends and timed initial
+/// literals do not use it.
 #[expect(clippy::arithmetic_side_effects, reason = "sequences are shorter than 2^28")]
 pub(super) fn time_of(position: usize) -> Column {
     2 * dense(position) + 2
 }
 
-/// Column of the chosen duration of the action that starts at a position.
+/// Column of the chosen duration of the action that starts at a position in the sequence.
 #[expect(clippy::arithmetic_side_effects, reason = "sequences are shorter than 2^28")]
 pub(super) fn duration_of(position: usize) -> Column {
     2 * dense(position) + 3
 }
 
-/// A running action.
+/// A running action of a partial plan.
 #[derive(Debug, Clone)]
 pub(super) struct RunningAction {
     pub(super) instance: u32,
-    /// Time of its end.
+    /// Time of the end of the action.
     end: Affine,
-    /// Value of the duration variable, if the instance has one. Other runs of the instance may have
-    /// other values.
+    /// Value of the number that holds the duration of this run, if the instance has such a number.
+    /// Other runs of the instance may have other values.
     number: Option<Affine>,
-    /// Time of the last happening that wrote an atom or number read by the joint condition over
-    /// all, if there is one.
+    /// Time of the last happening that wrote an atom or number in the joint condition over all of
+    /// the instance. `None` if the instance has no joint condition.
     last: Option<Affine>,
 }
 
-/// A happening of the sequence and its time.
+/// A happening of the sequence, its time and its contribution to the plan.
 #[derive(Debug, Clone)]
 pub(super) struct Passed {
     pub(super) operator: OperatorId,
-    /// For an end: index of the ended run among the runs of its instance, in the order of their
-    /// starts. Otherwise 0.
+    /// For an end: index of the ended run among the simultaneous runs of its instance, in the order
+    /// of their starts. Otherwise 0.
     pub(super) run: u32,
     pub(super) time: Affine,
     /// For a start: duration of the action. Otherwise 0.
     pub(super) duration: Affine,
-    /// Contribution of the numbers in the metric after this happening, in the task's cost unit.
+    /// Contribution of the numbers to the metric after this happening, in the task's cost unit.
     pub(super) measured: Affine,
 }
 
@@ -68,17 +70,17 @@ pub(super) struct Passed {
 #[derive(Debug, Clone)]
 pub(super) struct Course {
     pub(super) values: Vec<u32>,
-    /// Numeric variables of the task.
+    /// Value of each numeric variable of the task, as an expression over durations.
     pub(super) numbers: Vec<Affine>,
-    /// Sorted by instance; runs of one instance in the order of their starts.
+    /// Running actions, sorted by instance; runs of one instance in the order of their starts.
     pub(super) opens: Vec<RunningAction>,
     pub(super) passed: Vec<Passed>,
-    /// Bounds of each chosen duration (minimum and maximum) that follow from constraints on this
-    /// duration and earlier ones. Sorted by column.
+    /// Column, minimum and maximum (`None` if unbounded) of each chosen duration, sorted by column.
+    /// These bounds follow from constraints on this duration and earlier ones.
     ranges: Vec<(Column, Rational, Option<Rational>)>,
-    /// Time of the last timed initial literals, or -1.
+    /// Time of the last timed initial literals that have taken place, or -1.
     floor: Int,
-    /// Path cost in the task's cost unit.
+    /// Sum of the costs of the happenings, in the task's cost unit.
     pub(super) cost: Int,
     pub(super) program: Program,
 }
@@ -88,7 +90,7 @@ fn rational(number: Int) -> Rational {
 }
 
 impl Course {
-    /// Empty partial plan.
+    /// Empty partial plan, in the initial state.
     pub(super) fn new(concurrent: &TemporalTask) -> Self {
         let State { values, numbers } = concurrent.task.initial.clone();
         Self {
@@ -115,27 +117,31 @@ impl Course {
         numbers.chain(times).fold(fixed_size, usize::saturating_add)
     }
 
+    /// Current propositional state. Its numbers are the initial ones, because the actual values are
+    /// expressions in `numbers`.
     pub(super) fn state(&self, concurrent: &TemporalTask) -> State {
         State { values: self.values.clone(), numbers: concurrent.task.initial.numbers.clone() }
     }
 
+    /// Instances of the running actions; an instance occurs once for each of its simultaneous runs.
     pub(super) fn instances(&self) -> impl Iterator<Item = u32> {
         self.opens.iter().map(|open| open.instance)
     }
 
-    /// Number of runs of an instance that are running.
+    /// Number of simultaneous runs of an instance.
     fn runs(&self, instance: u32) -> usize {
         self.instances().filter(|open| *open == instance).count()
     }
 
-    /// Index of a run of an instance among the running actions.
+    /// Position in `opens` of a run of an instance; `run` counts the simultaneous runs of the
+    /// instance by start. Returns `None` if there is no such run.
     fn position(&self, instance: u32, run: u32) -> Option<usize> {
         let mut runs = (0..self.opens.len()).filter(|position| self.opens[*position].instance == instance);
         runs.nth(run as usize)
     }
 
-    /// Possible ends of running actions. If all runs of an instance have the same duration, only
-    /// the first one can end.
+    /// Possible ends of running actions, each with the index of the run. If all runs of an instance
+    /// have the same duration, only the first one can end.
     pub(super) fn ends(&self, concurrent: &TemporalTask) -> impl Iterator<Item = (OperatorId, u32)> {
         let mut before: Option<(u32, u32)> = None;
         let runs = self.instances().map(move |instance| {
@@ -149,8 +155,8 @@ impl Course {
             .map(|(candidate, run)| (candidate.end, run))
     }
 
-    /// Partial plan after a happening (for an end: of the given run). Returns `None` if no times
-    /// and durations are feasible.
+    /// Returns the partial plan after a happening. `run` identifies the run if the happening is an
+    /// end. Returns `None` if no times and durations satisfy the constraints.
     pub(super) fn after(
         &self,
         concurrent: &TemporalTask,
@@ -177,7 +183,8 @@ impl Course {
         if !next.program.constrain(&constraints) {
             return None;
         }
-        // Once the metric itself is minimised, its optimum is a lower bound for every continuation.
+        // Once the program minimises the metric itself, its optimum is a lower bound for every
+        // continuation.
         if concurrent.is_whole && !concurrent.task.objective.rest.is_empty() {
             let is_bounded = next.program.minimise(&next.value_of_plan(concurrent));
             debug_assert!(is_bounded, "what only grows has a least value");
@@ -185,7 +192,7 @@ impl Course {
         Some(next)
     }
 
-    /// Returns `true` if a happening is applicable, ignoring numbers and times.
+    /// Returns `true` if a happening is applicable, ignoring numeric conditions and times.
     fn admits(&self, concurrent: &TemporalTask, (operator, run): (OperatorId, u32), role: Role) -> bool {
         let designs = &concurrent.happenings[operator.index()].designs;
         let clashes = || {
@@ -208,6 +215,7 @@ impl Course {
     }
 
     /// Updates the numbers after a happening, and adds its numeric conditions to `constraints`.
+    /// Returns `None` if a condition is certainly violated.
     fn count(
         &mut self,
         concurrent: &TemporalTask,
@@ -256,7 +264,8 @@ impl Course {
         })
     }
 
-    /// Stores the bounds of a duration. Returns `None` if they contradict each other.
+    /// Stores the bounds of the duration in `column` that follow from `constraints` and the lower
+    /// bound `least`. Returns `None` if the bounds contradict each other.
     fn note_range(&mut self, column: Column, least: Rational, constraints: &mut Vec<Affine>) -> Option<()> {
         constraints.push(Affine::column(column).shifted(&-least.clone()));
         let (mut low, mut high) = (least, None);
@@ -277,7 +286,8 @@ impl Course {
         (!is_empty).then_some(())
     }
 
-    /// Upper bound on an expression over durations. Returns `None` if there is no bound.
+    /// Upper bound on an expression, from the bounds of the durations in it. Returns `None` if
+    /// there is no bound.
     pub(super) fn highest(&self, expression: &Affine) -> Option<Rational> {
         let mut sum = expression.constant.clone();
         for (column, factor) in &expression.terms {
@@ -289,8 +299,9 @@ impl Course {
         Some(sum)
     }
 
-    /// Sets the time of a happening: after the happenings that it interferes with, and before the
-    /// ends of running actions that interfere with it.
+    /// Appends a happening, and adds its temporal constraints: after earlier happenings that
+    /// interfere with it, and before the ends of running actions that interfere with it. Returns
+    /// `None` if a constraint is certainly violated.
     fn pass(
         &mut self,
         concurrent: &TemporalTask,
@@ -313,7 +324,7 @@ impl Course {
             let end = time.plus(&duration, &rational(1));
             constraints.push(Affine::column(MAKESPAN).minus(&end));
             ask(duration.shifted(&rational(concurrent.separation.saturating_neg())), constraints)?;
-            // The end also follows accesses from before the start.
+            // The end must also keep its distances from accesses before the start.
             let after =
                 &concurrent.happenings[concurrent.instances[instance as usize].end.index()].accesses.after;
             self.come_after(concurrent, &end, after, constraints)?;
@@ -362,7 +373,8 @@ impl Course {
         }
     }
 
-    /// Adds constraints that a time follows all earlier accesses that the happening waits for.
+    /// Adds constraints that `time` keeps the distances in `after` from all earlier accesses.
+    /// Returns `None` if a constraint is certainly violated.
     fn come_after(
         &self,
         concurrent: &TemporalTask,
@@ -379,8 +391,9 @@ impl Course {
         Some(())
     }
 
-    /// Adds constraints that the conditions over all of the running actions hold now. Returns
-    /// `None` if a propositional one does not hold.
+    /// Adds constraints that every condition over all of a running action holds after the last
+    /// happening, `operator`. Returns `None` if a propositional condition does not hold or a
+    /// constraint is certainly violated.
     fn keep_up(
         &mut self,
         concurrent: &TemporalTask,
@@ -412,7 +425,7 @@ impl Course {
         Some(())
     }
 
-    /// Contribution of the numbers in the metric, in the task's cost unit.
+    /// Current contribution of the numbers to the metric, in the task's cost unit.
     pub(super) fn measured(&self, concurrent: &TemporalTask) -> Affine {
         let (objective, scale) = (&concurrent.task.objective, concurrent.task.number_scale);
         let unit = rational(objective.scale) / rational(scale);
@@ -430,20 +443,20 @@ impl Course {
         whole.plus(&self.measured(concurrent), &rational(measure.cost))
     }
 
-    /// Lower bound on the metric of every plan that begins with this sequence. Requires that the
-    /// numbers in the metric never decrease.
+    /// Lower bound on the metric of every plan that begins with this sequence. Valid only if the
+    /// contribution of numbers to the metric never decreases.
     pub(super) fn least(&self, concurrent: &TemporalTask) -> Rational {
         self.program.value(&self.value_of_plan(concurrent))
     }
 
-    /// Positions of the actions with chosen durations.
+    /// Positions in the sequence of the starts of actions with chosen durations.
     pub(super) fn chosen(&self, concurrent: &TemporalTask) -> impl Iterator<Item = usize> {
         let roles = self.passed.iter().map(|passed| concurrent.happenings[passed.operator.index()].role);
         let positions = roles.enumerate().filter(|(_, role)| chosen(concurrent, *role).is_some());
         positions.map(|(position, _)| position)
     }
 
-    /// Returns `true` if a plan can end here, ignoring numbers.
+    /// Returns `true` if a plan can end here, ignoring numeric goals and times.
     pub(super) fn is_goal(&self, concurrent: &TemporalTask) -> bool {
         let ends =
             |passed: &Passed| !matches!(concurrent.happenings[passed.operator.index()].role, Role::Timed(_));
@@ -452,7 +465,8 @@ impl Course {
             && concurrent.task.goal.holds_propositionally(&self.values)
     }
 
-    /// Further constraints of the goal: numeric conditions, and no later timed initial literals.
+    /// Further constraints for a plan that ends here: numeric goals, and an end before all pending
+    /// timed initial literals. Returns `None` if a constraint is certainly violated.
     pub(super) fn goal(&self, concurrent: &TemporalTask) -> Option<Vec<Affine>> {
         let mut constraints = Vec::new();
         for linear in concurrent.task.goal.linears() {
@@ -478,14 +492,15 @@ fn ask(expression: Affine, constraints: &mut Vec<Affine>) -> Option<()> {
     Some(())
 }
 
-/// The instance that a happening starts, if the planner chooses its duration.
+/// Instance of the action that a happening starts, if the planner chooses its duration; otherwise
+/// `None`.
 fn chosen(concurrent: &TemporalTask, role: Role) -> Option<&Instance> {
     let Role::Start(instance) = role else { return None };
     Some(&concurrent.instances[instance as usize]).filter(|instance| instance.is_chosen)
 }
 
-/// Least separation between an earlier happening with `marks` and a later one that waits for
-/// `after`. Returns `None` if none is required.
+/// Required distance between an earlier happening with the accesses `marks` and a later one with
+/// the constraints `after`. Returns `None` if they do not interfere in this order.
 pub(super) fn gap(after: &[(Key, Int)], marks: &[Key]) -> Option<Int> {
     let by = after.iter().filter(|(key, _)| marks.binary_search(key).is_ok());
     by.map(|(_, by)| *by).max()

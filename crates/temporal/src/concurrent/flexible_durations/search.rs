@@ -1,10 +1,11 @@
 //! Search over sequences of happenings with durations from linear programs: greedy and exhaustive.
 //!
-//! Both searches are lazy: a sequence is evaluated, and its program solved, when it is expanded.
-//! The greedy search is guided by relaxed plans in which a number takes the best value that the
-//! bounds of durations allow. It keeps one sequence for each combination of values, running actions
-//! and ranges of numbers. The exhaustive search expands the sequence with the least metric of its
-//! program first, and keeps one sequence per trace.
+//! Both searches are lazy: a sequence is evaluated, and its linear program solved, when it is
+//! expanded. The greedy search is guided by relaxed plans in which a number takes the best value
+//! that the bounds of durations allow. It detects duplicates by values, running actions and ranges
+//! of numbers, and keeps the sequence with the least metric. The exhaustive search expands the
+//! sequence with the least optimum of its program first, and keeps one sequence per Mazurkiewicz
+//! trace.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -31,21 +32,21 @@ use crate::concurrent::temporal_task::TemporalTask;
 const BOOST: i64 = 1_000;
 
 /// Queue entry: heuristic value, lower bound on the metric, depth (deepest first), insertion order,
-/// parent node, and the happening with the run that it ends.
+/// parent node, and the happening with the index of the run that it ends.
 type QueueEntry = Reverse<(u64, Rational, Reverse<u32>, u32, u32, (OperatorId, u32))>;
 
-/// Outcome of one run.
+/// Outcome of one call of [`Search::run`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Outcome {
     /// Found a plan that is better than the incumbent.
     Found,
-    /// All sequences were expanded.
+    /// The open list is empty: all sequences were expanded.
     Exhausted,
     /// Stopped at a limit of time, memory or work.
     Stopped,
 }
 
-/// Duplicate detection and guidance of a search.
+/// Kind of a search, with its data for duplicate detection and guidance.
 enum Kind<'a> {
     Greedy { guidance: Box<RelaxedPlanHeuristic<'a>>, seen: FxHashMap<u64, Rational> },
     Exhaustive { traces: Traces<'a>, seen: FxHashSet<Vec<(OperatorId, u32)>> },
@@ -56,19 +57,19 @@ pub(super) struct Search<'a> {
     expansion: &'a Expansion<'a>,
     kind: Kind<'a>,
     nodes: Vec<Course>,
-    /// Queue of all happenings, and queue of preferred ones.
+    /// Queue of all happenings, and queue of preferred happenings.
     queues: [BinaryHeap<QueueEntry>; 2],
     priorities: [i64; 2],
     order: u32,
     nearest: u64,
     bytes: usize,
-    /// Least metric of the known plans if durations need not be decimals.
+    /// Least metric of all plans found, before durations are rounded to decimals.
     reached: Option<Rational>,
     pub(super) figures: SearchStatistics,
 }
 
 impl<'a> Search<'a> {
-    /// Greedy search guided by relaxed plans. It proves nothing.
+    /// Greedy search guided by relaxed plans. The search may miss plans and proves nothing.
     pub(super) fn greedy(
         concurrent: &'a TemporalTask,
         expansion: &'a Expansion<'a>,
@@ -78,7 +79,7 @@ impl<'a> Search<'a> {
         Self::new(concurrent, expansion, kind)
     }
 
-    /// Exhaustive search over all traces.
+    /// Exhaustive search over all Mazurkiewicz traces.
     pub(super) fn exhaustive(concurrent: &'a TemporalTask, expansion: &'a Expansion<'a>) -> Self {
         let kind = Kind::Exhaustive { traces: Traces::new(concurrent), seen: FxHashSet::default() };
         Self::new(concurrent, expansion, kind)
@@ -100,8 +101,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Lower bound on the metric of plans not found yet, provided that the search prunes nothing
-    /// unsoundly.
+    /// Lower bound on the metric of plans not found yet. Valid only if the search is exhaustive.
+    /// Returns `None` if no bound is known.
     pub(super) fn lower(&self) -> Option<Rational> {
         let open = self.queues[0].peek().map(|Reverse((_, least, ..))| least);
         open.into_iter().chain(&self.reached).min().cloned()
@@ -139,7 +140,8 @@ impl<'a> Search<'a> {
         Outcome::Stopped
     }
 
-    /// Evaluates a sequence and queues its successors.
+    /// Evaluates a sequence and queues its successors. Returns `Found` if the sequence is a plan
+    /// that is better than the incumbent `best`, which is then replaced.
     fn take_up(&mut self, course: Course, best: &mut Option<Answer>) -> Option<Outcome> {
         self.figures.evaluated = self.figures.evaluated.saturating_add(1);
         let least = course.least(self.concurrent);
@@ -180,14 +182,14 @@ impl<'a> Search<'a> {
         outcome
     }
 
-    /// Updates the least metric that plans without decimal durations can have.
+    /// Records the metric of a plan before its durations were rounded.
     fn note_reached(&mut self, least: &Rational) {
         if self.reached.as_ref().is_none_or(|reached| least < reached) {
             self.reached = Some(least.clone());
         }
     }
 
-    /// Heuristic value of a sequence. Returns `None` if it is a duplicate or a dead end.
+    /// Heuristic value of a sequence. Returns `None` if the sequence is a duplicate or a dead end.
     fn judge(&mut self, course: &Course, least: &Rational) -> Option<HeuristicValue> {
         match &mut self.kind {
             Kind::Exhaustive { traces, seen } => {
@@ -215,6 +217,8 @@ impl<'a> Search<'a> {
         }
     }
 
+    /// Removes an entry from the queue whose turn it is. Returns the lower bound, the parent node
+    /// and the happening.
     fn pop(&mut self) -> Option<(Rational, u32, (OperatorId, u32))> {
         let filled = (0..self.queues.len()).filter(|queue| !self.queues[*queue].is_empty());
         let queue = filled.min_by_key(|queue| self.priorities[*queue])?;
@@ -224,7 +228,7 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Returns `true` if no plan with this lower bound is better than the incumbent.
+/// Returns `true` if plans with the lower bound `least` cannot be better than the incumbent.
 fn is_lost(concurrent: &TemporalTask, least: &Rational, best: &Answer) -> bool {
     concurrent.is_whole && *least >= best.value
 }

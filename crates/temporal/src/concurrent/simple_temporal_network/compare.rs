@@ -1,4 +1,4 @@
-//! Dominance between two simple temporal networks, and the time points that still matter.
+//! Dominance between two simple temporal networks, and removal of accesses that no longer matter.
 
 use task::number::{Int, words};
 
@@ -6,7 +6,8 @@ use crate::concurrent::simple_temporal_network::{Key, RunningAction, SimpleTempo
 use crate::concurrent::time::TimeExpression;
 
 impl SimpleTemporalNetwork {
-    /// Appends the part that must be equal in two networks that are compared.
+    /// Appends to `out` the part that must be equal for two networks to be compared: running
+    /// actions and group.
     pub(in crate::concurrent) fn signature(&self, out: &mut Vec<u32>) {
         for open in &self.opens {
             out.extend([open.instance, open.float]);
@@ -19,8 +20,8 @@ impl SimpleTemporalNetwork {
         }
     }
 
-    /// Removes accesses that no longer delay anything, because every happening that waits for them
-    /// comes after the change of their guard.
+    /// Removes accesses that can no longer delay a happening: those at least `separation` before
+    /// the last timed initial literals or before the last change of their guard variable.
     pub(in crate::concurrent) fn forget(&mut self, guards: &[Option<u32>], separation: Int) {
         let mut entries = std::mem::take(&mut self.entries);
         entries.retain(|(key, time)| !self.is_past(*key, time, guards, separation));
@@ -35,8 +36,8 @@ impl SimpleTemporalNetwork {
         guard.is_some_and(|guard| time.precedes(guard, separation))
     }
 
-    /// Returns `true` if every continuation of `other` is possible after `self` and not later,
-    /// ignoring accesses. Their signatures must agree.
+    /// Returns `true` if every continuation of `other` is possible after `self` and no later,
+    /// ignoring access times. The signatures of both networks must be equal.
     pub(in crate::concurrent) fn dominates_ignoring_accesses(&self, other: &Self) -> bool {
         let floats = || self.floats.iter().zip(&other.floats);
         let lasts = || self.opens.iter().zip(&other.opens);
@@ -52,8 +53,8 @@ impl SimpleTemporalNetwork {
             && lasts().all(last)
     }
 
-    /// Returns `true` if the accesses of `self` allow every continuation of `other`, not later.
-    /// Complements [`SimpleTemporalNetwork::dominates_ignoring_accesses`].
+    /// Returns `true` if the access times of `self` delay no continuation more than those of
+    /// `other`. Complements [`SimpleTemporalNetwork::dominates_ignoring_accesses`].
     pub(in crate::concurrent) fn accesses_no_later(
         &self,
         other: &Self,

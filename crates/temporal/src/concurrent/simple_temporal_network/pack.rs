@@ -1,4 +1,5 @@
-//! Packs a simple temporal network into bytes and unpacks it; each number takes seven bits per byte.
+//! Packs a simple temporal network into bytes and unpacks it. Each byte holds seven bits of a
+//! number.
 
 use smallvec::SmallVec;
 use task::number::{Int, dense};
@@ -6,11 +7,11 @@ use task::number::{Int, dense};
 use crate::concurrent::simple_temporal_network::{RunningAction, SimpleTemporalNetwork, Start};
 use crate::concurrent::time::TimeExpression;
 
-/// Writes numbers one after another.
+/// Writes numbers in variable-length encoding.
 #[derive(Default)]
 struct Writer(Vec<u8>);
 
-/// Reads numbers in the order in which they were written.
+/// Reads numbers in the order in which [`Writer`] wrote them.
 struct Reader<'a>(std::slice::Iter<'a, u8>);
 
 impl Writer {
@@ -124,8 +125,9 @@ impl SimpleTemporalNetwork {
         packed.clocks
     }
 
-    /// Unpacks only the part that [`SimpleTemporalNetwork::dominates_ignoring_accesses`] reads. It
-    /// is small and decides most comparisons.
+    /// Unpacks only the head: all parts except the times of accesses and changes.
+    /// [`SimpleTemporalNetwork::dominates_ignoring_accesses`] reads only the head, which is small
+    /// and decides most comparisons.
     pub(in crate::concurrent) fn unpack_head(bytes: &[u8]) -> PackedStn<'_> {
         let mut reader = Reader(bytes.iter());
         let (floor, latest) = (reader.number(), reader.time());
@@ -144,14 +146,15 @@ impl SimpleTemporalNetwork {
     }
 }
 
-/// A packed simple temporal network whose head is unpacked.
+/// A packed simple temporal network. At first only its head is unpacked: all parts except the times
+/// of accesses and changes.
 pub(in crate::concurrent) struct PackedStn<'a> {
     pub(in crate::concurrent) clocks: SimpleTemporalNetwork,
     rest: Reader<'a>,
 }
 
 impl PackedStn<'_> {
-    /// Unpacks the remaining part.
+    /// Unpacks the times of accesses and changes.
     pub(in crate::concurrent) fn finish(&mut self) {
         let reader = &mut self.rest;
         let mut times = || reader.list(|times| (times.index(), times.time()));

@@ -1,4 +1,5 @@
-//! Actions: started once their functions have their designs, and ended by their performers.
+//! Actions of the plan: started once their functions have the required designs, and ended by their
+//! performers.
 
 use metaplan::mapek::Event;
 use serde_json::json;
@@ -7,7 +8,8 @@ use crate::manager::machine::Machine;
 use crate::manager::machine::io::{Ended, Output};
 
 impl Machine {
-    /// Starts the requested action once every required function has its design.
+    /// Starts the requested action once every function has the required design and no mode request
+    /// is pending.
     pub(super) fn begin(&mut self) {
         let beliefs = self.control.beliefs();
         let has = |(function, design): &(String, String)| {

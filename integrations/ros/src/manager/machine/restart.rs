@@ -1,4 +1,5 @@
-//! Restart: requested work that is not done, and changes of the robot in the meantime.
+//! Restart of the manager: resumes unfinished requests, and adopts mode changes of the robot since
+//! the previous run.
 
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -9,11 +10,14 @@ use metaplan::message::Message;
 use crate::manager::machine::io::{Output, State};
 use crate::manager::machine::{Action, Deferred, Machine, call, unwritten};
 
-/// Time to wait for diagnostics before the modes found after a restart are evaluated with old data.
+/// Time to wait for new diagnostics after a restart. Modes that are found earlier would be
+/// evaluated with old data.
 const DIAGNOSTICS_WAIT: Duration = Duration::from_secs(3);
 
 impl Machine {
-    /// Handles the modes of the robot after the start, and the answers that the loop repeats.
+    /// Handles the start: `modes` are the current modes of the robot's functions. After a restart,
+    /// the answers of the adaptation loop are deferred until diagnostics arrive, at most for
+    /// [`DIAGNOSTICS_WAIT`].
     pub(super) fn ready(&mut self, modes: Vec<(String, Option<String>)>) -> Result<String, Message> {
         self.state = State::Idle;
         let is_first = self.control.beliefs().lines() == 0;
@@ -24,7 +28,8 @@ impl Machine {
         let way = |from: &str, to: State| [from.to_owned(), to.to_string()];
         self.note(&way("START", State::WaitGraph), "the mission and its settings are read")?;
         self.note(&[State::WaitGraph.to_string(), State::Idle.to_string()], "every function answers")?;
-        // Requests that were fulfilled in the meantime are not repeated.
+        // The current modes are recorded, so that requests fulfilled in the meantime are not
+        // repeated.
         for (function, mode) in modes {
             if let Some(mode) = mode {
                 self.modes.insert(function, mode);
@@ -39,14 +44,15 @@ impl Machine {
         Ok("every function answers".to_owned())
     }
 
-    /// Repeats unfulfilled requests from before the restart, and adopts changes since then.
+    /// Repeats the deferred answers whose requests are still outstanding, and reports modes that
+    /// have changed since the previous run.
     pub(super) fn catch_up(&mut self) {
         let Some(deferred) = &mut self.deferred else { return };
         let (mut answers, modes) =
             (std::mem::take(&mut deferred.answers), std::mem::take(&mut deferred.modes));
         let outstanding: BTreeSet<u64> =
             self.control.beliefs().outstanding().map(|effect| effect.number).collect();
-        // The other requests have been replaced.
+        // Answers without an outstanding request have been replaced.
         answers.retain(|answer| answer.effect().is_none_or(|effect| outstanding.contains(&effect.number)));
         self.handle_answers(answers);
         self.deferred = None;
@@ -57,14 +63,14 @@ impl Machine {
         }
     }
 
-    /// Restores an action that was running when the program ended.
+    /// Restores the action that was running when the previous run of the program ended.
     pub(super) fn restore_action(&mut self) {
         let Some((number, step)) = self.control.beliefs().running() else { return };
         let call = call(step);
         let is_waiting = |effect: &&Effect| matches!(effect.command, Command::Request { .. });
         let effect = self.control.beliefs().outstanding().find(is_waiting).map(|effect| effect.number);
-        // The performer may have lost the action, so it is started again. This is correct for
-        // actions that end with a message on a topic.
+        // The performer may have lost the action, so the action is started again. This is correct
+        // for actions that end with a message on a topic.
         self.action =
             Some(Action { number, call, effect: effect.unwrap_or_default(), begun: effect.is_none() });
         if effect.is_none()

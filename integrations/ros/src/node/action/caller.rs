@@ -1,4 +1,4 @@
-//! Action clients: goals are sent, monitored and cancelled.
+//! Action clients: sending, monitoring and cancelling goals.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -17,29 +17,30 @@ use crate::node::graph::{Graph, Server, Topics};
 use crate::node::rmw::Mapping;
 use crate::node::{Node, client_name, creation_error, latched, qos};
 
-/// Time after the discovery of a server during which it discovers this client.
+/// Time for which the client waits after discovering a server, so that the server can discover the
+/// client.
 const MATCHING_TIME: Duration = Duration::from_millis(100);
 
-/// Number of consecutive failed look-ups after which a server counts as lost.
+/// Number of consecutive failed look-ups of a server after which the server counts as lost.
 const MAX_FAILED_LOOKUPS: u32 = 250;
 
 type Client<A> = ActionClient<<A as Action>::Goal, <A as Action>::Result, <A as Action>::Feedback>;
 
-/// Message about an accepted goal.
+/// Message about an accepted goal, for the sender of the goal.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Accepted<A: Action> {
     /// Intermediate feedback.
     Feedback(A::Feedback),
     /// Outcome and result of the goal.
     Ended(GoalEnd, A::Result),
-    /// The outcome is unknown, for this reason.
+    /// The outcome is unknown, because the server was lost; contains a description.
     Lost(String),
 }
 
 /// Reason why a goal was not accepted.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum GoalError {
-    /// The action has no server, or the server does not answer.
+    /// The action has no server, the server has another type, or the server does not answer.
     #[error("{action}: {because}")]
     Unreachable {
         /// Full name of the action.
@@ -52,44 +53,44 @@ pub enum GoalError {
     Rejected(String),
 }
 
-/// Action client.
+/// Action client of one action.
 pub struct ActionCaller<A: Action> {
     node: Arc<Node>,
     full: String,
     connection: smol::lock::Mutex<Option<Arc<Connection<A>>>>,
 }
 
-/// A client with its running goals. The client library gives each message to the first receiver,
-/// regardless of its goal, so a single task receives for all goals.
+/// A client of a server with its running goals. The client library passes each message to the first
+/// receiver, regardless of the goal, so a single task receives the messages about all goals.
 struct Connection<A: Action> {
     server: Server,
     client: Client<A>,
     goals: Mutex<BTreeMap<GoalId, Followed<A>>>,
 }
 
-/// Receiver of the messages about a goal.
+/// Channels to the sender of a running goal.
 struct Followed<A: Action> {
     result: RmwRequestId,
     events: channel::Sender<Accepted<A>>,
     cancelled: channel::Receiver<()>,
 }
 
-/// A goal at an action server.
+/// A goal that an action server has accepted.
 #[derive(Debug)]
 pub struct Pursued<A: Action> {
     goal: GoalId,
-    /// Messages about the goal. The last one is its end.
+    /// Messages about the goal. The last message is its end.
     pub events: channel::Receiver<Accepted<A>>,
     cancel: channel::Sender<()>,
 }
 
 impl<A: Action> Pursued<A> {
-    /// Id of the goal, as in logs.
+    /// Id of the goal, as it occurs in logs.
     pub fn goal(&self) -> GoalId {
         self.goal
     }
 
-    /// Requests cancellation, which is reported like any other end.
+    /// Requests cancellation of the goal. The end of the goal is reported in `events` as usual.
     pub fn cancel(&self) {
         // A full channel means that cancellation was already requested.
         let _ = self.cancel.try_send(());
@@ -103,15 +104,16 @@ impl<A: Action> std::fmt::Debug for ActionCaller<A> {
 }
 
 impl<A: Action + 'static> ActionCaller<A> {
-    /// Sends a goal. `within` limits the wait for a server and its answer.
+    /// Sends a goal, and waits until the server accepts it. `within` limits the time to wait for a
+    /// server and its answer.
     ///
     /// # Errors
-    /// There is no server, no answer, or the goal is rejected.
+    /// Fails if there is no server, no answer, or the goal is rejected.
     pub async fn pursue(&self, goal: A::Goal, within: Duration) -> Result<Pursued<A>, GoalError> {
         let start = Instant::now();
         let unreachable = |because: String| GoalError::Unreachable { action: self.full.clone(), because };
-        // The lock is held until the answer arrives, because concurrent receivers would take each
-        // other's answers.
+        // The lock is held until the answer arrives, because concurrent receivers would take
+        // answers to other goals.
         let mut connection = self.connection.lock().await;
         let connection = self.connect(&mut connection, within).await.map_err(unreachable)?;
         let (client, mapping) = (&connection.client, connection.server.mapping);
@@ -155,7 +157,7 @@ impl<A: Action + 'static> ActionCaller<A> {
             discovered.ok_or_else(|| format!("nobody serves it after {:.1} s", within.as_secs_f64()))??;
         if connection.as_ref().is_none_or(|connected| connected.server != server) {
             let client = self.client(server.mapping).map_err(|message| message.message.clone())?;
-            // Answers that precede the server's discovery of this client are lost.
+            // Answers that the server sends before it has discovered this client are lost.
             Timer::after(MATCHING_TIME.min(within)).await;
             *connection = Some(Arc::new(Connection { server, client, goals: Mutex::default() }));
         }
@@ -184,7 +186,8 @@ impl<A: Action + 'static> Connection<A> {
         self.goals.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Registers a goal. Returns `true` if no task receives messages yet.
+    /// Registers a running goal. Returns `true` if it is the only one, so that a task must be
+    /// started to receive messages.
     fn follow(&self, goal: GoalId, followed: Followed<A>) -> bool {
         let mut goals = self.goals();
         let is_first = goals.is_empty();
@@ -192,7 +195,7 @@ impl<A: Action + 'static> Connection<A> {
         is_first
     }
 
-    /// Forwards the messages about all goals until none is running.
+    /// Forwards the messages about all goals until no goal is running.
     async fn run(&self, graph: &Graph, full: &str) {
         let topics = goal_topics(full);
         let mut absent = 0;
@@ -213,8 +216,8 @@ impl<A: Action + 'static> Connection<A> {
     }
 
     fn poll(&self) {
-        // Invalid messages are skipped. A goal with an invalid result never ends, as with every
-        // client.
+        // Invalid messages are skipped. A goal with an invalid result never ends, as with other ROS
+        // clients.
         while let Ok(Some((message, _))) = self.client.feedback_subscription().take() {
             if let Some(followed) = self.goals().get(&message.goal_id) {
                 let _ = followed.events.try_send(Accepted::Feedback(message.feedback));
@@ -244,13 +247,13 @@ impl<A: Action + 'static> Connection<A> {
     }
 }
 
-/// Topics of the service that accepts goals.
+/// Topics of the service `send_goal` of an action.
 fn goal_topics(action: &str) -> Topics {
     Topics::of(&format!("{action}/_action/send_goal"))
 }
 
 impl Node {
-    /// Creates an action client.
+    /// Creates a client of the action `name`.
     pub fn action_caller<A: Action>(self: &Arc<Self>, name: &str) -> ActionCaller<A> {
         let full = self.resolve(name);
         expect_action::<A>(&self.graph, &full);

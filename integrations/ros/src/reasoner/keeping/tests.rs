@@ -1,4 +1,4 @@
-//! Tests of the reasoner without a robot: outputs after sequences of inputs.
+//! Tests of the reasoner without a robot: expected outputs after sequences of inputs.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -28,7 +28,7 @@ fn wanted(function: &str) -> QoS {
     QoS { objective_type: function.to_owned(), always_improve: true, ..QoS::default() }
 }
 
-/// Requested modes; other outputs are discarded.
+/// Returns the requested modes among the pending outputs; other outputs are discarded.
 fn requested_modes(keeping: &mut Keeping) -> Vec<Wanted> {
     let mut requested = Vec::new();
     for output in keeping.outputs() {
@@ -114,7 +114,7 @@ fn a_restart_repeats_no_fulfilled_request() {
     let mut after = again("fd_spiral_medium");
     assert_eq!(requested_modes(&mut after), []);
     assert_eq!(modes(&see(&mut after, "4")), ["fd_spiral_high"], "it goes on");
-    // Another client has changed the mode, so the right one is requested.
+    // Another client has changed the mode, so the mode of the goal's design is requested again.
     assert_eq!(modes(&requested_modes(&mut again("fd_spiral_low"))), ["fd_spiral_medium"]);
     // Reports are restored even without goals.
     let mut alone = keeping();
