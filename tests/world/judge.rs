@@ -87,7 +87,9 @@ impl Judge {
             }
             "configuration_observed" => {
                 let design = event["design"].as_str().map(ToOwned::to_owned);
-                self.is_misled = design.is_some() && design != robot.design;
+                // After an outdated report that there is no design, the loop requests the design again, unless an earlier
+                // outdated observation has changed its decision.
+                self.is_misled = (design.is_some() || self.is_misled) && design != robot.design;
                 let latest = self.requested.last_key_value().map_or(0, |(number, _)| *number);
                 self.belief.observe(design, latest);
             }
