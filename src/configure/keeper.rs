@@ -180,7 +180,7 @@ impl Keeper {
         self.lines
     }
 
-    /// Returns the greatest sequence number of a line.
+    /// Returns the greatest sequence number of the received lines; `None` if no line has one.
     pub fn sequence(&self) -> Option<u64> {
         self.numbers.greatest()
     }

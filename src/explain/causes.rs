@@ -24,7 +24,7 @@ use crate::message::Errors;
 use crate::mission::Mission;
 use crate::mission::numbers::against;
 
-/// Upper limit on the number of sets of alterations that are tried.
+/// Maximum number of sets of alterations that are tried in order of size.
 const MAX_TRIED: usize = 2_000;
 
 /// Availability of one design and its causes, derived without planning.
@@ -101,8 +101,9 @@ fn causes_of(knowledge: &Knowledge, design: &FunctionDesign, ways: &[Vec<Alterat
     causes
 }
 
-/// Returns the smallest sets of alterations that make a design available. Considers the design's
-/// own components and measurements first, then all of them.
+/// Returns minimal sets of alterations that make a design available (see [`repairs`]). The alterations of all
+/// components and measurements are considered only if those of the design's own components and measurements do not
+/// suffice.
 fn ways(knowledge: &Knowledge, design: &FunctionDesign) -> Vec<Vec<Alteration>> {
     let candidates = candidates(knowledge, design);
     let ways = repairs(knowledge, design, &candidates);
@@ -127,7 +128,7 @@ pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availa
             altered(knowledge, [alteration]).is_some_and(|knowledge| !is_available(&knowledge, design))
         };
         let candidates = candidates(knowledge, design).into_iter();
-        // For an available design, each alteration alone that makes it unavailable is listed.
+        // For an available design, each of its own alterations that makes it unavailable on its own is listed.
         availability.ways = candidates.filter(loses).map(|alteration| vec![alteration]).collect();
         return availability;
     }
@@ -142,8 +143,8 @@ pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availa
     availability
 }
 
-/// Returns the smallest sets of `candidates` that make a design available, in ascending order of
-/// size.
+/// Returns minimal sets of `candidates` that make a design available: no proper subset suffices. Small sets are tried
+/// first. At most [`MAX_TRIED`] sets are tried, so some minimal sets may be missing.
 fn repairs(
     knowledge: &Knowledge,
     design: &FunctionDesign,

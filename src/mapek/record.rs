@@ -1,4 +1,4 @@
-//! Serialization of the loop: decisions for the journal, and snapshots of the beliefs.
+//! Serialisation of the loop: decisions for the journal, and snapshots of the beliefs.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;

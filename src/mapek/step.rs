@@ -1,4 +1,4 @@
-//! Plan steps with rational durations and costs, and their serialization as JSON and for the journal.
+//! Plan steps with rational durations and costs, and their serialisation as JSON and for the journal.
 
 use std::borrow::Cow;
 

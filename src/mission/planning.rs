@@ -160,8 +160,8 @@ mod tests {
 
     use super::{GroundConfig, Name};
 
-    /// The checker does not link the planner, so the default names are defined in both and must be
-    /// equal.
+    /// The certificate checker does not link the planner. So the default names of the predicate `solves` are defined
+    /// both in the crate `mission` and in the planner, and must be equal.
     #[test]
     fn default_names_equal_those_of_the_planner() {
         let sorted = |mut names: Vec<Name>| {

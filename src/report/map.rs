@@ -183,8 +183,9 @@ fn goals(goal: &Condition) -> impl Iterator<Item = &Atom> {
     })
 }
 
-/// Returns pairs of neighbouring places by number. Neighbours are given by facts or, if there are
-/// no such facts, by numeric values. Facts of `moving` predicates are ignored.
+/// Returns the pairs of neighbouring places, as numbers of places. Two places are neighbours if an initial fact has
+/// exactly these two places among its arguments; if there is no such fact, initial numeric values are used instead.
+/// `moving` are the predicates that movements change, such as `robot_at`; they are ignored.
 fn ways(problem: &Problem, number: &BTreeMap<&Name, usize>, moving: &BTreeSet<&Name>) -> Vec<(usize, usize)> {
     let (mut facts, mut values) = (BTreeSet::new(), BTreeSet::new());
     for element in &problem.init {

@@ -94,7 +94,8 @@ impl Filters {
         let nothing = MeasuredSettings::default();
         let measured = bounds.into_iter().map(|(name, mut bounds)| {
             let entry = settings.measured.get(&name).unwrap_or(&nothing);
-            // The side on which a design can be used is unknown for bounds from the manifest.
+            // A bound in the manifest is only a number. It is unknown whether designs require at least or at most this
+            // value, so both are added.
             bounds.extend(
                 entry
                     .bounds
