@@ -1,11 +1,10 @@
-//! Causes that rule a design out, and the smallest sets of alterations that make the design
-//! available. An alteration is a recovery of a component or a change of a measurement.
+//! Causes that rule a design out, and minimal sets of alterations that make the design available. An alteration is a
+//! recovery of a component or a change of a measurement.
 //!
-//! Sets of alterations are tried in ascending order of size, by reasoning with a copy of the
-//! knowledge base. So each listed set is known to suffice, and contains no other listed set. These
-//! sets are the diagnoses of \[1\]. Each alteration of a set removes one cause. To explain a cause,
-//! all other alterations of its set are applied: whatever still rules the design out is due to this
-//! cause.
+//! Sets of alterations are tried in ascending order of size, up to a maximum number, by reasoning with a copy of the
+//! knowledge base. So each listed set is known to suffice, but some sets may be missing. These sets are the diagnoses
+//! of \[1\]. Each alteration of a set removes one cause. To explain a cause, all other alterations of its set are
+//! applied: whatever still rules the design out is due to this cause.
 //!
 //! \[1\] R. Reiter: A theory of diagnosis from first principles, Artificial Intelligence 32, 1987.
 
@@ -42,9 +41,9 @@ pub struct Availability {
     pub because: Vec<String>,
     /// Failed components and measurements that contribute to ruling the design out.
     pub causes: Vec<Cause>,
-    /// If the design is unavailable: the smallest sets of alterations that make it available. All
-    /// alterations of a set together suffice, and no proper subset suffices. If the design is
-    /// available: sets of one alteration, each of which makes it unavailable.
+    /// If the design is unavailable: minimal sets of alterations that make it available; some may be missing if there
+    /// are many. All alterations of a set together suffice, and no proper subset suffices. If the design is available:
+    /// sets of one alteration, each of which makes it unavailable.
     pub ways: Vec<Vec<Alteration>>,
 }
 
@@ -53,8 +52,8 @@ pub struct Availability {
 pub struct Cause {
     /// The alteration that removes this cause; other causes may remain.
     pub alteration: Alteration,
-    /// The rules and facts by which this cause alone rules the design out, i.e. after the other
-    /// alterations of a smallest set.
+    /// The rules and facts by which this cause alone rules the design out, i.e. after the other alterations of a
+    /// minimal set.
     pub because: Vec<String>,
     /// The knowledge base after the other alterations of that set, for further analysis.
     pub knowledge: Knowledge,
@@ -72,8 +71,8 @@ pub struct Causes {
     /// The causes. Empty if the design is available, or if neither a component nor a measurement is
     /// a cause.
     pub causes: Vec<Cause>,
-    /// `true` if the design becomes available only after all causes are removed; `false` if
-    /// removing some of them can suffice.
+    /// `true` if exactly one minimal set of alterations was found: the design becomes available only after all causes
+    /// are removed. `false` if removing some of them can suffice, or if no set was found.
     pub are_all_needed: bool,
 }
 
@@ -143,8 +142,8 @@ pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availa
     availability
 }
 
-/// Returns minimal sets of `candidates` that make a design available: no proper subset suffices. Small sets are tried
-/// first. At most [`MAX_TRIED`] sets are tried, so some minimal sets may be missing.
+/// Returns minimal sets of `candidates` that make a design available (see [`minimal`]). Small sets are tried first. At
+/// most [`MAX_TRIED`] sets are tried, so some minimal sets may be missing.
 fn repairs(
     knowledge: &Knowledge,
     design: &FunctionDesign,
@@ -206,8 +205,8 @@ fn subsets(count: usize) -> impl Iterator<Item = Vec<usize>> {
     })
 }
 
-/// Returns a subset of `set` that still suffices, although none of its proper subsets does. Removes
-/// alterations one by one.
+/// Returns a subset of `set` that still suffices, after trying once to remove each alteration. No proper subset
+/// suffices if availability is monotone in the alterations.
 fn minimal<'a>(
     mut set: Vec<&'a Alteration>,
     suffice: &dyn Fn(&[&'a Alteration]) -> bool,
@@ -246,8 +245,8 @@ fn is_available(knowledge: &Knowledge, design: &FunctionDesign) -> bool {
     designs.iter().any(|candidate| candidate.individual == design.individual && candidate.available)
 }
 
-/// Computes the best plan after alterations of the situation. At a limit, returns the best plan
-/// found until then.
+/// Computes the best plan after alterations of the situation. At a limit, returns the best plan found until then.
+/// Alterations with which reasoning fails are ignored.
 pub(super) fn in_situation(
     mission: &Mission,
     alterations: &[Alteration],
