@@ -245,7 +245,7 @@ impl Command {
     }
 }
 
-/// Serializes the answer as a JSON object of the output format.
+/// Serialises the answer as a JSON object of the output format.
 impl Serialize for Answer {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut object = serializer.serialize_map(None)?;

@@ -62,7 +62,7 @@ pub struct Beliefs {
     pub(super) actions: u64,
     /// Number of effects requested since the start.
     pub(super) effects: u64,
-    /// Unacknowledged effects by number.
+    /// Unacknowledged effects (requests to the robot) by number.
     pub(super) outstanding: BTreeMap<u64, Effect>,
     /// History of acknowledged and superseded reconfigurations, by function.
     pub(super) receipts: Receipts,

@@ -103,7 +103,7 @@ impl Receipts {
         self.functions.iter().find_map(design)
     }
 
-    /// Serializes the history for a snapshot.
+    /// Serialises the history for a snapshot.
     pub(super) fn to_record(&self) -> Value {
         let function = |(name, history): (&String, &Received)| {
             let last = history.last.as_ref().map(|last| {

@@ -364,7 +364,7 @@ impl AttributeState {
         Self { believed: value, ..Self::default() }
     }
 
-    /// Serializes the state for a snapshot.
+    /// Serialises the state for a snapshot.
     pub(crate) fn to_record(&self) -> Value {
         let text = |value: &Option<BigRational>| value.as_ref().map(ToString::to_string);
         json!([

@@ -264,7 +264,7 @@ impl Accepted {
 }
 
 impl FilterStates {
-    /// Serializes the states for a snapshot.
+    /// Serialises the states for a snapshot.
     pub(crate) fn to_record(&self) -> Value {
         let measured = self.measured.iter().map(|(name, state)| (name.clone(), state.to_record()));
         let components = self.components.iter().map(|(name, state)| (name.clone(), state.to_record()));
