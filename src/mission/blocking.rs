@@ -45,8 +45,8 @@ impl fmt::Display for Blocking {
     }
 }
 
-/// Explains why an unsolvable problem has no plan. The problem was returned by [`Mission::filled`].
-/// Returns `None` if the mission has no knowledge base, or if a limit is reached.
+/// Explains why an unsolvable problem has no plan. The problem was returned by [`Mission::filled`]. Returns `None` if
+/// the mission has no knowledge base, or if planning cannot decide within the limits.
 pub fn blocking(mission: &Mission, problem: &Problem, config: &Config) -> Option<Blocking> {
     let mut config = config.clone();
     // A limit on the number of steps would hide longer plans.

@@ -40,8 +40,8 @@ impl Reading {
         }
     }
 
-    /// Executes the plan with the validator and returns its value by the problem's metric. `None`
-    /// if the plan is invalid, or if a limit is reached.
+    /// Executes the plan with the validator and returns its value by the problem's metric. Returns `None` if the plan
+    /// is invalid, if the value is undefined, or if a limit is reached.
     pub(super) fn value(
         &self,
         mission: &Mission,

@@ -273,8 +273,8 @@ impl<'m, 'r> Planner<'m, 'r> {
         Ok(planned)
     }
 
-    /// Computes further optimal plans, and executes each of them with the validator. Returns `None`
-    /// if the solution has no proved optimal plan.
+    /// Computes further optimal plans, and executes each of them with the validator. Plans that are not validated
+    /// within the limits are omitted. Returns `None` if the solution has no proved optimal plan.
     fn further_plans(
         &self,
         task: &Task,

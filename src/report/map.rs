@@ -63,8 +63,8 @@ struct Moving<'d> {
     places: Vec<Name>,
 }
 
-/// Selects the places between which the plan moves most often; of equal candidates, those with more
-/// movements in the domain. Types with designs are excluded.
+/// Selects the places between which the plan moves most often; of equal candidates, those with more movements in the
+/// domain. Types with designs or with fewer than two objects are excluded. Returns `None` if no type remains.
 fn places_of_most<'d>(scene: Scene<'_>, plan: &Plan, movements: &'d [Movement<'d>]) -> Option<Moving<'d>> {
     let designs: BTreeSet<Name> = scene.designs.keys().map(|design| Name::new(design)).collect();
     let mut kinds: BTreeMap<Vec<Name>, Vec<&'d Movement<'d>>> = BTreeMap::new();
@@ -83,7 +83,7 @@ fn places_of_most<'d>(scene: Scene<'_>, plan: &Plan, movements: &'d [Movement<'d
     most_used.map(|(places, movements)| Moving { movements, places })
 }
 
-/// Returns all movements that an action describes.
+/// Returns all movements that the unconditional effects of an action describe.
 fn moves(action: &Action) -> Vec<Movement<'_>> {
     let (mut added, mut deleted) = (Vec::new(), Vec::new());
     let mut parts: Vec<&Effect> = match &action.body {

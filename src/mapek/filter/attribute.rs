@@ -319,7 +319,8 @@ impl AttributeFilter {
         }
     }
 
-    /// Returns a value that satisfies the fewest bounds, the lowest one if several do. Returns `None` without bounds.
+    /// Returns a value that satisfies the fewest bounds, the lowest one if several do. Values below or above all bounds
+    /// must be plausible unless no plausible value is there. Returns `None` without bounds.
     pub(crate) fn worst(&self) -> Option<BigRational> {
         let unit = BigRational::from_integer(1.into());
         let two = BigRational::from_integer(2.into());

@@ -31,8 +31,8 @@ use crate::message::Message;
 use crate::number;
 
 impl FilterSettings {
-    /// Returns warnings, for `lint`, about attributes and components whose noise causes reconfigurations: attributes
-    /// without hysteresis and debounce, and components without `heal_time`.
+    /// Returns warnings, for `lint`, about settings with which noise causes reconfigurations: attributes without
+    /// hysteresis and debounce, and a default `heal_time` of 0 if the knowledge base has components.
     pub(crate) fn doubts(&self, knowledge: Option<&Knowledge>) -> Vec<Message> {
         let filters = Filters::new(self, knowledge);
         let is_noisy = |(_, filter): &(&String, &AttributeFilter)| {
@@ -145,8 +145,8 @@ impl Filters {
         }
     }
 
-    /// Filters a sample of an attribute. Returns the newly believed value, or `None` if the sample is held back. Some
-    /// of the held samples are reported in `answers`.
+    /// Filters a sample of an attribute. Returns the newly believed value, or `None` if the sample is held back. A
+    /// sample of an attribute without a filter is believed. Some of the held samples are reported in `answers`.
     pub(crate) fn sample(
         &self,
         states: &mut FilterStates,
@@ -216,7 +216,7 @@ impl Filters {
     }
 
     /// Applies and returns the changes of belief that are due at `now` without a further report: first changes of
-    /// attributes, then changes of components.
+    /// attributes, then changes of components. Sensors that have become silent are reported in `answers`.
     pub(crate) fn elapse(
         &self,
         states: &mut FilterStates,
