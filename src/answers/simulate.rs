@@ -202,8 +202,8 @@ pub fn beside_joint(runs: &[Run], strategy: Strategy) -> Option<(usize, usize)> 
     }))
 }
 
-/// Returns the statistics of `figure` over the runs of a strategy. Runs for which `figure` is
-/// `None` are ignored.
+/// Returns the statistics of `figure` over the runs of a strategy. Runs for which `figure` is `None` are ignored.
+/// Returns `None` if no run has a value.
 pub fn sample(runs: &[Run], strategy: Strategy, figure: impl Fn(&Run) -> Option<f64>) -> Option<Sample> {
     Sample::of(&runs_of(runs, strategy).filter_map(figure).collect::<Vec<_>>())
 }

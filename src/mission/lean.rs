@@ -17,7 +17,7 @@ use crate::mission::confirm::Reading;
 const MAX_ACTIONS: usize = 200;
 
 /// Removes superfluous actions of cost 0 from a plan. If a limit is reached, returns the plan as reduced until then. A
-/// plan of more than [`MAX_ACTIONS`] actions is returned unchanged.
+/// plan of more than 200 actions is returned unchanged.
 pub fn lean(
     mission: &Mission,
     problem: &Problem,

@@ -94,7 +94,7 @@ impl Experiment {
     /// before the end of the mission.
     ///
     /// # Errors
-    /// The mission cannot be planned for.
+    /// The problem or a disturbance of the scenario does not fit the mission, or the knowledge is inconsistent.
     pub fn run(
         &self,
         strategy: Strategy,
