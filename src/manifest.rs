@@ -59,7 +59,7 @@ pub struct ManifestPath {
 /// relative to the current directory.
 ///
 /// # Errors
-/// The file cannot be read or is not a manifest; otherwise all faults of its sections and keys.
+/// The file cannot be read or is not a manifest; otherwise the faults of its sections and keys.
 pub fn read<S: DeserializeOwned>(file: &Path) -> Result<(S, ManifestPath), Errors> {
     let source = source(file)?;
     parse(source.name(), source.text(), &file.parent().map(Path::to_owned).unwrap_or_default())
@@ -69,7 +69,7 @@ pub fn read<S: DeserializeOwned>(file: &Path) -> Result<(S, ManifestPath), Error
 /// the file name.
 ///
 /// # Errors
-/// The text is not a manifest; otherwise all faults of its sections and keys.
+/// The text is not a manifest; otherwise the faults of its sections and keys.
 pub fn parse<S: DeserializeOwned>(
     name: &str,
     text: &str,

@@ -157,9 +157,9 @@ impl Configurator {
         choose(&self.knowledge, &self.wishes, &is_in_need, limits)
     }
 
-    /// Grounds the objective by the chosen design. Statuses and recoveries that made the objective
-    /// updatable are retracted; failures of designs are kept. An objective that no design can serve
-    /// keeps its design and stays in need.
+    /// Grounds the objective by the chosen design, i.e. makes it the design of the objective. Statuses and recoveries
+    /// that made the objective updatable are retracted; failures of designs are kept. An objective that no design can
+    /// serve keeps its design and stays in need.
     ///
     /// # Errors
     /// The objective or the design does not exist, or the rules do not terminate.

@@ -65,7 +65,7 @@ impl PartialEq for Cause {
     }
 }
 
-/// All causes that rule a design out.
+/// The causes found that rule a design out.
 #[derive(Debug, Clone)]
 pub struct Causes {
     /// The causes. Empty if the design is available, or if neither a component nor a measurement is
@@ -76,7 +76,8 @@ pub struct Causes {
     pub are_all_needed: bool,
 }
 
-/// Returns all failed components and measurements that contribute to ruling a design out.
+/// Returns the failed components and measurements that are found to contribute to ruling a design out. Some may be
+/// missing, since only [`MAX_TRIED`] sets of alterations are tried.
 pub fn causes(knowledge: &Knowledge, design: &FunctionDesign) -> Causes {
     if design.available {
         return Causes { causes: Vec::new(), are_all_needed: false };
@@ -85,8 +86,8 @@ pub fn causes(knowledge: &Knowledge, design: &FunctionDesign) -> Causes {
     Causes { causes: causes_of(knowledge, design, &ways), are_all_needed: ways.len() == 1 }
 }
 
-/// Returns a cause for each alteration in `ways`. Its reasons are the conclusions that remain after
-/// all other alterations of the set.
+/// Returns a cause for each different alteration in `ways`. Its reasons are the conclusions that remain after all other
+/// alterations of the set.
 fn causes_of(knowledge: &Knowledge, design: &FunctionDesign, ways: &[Vec<Alteration>]) -> Vec<Cause> {
     let mut causes: Vec<Cause> = Vec::new();
     for (way, alteration) in ways.iter().flat_map(|way| way.iter().map(move |alteration| (way, alteration))) {
@@ -350,7 +351,7 @@ fn targets<'a>(bounds: impl Iterator<Item = &'a Requirement>, from: &BigRational
     least.into_iter().chain(most).collect()
 }
 
-/// Returns targets at a bound and just beyond it, as seen from the current value `from`.
+/// Returns targets (bounds for the value) at a bound and just beyond it, as seen from the current value `from`.
 fn around(bound: &BigRational, from: &BigRational) -> Vec<Target> {
     let bound = bound.clone();
     match from.cmp(&bound) {

@@ -462,8 +462,8 @@ fn resume<'c, C: Recoverable>(
     Ok(Resumed { from, segments, observations, unfinished, missing_snapshots })
 }
 
-/// Atomically creates a segment file that contains only its header. Returns the file and the link
-/// after the header.
+/// Atomically creates a segment file that contains only its header. Returns the file and the link (position in the
+/// chain of records) after the header.
 fn create_segment(directory: &Path, after: &Link, digest: &str, number: u64) -> io::Result<(File, Link)> {
     let (line, link) = header(after, digest, number);
     let mut file = tempfile::NamedTempFile::new_in(directory)?;

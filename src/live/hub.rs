@@ -91,7 +91,8 @@ impl Hub {
         }
     }
 
-    /// Appends a line, and stores it as the current state of `keys`.
+    /// Appends a line, and stores it as the current state of `keys`. Above the limits, drops the oldest lines, and the
+    /// keys that changed longest ago.
     fn take(&self, line: Arc<str>, keys: Vec<String>) {
         let mut state = self.lock();
         let number = state.end();

@@ -199,7 +199,7 @@ impl Adaptation<'_> {
     }
 
     /// Schedules another search after a search without a proved outcome. The pause doubles with each attempt, up to
-    /// [`MAX_RETRY`]. Nothing is scheduled while conclusions are missing.
+    /// [`MAX_RETRY`]. Nothing is scheduled while conclusions are missing because of a fault of the reasoner.
     fn schedule_retry(&mut self, attempt: u32, outcome: &Outcome) {
         if outcome.proved || self.beliefs.fault.is_some() {
             return;

@@ -31,8 +31,8 @@ impl Reading {
         Self { options: Options::default(), timed }
     }
 
-    /// Semantics for overlapping actions. Interfering happenings are at least `separation` apart,
-    /// in the domain's time unit.
+    /// Semantics for overlapping actions. Interfering happenings (starts and ends of actions) are at least `separation`
+    /// apart, in the domain's time unit.
     pub fn concurrent(separation: &BigRational) -> Self {
         Self {
             options: Options::default().with_concurrent(true).with_tolerance(separation.clone()),

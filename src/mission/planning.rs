@@ -38,8 +38,8 @@ pub trait Planning {
         limits: &Limits,
     ) -> Result<ExactTask, Errors>;
 
-    /// Grounds a problem that [`Mission::filled`] returned, for plans with overlapping actions.
-    /// Interfering happenings are at least `separation` apart, in the domain's time unit.
+    /// Grounds a problem that [`Mission::filled`] returned, for plans with overlapping actions. Interfering happenings
+    /// (starts and ends of actions) are at least `separation` apart, in the domain's time unit.
     ///
     /// # Errors
     /// All constructs that the planner does not support, with their places.

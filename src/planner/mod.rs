@@ -125,8 +125,8 @@ impl<'m, 'r> Planner<'m, 'r> {
         self
     }
 
-    /// Sets the least time between interfering happenings, in the domain's time unit, and allows
-    /// actions to overlap as in PDDL 2.1. `None` keeps actions sequential.
+    /// Sets the least time between interfering happenings (starts and ends of actions), in the domain's time unit, and
+    /// allows actions to overlap as in PDDL 2.1. `None` keeps actions sequential.
     #[must_use]
     pub fn concurrent(mut self, separation: impl Into<Option<BigRational>>) -> Self {
         self.separation = separation.into();
@@ -335,8 +335,8 @@ impl<'m, 'r> Planner<'m, 'r> {
         })
     }
 
-    /// Returns a callback that forwards improvements to the caller's callback, and sets the
-    /// interruption flag if that returns `Break`.
+    /// Returns a callback that forwards improvements to the caller's callback, and sets the interruption flag if the
+    /// caller's callback returns `Break`.
     fn improvement_listener(&mut self) -> impl FnMut(Improvement) {
         let flag = self.config.limits.interrupt();
         let report = &mut self.report;
