@@ -77,7 +77,7 @@ pub struct Causes {
 }
 
 /// Returns the failed components and measurements that are found to contribute to ruling a design out. Some may be
-/// missing, since only [`MAX_TRIED`] sets of alterations are tried.
+/// missing, since the number of sets of alterations that are tried is limited.
 pub fn causes(knowledge: &Knowledge, design: &FunctionDesign) -> Causes {
     if design.available {
         return Causes { causes: Vec::new(), are_all_needed: false };
